@@ -16,7 +16,7 @@ from time import perf_counter
 from typing import Any
 
 import quakedesign as qd
-from quakedesign.simulation.campaign import Campaign, Problem, campaign_problem, run_campaign
+from quakedesign.simulation.campaign import Campaign, CampaignProblem, campaign_problem, run_campaign
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,7 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def timed(problem: Problem, samples: int, workers: int) -> Run:
+def timed(problem: CampaignProblem, samples: int, workers: int) -> Run:
     """Campaign with all samples but one still to do."""
     with tempfile.TemporaryDirectory() as folder:
         run_campaign(problem, 1, folder, workers=1, batch=1)  # derives and compiles the loop

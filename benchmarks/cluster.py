@@ -17,7 +17,7 @@ from pathlib import Path
 from time import perf_counter
 
 import quakedesign as qd
-from quakedesign.simulation.campaign import Problem, campaign_problem, run_campaign
+from quakedesign.simulation.campaign import CampaignProblem, campaign_problem, run_campaign
 
 MOST_GROWTH, LEAST_EFFICIENCY = 100.0, 0.9
 
@@ -37,7 +37,7 @@ def main() -> None:
     )
 
 
-def timed(problem: Problem, samples: int, workers: int) -> float:
+def timed(problem: CampaignProblem, samples: int, workers: int) -> float:
     """Seconds of a campaign on a cluster of its own."""
     with tempfile.TemporaryDirectory() as folder, cluster(workers, Path(folder)) as (address, scheduler):
         out = Path(folder) / "campaign"

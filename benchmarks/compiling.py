@@ -11,11 +11,10 @@ from typing import Any
 import casadi as ca
 
 import quakedesign as qd
-from quakedesign.loop.actuators import Actuator, Diffusion
-from quakedesign.loop.schemes import simulation_scheme
-from quakedesign.simulation.backend import compiler, shared_library
+from quakedesign.loop import Actuator, Diffusion, simulation_scheme
+from quakedesign.simulation import integrator
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.integrators import integrator
+from quakedesign.simulation.compiled import compiler, shared_library
 from quakedesign.simulation.recorder import Recorder
 
 FAULT = qd.load_fault("real-fault")

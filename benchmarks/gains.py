@@ -24,17 +24,14 @@ import clarabel
 from cvxpy.reductions.solvers.conic_solvers.clarabel_conif import dims_to_solver_cones
 from scipy import sparse
 
-from quakedesign.certificates import Loop
-from quakedesign.certificates.command import check_files
+from quakedesign.checking import check_files
+from quakedesign.lyapunov import Loop
+from quakedesign.lyapunov.maps.gain_map import Screener, Sheet, axis
+from quakedesign.lyapunov.maps.sweep import ACCURACY, Sweep
+from quakedesign.lyapunov.search.certify import closed_loop, largest_lipschitz
+from quakedesign.lyapunov.search.search import balance, family_of, finished
 from quakedesign.sos.solve.joint import JointProgram, Proposal
 from quakedesign.sos.solve.moment import settings
-from quakedesign.synthesis.analysis.certify import closed_loop
-from quakedesign.synthesis.analysis.gain_map import axis
-from quakedesign.synthesis.analysis.gain_map_workers import Screener, Sheet
-from quakedesign.synthesis.analysis.margins import largest_lipschitz
-from quakedesign.synthesis.analysis.parametric_program import ACCURACY, Sweep
-from quakedesign.synthesis.lyapunov.balancing import balance
-from quakedesign.synthesis.lyapunov.search import family_of, finished
 
 DEGREE = 5
 SETS = (("5", "5", "2.3", "1.1"), ("5", "15", "2.3", "1.1"), ("7", "5", "2.3", "1.1"), ("25", "15", "2.3", "1.1"))

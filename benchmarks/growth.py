@@ -14,15 +14,15 @@ from typing import Any
 
 import quakedesign as qd
 from quakedesign import cache
-from quakedesign.certificates.guarantee import Guarantee
-from quakedesign.certificates.guarantee.norms import _norms
-from quakedesign.controllers import family
-from quakedesign.loop.actuators import Actuator, Diffusion
+from quakedesign.guarantees import Guarantee
+from quakedesign.guarantees.exact.norms import _norms
+from quakedesign.laws import family
+from quakedesign.loop import Actuator, Diffusion
+from quakedesign.lyapunov.maps.gain_map import gain_map
+from quakedesign.lyapunov.search.search import find_certificate
 from quakedesign.simulation.campaign import campaign_problem, run_campaign
 from quakedesign.synthesis import answer
-from quakedesign.synthesis.analysis.gain_map import gain_map
-from quakedesign.synthesis.lyapunov.search import find_certificate
-from quakedesign.synthesis.methods.sliding_mode import sliding_mode_loop
+from quakedesign.synthesis.sliding_mode_design import sliding_mode_loop
 
 FAULT = qd.load_fault("real-fault")
 BASE = family("cta")[0].law

@@ -13,12 +13,12 @@ import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from quakedesign.certificates.guarantee import Guarantee
-from quakedesign.controllers import published
-from quakedesign.report.laboratory import conditions_figure, runs_figure
+from quakedesign.guarantees import Guarantee
+from quakedesign.laws import published
+from quakedesign.report.laboratory_figure import conditions_figure, runs_figure
 from quakedesign.studies.laboratory import (
     Apparatus,
-    Finding,
+    LaboratoryFinding,
     as_proved,
     conditions,
     explain,
@@ -32,7 +32,7 @@ WHOLE = ("stick, quick λ_d, as printed", "apparatus")
 TITLE = "Published laboratory gains under conditions that the paper does not print"
 
 
-def keep(folder: Path, findings: list[Finding]) -> None:
+def keep(folder: Path, findings: list[LaboratoryFinding]) -> None:
     """Print findings, and write them one a line."""
     with (folder / "findings.jsonl").open("a", encoding="utf-8") as file:
         for found in findings:
@@ -40,7 +40,7 @@ def keep(folder: Path, findings: list[Finding]) -> None:
             file.write(json.dumps(asdict(found)) + "\n")
 
 
-def told(found: Finding) -> str:
+def told(found: LaboratoryFinding) -> str:
     """Row of a table: median (least to largest)."""
     kinds = ", ".join(f"{count} {kind}" for kind, count in found.outcomes.items() if count)
     sizes = found.slip_error, found.peak_slip_rate, found.rms_pressure
@@ -62,7 +62,7 @@ def whole(folder: Path) -> None:
     explain({name: conditions()[name] for name in WHOLE}, tell=lambda found: keep(folder, [whole_task(found)]))
 
 
-def whole_task(found: Finding) -> Finding:
+def whole_task(found: LaboratoryFinding) -> LaboratoryFinding:
     """Finding whose condition says that it is about the whole task."""
     return replace(found, condition=f"{found.condition}, one hour")
 

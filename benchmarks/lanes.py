@@ -18,9 +18,8 @@ import casadi as ca
 import numpy as np
 
 import quakedesign as qd
-from quakedesign.simulation.backend import compiler, shared_library
-from quakedesign.simulation.campaign import Problem, campaign_problem, run_campaign
-from quakedesign.simulation.lanes import LANE_FLAGS, LANES, lanes_c, processor_flags
+from quakedesign.simulation.campaign import CampaignProblem, campaign_problem, run_campaign
+from quakedesign.simulation.compiled import LANE_FLAGS, LANES, compiler, lanes_c, processor_flags, shared_library
 
 STEPS = 4000
 LOOPS = (("cta", "compensated"), ("dia", "compensated"), ("cta", "continuous"), ("elqr", "compensated"))
@@ -103,7 +102,9 @@ def beside(law: str, scheme: str) -> None:
 def hour() -> None:
     """The laboratory loop over an hour, 1000 samples, on two processes."""
     fault = qd.load_fault("lab-fault", box="ten-percent")
-    problem: Problem = campaign_problem(fault, qd.published("lab-fault")["cta"], scheme="compensated", duration=3600.0)
+    problem: CampaignProblem = campaign_problem(
+        fault, qd.published("lab-fault")["cta"], scheme="compensated", duration=3600.0
+    )
     with tempfile.TemporaryDirectory() as folder:
         began, before = perf_counter(), sum(os.times()[:4])
         campaign = run_campaign(problem, 1000, Path(folder) / "campaign", workers=2)

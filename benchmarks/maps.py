@@ -12,10 +12,9 @@ from typing import Any
 from unittest.mock import patch
 
 from quakedesign import cache
-from quakedesign.controllers import family
-from quakedesign.synthesis.analysis.gain_map import _sheet, gain_map
-from quakedesign.synthesis.analysis.gain_map_workers import Screener
-from quakedesign.synthesis.analysis.parametric_path import Path
+from quakedesign.laws import family
+from quakedesign.lyapunov.maps.gain_map import Screener, _sheet, gain_map
+from quakedesign.lyapunov.maps.sweep import Path
 
 OVER = {"cta": ("k1", "k2"), "dia": ("kI1", "kI2")}
 MINUTES = {"cta": 3, "dia": 10}

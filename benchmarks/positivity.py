@@ -24,8 +24,8 @@ from typing import Any
 import sympy as sp
 
 from quakedesign import sos
-from quakedesign.sos.exact.statement import statement
-from quakedesign.sos.solve.membership import Membership
+from quakedesign.sos.exact.polynomial_statement import statement
+from quakedesign.sos.solve.program import Membership
 
 TURNS, SECONDS = 31, 10.0  # of the processor, after which no further turn begins
 

@@ -14,11 +14,9 @@ from collections.abc import Iterator
 from time import perf_counter
 
 import quakedesign as qd
-from quakedesign.synthesis.gains.dilation import scaled_norm
-from quakedesign.synthesis.gains.objectives import OBJECTIVES
-from quakedesign.synthesis.gains.problem import question
-from quakedesign.synthesis.gains.simulated_error import sampling, synthesise_sampled
-from quakedesign.synthesis.gains.synthesise import synthesise
+from quakedesign.lyapunov.gains.path_following import scaled_norm
+from quakedesign.lyapunov.gains.synthesise import OBJECTIVES, question, synthesise
+from quakedesign.synthesis.simulated_error import sampling, synthesise_sampled
 
 DEGREES = {
     ("cta", "norm"): (5, 6),

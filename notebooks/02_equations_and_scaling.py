@@ -54,7 +54,7 @@ for pressure in ("0", "-20e6", "40e6"):
 print(f"critical stiffness {critical_stiffness(fault):.4g} N/m, nucleation length {nucleation_length(fault):.4g} m")
 
 # %%
-from quakedesign.report.stability_map import stability_map
+from quakedesign.report.figures import stability_map
 
 stability_map(fault)
 
@@ -89,7 +89,7 @@ found
 # The dimensionless groups are computed from the units. Two faults are similar if all groups agree; gains then carry over.
 
 # %%
-from quakedesign.report.scaling import scale_lines
+from quakedesign.report.plain import scale_lines
 from quakedesign.studies.scaling import scale_answer
 
 answer = scale_answer("lab-fault", "real-fault", "cta", "published")

@@ -28,8 +28,8 @@ from pathlib import Path
 import sympy as sp
 
 import quakedesign as qd
-from quakedesign.certificates import certificate_text
-from quakedesign.certificates.command import check_files
+from quakedesign.lyapunov import certificate_text
+from quakedesign.checking import check_files
 
 PROOFS = next(base / "proofs" for base in Path(qd.__file__).parents if (base / "proofs").is_dir())
 path = PROOFS / "certificates" / "cta_7_5_2.3_1.1.json"
@@ -50,7 +50,7 @@ print("\n".join(lines))
 # $\kappa$ in $\dot V \le -\kappa V^{4/5}$: the origin is reached within $\frac{5}{\kappa}V(0)^{1/5}$.
 
 # %%
-from quakedesign.synthesis.analysis.settling_time import settling
+from quakedesign.lyapunov.search.settling import settling
 
 print(f"settles from |e_i| <= 1 within {settling(certificate, 1).seconds:.3g} s")
 
@@ -135,7 +135,7 @@ broken
 # weights and degree, and the same call proves the gains.
 
 # %%
-from quakedesign.controllers import LoopField
+from quakedesign.laws import LoopField
 from quakedesign.symbolic import SignedPower
 
 e1, e2, e3, k1, k2, k3, beta, d = sp.symbols("e1 e2 e3 k1 k2 k3 beta d", real=True)

@@ -33,15 +33,15 @@ from scipy.linalg import expm
 
 # %matplotlib inline
 import quakedesign as qd
-from quakedesign.bounds import UpperBound
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.guarantee import task_of
-from quakedesign.report.elqr_sentences import verdict_lines
+from quakedesign.exact import UpperBound
+from quakedesign.lyapunov import Verdict
+from quakedesign.guarantees import task_of
+from quakedesign.report.sentences import verdict_lines
 from quakedesign.simulation import natural_earthquake
-from quakedesign.synthesis.guaranteed import design_held, worst_found
-from quakedesign.synthesis.linear.analysis.printed_theorem import both_tests
-from quakedesign.synthesis.linear.plant.uncertainty_bounds import uncertainty_bounds
-from quakedesign.synthesis.linear.analysis.verdict import judge
+from quakedesign.guarantees import design_held, worst_found
+from quakedesign.linear.printed_theorem import both_tests
+from quakedesign.linear.uncertainty_bounds import uncertainty_bounds
+from quakedesign.linear.verdict import judge
 
 from own import printed_examples as examples  # beside this notebook
 

@@ -29,7 +29,7 @@ import numpy as np
 
 # %matplotlib inline
 import quakedesign as qd
-from quakedesign.controllers.elqr import ExtendedLQR
+from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.synthesis import answer
 
 fault = qd.load_fault("real-fault")

@@ -8,7 +8,7 @@ import sympy as sp
 from set_valued import Condition, Interval, SetValued, exact_intervals, restrict, solve_signed, substituted
 
 from quakedesign.errors import KinkError, ParameterError
-from quakedesign.symbolic.normal_form import normal_form, signs
+from quakedesign.symbolic.signed_power import normal_form, signs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

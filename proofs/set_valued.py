@@ -8,9 +8,8 @@ from typing import Any
 import sympy as sp
 
 from quakedesign.errors import KinkError, ParameterError
-from quakedesign.rationals import rational
-from quakedesign.symbolic.normal_form import normal_form, signs
-from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
+from quakedesign.exact import rational
+from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, normal_form, signs
 
 Interval = tuple[sp.Expr, sp.Expr]
 Condition = tuple[sp.Expr, sp.Symbol]

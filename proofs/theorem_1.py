@@ -12,9 +12,9 @@ from filippov import FilippovField, filippov_derivative, inverse, lie_derivative
 from set_valued import restrict
 from steps import Step, cited, equal, printed, text, true
 
-from quakedesign.controllers import control_law
+from quakedesign.laws import control_law
 from quakedesign.symbolic import AbsolutePower, SignedPower, homogeneous, normal_form
-from quakedesign.symbolic.balls import enclose
+from quakedesign.symbolic.enclosure import enclose
 
 R, ONE = sp.Rational, sp.Integer(1)
 e1, e2, e3, h = sp.symbols("e_1 e_2 e_3 h", real=True)

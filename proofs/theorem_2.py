@@ -10,7 +10,7 @@ import sympy as sp
 from set_valued import SetValued
 from steps import Step, cited, equal, printed, text, true
 
-from quakedesign.controllers import Signals, control_law
+from quakedesign.laws import Signals, control_law
 from quakedesign.symbolic import plant
 
 r0 = sp.Symbol("r_0", real=True)

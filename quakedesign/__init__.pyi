@@ -1,18 +1,20 @@
-from quakedesign.certificates import Certificate as Certificate
-from quakedesign.certificates import Verdict as Verdict
-from quakedesign.certificates import load_certificate as load_certificate
-from quakedesign.certificates import load_guarantee as load_guarantee
-from quakedesign.controllers import Controller as Controller
-from quakedesign.controllers import published as published
 from quakedesign.fault import Disturbance as Disturbance
 from quakedesign.fault import Fault as Fault
 from quakedesign.fault import FrictionLaw as FrictionLaw
 from quakedesign.fault import Reference as Reference
 from quakedesign.fault import UncertaintyBox as UncertaintyBox
 from quakedesign.fault import load_fault as load_fault
-from quakedesign.fault.scales import Scales as Scales
-from quakedesign.fault.scaling import scaled_fault as scaled_fault
-from quakedesign.identification import identify as identify
+from quakedesign.fault.similarity import Scales as Scales
+from quakedesign.fault.similarity import scaled_fault as scaled_fault
+from quakedesign.guarantees import load_guarantee as load_guarantee
+from quakedesign.identification.identify import identify as identify
+from quakedesign.laws import Controller as Controller
+from quakedesign.laws import published as published
+from quakedesign.lyapunov import Certificate as Certificate
+from quakedesign.lyapunov import Verdict as Verdict
+from quakedesign.lyapunov import certify as certify
+from quakedesign.lyapunov import load_certificate as load_certificate
+from quakedesign.lyapunov.gains.synthesise import synthesise as synthesise
 from quakedesign.report import compare as compare
 from quakedesign.simulation import Trajectory as Trajectory
 from quakedesign.simulation import export_controller as export_controller
@@ -29,9 +31,7 @@ from quakedesign.studies import limits as limits
 from quakedesign.symbolic import derive as derive
 from quakedesign.synthesis import Design as Design
 from quakedesign.synthesis import assess as assess
-from quakedesign.synthesis import certify as certify
 from quakedesign.synthesis import design as design
 from quakedesign.synthesis import guarantee as guarantee
-from quakedesign.synthesis.gains.synthesise import synthesise as synthesise
 
 __version__: str

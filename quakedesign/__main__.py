@@ -4,7 +4,7 @@ import gc
 import os
 import sys
 
-from quakedesign.interruption import ending, leave
+from quakedesign.parallel import ending, leave
 from quakedesign.streams import has_room, lack_memory, lacks_memory, open_all, widen
 
 _OBJECTS = 100_000

@@ -109,7 +109,7 @@ def search_once(search: Callable[[], Any], *question: Any) -> Any:
     return found
 
 
-class Statement(pickle.Pickler):
+class CachedStatement(pickle.Pickler):
     """A value by its fields alone: what was computed of it on the way and is kept beside them says nothing more."""
 
     def field(self, value: Any, name: str) -> Any:
@@ -127,7 +127,7 @@ class Statement(pickle.Pickler):
 
 def _stated(question: tuple[Any, ...]) -> bytes:
     content = io.BytesIO()
-    Statement(content).dump(question)
+    CachedStatement(content).dump(question)
     return content.getvalue()
 
 

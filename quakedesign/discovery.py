@@ -42,7 +42,7 @@ def discovered(package: str, kind: type, shared: Collection[str] | None = None) 
         if shared is not None and info.name not in shared and all(i.__module__ != module.__name__ for i in own):
             raise ImportError(f"{module.__name__} defines no {kind.__name__}")
         kinds |= {item.name: item for item in own if hasattr(item, "name") and not isabstract(item)}
-    return kinds
+    return dict(sorted(kinds.items()))
 
 
 def allow_code(allowed: bool) -> None:

@@ -30,7 +30,7 @@ def overview(width: int) -> Iterator[str]:
     longest = max(map(len, told))
     yield "Usage: quakedesign COMMAND"
     yield ""
-    yield from _wrapped(_purpose(sources["shared.py"]), width)
+    yield from _wrapped(_purpose(sources["app.py"]), width)
     yield ""
     yield f"╭─ Commands {'─' * (width - 13)}╮"
     for name, what in told.items():

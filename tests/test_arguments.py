@@ -17,15 +17,14 @@ import sympy as sp
 
 import quakedesign as qd
 from quakedesign.arguments import matches
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.guarantee import Claims, guarantee
-from quakedesign.controllers import Law
-from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.fault import Disturbance, Reference, UncertaintyBox
-from quakedesign.loop import summed_integrals
+from quakedesign.guarantees import Claims, guarantee
+from quakedesign.laws import Law, summed_integrals
+from quakedesign.laws.elqr import ExtendedLQR
+from quakedesign.loop import Diffusion
+from quakedesign.lyapunov import Verdict
 from quakedesign.report import headline
-from quakedesign.simulation import Diffusion
 from quakedesign.simulation.campaign import run_campaign
 from quakedesign.synthesis import answer
 

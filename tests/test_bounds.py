@@ -9,9 +9,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from quakedesign.bounds import Enclosure, LowerBound, UpperBound
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import rational
+from quakedesign.exact import Enclosure, LowerBound, UpperBound, rational
 
 KINDS = st.sampled_from((UpperBound, LowerBound))
 NUMBERS = st.one_of(

@@ -13,7 +13,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 import quakedesign
-from quakedesign.certificates.guarantee.files import read_guarantee
+from quakedesign.guarantees.exact.guarantee_files import read_guarantee
 
 ROOT = Path(__file__).parents[1]
 SPECIFICATION = spec_from_file_location("generated_pages", ROOT / "docs" / "_extensions" / "generated.py")
@@ -87,7 +87,7 @@ def test_every_link_inside_resolves_and_nothing_is_loaded_from_elsewhere(pages):
 
 
 def test_every_public_name_and_command_is_told(pages):
-    from quakedesign.cli import app
+    from quakedesign.cli.app import app
 
     names = (pages / "reference" / "api.html").read_text(encoding="utf-8")
     assert [name for name in quakedesign.__all__ if f"quakedesign.{name}" not in names] == []

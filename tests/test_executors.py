@@ -8,15 +8,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from quakedesign import executors
-from quakedesign.certificates import certificate_text
+from quakedesign import parallel as executors
 from quakedesign.errors import ParameterError, SimulationError
-from quakedesign.executors import Cluster, Given, Here, SerialExecutor, crew_of, crew_or_here
 from quakedesign.fault import load_fault
+from quakedesign.lyapunov import certificate_text
+from quakedesign.lyapunov.gains.synthesise import synthesise
+from quakedesign.lyapunov.maps.gain_map import gain_map
+from quakedesign.parallel import Cluster, Given, Here, Processes, SerialExecutor, crew_of, crew_or_here
 from quakedesign.synthesis import answer, answers
-from quakedesign.synthesis.analysis.gain_map import gain_map
-from quakedesign.synthesis.gains.synthesise import synthesise
-from quakedesign.workers import Processes
 
 MAP = {"ranges": (("0.5", "3"), ("1", "4")), "points": 4, "levels": ("1", "0.5"), "degree": 4, "interior": 2}
 GAINS = ("6.96e8", "2.53e8", "6.02e8", "2.16e8")

@@ -31,17 +31,19 @@ from hypothesis import strategies as st
 
 import quakedesign as qd
 from quakedesign import sos
-from quakedesign.certificates.guarantee import Held, guarantee, task_of
-from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
-from quakedesign.certificates.guarantee.slow_gain import SlowGain
-from quakedesign.cli import app, main
+from quakedesign.cli import main
+from quakedesign.cli.app import app
 from quakedesign.errors import QuakedesignError
+from quakedesign.exact import rational
 from quakedesign.fault import parse_fault
-from quakedesign.loop import summed_integrals
-from quakedesign.loop.rest_limit import RestLimit
-from quakedesign.rationals import rational
-from quakedesign.report import Comparison, Entry
+from quakedesign.guarantees import Held, guarantee, task_of
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
+from quakedesign.guarantees.exact.small_gain import SlowGain
+from quakedesign.laws import summed_integrals
+from quakedesign.laws.sampled_law import RestLimit
+from quakedesign.report import Comparison
 from quakedesign.simulation.campaign import Space, campaign_problem
+from quakedesign.studies import Entry
 from quakedesign.symbolic.term_expressions import real_symbols
 
 LONGEST = 60  # seconds of this process

@@ -5,8 +5,7 @@ import os
 import pytest
 
 from quakedesign.errors import CertificateError, OutputError, ScenarioError
-from quakedesign.input import parse_toml, read_text
-from quakedesign.output import require_room
+from quakedesign.files import parse_toml, read_text, require_room
 
 
 def read(path):
@@ -42,7 +41,7 @@ def test_what_is_no_file_is_refused_at_once(tmp_path):
 
 
 def test_certificates_are_read_alike(tmp_path):
-    from quakedesign.certificates import load_certificate
+    from quakedesign.lyapunov import load_certificate
 
     os.mkfifo(tmp_path / "pipe.json")
     with pytest.raises(CertificateError, match="must be a regular file"):
@@ -57,7 +56,7 @@ def test_a_place_that_cannot_be_is_refused_before_the_work(name, tmp_path):
 
 
 def test_the_longest_name_has_room_for_its_neighbours(tmp_path):
-    from quakedesign.output import whole_folder
+    from quakedesign.files import whole_folder
 
     target = tmp_path / ("a" * 200)
     for _ in range(2):

@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from quakedesign.interruption import SIGNALS, ending, remedy, undisturbed
-from quakedesign.output import write_whole
+from quakedesign.files import write_whole
+from quakedesign.parallel import SIGNALS, ending, remedy, undisturbed
 
 
 @pytest.fixture(autouse=True)
@@ -125,7 +125,7 @@ def test_other_errors_pass(capsys):
 
 
 GENERATED = """
-from quakedesign.interruption import ending
+from quakedesign.parallel import ending
 with ending():
     exec("import signal; signal.raise_signal(signal.SIGTERM)")
 """
@@ -140,7 +140,7 @@ def test_the_exit_code_is_that_of_the_signal_even_within_generated_code(start, t
 
 LATE = """
 import atexit, signal, sys
-from quakedesign.interruption import SIGNALS, ending
+from quakedesign.parallel import SIGNALS, ending
 atexit.register(lambda: [signal.raise_signal(number) for number in SIGNALS])
 with ending(process=True):
     sys.exit(1)
@@ -155,7 +155,7 @@ def test_a_signal_after_the_end_changes_nothing(start):
 
 LOADED = """
 import atexit, signal
-from quakedesign.interruption import ending
+from quakedesign.parallel import ending
 
 class Loaded:
     def __del__(self):
@@ -176,8 +176,8 @@ def test_after_a_signal_the_process_ends_without_being_taken_apart(start):
 
 SWALLOWS = """
 import time
-from quakedesign.interruption import ending
-from quakedesign.temporary import temporary_folder
+from quakedesign.parallel import ending
+from quakedesign.files import temporary_folder
 
 with ending(), temporary_folder():
     while True:
@@ -203,7 +203,7 @@ def test_an_interruption_that_is_swallowed_ends_the_process_all_the_same(start, 
 def test_an_interruption_that_python_can_only_report_ends_the_command_all_the_same():
     text = """
 import os, signal, time
-from quakedesign.interruption import ending
+from quakedesign.parallel import ending
 
 class Slow:
     def __del__(self):

@@ -130,7 +130,7 @@ def test_single_mutants_and_kinds_are_explained():
     explanations = tool.Explanations()
     limit = ("proofs/loop.py", "MAX_ROOTS, MAX_LIFTS = 4, 4", "4 → 5")
     assert explanations.of(limit) == "by rule"
-    assert explanations.of(("quakedesign/certificates/claim.py", *limit[1:])) == ""
+    assert explanations.of(("quakedesign/lyapunov/exact/claim.py", *limit[1:])) == ""
     assert (
         explanations.of(("proofs/loop.py", "need(x <= MAX_ROOTS, where)", "need(x <= MAX_ROOTS, where) → pass")) == ""
     )

@@ -7,10 +7,10 @@ import sys
 
 import pytest
 
-from quakedesign import output
+from quakedesign import files as output
 from quakedesign.cli import main
 from quakedesign.errors import OutputError
-from quakedesign.output import whole_folder, write_whole
+from quakedesign.files import whole_folder, write_whole
 
 
 @pytest.mark.parametrize(("content", "held"), [("μ = ½\n", "μ = ½\n".encode()), (b"\x00\xff", b"\x00\xff")])
@@ -99,7 +99,7 @@ def test_a_folder_in_no_folder_is_one_clear_message(tmp_path):
 HOLDING = """
 import sys
 from pathlib import Path
-from quakedesign.output import hold
+from quakedesign.files import hold
 hold(Path(sys.argv[1]), make=True)
 print("held", flush=True)
 sys.stdin.readline()

@@ -5,7 +5,7 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from quakedesign.cli import app
+from quakedesign.cli.app import app
 from quakedesign.overview import overview, print_overview
 
 

@@ -9,17 +9,18 @@ import own_parts
 import pytest
 
 import quakedesign as qd
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.premises import Premise
-from quakedesign.cli import app, main
-from quakedesign.controllers import control_law, family
+from quakedesign.cli import main
+from quakedesign.cli.app import app
 from quakedesign.errors import CertificateError, UnknownNameError, UnsupportedError, UserCodeError
 from quakedesign.fault import friction_law, parse_fault
-from quakedesign.fault.template import fault_toml, template
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.fault.fault_toml import fault_toml, template
+from quakedesign.laws import control_law, family
+from quakedesign.loop import simulation_scheme
+from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.symbolic.friction_bounds import friction_bounds
 from quakedesign.synthesis import answer, assess
-from quakedesign.synthesis.methods.base import method_of
+from quakedesign.synthesis.method import method_of
 
 REAL, LAB = qd.load_fault("real-fault"), qd.load_fault("lab-fault")
 TEXT = """

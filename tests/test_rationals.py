@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import float_above, float_below, fraction_of_float, nearest, rational, six_digits
+from quakedesign.exact import float_above, float_below, fraction_of_float, nearest, rational, six_digits
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.cli import app, main
+from quakedesign.cli import main
+from quakedesign.cli.app import app
 from quakedesign.simulation import Metrics
-from quakedesign.simulation.metrics import ActuatorMetrics
+from quakedesign.simulation.recorder import ActuatorMetrics
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "proofs/FORMAT.md")

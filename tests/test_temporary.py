@@ -5,13 +5,21 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from quakedesign.output import require_room, whole_folder, write_whole
-from quakedesign.temporary import FAMILY, PREFIX, discard_all, sweep, temporary_folder
+from quakedesign.files import (
+    FAMILY,
+    PREFIX,
+    discard_all,
+    require_room,
+    sweep,
+    temporary_folder,
+    whole_folder,
+    write_whole,
+)
 
 HOLDS = """
 import os, sys, time
 from pathlib import Path
-from quakedesign import output, temporary
+from quakedesign import files as output
 
 def stop(*arguments):
     print("there", flush=True)
@@ -126,7 +134,7 @@ def test_where_folders_have_no_locks_nothing_is_swept(tmp_path, monkeypatch):
         raise OSError("no locks available")
 
     (tmp_path / f"{PREFIX}dead").mkdir()
-    monkeypatch.setattr("quakedesign.temporary._locked", refuse)
+    monkeypatch.setattr("quakedesign.files._locked", refuse)
     write_whole(tmp_path / "result", "x")
     sweep(tmp_path)
     assert sorted(os.listdir(tmp_path)) == sorted([f"{PREFIX}dead", "result"])

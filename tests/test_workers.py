@@ -9,12 +9,12 @@ from concurrent.futures import BrokenExecutor, Future
 import pytest
 
 from quakedesign.errors import ParameterError, SimulationError
-from quakedesign.workers import Crew, Processes, cores, require_workers
+from quakedesign.parallel import Crew, Processes, cores, require_workers
 
 PROGRAM = """
 import os, sys, time
-from quakedesign.interruption import ending
-from quakedesign.workers import Processes
+from quakedesign.parallel import ending
+from quakedesign.parallel import Processes
 
 def work(kind):
     os.write(1, b"there\\n")  # two write at once: a line in one piece

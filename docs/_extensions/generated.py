@@ -13,7 +13,7 @@ DOCS = Path(__file__).parents[1]
 
 def _fault_file():
     """Rows of the keys of a fault file: table, key, type, meaning."""
-    from quakedesign.fault.template import fault_schema
+    from quakedesign.fault.fault_toml import fault_schema
 
     schema = fault_schema()
     yield from _keys("", schema)
@@ -45,7 +45,7 @@ def _names():
 
 def _commands():
     """Rows of the commands: name, what it does."""
-    from quakedesign.cli import app
+    from quakedesign.cli.app import app
 
     for name in sorted(name for name in app if not name.startswith("-")):
         yield f"quakedesign {name}", " ".join(app[name].help.split("\n\n")[0].split())
@@ -85,7 +85,7 @@ def _bring_notebooks(app):
 
 
 def _write_commands(_app):
-    from quakedesign.cli import app
+    from quakedesign.cli.app import app
 
     told = app.generate_docs(output_format="markdown", usage_name="quakedesign")
     (DOCS / "reference" / "_commands.md").write_text(told[told.index("**Commands**") :], encoding="utf-8")

@@ -5,13 +5,13 @@ from fractions import Fraction
 
 from scipy.optimize import minimize_scalar
 
-from quakedesign.certificates.sectors import Sectors
+from quakedesign.lyapunov.exact.fault_bounds import Sectors
 from quakedesign.fault import load_fault
-from quakedesign.synthesis.linear.analysis.printed_theorem import Switching, decreases, printed_row
-from quakedesign.synthesis.linear.design.algebraic_riccati import solve_care
-from quakedesign.synthesis.linear.design.nondimensional import sound_bound
-from quakedesign.synthesis.linear.plant.problem import LinearProblem, Scales
-from quakedesign.synthesis.linear.plant.rational_matrices import Matrix, diagonal, outer, rounded, times, total
+from quakedesign.linear.printed_theorem import Switching, decreases, printed_row
+from quakedesign.linear.riccati import solve_care
+from quakedesign.linear.riccati import sound_bound
+from quakedesign.linear.linear_problem import LinearProblem, ProblemScales
+from quakedesign.linear.linear_problem import Matrix, diagonal, outer, rounded, times, total
 
 Range = tuple[Fraction, Fraction]
 
@@ -90,7 +90,7 @@ def _designed(example: Example, bound: Matrix) -> ExactDesign:
 def printed_bound_example() -> Example:
     """ERRATA 6: the real fault, N̂ known, so that the printed bound has no friction; Q0 = 1e-6·I, R = 1, p in MPa."""
     fault = load_fault("real-fault")
-    mega = Scales(time=Fraction(1), slip=Fraction(1), pressure=Fraction(10**6))
+    mega = ProblemScales(time=Fraction(1), slip=Fraction(1), pressure=Fraction(10**6))
     g1, g2 = printed_row(fault)
     return Example(
         name="friction missing in G",

@@ -8,7 +8,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from quakedesign import load_fault
-from quakedesign.studies.errata import Finding, Row
+from quakedesign.studies.errata import ErrataRow, Finding
 
 FAULT = load_fault("real-fault")
 
@@ -102,14 +102,14 @@ def characteristic_order() -> int:
 
 
 ROWS = (
-    Row(
+    ErrataRow(
         number=12,
         printed="μ_res − Δμ e^{−x1/d_c} satisfies the friction bounds",
         correct="only for x1 ≥ 0, which is not invariant; hold μ(x1 < 0) = μ_max",
         kind="counterexample",
         check=row_12,
     ),
-    Row(
+    ErrataRow(
         number=13,
         printed="rate-and-state friction satisfies the friction bounds",
         correct="only on a working range V ≥ V_min > 0, with a state of its own: a third-order plant",

@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from quakedesign import derive, load_fault
-from quakedesign.studies.errata import Finding, Row
+from quakedesign.studies.errata import ErrataRow, Finding
 from quakedesign.symbolic import plant
 
 
@@ -161,36 +161,36 @@ def row_26(rest: tuple[float, float] = (7.098e-3, 0.7846)) -> Finding:
 
 
 ROWS = (
-    Row(
+    ErrataRow(
         number=1,
         printed="J22 = −η̂ − ∂μ/∂x2, J21 with σ′ alone",
         correct="J22 = −η̂ − N̂(σ′−p)∂μ/∂x2, J21 = −k̂ − N̂(σ′−p)∂μ/∂x1",
         kind="symbolic identity",
         check=row_01,
     ),
-    Row(
+    ErrataRow(
         number=2,
         printed="unstable when k < −Aσ′μ_x1, η < −mμ_x2 (a comma)",
         correct="k < −A(σ′−p)μ_x1 or η < −A(σ′−p)μ_x2",
         kind="counterexample",
         check=row_02,
     ),
-    Row(number=3, printed="k = G/L_ac", correct="k = G·L_ac", kind="numeric reproduction", check=row_03),
-    Row(
+    ErrataRow(number=3, printed="k = G/L_ac", correct="k = G·L_ac", kind="numeric reproduction", check=row_03),
+    ErrataRow(
         number=4,
         printed="λ_Mw = ⅔log10 λ_M0 − 6.07, as a ratio",
         correct="M_w differs by ⅔log10 λ_M0; there is no ratio",
         kind="numeric reproduction",
         check=row_04,
     ),
-    Row(
+    ErrataRow(
         number=24,
         printed="δ∞ = v∞t with a fixed equilibrium",
         correct="the shifted system keeps the residual k̂v∞t",
         kind="symbolic identity",
         check=row_24,
     ),
-    Row(
+    ErrataRow(
         number=26,
         printed="d_max = 7.1 mm and 7.5 mm; r(t) for every t",
         correct="the next static rest is at 7.098 mm (784.6 mm); hold r after t_op",

@@ -11,10 +11,9 @@ from scipy.linalg import expm
 from scipy.optimize import minimize_scalar
 
 from quakedesign import load_fault
-from quakedesign.certificates.premises import least_authority
-from quakedesign.certificates.sectors import effective_stress
-from quakedesign.controllers import Signals, control_law
-from quakedesign.studies.errata import Finding, Row
+from quakedesign.laws import Signals, control_law
+from quakedesign.lyapunov.exact.fault_bounds import effective_stress, least_authority
+from quakedesign.studies.errata import ErrataRow, Finding
 from quakedesign.symbolic import plant
 
 FAULT = load_fault("real-fault")
@@ -228,42 +227,42 @@ def row_11(bound: Callable = lambda g1, g2, x1, x2: g1 * abs(x1) + g2 * abs(x2))
 
 
 ROWS = (
-    Row(
+    ErrataRow(
         number=6,
         printed="G contains μ_x1^max σ′ΔN̂_max",
         correct="μ_x1^max (σ′N̂)_max",
         kind="counterexample",
         check=row_06,
     ),
-    Row(
+    ErrataRow(
         number=7,
         printed="‖h‖ ≤ ‖Gx_a‖ with G = [g1 g2 0 0]",
         correct="h² ≤ x_aᵀWx_a, W = diag(g1²/w, g2²/(1−w), 0, 0), 0 < w < 1",
         kind="counterexample",
         check=row_07,
     ),
-    Row(
+    ErrataRow(
         number=8,
         printed="r_ξ dropped, the origin exponentially stable for r = r0",
         correct="shift to (r0, 0, 0, ξ2*), σ′ becomes σ′−p*, p* = −[(μ*−μ(r0))N̂σ′ − k̂r0 + φ*]/(μ(r0)N̂)",
         kind="symbolic identity",
         check=row_08,
     ),
-    Row(
+    ErrataRow(
         number=9,
         printed="B0 = [0; [μ_res N̂; 0; 0]",
         correct="B0 = [0; μ_res·N̂_min; 0; 0], constant; the sign argument needs a single input",
         kind="counterexample",
         check=row_09,
     ),
-    Row(
+    ErrataRow(
         number=10,
         printed="second entry of G without friction",
         correct="add N̂_max(σ′−p*)L_μ2; one-sided is tighter for rate weakening",
         kind="counterexample",
         check=row_10,
     ),
-    Row(
+    ErrataRow(
         number=11,
         printed="|φ_e| ≤ |φ1e x1 + φ2e x2|, then a sine",
         correct="|φ_e| ≤ φ1e|x1| + φ2e|x2|; a sine needs an input-to-state bound",

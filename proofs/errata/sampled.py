@@ -11,11 +11,11 @@ import sympy as sp
 from scipy.optimize import brentq
 
 import quakedesign as qd
-from quakedesign.controllers import published
+from quakedesign.laws import published
+from quakedesign.simulation import integrator
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.integrators import integrator
-from quakedesign.simulation.step_stability import amplification
-from quakedesign.studies.errata import Finding, Row
+from quakedesign.simulation.integrators import amplification
+from quakedesign.studies.errata import ErrataRow, Finding
 
 REAL, LAB = qd.load_fault("real-fault"), qd.load_fault("lab-fault")
 CHUNK = 1000
@@ -224,21 +224,21 @@ def row_22(said: dict[str, tuple] = RADII) -> Finding:
 
 
 ROWS = (
-    Row(
+    ErrataRow(
         number=14,
         printed="friction without sign(δ̇)",
         correct="set-valued at δ̇ = 0, opposing motion; the printed plant holds for δ̇ ≥ 0 only",
         kind="numeric reproduction",
         check=row_14,
     ),
-    Row(
+    ErrataRow(
         number=21,
         printed="λ_d = 1e-5; it works if |x1'''| ≤ L_d",
         correct="x1''' is unbounded in a sliding mode; λ_d and the sampling period must be chosen jointly",
         kind="counterexample",
         check=row_21,
     ),
-    Row(
+    ErrataRow(
         number=22,
         printed="lab e-LQR gains sampled at 1 ms",
         correct="with a zero-order hold the spectral radius is 1.026 (limit 0.989 ms) and 2.01 (limit 0.70 ms)",

@@ -9,9 +9,9 @@ import numpy as np
 import sympy as sp
 
 from quakedesign import load_fault
-from quakedesign.controllers import published
-from quakedesign.controllers.dia import DiscontinuousIntegral
-from quakedesign.studies.errata import Finding, Row
+from quakedesign.laws import published
+from quakedesign.laws.dia import DiscontinuousIntegral
+from quakedesign.studies.errata import ErrataRow, Finding
 
 
 def signed(x, a):
@@ -162,28 +162,28 @@ def row_25(lab: tuple[Fraction, ...] = UNROUNDED) -> Finding:
 
 
 ROWS = (
-    Row(
+    ErrataRow(
         number=5,
         printed="closed-loop 2-DIA with λ^{1/3}k_I1^{3/2}",
         correct="λ^{1/2}k_I1^{3/2}, as in the control law",
         kind="symbolic identity",
         check=row_05,
     ),
-    Row(
+    ErrataRow(
         number=19,
         printed="p^L = −[… + ξ1] for the 2-DIA",
         correct="−λ^{1/2}k_I2⌈…⌋^{1/3} + ξ1",
         kind="counterexample",
         check=row_19,
     ),
-    Row(
+    ErrataRow(
         number=20,
         printed="ξ1^R = λ_δλ_t ξ1^L for every law",
         correct="λ_δλ_t for the e-LQR only; λ_p for the sliding modes",
         kind="numeric reproduction",
         check=row_20,
     ),
-    Row(
+    ErrataRow(
         number=25,
         printed="k2 = 3.22e3 and 3.23e3; e-LQR 1.88e9, 5.79e8, 1.02e6, 18.52",
         correct="3226.9 for both; the e-LQR gains follow from 1e10/24, 25e6/36, 1e9/24, 1e7/72 before rounding",

@@ -9,8 +9,8 @@ import numpy as np
 import sympy as sp
 
 from quakedesign import load_fault
-from quakedesign.controllers import control_law, published
-from quakedesign.studies.errata import Finding, Row
+from quakedesign.laws import control_law, published
+from quakedesign.studies.errata import ErrataRow, Finding
 from quakedesign.symbolic import AbsolutePower, SignedPower, off_kinks, plant
 
 FAULT = load_fault("real-fault")
@@ -264,35 +264,35 @@ def row_27(rates: tuple[float, float] = (0.060, 0.010)) -> Finding:
 
 
 ROWS = (
-    Row(
+    ErrataRow(
         number=15,
         printed="real-fault gains reject 3.2e-4 sin(0.69t): “finite-time”",
         correct="L̄ is violated 200 to 290 times (2-CTA) and 120 to 175 times (2-DIA)",
         kind="numeric reproduction",
         check=row_15,
     ),
-    Row(
+    ErrataRow(
         number=16,
         printed="L̄ known in an operating domain",
         correct="ḣ contains η̂ė2/β = η̂(ν+h), the slope term, β̇/β² and μ_x2ė2: certify on a level set of V",
         kind="symbolic identity",
         check=row_16,
     ),
-    Row(
+    ErrataRow(
         number=17,
         printed="the 2-CTA Lyapunov function is smooth",
         correct="C¹ only: not C² across e1 = 0 and e3 = 0; C² but not C³ across e2 = 0",
         kind="symbolic identity",
         check=row_17,
     ),
-    Row(
+    ErrataRow(
         number=18,
         printed="β(t,e) uncertain: “similar arguments”",
         correct="one V for the whole range: V̇ affine in β and ḣ without product, 4 vertices; 2-DIA: b_m is worst",
         kind="symbolic identity",
         check=row_18,
     ),
-    Row(
+    ErrataRow(
         number=27,
         printed="2-DIA gains (2, 5, ·, 0) under the printed V",
         correct="V̇ = +0.060 (β = 1), +0.010 (β = 1.425) at γ1 = 2.01, φ = (0.2, 0.2, 1), ḣ = 0: not certified by it",

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from quakedesign import load_fault
-from quakedesign.controllers import published
-from quakedesign.studies.errata import Finding, Row
+from quakedesign.laws import published
+from quakedesign.studies.errata import ErrataRow, Finding
 
 FAULT = load_fault("real-fault")
 LAW, TASK = FAULT.friction, FAULT.reference
@@ -157,21 +157,21 @@ def row_29(feedback: str = "error") -> Finding:
 
 
 ROWS = (
-    Row(
+    ErrataRow(
         number=23,
         printed="no bound on p",
         correct="p < σ′, p ≥ −p_max and a rate limit; “global” fails",
         kind="counterexample",
         check=row_23,
     ),
-    Row(
+    ErrataRow(
         number=28,
         printed="a double integrator follows ramps",
         correct="for a linear plant only; p*(r(t)) is nonlinear in t and leaves e1 ≈ −p*''ṙ²/k4",
         kind="counterexample",
         check=row_28,
     ),
-    Row(
+    ErrataRow(
         number=29,
         printed="e-LQR feeds back k1x1 and k2x2",
         correct="feed back x1−r and x2−ṙ: the term −k1r̈/k4 of the error and 1.5 GPa of cancellation go",

@@ -9,48 +9,30 @@ import warnings
 from cyclopts import CoercionError, CycloptsError, MissingArgumentError
 
 from quakedesign.cli import (
-    attraction,
-    campaign,
-    completion,
-    design,
-    figures,
-    gain_map,
-    guarantee,
-    identify,
-    limits,
-    loop,
-    plant,
-    polynomial,
-    proof,
-    start,
-    synthesis,
+    design_commands,
+    fault_commands,
+    gain_commands,
+    guarantee_commands,
+    proof_commands,
+    simulate_commands,
 )
-from quakedesign.cli.shared import app, typed
+from quakedesign.cli.app import app, typed
 from quakedesign.discovery import user_code
 from quakedesign.errors import QuakedesignError
-from quakedesign.interruption import ending
-from quakedesign.output import release
+from quakedesign.files import release
+from quakedesign.parallel import ending
 from quakedesign.streams import lack_memory, lacks_memory
 from quakedesign.text import one_line
 
 __all__ = [
     "app",
-    "attraction",
-    "campaign",
-    "completion",
-    "design",
-    "figures",
-    "gain_map",
-    "guarantee",
-    "identify",
-    "limits",
-    "loop",
+    "design_commands",
+    "fault_commands",
+    "gain_commands",
+    "guarantee_commands",
     "main",
-    "plant",
-    "polynomial",
-    "proof",
-    "start",
-    "synthesis",
+    "proof_commands",
+    "simulate_commands",
 ]
 
 

@@ -1,26 +1,151 @@
-"""Options that several commands share, each told once."""
+"""Option types of the command line, and options that several commands share.
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+Chapters: numbers with units, exact numbers and gains; options of laws, runs and output; actuator and
+sensors; runs of faults with friction state.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, is_dataclass, make_dataclass, replace
+from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
-from quakedesign.cli.option_values import Gains, Metres, MetresPerSecond, Push, Seconds, Whole
-from quakedesign.cli.shared import hush, print_json, print_lines
-from quakedesign.errors import ParameterError
+from quakedesign.cli.app import given, hush, print_json, print_lines, refuse
+from quakedesign.errors import ParameterError, UnitError
+from quakedesign.exact import rational
+from quakedesign.loop import Actuator, stages
+from quakedesign.loop.actuators.base import Option, Stage
 
 if TYPE_CHECKING:
-    from quakedesign.controllers import Controller
     from quakedesign.fault import Fault
+    from quakedesign.laws import Controller
+    from quakedesign.loop.sensing import Sensor
     from quakedesign.simulation import Load
-    from quakedesign.studies.single import Choice
+    from quakedesign.simulation.trajectory import Recording
+    from quakedesign.studies.runs import Choice
+
+
+# ----------------------------------------------------------------------
+# Values of options as they are typed: numbers with units, exact numbers, whole ones, gains.
+
+# Negative decimals are values anyhow; with leading hyphens allowed, options after the values would be values too.
+Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
+
+
+def _gains(_type: Any, tokens: Sequence[Any]) -> tuple[str, ...]:
+    """One word, or numbers as they are written."""
+    texts = tuple(token.value for token in tokens)
+    for place, text in enumerate(texts if len(texts) > 1 else (), start=1):
+        rational(text, f"gain k{place}")
+    return texts
+
+
+Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_gains)]
+
+
+def quantity(unit: str) -> Callable[[Any, Sequence[Any]], float]:
+    """Converter of an option's text, with a unit or a bare number in the SI unit."""
+
+    def read(_type: Any, tokens: Sequence[Any]) -> float:
+        return in_unit(tokens[0].value, unit, (tokens[0].keyword or "value").strip("-").replace("-", " "))
+
+    return read
+
+
+def in_unit(text: str, unit: str, name: str) -> float:
+    """Number of a text with a unit, or a bare one in that SI unit."""
+    try:
+        return float(text)
+    except ValueError:
+        return _with_unit(text, unit, name)
+
+
+def whole(_type: Any, tokens: Sequence[Any]) -> int:
+    """Whole number of an option's text."""
+    text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
+    try:
+        return int(text)
+    except ValueError:
+        raise ParameterError(f"{name} must be a whole number. Received {text!r}. Write for example 8.") from None
+
+
+def _exact_reader(unit: str) -> Callable[[Any, Sequence[Any]], str]:
+    """Converter to a number as it is written, p/q among them, or that of a text with a unit."""
+
+    def read(_type: Any, tokens: Sequence[Any]) -> str:
+        text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
+        try:
+            rational(text)
+        except ParameterError:
+            return repr(_with_unit(text, unit, name))
+        return str(text)
+
+    return read
+
+
+def rock(diffusion: str | None, well: str | None, diffusivity: str | None) -> str | None:
+    """L²/D [s] as it is told, or of the distance of a well [m] and the diffusivity of the rock [m²/s].
+
+    Raises
+    ------
+    ParameterError
+        For both, for one of the two alone, or for one that is not positive.
+    """
+    if well is None and diffusivity is None:
+        return diffusion
+    if well is None or diffusivity is None or diffusion not in (None, "0"):
+        units = {"well": "m", "diffusivity": "m^2/s", "diffusion": "s"}
+        told = {"well": well, "diffusivity": diffusivity, "diffusion": diffusion}
+        received = " and ".join(
+            f"--{name} of {value} {units[name]}" for name, value in told.items() if value not in (None, "0")
+        )
+        alone = " alone" if " and " not in received else ""
+        raise ParameterError(
+            "a well is told by its distance and the diffusivity of the rock, or by L^2/D. Received "
+            f"{received}{alone}. Give --well and --diffusivity, or --diffusion alone."
+        )
+    distance, spread = rational(well, "well"), rational(diffusivity, "diffusivity")
+    if distance <= 0 or spread <= 0:
+        raise ParameterError(
+            f"the distance of a well and a diffusivity must be positive. Received {well} m and {diffusivity} m^2/s. "
+            "Leave out --well for the nearest."
+        )
+    return str(distance**2 / spread)
+
+
+def _with_unit(text: str, unit: str, name: str) -> float:
+    from quakedesign.fault.units import si_value
+
+    if unit == "Hz" and "rad" in text:
+        raise UnitError(f"{name} must be a frequency in Hz. Received {text!r}. Divide it by 2π.")
+    return si_value(text, unit, name)
+
+
+Seconds = Annotated[float, Parameter(converter=quantity("s"))]
+Hertz = Annotated[float, Parameter(converter=quantity("Hz"))]
+Metres = Annotated[float, Parameter(converter=quantity("m"))]
+MetresPerSecond = Annotated[float, Parameter(converter=quantity("m/s"))]
+Pascals = Annotated[float, Parameter(converter=quantity("Pa"))]
+ExactSeconds = Annotated[str, Parameter(converter=_exact_reader("s"))]
+ExactPascals = Annotated[str, Parameter(converter=_exact_reader("Pa"))]
+ExactPascalsPerSecond = Annotated[str, Parameter(converter=_exact_reader("Pa/s"))]
+ExactSquareMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m^2/s"))]
+ExactMetres = Annotated[str, Parameter(converter=_exact_reader("m"))]
+ExactMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m/s"))]
+Whole = Annotated[int, Parameter(converter=whole)]
+Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
+
+
+# ----------------------------------------------------------------------
+# Options that several commands share, each told once.
 
 
 def _fault_name(_type: Any, tokens: Sequence[Any]) -> str:
     """Name of a fault, refused before anything else is loaded if there is none."""
-    from quakedesign.fault.sources import require_source
+    from quakedesign.fault.fault_toml import require_source
 
     return require_source(tokens[0].value)
 
@@ -135,9 +260,9 @@ class LawOptions:
     ) -> "Choice | None":
         """Controller for a fault and what is certified of it; None where none is asked for.
 
-        A designed one is for a T_s [s], the fault's unless given, and a path, see `quakedesign.studies.single.choice`.
+        A designed one is for a T_s [s], the fault's unless given, and a path, see `quakedesign.studies.runs.choice`.
         """
-        from quakedesign.studies.single import certified_choice, optional_choice
+        from quakedesign.studies.runs import certified_choice, optional_choice
 
         told = {"scale": self.scale, "feedforward": self.feedforward}
         if self.certificate is None:
@@ -242,3 +367,405 @@ class StartOptions:
         if self.target_slip is None:
             return fault
         return replace(fault, reference=replace(fault.reference, target_slip=self.target_slip))
+
+
+# ----------------------------------------------------------------------
+# Options about what lies around a controller: actuator and sensors, the same for every command that runs one.
+
+_ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
+_SENSORS = Group("Sensors (schemes that sample)")
+Options = TypeVar("Options")
+
+
+def _asks_every_stage(options: type[Options]) -> type[Options]:
+    """Frozen dataclass with the options that the stages of the package declare."""
+    asked = [option for stage in stages().values() for option in stage.options]
+    fields = [(option.name, _annotation(option), option.default) for option in asked]
+    doc = {"__doc__": options.__doc__, "__module__": options.__module__}
+    return make_dataclass(options.__name__, fields, bases=(options,), namespace=doc, frozen=True, kw_only=True)
+
+
+def _annotation(option: Option) -> Any:
+    read: Any = quantity(option.unit) if option.unit else whole
+    kind: Any = float if option.unit else int
+    return Annotated[kind if option.default is not None else kind | None, Parameter(converter=read, help=option.help)]
+
+
+@Parameter(name="*", group=_ACTUATOR)
+@_asks_every_stage
+class ActuatorOptions:
+    """Stages between law and fault, for schemes that sample: what each declares where it is defined."""
+
+    def told(self) -> dict[str, Any]:
+        """Values in SI units, by the names of the options."""
+        return dict(vars(self))
+
+    def path(self) -> dict[str, float]:
+        """Delay, lag and diffusion [s] that are given: what a law can be designed for."""
+        told = self.told()
+        return {name: told[name] for name in ("delay", "lag", "diffusion") if told[name]}
+
+    def build(self, step: float, seed: int = 0) -> Actuator:
+        """Stages of an actuator in the order of the signal, for a sampling period [s] and a seed of the jitter.
+
+        Raises
+        ------
+        ParameterError
+            For values that a stage refuses, or for a part of a stage that is not there.
+        """
+        chosen = (_stage(stage, self.told(), step) for stage in stages().values() if stage.options)
+        chain = Actuator(stages=tuple(stage for stage in chosen if stage is not None))
+        if not self.told()["jitter"]:
+            return chain
+        from quakedesign.simulation.campaign.problem import reseeded
+
+        return reseeded(chain, seed)
+
+
+def _stage(stage: type[Stage], told: Mapping[str, Any], step: float) -> Stage | None:
+    """One stage; None where it is not asked for."""
+    first, *others = stage.options
+    if told[first.name] != first.default:
+        return stage.asked(step, **{option.name: told[option.name] for option in stage.options})
+    for other in others:
+        if told[other.name] is not None and other.default is None:
+            raise ParameterError(
+                f"a {other.name} belongs to a {first.name}. Received {told[other.name]:g} {other.unit} alone. "
+                "Give both."
+            )
+    return None
+
+
+@Parameter(name="*", group=_SENSORS)
+@dataclass(frozen=True, kw_only=True)
+class EstimateOptions:
+    """How a controller gets slip and slip rate from readings of the slip alone.
+
+    Parameters
+    ----------
+    averaging
+        Number of the latest readings whose mean the differentiator gets.
+    differentiator_bound
+        λ_d in m/s^(n_d + 1): tell the law what a differentiator estimates from the slip.
+    differentiator_order
+        n_d; the paper prints 2, for which a held pressure has no λ_d.
+    filter_order
+        n_f of the differentiator.
+    differentiator_steps
+        Of it inside the controller, for every reading.
+    """
+
+    averaging: Whole = 1
+    differentiator_bound: str | None = None
+    differentiator_order: Whole = 1
+    filter_order: Whole = 0
+    differentiator_steps: Whole = 1
+
+    @property
+    def bound(self) -> float | None:
+        """λ_d [m/s^(n_d + 1)]."""
+        if self.differentiator_bound is None:
+            return None
+        return in_unit(self.differentiator_bound, f"m/s^{self.differentiator_order + 1}", "differentiator bound")
+
+    def told(self) -> dict[str, Any]:
+        """Options in SI units."""
+        return asdict(self) | {"differentiator_bound": self.bound}
+
+
+@Parameter(name="*", group=_SENSORS)
+@dataclass(frozen=True, kw_only=True)
+class SensorOptions(EstimateOptions):
+    """What a controller is told of slip and slip rate, for schemes that sample.
+
+    Parameters
+    ----------
+    slip_noise
+        Standard deviation of normal noise of the measured slip, such as '1 um': a third of the readings are off by
+        more. --slip-noise is a bound, of guarantee and design.
+    rate_noise
+        The same of the slip rate, where it is measured, such as '1 um/s'.
+    bandwidth
+        Of the transducer in front of a differentiator, such as '100 Hz'.
+    slip_quantum
+        Steps in which that transducer reads, such as '0.15 um'.
+    """
+
+    slip_noise: Annotated[Metres, Parameter(name="--slip-noise-deviation")] = 0.0
+    rate_noise: Annotated[MetresPerSecond, Parameter(name="--rate-noise-deviation")] = 0.0
+    bandwidth: Hertz | None = None
+    slip_quantum: Metres = 0.0
+
+    def build(self, step: float, seed: int = 0) -> "Sensor":
+        """Measurement or sensor for a sampling period [s] and a seed of the noise; raises `ParameterError`."""
+        from quakedesign.loop.sensing import Measurement
+        from quakedesign.studies.runs import sensor
+
+        return sensor(
+            step,
+            Measurement(slip_noise=self.slip_noise, rate_noise=self.rate_noise, seed=seed),
+            self.bound,
+            self.filter_order,
+            order=self.differentiator_order,
+            bandwidth=math.inf if self.bandwidth is None else self.bandwidth,
+            averaging=self.averaging,
+            quantum=self.slip_quantum,
+            inner_steps=self.differentiator_steps,
+        )
+
+
+def surroundings(
+    chosen: "Choice | None",
+    step: float,
+    run: "RunOptions",
+    actuator: ActuatorOptions,
+    sensors: SensorOptions,
+    seed: int,
+) -> "tuple[int, Actuator, Sensor]":
+    """Substeps, actuator and sensor of a run with a sampling period [s].
+
+    Stages for which a law of samples is designed, with the substeps that they need, and the noise of its certificate
+    stand where none is given.
+    """
+    from quakedesign.simulation.run import own_path
+
+    told, seen = actuator.build(step, seed), sensors.build(step, seed)
+    if chosen is None:
+        return run.substeps, told, seen
+    meant, substeps = own_path(chosen.controller, None, run.substeps)
+    return substeps, told.completed(meant) if meant else told, seen if seen.noisy else chosen.noise(seed)
+
+
+# ----------------------------------------------------------------------
+# Options of runs of faults whose friction has a state.
+
+_GROUP = Group("Friction with a state (rate-and-state)")
+_BOTH = {"duration": "duration", "plant": "plant", "method": "method"}
+_FREE = {"drift": "loading_rate", **_BOTH}
+_HELD = {"step": "step", "lag": "lag", "diffusion": "diffusion", **_BOTH}
+_OF_LAW = ("step", "delay", "lag", "diffusion")  # what a certificate says itself
+_PUMP = ("delay", "jitter", "quantum", "saturation", "withdrawal", "rate_limit")
+_READING = {"slip_noise": "deviation", "bandwidth": "bandwidth", "slip_quantum": "quantum", "seed": "seed"}
+_AROUND = ("fault", "controller", "gains", "state", "out", "force", "json")
+
+
+@Parameter(name="*", group=_GROUP)
+@dataclass(frozen=True, kw_only=True)
+class StateOptions:
+    """How such a fault starts, and which pressure acts on it; it is loaded at --drift, or the law's reference rate.
+
+    Parameters
+    ----------
+    pressure
+        '5 MPa'; or instants, linear between and a step where one stands twice, as '0 s: 0 MPa, 1 day: 0 MPa, 1 day: 5
+        MPa'; or a file FILE.csv with the columns 'time [s]' and 'pressure [Pa]', in any units.
+    start
+        steady (sliding; unless given), locked (held for --hold) or late (in the cycle: --share).
+    hold
+        Time for which the far end has been at rest before the run, such as '100 year'.
+    share
+        Of the time between two events that has passed at the start; 0.9 unless given.
+    stress
+        With --controller elqr: amplitude of a shear stress on the fault that swings as a sine, such as '20 kPa'.
+    stress_period
+        Its period; that of the tide, 12.42 hours, unless given.
+    """
+
+    pressure: str | None = None
+    start: str | None = None
+    hold: Seconds | None = None
+    share: float | None = None
+    stress: Pascals | None = None
+    stress_period: Seconds | None = None
+
+    def of_control(self) -> dict[str, Any]:
+        """Those of a controlled run that are given."""
+        if any(value is not None for value in (self.pressure, self.start, self.hold, self.share)):
+            raise ParameterError(
+                "a controlled run starts in steady sliding, and its law sets the pressure. Received pressure, start, "
+                "hold or share. Leave them out."
+            )
+        return given({"stress": self.stress, "stress_period": self.stress_period})
+
+    def of_free(self) -> dict[str, Any]:
+        """Those of a run without control that are given."""
+        from quakedesign.simulation import pressure_course
+
+        if self.stress is not None or self.stress_period is not None:
+            raise ParameterError("a stress disturbance needs a controller. Received none. Give --controller elqr.")
+        told = given({"start": self.start, "hold": self.hold, "share": self.share})
+        return told | ({} if self.pressure is None else {"pressure": pressure_course(self.pressure)})
+
+
+NO_STATE = StateOptions()
+
+
+def require_no_state_options(state: StateOptions, fault: "Fault") -> None:
+    """Refuse options that friction without a state has no use for."""
+    if state != NO_STATE:
+        raise ParameterError(
+            "pressure, start, hold, share and stress need friction with a state. "
+            f"Received {fault.friction.name}. Leave them out."
+        )
+
+
+def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int:
+    """Run a fault whose friction has a state as `simulate` was asked to, and print what it comes to."""
+    from quakedesign.report.sentences import sliding_run_lines, state_run_lines
+    from quakedesign.studies.runs import run_held, run_state
+
+    asked, changed = _single(options), changed_options(command, options)
+    trajectory: Recording
+    certificate = changed.pop("certificate", None)
+    if certificate is not None:
+        told = _as_proved(fault, certificate, changed, options)
+        held, more = run_held(fault, **told), told["stress"] > told["claim"].task.stress
+        outside = [*(["stress"] if more else []), *(name for name in changed if name in (*_PUMP, *_READING, "plant"))]
+        trajectory, answer = held.trajectory, held.to_dict() | {"outside": [n for n in outside if n != "seed"]}
+        lines = sliding_run_lines
+    elif "controller" in changed:
+        _require_designed(asked)
+        held = run_held(fault, **_instruments(fault, changed, options), **options["state"].of_control())
+        trajectory, answer, lines = held.trajectory, held.to_dict(), sliding_run_lines
+    else:
+        free = run_state(fault, **_told(fault, changed, _FREE), **options["state"].of_free())
+        trajectory, answer, lines = free.trajectory, free.to_dict(), state_run_lines
+    if options["out"] is not None:
+        trajectory.save(Path(options["out"]))
+    options["output"].show(answer, [trajectory.name, *(f"  {line}" for line in lines(answer))])
+    return 0
+
+
+def changed_options(command: Any, options: dict[str, Any]) -> dict[str, Any]:
+    """What was given to a command other than its defaults, by the names of single options; those of the state apart."""
+    usual = _single({name: option.default for name, option in signature(command).parameters.items()})
+    return {name: value for name, value in _single(options).items() if value != usual[name]}
+
+
+@Parameter(name="*", group=_GROUP)
+@dataclass(frozen=True, kw_only=True)
+class SpreadOptions:
+    """What varies in a campaign of such a fault.
+
+    Parameters
+    ----------
+    spread
+        Held in slow sliding by the e-LQR that design finds: by how much of their values a, b and D_c are off, such as
+        0.1; the effective normal stress, stiffness and damping by the box.
+    stress
+        Bound of a sine of shear stress, such as '25 kPa'; what is proved of the design unless given.
+    stress_period
+        Its period; that of the tide, 12.42 hours, unless given.
+    """
+
+    spread: str = "0"
+    stress: Pascals | None = None
+    stress_period: Seconds | None = None
+
+    def choose(
+        self, fault: "Fault", law: "LawOptions", step: float | None, path: dict[str, float]
+    ) -> tuple["Choice | None", dict[str, Any]]:
+        """Law of a campaign, and what it is told of spread and stress, which friction without a state does not have.
+
+        With a state it is the law that `design` finds for the nominal normal stress, stiffness and damping, whatever
+        the box of the campaign.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if not fault.friction.state_names:
+            if self != SpreadOptions():
+                raise ParameterError(
+                    f"spread and stress need friction with a state. Received {fault.friction.name}. Leave them out."
+                )
+            return law.choose(fault, step, path), {}
+        from quakedesign.exact import rational
+        from quakedesign.studies.runs import Choice
+        from quakedesign.synthesis import design
+
+        period = {} if self.stress_period is None else {"stress_period": self.stress_period}
+        if law.certificate is not None and (chosen := law.choose(fault.with_box("paper"))):
+            return chosen, _of_proof(chosen.claim, self.spread, self.stress) | period
+        _require_designed({"controller": law.controller, "gains": law.gains})
+        off = rational(self.spread, "spread")
+        diffusion = path.get("diffusion")
+        designed = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=self.stress, spread=off)
+        if designed.controller is None or designed.sliding is None:
+            raise ParameterError(f"a campaign needs a law. Received none from design: {designed.details['reason']}.")
+        told = {"spread": off, "stress": float(designed.sliding.task.stress)}
+        return Choice(controller=designed.controller), told | period
+
+
+def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
+    """Spread and stress of a campaign with the law of a certificate: all that it is proved for unless told.
+
+    Raises
+    ------
+    ParameterError
+        For a delay or noise, which campaigns of slow sliding do not have.
+    """
+    from quakedesign.exact import rational
+
+    if claim.held.delay or claim.held.slip_noise:
+        raise ParameterError(
+            "a campaign of slow sliding is told the slip at once and as it is. Received a certificate with a delay or "
+            "noise. Use simulate --certificate."
+        )
+    low, high = claim.task.ranges["direct_effect"]
+    off = rational(spread, "spread") or (high - low) / (high + low)
+    return {"spread": off, "stress": float(claim.task.stress) if stress is None else stress}
+
+
+def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
+    """The law of a certificate around its fault, under a sine of all the stress that it is proved for unless told.
+
+    The reading is off by at most the noise of the certificate: the nearest multiple of twice that.
+    """
+    from quakedesign.loop.sensing import Transducer
+
+    claim = options["law"].choose(fault).claim
+    refuse({name: changed.get(name) for name in _OF_LAW}, f"{certificate}, whose law has its own")
+    told = {"stress": float(claim.task.stress)} | options["state"].of_control()
+    told |= _instruments(fault, {**changed, "step": float(claim.held.step)}, options)
+    if told["transducer"] is None and claim.held.slip_noise:
+        told["transducer"] = Transducer(quantum=2 * float(claim.held.slip_noise))
+    return {**told, "step": None, "claim": claim}
+
+
+def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
+    """What a controlled run was asked for, the pump and the transducer made of their options."""
+    from quakedesign.loop.sensing import Transducer
+
+    others = {name: value for name, value in changed.items() if name not in (*_PUMP, *_READING)}
+    told = _told(fault, others, _HELD, (*_PUMP, *_READING))
+    chain = options["actuator"].build(told.get("step", fault.sampling_time), options["seed"])
+    reading: dict[str, Any] = {_READING[name]: value for name, value in changed.items() if name in _READING}
+    transducer = Transducer(**reading) if set(reading) - {"seed"} else None
+    return told | {"stages": chain.sampled, "transducer": transducer}
+
+
+def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: tuple[str, ...] = ()) -> dict[str, Any]:
+    """What was asked for, by the name that a run has for it; refuses what does not apply."""
+    if foreign := [name for name in changed if name not in (*taken, *_AROUND)]:
+        kind = f"friction with a state {'with' if taken is _HELD else 'without'} control"
+        raise ParameterError(
+            f"{', '.join(foreign)}: not for {kind}. Received {fault.friction.name}. "
+            f"Leave out what is not among {', '.join((*taken, *more))} and the options of friction with a state."
+        )
+    return {taken[name]: value for name, value in changed.items() if name in taken}
+
+
+def _require_designed(options: dict[str, Any]) -> None:
+    if options["controller"] != "elqr" or tuple(options["gains"]) not in (("published",), ("designed",)):
+        raise ParameterError(
+            "friction with a state is controlled by elqr with designed gains; no sliding mode, as the slip rate "
+            f"follows the pressure at once. Received {options['controller']}. Give --controller elqr."
+        )
+
+
+def _single(options: dict[str, Any]) -> dict[str, Any]:
+    """Options of all groups but that of the state, by their own names."""
+    groups = [name for name, value in options.items() if is_dataclass(value) and name != "state"]
+    alone = {name: value for name, value in options.items() if name not in groups}
+    return alone | {name: value for group in groups for name, value in asdict(options[group]).items()}

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import ParameterError, UnitError
-from quakedesign.rationals import rational
+from quakedesign.exact import rational
 from quakedesign.text import nearest_name, shown
 
 _TIMES = {"s": "1", "ms": "0.001", "us": "0.000001", "min": "60", "h": "3600", "hour": "3600", "day": "86400"}

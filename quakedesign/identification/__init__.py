@@ -10,13 +10,13 @@ from quakedesign.identification.fault_file import (
     save_fault,
     task_remarks,
 )
+from quakedesign.identification.identification_result import Identification, ParameterEstimate
 from quakedesign.identification.identify import identify
 from quakedesign.identification.record import Record, read_record
-from quakedesign.identification.result import Estimate, Identification
 
 __all__ = [
-    "Estimate",
     "Identification",
+    "ParameterEstimate",
     "Record",
     "cover",
     "identified_fault",

@@ -16,14 +16,12 @@ from pathlib import Path
 from shlex import quote
 
 from quakedesign.errors import RecordError
-from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox
-from quakedesign.fault.defaults import beyond_rates, mean_rate, sliding_step, step_assumed
-from quakedesign.fault.friction import friction_laws
+from quakedesign.exact import rational
+from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox, friction_laws
+from quakedesign.fault.fault_toml import beyond_rates, fault_toml, mean_rate, sliding_step, step_assumed
 from quakedesign.fault.friction.rate_and_state import RateAndState
-from quakedesign.fault.template import fault_toml
-from quakedesign.identification.result import Estimate, Identification
-from quakedesign.output import write_whole
-from quakedesign.rationals import rational
+from quakedesign.files import write_whole
+from quakedesign.identification.identification_result import Identification, ParameterEstimate
 
 _DIGITS = 6
 _WIDEST_SPREAD = 0.99  # as it is rounded up to two digits and must stay below 1
@@ -284,6 +282,6 @@ def _spread(identification: Identification) -> str:
     return f"{float(_decimal(max(shares), up=True, digits=2)):g}"
 
 
-def _remark(estimate: Estimate) -> str:
+def _remark(estimate: ParameterEstimate) -> str:
     ends = f"{estimate.low:.6g} to {estimate.high:.6g}; {estimate.least:.6g} to {estimate.most:.6g}"
     return f"  {estimate.name} = {estimate.value:.6g} ({ends}) {estimate.unit}".rstrip()

@@ -1,22 +1,39 @@
-"""Flow through the rock between well and fault: slow modes exactly, and a bound of all the others.
+"""Pressure diffusion between well and fault: exact slow modes, bounded fast modes.
 
-**Statement.** Let ∂p/∂t = D∂²p/∂x² in a layer of length L, without pressure at first, with the pressure u at the well
-and without outflow at the fault, and τ = L²/D. With λ_n = ((2n + 1)π/2)²/τ and c_n = (4/π)(−1)ⁿ/(2n + 1) the pressure
-in the fault t after a unit step of u is 1 − Σ c_n·e^{−λ_n·t} (Carslaw and Jaeger, Conduction of Heat in Solids, 1959,
-sec. 3.4), Σ c_n = 1. So it is Σ_{n<N} c_n·z_n + (1 − Σ_{n<N} c_n)u + R with z_n′ = λ_n(u − z_n) and what is left out,
-R(t) = Σ_k Δu_k·E(t − t_k) over the steps of u, E(t) = −Σ_{n≥N} c_n·e^{−λ_n·t}. These terms alternate and shrink, so
-|E(t)| ≤ |c_N|e^{−λ_N·t}.
-
-**In rationals.** π is replaced by π̂ = π(1 − δ), 0 ≤ δ ≤ 10⁻²⁰, so λ̂_n = λ_n(1 − δ)² and ĉ_n = c_n/(1 − δ), which adds
-to |E(t)| at most Σ_{n<N} |c_n|(2δ + 3δλ̂_n·t)e^{−λ̂_n·t} ≤ 6Nδe^{−λ̂_0·t/2}.
-
-- *A well whose pressure is held*, with a step at most every T: |R(t)| ≤ max|Δu_k|·(h·e^{−λ̂_N·θ} + f), θ the time since
-  the last step, h = |ĉ_N|(1 + 1/(λ̂_N·T)) and f = 6Nδ(1 + τ/T), since Σ_{k≥0} e^{−xk} ≤ 1 + 1/x.
-- *A well whose pressure moves*: |R(t)| ≤ max|u′|·∫|E| ≤ max|u′|(|ĉ_N|/λ̂_N + 6Nδτ). ∎
+One-dimensional diffusion in a layer with a no-flow boundary at the fault (Carslaw and Jaeger, Conduction
+of Heat in Solids, 1959, sec. 3.4). The first chapter states and proves the truncation error of the modes.
+The second moves this error into the slip-rate error, as a known jump at each pressure step and a smaller
+remainder.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+
+from quakedesign.laws.sampled_law import unit_row
+from quakedesign.loop.periodic import Fading, PeriodicLoop
+
+# ----------------------------------------------------------------------
+# Flow through the rock between well and fault: slow modes exactly, and a bound of all the others.
+#
+# **Statement.** Let ∂p/∂t = D∂²p/∂x² in a layer of length L, without pressure at first, with the pressure u at the
+# well
+# and without outflow at the fault, and τ = L²/D. With λ_n = ((2n + 1)π/2)²/τ and c_n = (4/π)(−1)ⁿ/(2n + 1) the
+# pressure
+# in the fault t after a unit step of u is 1 − Σ c_n·e^{−λ_n·t} (Carslaw and Jaeger, Conduction of Heat in Solids,
+# 1959,
+# sec. 3.4), Σ c_n = 1. So it is Σ_{n<N} c_n·z_n + (1 − Σ_{n<N} c_n)u + R with z_n′ = λ_n(u − z_n) and what is left
+# out,
+# R(t) = Σ_k Δu_k·E(t − t_k) over the steps of u, E(t) = −Σ_{n≥N} c_n·e^{−λ_n·t}. These terms alternate and shrink, so
+# |E(t)| ≤ |c_N|e^{−λ_N·t}.
+#
+# **In rationals.** π is replaced by π̂ = π(1 − δ), 0 ≤ δ ≤ 10⁻²⁰, so λ̂_n = λ_n(1 − δ)² and ĉ_n = c_n/(1 − δ), which
+# adds
+# to |E(t)| at most Σ_{n<N} |c_n|(2δ + 3δλ̂_n·t)e^{−λ̂_n·t} ≤ 6Nδe^{−λ̂_0·t/2}.
+#
+# - *A well whose pressure is held*, with a step at most every T: |R(t)| ≤ max|Δu_k|·(h·e^{−λ̂_N·θ} + f), θ the time
+#   since
+#   the last step, h = |ĉ_N|(1 + 1/(λ̂_N·T)) and f = 6Nδ(1 + τ/T), since Σ_{k≥0} e^{−xk} ≤ 1 + 1/x.
+# - *A well whose pressure moves*: |R(t)| ≤ max|u′|·∫|E| ≤ max|u′|(|ĉ_N|/λ̂_N + 6Nδτ). ∎
 
 MODES = 8
 _PI = Fraction("3.14159265358979323846")  # π̂
@@ -62,3 +79,82 @@ class Layer:
     def awaited_in_all(self) -> Fraction:
         """Bound of ∫|F| [s²], F(t) = −∫E from t on."""
         return abs(self.share(MODES)) / self.rate(MODES) ** 2 + 6 * MODES * _SHORT * self.time**2
+
+
+# ----------------------------------------------------------------------
+# What the fast modes of a layer bring into the slip rate at each step of the well: as one known kick, and a
+# remainder.
+#
+# **Statement.** Let R be what the modes n < N of a layer leave out of the pressure in the fault (`layer`), E that of
+# a
+# unit step, and A = τ/2 − Σ_{n<N} ĉ_n/λ̂_n. Then ∫E = −A exactly, and with F(t) = −∫_t^∞ E, Y = Σ_k Δu_k·F(t − t_k)
+# over
+# the steps so far, and e2 = x2 + β0·b·Y, the loop e1′ = e2, e2′ = s0·e1 − w0·e2 + β0·b·(v/b + R) + a is the same as
+#
+#     e1′ = x2 + β0·bY,   x2′ = s0·e1 − w0·x2 + β0·v + a − w0·β0·bY,   x2 ← x2 − β0·A·bΔu_k at every step.
+#
+# *Proof.* ∫₀^∞ Σ c_n·e^{−λ_n·t}dt = τ/2, since 1/cosh √(sτ) = 1 − sτ/2 + …; so F(0) = A, and R − Y′ = −A·Σ_k Δu_k·δ(t
+# −
+# t_k). ∎ Y is as unknown as R is, but λ_N times smaller and not differentiated: what the steps so far will still
+# bring.
+#
+# **Bounds.** |F(t)| ≤ |ĉ_N|/λ̂_N·e^{−λ̂_N·t} + 6Nδτ·e^{−λ̂_0·t/2}: the terms c_n/λ_n·e^{−λ_n·t} alternate and shrink
+# as
+# those of E, and the errors of ĉ_n and λ̂_n add at most 6Nδ·e^{−λ̂_0·t/2} to |E|, 2/λ̂_0 < τ.
+#
+# - *A well whose pressure is held*: |Y| ≤ max|Δu_k|·(h/λ̂_N·e^{−λ̂_N·θ} + f·τ) with θ, h and f of `layer`.
+# - *A well whose pressure moves*: with Y = ∫u′(σ)F(t − σ)dσ there are no kicks, but R = Y′ − A·u′, so that A·u′ is
+#   less
+#   in v, and |Y| ≤ max|u′|·(|ĉ_N|/λ̂_N² + 6Nδτ²). ∎
+
+
+def with_known_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> PeriodicLoop:
+    """A loop of `held_loop` through a layer, with x2 in place of e2 and Y in place of R times β0.
+
+    ``awaited`` is bY over what bounds it, so that it is at most the output ``left_out`` (times its weight, where the
+    well steps): an input, and what the law is told of it, the sampled input ``awaited_told``.
+
+    Parameters
+    ----------
+    loop : PeriodicLoop
+    gain : Fraction
+        β0 [-].
+    layer : Layer
+        Between well and fault.
+    """
+    size, slip_rate = len(loop.states), loop.states.index("e2")
+    *others, last = loop.segments
+    if loop.fading:
+        share, fading = _held(loop, layer)
+        step = last.jump[loop.states.index("stepped")]
+        kicked = [list(row) for row in last.jump]
+        kicked[slip_rate] = [v - gain * layer.area * d for v, d in zip(kicked[slip_rate], step, strict=True)]
+        last = replace(last, jump=tuple(map(tuple, kicked)))
+        late = fading.weight(last.duration)  # at the sample, which comes before the next step
+    else:
+        share, fading, late = layer.awaited_in_all / layer.left_out_in_all, None, Fraction(1)
+        behind = loop.states.index("behind")
+        flow = [list(row) for row in loop.flow]
+        flow[slip_rate][behind] -= gain * layer.area * flow[behind][behind]
+        loop = replace(loop, flow=tuple(map(tuple, flow)))
+    segments = (*others, last)
+    told = tuple(row[slip_rate] - (i == slip_rate) for i, row in enumerate(segments[0].jump))
+    own = gain * share
+    entry = unit_row(size, {loop.states.index("e1"): own, slip_rate: own * loop.flow[slip_rate][slip_rate]})
+    return replace(
+        loop,
+        segments=segments,
+        inputs=loop.inputs if fading else {**loop.inputs, "awaited": entry},
+        sampled={**loop.sampled, "awaited_told": tuple(own * late * v for v in told)},
+        fading={**loop.fading, "awaited": replace(fading, entry=entry)} if fading else {},
+        at_once={("slip_rate_error", "awaited"): own},
+    )
+
+
+def _held(loop: PeriodicLoop, layer: Layer) -> tuple[Fraction, Fading]:
+    """Largest |bY| over the bound of |b·R|, and how it fades."""
+    (own,) = loop.fading.values()
+    height, rate, floor = layer.left_out(loop.period)
+    awaited = height / rate, floor * layer.time
+    most = sum(awaited)
+    return most / (height + floor), replace(own, height=awaited[0] / most, floor=awaited[1] / most)

@@ -1,16 +1,29 @@
-"""What all figures share: size, colours, units, and the line that says how the runs were made."""
+"""Common style of figures, figure files for journals, inline SVG, and cached figures."""
 
-from collections.abc import Iterable, Sequence
+import io
+import json
+import os
+import pickle
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from markupsafe import Markup, escape
 
-from quakedesign.controllers import control_laws
+from quakedesign import cache
+from quakedesign.files import write_whole
+from quakedesign.laws import control_laws
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Entry, Run
+
+
+# ----------------------------------------------------------------------
+# What all figures share: size, colours, units, and the line that says how the runs were made.
 
 WIDTH = 7.16  # two columns of a printed page [in]
 SMALL = 8  # size of letters [pt], still readable in print
@@ -138,3 +151,187 @@ def known(values: np.ndarray | None) -> np.ndarray:
     """Values of a controlled run, which always has a reference."""
     assert values is not None
     return values
+
+
+# ----------------------------------------------------------------------
+# Figures as files that journals accept: letters of 8 pt to 9 pt, fonts embedded, no date, at the width of a page.
+
+Format = Literal["svg", "pdf", "png"]
+FORMATS: tuple[Format, ...] = ("svg", "pdf", "png")
+DEFAULT: tuple[Format, ...] = ("svg",)
+_STYLE: dict[str, Any] = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
+"""Letters stay letters: as such in SVG, as TrueType, which journals ask for, in PDF."""
+_UNDATED: dict[str, dict[str, Any]] = {
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+    "png": {"Software": None},
+}
+
+
+def figure_bytes(drawing: Any, kind: str, name: str) -> bytes:
+    """Contents of a file with a figure, the same for the same figure.
+
+    Parameters
+    ----------
+    drawing : matplotlib.figure.Figure
+    kind : str
+        One of `FORMATS`.
+    name : str
+        Makes the names inside an SVG.
+    """
+    import matplotlib as mpl
+
+    stream = io.BytesIO()
+    style: Any = _STYLE | {"svg.hashsalt": name}
+    with mpl.rc_context(style):
+        _lay_out(drawing)
+        drawing.savefig(stream, format=kind, metadata=_UNDATED[kind])
+    return stream.getvalue()
+
+
+def _lay_out(drawing: Any) -> None:
+    """Place what is in a figure, for good: `savefig` would draw all of it once more for that, in every format."""
+    if (engine := drawing.get_layout_engine()) is not None:
+        engine.execute(drawing)
+        drawing.set_layout_engine(None)
+
+
+def write_figures(folder: Path, drawn: Mapping[str, Any], formats: Sequence[str]) -> None:
+    """Write figures, each by its name, in every format into a folder that exists."""
+    for name, drawing in drawn.items():
+        for kind in formats:
+            (folder / f"{name}.{kind}").write_bytes(figure_bytes(drawing, kind, name))
+
+
+def write_results(folder: Path, facts: Mapping[str, Any]) -> None:
+    """Write ``results.json`` into a folder that exists."""
+    write_whole(folder / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
+
+
+def file_names(name: str, formats: Sequence[str]) -> str:
+    """Of one figure, as a message lists them."""
+    return ", ".join(f"{name}.{kind}" for kind in formats)
+
+
+# ----------------------------------------------------------------------
+# Figures as SVG inside a page: small, with colours that follow the page, and what a pointer needs to read values.
+
+_INKS = {"#000000": "var(--ink)", "#444444": "var(--soft)", "#b0b0b0": "var(--line)", "#cccccc": "var(--line)"}
+"""Colours of frames, letters and grids; those of the curves stay."""
+_PAPER = "#ffffff"
+
+
+def inline_svg(drawn: str, drawing: Any, name: str, told: str) -> Markup:
+    """SVG element of a figure, with names of its own, that tells what it shows.
+
+    Parameters
+    ----------
+    drawn : str
+        SVG file of the figure.
+    drawing : matplotlib.figure.Figure
+    name : str
+        Unique in its page.
+    told : str
+        For readers who do not see it.
+    """
+    body = drawn[drawn.index("<defs>", drawn.index("</metadata>") if "</metadata>" in drawn else 0) :]
+    width, height = (72 * float(size) for size in drawing.get_size_inches())
+    head = f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(told)}" '
+    return Markup(f'{head}data-axes="{escape(json.dumps(_axes(drawing, height)))}">{_tightened(body, name)}')
+
+
+def _tightened(body: str, name: str) -> str:
+    """Two decimals of a point [1/72 in], colours of the page, names that no other figure has, no line breaks."""
+    body = re.sub(r"<g id=\"figure_1\">\s*<g id=\"patch_1\">.*?</g>", '<g id="figure_1">', body, count=1, flags=re.S)
+    body = re.sub(r"<[^>]*>", lambda tag: re.sub(r"-?\d+\.\d{3,}", _shorter, tag[0]), body)
+    for colour, ink in _INKS.items():
+        body = body.replace(colour, ink)
+    body = re.sub(rf"fill: {_PAPER}", "fill: var(--paper)", body)
+    body = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", body)
+    return re.sub(r"\s*\n\s*", "\n", body)
+
+
+def _shorter(number: re.Match[str]) -> str:
+    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
+
+
+def _axes(drawing: Any, height: float) -> list[dict[str, Any]]:
+    """Place in the picture and scales of every axis that carries labels."""
+    axes = []
+    for axis in drawing.axes:
+        low, high = axis.get_window_extent().get_points() * 72 / drawing.dpi
+        box = [float(v) for v in (low[0], height - high[1], high[0], height - low[1])]
+        siblings = axis.get_shared_x_axes().get_siblings(axis)
+        across = next((label for other in siblings if (label := other.get_xlabel())), "x")
+        sides = {"x": _side(axis.xaxis, across), "y": _side(axis.yaxis, axis.get_ylabel())}
+        axes.append({"box": [round(v, 2) for v in box], **sides})
+    return axes
+
+
+def _side(axis: Any, label: str) -> dict[str, Any]:
+    """Ends of a side on its own scale, and what it takes to come back from there to values."""
+    transform = axis.get_transform()
+    low, high = (float(v) for v in transform.transform(axis.get_view_interval()))
+    side = {"label": label, "scale": axis.get_scale(), "low": low, "high": high}
+    if side["scale"] != "symlog":
+        return side
+    (bend,) = transform.transform([transform.linthresh]) / transform.linthresh
+    return side | {"linear": float(transform.linthresh), "bend": float(bend)}
+
+
+# ----------------------------------------------------------------------
+# Figures kept on the user's disk, see `quakedesign.cache`: found by all that they could show before one is drawn.
+
+Drawn = tuple[bytes, Markup]
+
+
+def drawn_once(draw: Callable[[], Mapping[str, Any]], told: Mapping[str, str], shown: Any) -> dict[str, Drawn]:
+    """SVG files of figures by name, and their elements for a page; from the cache if the same were drawn before.
+
+    Parameters
+    ----------
+    draw : callable
+        Gives figures of matplotlib by name, not drawn yet, that depend on what they show alone.
+    told : mapping of str to str
+        For readers who do not see a figure, by its name.
+    shown : Any
+        All that is shown, but for how long it took.
+    """
+    asked = _stated(told, shown) if cache.in_use() else None
+    if asked is not None and (kept := cache.recall("figures", asked)) is not None:
+        return {name: (vector.encode(), Markup(inside)) for name, (vector, inside) in json.loads(kept).items()}
+    drawn = {}
+    for name, drawing in draw().items():
+        vector = figure_bytes(drawing, "svg", name)
+        drawn[name] = vector, inline_svg(vector.decode(), drawing, name, told[name])
+    if asked is not None:
+        texts = {name: [vector.decode(), inside] for name, (vector, inside) in drawn.items()}
+        cache.keep("figures", json.dumps(texts).encode(), asked)
+    return drawn
+
+
+def _stated(told: Mapping[str, str], shown: Any) -> bytes | None:
+    """All that drawings depend on: contents, settings and fonts; None if they cannot be told."""
+    import matplotlib as mpl
+    from matplotlib.font_manager import fontManager
+
+    content = io.BytesIO()
+    statement = _Untimed(content)
+    statement.fast = True  # what is equal is written the same, be it one value or two
+    try:
+        fonts = [(font.fname, (file := os.stat(font.fname)).st_size, file.st_mtime_ns) for font in fontManager.ttflist]
+        settings = {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}  # which would be loaded
+        statement.dump((dict(told), shown, settings, fonts))
+    except (pickle.PicklingError, AttributeError, TypeError, OSError, ValueError, RecursionError):
+        return None
+    return content.getvalue()
+
+
+class _Untimed(cache.CachedStatement):
+    """A value by its fields, without how long it took and how it was computed."""
+
+    def field(self, value: Any, name: str) -> Any:
+        given = super().field(value, name)
+        if name == "provenance":
+            return {k: v for k, v in given.items() if not (k.startswith("backend") or k.endswith("_seconds"))}
+        return None if name == "seconds" else given

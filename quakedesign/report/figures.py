@@ -1,30 +1,281 @@
-"""Figures of a comparison: one idea each, axes with units."""
+"""Figures of a comparison: states, pressure, errors, metrics, stability map, cycles.
 
+Cycles and slow sliding are for faults with friction state. Published and designed gains appear in one
+figure.
+"""
+
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quakedesign.report.closed_loop_figures import pressure, states
+from quakedesign.fault import Fault
 from quakedesign.report.drawing import (
     NATURAL,
+    ORIGINS,
     SMALL,
     band,
     bar_look,
     clock,
+    colour,
     figure,
     finish,
     known,
     length,
+    named,
     runs_of,
     scaled,
     style,
     with_diverged,
 )
-from quakedesign.report.state_figures import state_figures
-from quakedesign.studies.state_runs import StateRun
+from quakedesign.simulation.slow_sliding import SlidingRun
+from quakedesign.studies.facts import Plane, StabilityRegions, stability_regions
+from quakedesign.studies.runs import StateRun
 
 if TYPE_CHECKING:
-    from quakedesign.studies.comparison import Compared, Run
+    from quakedesign.simulation import Trajectory
+    from quakedesign.studies.comparison import Compared, Entry, Run
+
+
+# ----------------------------------------------------------------------
+# States and pressure in closed loop: a row for every control law, published gains beside designed ones.
+
+_INSET = (0.16, 0.66, 0.82, 0.31)
+_ROOM = 0.9  # for the insets above the data, over the height of the data
+
+
+def grid(comparison: "Compared") -> tuple[list[str], list[str], dict[tuple[str, str], "Entry"]]:
+    """Laws and origins that have a run, in order, and the entry of each pair."""
+    found = {(e.design.name, e.origin): e for e, _ in runs_of(comparison.entries)}
+    laws = list(dict.fromkeys(name for name, _ in found))
+    return laws, [o for o in ORIGINS if any(origin == o for _, origin in found)], found
+
+
+def states(comparison: "Compared") -> Any:
+    """Slip of all laws in the first row, below it the band of the slip rate of each law.
+
+    The rate is on a scale that is linear below the largest reference rate and logarithmic beyond it.
+    """
+    laws, origins, found = grid(comparison)
+    rows = 1 + len(laws)
+    drawing, axes = figure(rows, 0.95 + 1.1 * rows, len(origins), sharex=True, sharey="row")
+    runs = [run for _, run in runs_of(comparison.entries)]
+    divisor, unit = clock(max(float(run.time[-1]) for run in runs))
+    size, name = length(float(known(runs[0].reference).max()))
+    for column, origin in enumerate(origins):
+        _slips(axes[0, column], comparison, origin, (divisor, size))
+        axes[0, column].set_ylabel(f"slip [{name}]")
+        for row, law in enumerate(laws, 1):
+            entry = found.get((law, origin))
+            if entry is None:
+                drawing.delaxes(axes[row, column])
+                continue
+            _rate(axes[row, column], entry, comparison, divisor)
+        _time_below(axes[:, column], drawing, unit)
+    note = "slip rate: band between the extremes of 40 kept samples, logarithmic beyond the largest reference rate"
+    rates = [axis for axis in drawing.axes if axis not in axes[0]]
+    return finish(
+        drawing,
+        f"{comparison.fault.name}: states in closed loop",
+        runs,
+        with_diverged(comparison.entries, note),
+        legend=rates[0],
+    )
+
+
+def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, float]) -> None:
+    """Curves that lie on each other, each narrower than the one below it."""
+    divisor, size = sizes
+    runs = runs_of(comparison.of(origin))
+    for place, (entry, run) in enumerate(runs):
+        width = 1.5 * (len(runs) - place)
+        look = style(entry) | {"linewidth": width, "linestyle": "solid", "label": entry.design.title}
+        axis.plot(run.time / divisor, run.slip / size, **look)
+    axis.plot(runs[0][1].time / divisor, known(runs[0][1].reference) / size, color="black", linestyle=":", linewidth=1)
+    axis.legend(loc="lower right", fontsize=SMALL - 1)
+    named(axis, f"{origin} gains")
+
+
+def _rate(axis: Any, entry: "Entry", comparison: "Compared", divisor: float) -> None:
+    run = entry.run
+    assert run is not None
+    reference, peak = known(run.reference_rate), comparison.uncontrolled.metrics.peak_slip_rate
+    middle, low, high = band(run.time / divisor, run.slip_rate)
+    axis.fill_between(middle, low, high, color=colour(entry.design.name), alpha=0.6, linewidth=0.4)
+    axis.plot(run.time / divisor, reference, color="black", linestyle=":", linewidth=1, label="reference")
+    if peak:
+        axis.axhline(peak, color="black", linestyle="--", linewidth=0.9, label="peak of the natural earthquake")
+    axis.set_yscale("symlog", linthresh=_power_of_ten(float(np.abs(reference).max())))
+    axis.yaxis.set_major_locator(_decades(axis))
+    named(axis, entry.label)
+    axis.set_ylabel("slip rate [m/s]")
+
+
+def _power_of_ten(value: float) -> float:
+    return float(10.0 ** np.ceil(np.log10(value)))
+
+
+def _decades(axis: Any) -> Any:
+    """Ticks at zero and at every other power of ten beyond the linear part, or further apart: at most five."""
+    from matplotlib.ticker import FixedLocator
+
+    last = int(np.floor(np.log10(max(np.abs(axis.get_ylim())))))
+    first = int(np.log10(axis.yaxis.get_transform().linthresh)) + 1
+    powers = [10.0**power for power in range(last, first - 1, -max(2, (last - first) // 2 + 1))] or [10.0**first]
+    return FixedLocator([*(-power for power in powers), 0.0, *powers])
+
+
+def _time_below(column: Any, drawing: Any, unit: str) -> None:
+    """Label the lowest axis of a column that is drawn, and the ticks of all."""
+    drawn = [axis for axis in column if axis in drawing.axes]
+    for axis in drawn:
+        axis.tick_params(labelleft=True)
+    lowest = drawn[-1]
+    lowest.set_xlabel(f"time [{unit}]")
+    lowest.tick_params(labelbottom=True)
+
+
+def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None" = None) -> Any:
+    """Fluid pressure of every run as the band that it fills; with close-ups, each has an inset with every step.
+
+    Parameters
+    ----------
+    comparison : Compared
+    close_ups : mapping of str to Trajectory, optional
+        Short runs by label of the entry.
+    """
+    laws, origins, found = grid(comparison)
+    drawing, axes = figure(
+        len(laws), 0.9 + (2.1 if close_ups else 1.15) * len(laws), len(origins), sharex=True, sharey=True
+    )
+    runs = [run for _, run in runs_of(comparison.entries)]
+    divisor, unit = clock(max(float(run.time[-1]) for run in runs))
+    size, name = scaled(comparison.fault.effective_normal_stress / 10, "Pa")
+    for column, origin in enumerate(origins):
+        for row, law in enumerate(laws):
+            entry = found.get((law, origin))
+            if entry is None or entry.run is None:
+                drawing.delaxes(axes[row, column])
+                continue
+            axis, shade = axes[row, column], colour(law)
+            middle, low, high = band(entry.run.time / divisor, entry.run.pressure / size, 10)
+            axis.fill_between(middle, low, high, color=shade, linewidth=0.8)
+            named(axis, entry.label)
+            axis.set_ylabel(f"pressure [{name}]")
+            if close_ups and entry.label in close_ups:
+                _inset(axis, close_ups[entry.label], shade)
+        _time_below(axes[:, column], drawing, unit)
+    if close_ups:
+        low, high = drawing.axes[0].get_ylim()
+        drawing.axes[0].set_ylim(low, high + _ROOM * (high - low))
+    note = "bands between the extremes of 10 kept samples" + (
+        "; insets: Δp about its mean, every step" if close_ups else ""
+    )
+    return finish(drawing, f"{comparison.fault.name}: fluid pressure", runs, with_diverged(comparison.entries, note))
+
+
+def _inset(axis: Any, run: "Trajectory", shade: str) -> None:
+    """The last quarter of a short run, about its mean, in an inset with its own units."""
+    late = slice(-(len(run.time) // 4 or 1), None)
+    time, values = run.time[late], run.pressure[late] - run.pressure[late].mean()
+    size, name = scaled(float(np.abs(values).max()) or 1.0, "Pa")
+    step, unit = scaled(float(time[-1] - time[0]) / 2 or 1.0, "s")
+    small = axis.inset_axes(_INSET)
+    small.set_zorder(5)
+    small.plot((time - time[0]) / step, values / size, color=shade, linewidth=0.7)
+    small.set_ylabel(f"Δp [{name}]", fontsize=SMALL - 2, labelpad=1)
+    small.set_xlabel(f"time after {time[0]:.4g} s [{unit}]", fontsize=SMALL - 2, labelpad=1)
+    small.tick_params(labelsize=SMALL - 2, pad=1)
+    small.margins(x=0)
+
+
+# ----------------------------------------------------------------------
+# Figures of faults whose friction has a state: their cycle, and how they are held in slow sliding.
+
+_BANDS = 600  # of a run at most: more are not seen, and make a file of many megabytes
+_PER_BAND = 16  # instants at least, four periods
+
+
+def state_figures(comparison: "Compared", natural: "StateRun") -> dict[str, Any]:
+    """``cycle``, where it is known, and ``slow-sliding`` and ``sliding-errors`` of the first law that ran."""
+    held = next(((e, e.run) for e in comparison.entries if isinstance(e.run, SlidingRun)), None)
+    drawn = {} if natural.failed else {"cycle": cycle(comparison, natural)}
+    return drawn if held is None else drawn | {"slow-sliding": slow_sliding(*held), "sliding-errors": errors(*held)}
+
+
+def cycle(comparison: "Compared", natural: "StateRun") -> Any:
+    """Slip and slip rate without control."""
+    run, name = natural.trajectory, comparison.fault.name
+    drawing, ((slip,), (rate,)) = figure(2, 3.6)
+    size, unit = length(float(run.slip.max()))
+    divisor, passing = clock(float(run.time[-1]))
+    slip.plot(run.time / divisor, run.slip / size, color=NATURAL)
+    slip.set_ylabel(f"slip [{unit}]")
+    rate.semilogy(run.time / divisor, run.slip_rate, color=NATURAL)
+    rate.axhline(natural.loading_rate, color="grey", linestyle=":", label="loading rate")
+    rate.set_ylabel("slip rate [m/s]")
+    rate.set_xlabel(f"time [{passing}]")
+    moved = "with inertia" if natural.provenance["plant"] == "smooth" else natural.provenance["plant"]
+    made = f"method {run.provenance['method']}, tolerance {run.provenance['rtol']:g}, {moved}"
+    return finish(drawing, f"{name} without control", [], made, legend=rate)
+
+
+def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
+    """Slip, slip rate, pressure and state of a law that holds slow sliding."""
+    fault, shade = entry.design.fault, colour(entry.design.name)
+    drawing, ((slip,), (rate,), (pressure,), (state,)) = figure(4, 6.6)
+    divisor, unit = clock(float(run.time[-1]))
+    time, speed = run.time / divisor, known(run.reference_rate)
+    size, name = length(float(run.slip.max()))
+    slip.plot(time, run.slip / size, color=shade, linewidth=2.5)
+    slip.plot(time, known(run.reference) / size, color="black", linestyle=":", linewidth=1, label="reference")
+    slip.set_ylabel(f"slip [{name}]")
+    first = float(speed[0])
+    _filled(rate, time, run.slip_rate / first, shade)
+    rate.plot(time, speed / first, color="black", linestyle=":", linewidth=1, label="reference")
+    if entry.guaranteed is not None:
+        never = float(entry.guaranteed.peak_slip_rate) / first
+        rate.axhline(never, color="black", linestyle="--", label="never exceeded, proved")
+    rate.set_ylabel("slip rate / V [-]")
+    largest, pascal = scaled(float(np.abs(run.pressure).max()) or 1.0, "Pa")
+    _filled(pressure, time, run.pressure / largest, shade)
+    pressure.set_ylabel(f"pressure [{pascal}]")
+    (steady,) = map(float, fault.friction.steady_state(first))
+    _filled(state, time, run.theta / steady, shade)
+    state.set_ylabel("state / steady [-]")
+    state.set_ylim(min(state.get_ylim()[0], 0.99), max(state.get_ylim()[1], 1.01))
+    state.set_xlabel(f"time [{unit}]")
+    shaken = f"shear stress up to {float(np.abs(run.stress).max()) / 1e3:.3g} kPa"
+    note = f"V = {first:.4g} m/s; bands between the extremes of {_width(run.time)} instants; {shaken}"
+    return finish(drawing, f"{fault.name} held in slow sliding", [run], note, legend=rate)
+
+
+def errors(entry: "Entry", run: SlidingRun) -> Any:
+    """Slip and slip rate less their references."""
+    drawing, axes = figure(2, 3.6)
+    divisor, unit = clock(float(run.time[-1]))
+    shown = ((known(run.slip_error), "m", "slip error"), (known(run.slip_rate_error), "m/s", "slip-rate error"))
+    for (axis,), (values, si, name) in zip(axes, shown, strict=True):
+        size, scale = scaled(float(np.abs(values).max()) or 1.0, si)
+        _filled(axis, run.time / divisor, values / size, colour(entry.design.name))
+        axis.set_ylabel(f"{name} [{scale}]")
+    axes[1, 0].set_xlabel(f"time [{unit}]")
+    note = f"bands between the extremes of {_width(run.time)} instants"
+    return finish(drawing, f"{entry.design.fault.name}: tracking errors", [run], note)
+
+
+def _filled(axis: Any, time: "np.ndarray", values: "np.ndarray", shade: str) -> None:
+    middle, low, high = band(time, values, _width(time))
+    axis.fill_between(middle, low, high, color=shade, linewidth=0.8)
+
+
+def _width(time: "np.ndarray") -> int:
+    """Instants of a band."""
+    return max(_PER_BAND, len(time) // _BANDS)
+
+
+# ----------------------------------------------------------------------
+# Figures of a comparison: one idea each, axes with units.
 
 
 def figures(comparison: "Compared") -> dict[str, Any]:
@@ -36,7 +287,7 @@ def figures(comparison: "Compared") -> dict[str, Any]:
         drawn |= {
             "states": states(comparison),
             "pressure": pressure(comparison),
-            "errors": errors(comparison),
+            "errors": error_figure(comparison),
             "metrics": metrics(comparison),
         }
     return drawn
@@ -67,7 +318,7 @@ def end(*runs: "Run") -> float:
     return float(min(1.4 * max(settled), min(run.time[-1] for run in runs))) or float(runs[0].time[-1])
 
 
-def errors(comparison: "Compared") -> Any:
+def error_figure(comparison: "Compared") -> Any:
     """Size of both tracking errors over time, as envelopes."""
     drawing, ((slip,), (rate,)) = figure(2, 3.9)
     runs = runs_of(comparison.entries)
@@ -118,3 +369,89 @@ def metrics(comparison: "Compared") -> Any:
     axes[0, 0].invert_yaxis()
     title = f"{comparison.fault.name}: comparison after a quarter of the task"
     return finish(drawing, title, [run for _, run in settled], with_diverged(comparison.entries))
+
+
+# ----------------------------------------------------------------------
+# A map of stability: stiffness against effective normal stress and against injected pressure.
+
+_COLOURS = {"unstable": "#F3C6B2", "stable": "#BFD9EC"}
+
+
+def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True) -> Any:
+    """Draw the stable and the unstable region of a fault, bounded by its symbolic stability conditions.
+
+    The left panel varies the effective normal stress σ' at the given pressure, the right one the pressure p at the
+    fault's σ'. Mass, damping and friction are the fault's. The point is the fault; its verdict is exact.
+
+    Parameters
+    ----------
+    fault : Fault
+    pressure : float
+        Injected pressure [Pa] at which the fault is marked, below its effective normal stress.
+    loading_rate : float, optional
+        Slip rate [m/s] of steady sliding; without it the law's ``operating_rate``.
+    inertia : bool
+        Whether the mass counts.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ParameterError
+        When the pressure opens the fault, or the rate is outside of the law's domain.
+    """
+    regions = stability_regions(fault, pressure=pressure, loading_rate=loading_rate, inertia=inertia)
+    drawing, ((left, right),) = figure(1, 3.6, 2, sharey=True)
+    normal, outcome = fault.effective_normal_stress, regions.verdict.outcome.name.lower()
+    (size, unit), (high, stiff) = scaled(normal, "Pa"), scaled(regions.stiffness.max(), "Pa")
+    for axis, plane in ((left, regions.over_stress), (right, regions.over_pressure)):
+        _region(axis, plane, size, regions.stiffness / high, high)
+        axis.plot(plane.own / size, regions.own / high, "ko", markersize=7, label=f"{fault.name}: {outcome}")
+    left.set_xlabel(f"effective normal stress σ' [{unit}] (p = {pressure / size:.4g} {unit})")
+    right.set_xlabel(f"injected pressure p [{unit}] (σ' = {normal / size:.4g} {unit}; p < 0 is withdrawal)")
+    left.set_ylabel(f"stiffness per area k/A [{stiff}/m]")
+    if regions.nucleation_length is not None:
+        left.plot(normal / size, regions.critical / high, "kx", label="critical here")
+    box = {"boxstyle": "round", "facecolor": "white", "alpha": 0.85, "edgecolor": "#999999"}
+    left.text(0.03, 0.97, _critical(regions, fault), transform=left.transAxes, va="top", fontsize=8, bbox=box)
+    once = {
+        name: handle for axis in (left, right) for handle, name in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
+    drawing.legend(once.values(), once.keys(), loc="outside lower center", ncols=3, fontsize=8)
+    rate, mass = float(regions.verdict.loading_rate), "with inertia" if inertia else "quasi-dynamic"
+    about = f"steady sliding at {rate:.3g} m/s" if rate else "rest"
+    drawing.suptitle(
+        f"{fault.name}, {fault.friction.name}, about {about}, {mass}: {outcome}, "
+        f"margin {float(regions.verdict.margin[0]):+.3g}",
+        fontsize=10,
+    )
+    return drawing
+
+
+def _region(axis: Any, plane: Plane, size: float, stiffness: np.ndarray, high: float) -> None:
+    """Colour one panel by what is stable, and draw the critical stiffness and where damping alone decides."""
+    across, critical = plane.across / size, np.where(plane.critical > 0, plane.critical, np.nan) / high
+    levels = [-0.5, 0.5, 1.5]
+    axis.contourf(across, stiffness, plane.stable.astype(float), levels=levels, colors=list(_COLOURS.values()))
+    for name, shade in _COLOURS.items():
+        if (plane.stable == (name == "stable")).any():
+            axis.fill_between([], [], color=shade, label=name)
+    if np.isfinite(critical).any():
+        axis.plot(across, critical, color="black", label="critical stiffness")
+    for limit in plane.limits:
+        axis.axvline(limit / size, color="black", linestyle="--", label="damping limit")
+    axis.set(xlim=(np.min(across), np.max(across)), ylim=(np.min(stiffness), np.max(stiffness)))
+
+
+def _critical(regions: StabilityRegions, fault: Fault) -> str:
+    if regions.nucleation_length is None:
+        return "no critical stiffness"
+    (size, unit), (metres, metre) = scaled(regions.critical, "Pa"), scaled(regions.nucleation_length, "m")
+    side, km = scaled(fault.side, "m")
+    return (
+        f"critical stiffness per area {regions.critical / size:.4g} {unit}/m\n"
+        f"nucleation length {regions.nucleation_length / metres:.4g} {metre}\n"
+        f"fault length {fault.side / side:.4g} {km}"
+    )

@@ -8,24 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from quakedesign.certificates import certificate_text
-from quakedesign.certificates.guarantee.files import guarantee_text
 from quakedesign.errors import OutputError
 from quakedesign.fault import fault_toml
-from quakedesign.output import require_room, whole_folder, write_whole
-from quakedesign.report.captions import CAPTIONS
-from quakedesign.report.comparison import Comparison
-from quakedesign.report.csv_tables import csv_text
-from quakedesign.report.figure_files import DEFAULT, figure_bytes, write_results
-from quakedesign.report.kept_figures import drawn_once
-from quakedesign.report.page import page_html
+from quakedesign.files import require_room, whole_folder, write_whole
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text
+from quakedesign.lyapunov import certificate_text
+from quakedesign.report.comparison_table import Comparison
+from quakedesign.report.drawing import DEFAULT, drawn_once, figure_bytes, write_results
+from quakedesign.report.page import CAPTIONS, page_html, reproduction, versions
 from quakedesign.report.paper_figures import PAPER
-from quakedesign.report.reproduction import reproduction, versions
+from quakedesign.report.tables import csv_text
 from quakedesign.studies.facts import fault_dict
-from quakedesign.studies.paper_numbers import printed, table
+from quakedesign.studies.paper import printed, table
 
 if TYPE_CHECKING:
-    from quakedesign.report.paper_study import PaperStudy
+    from quakedesign.report.paper_figures import PaperStudy
 
 
 def prepare(out: Path, *, force: bool) -> None:
@@ -112,7 +109,7 @@ def write_folder(
     study : PaperStudy, optional
         Of the same comparison: its figures instead of the comparison's, and ``numbers.csv``.
     formats : sequence of str
-        Of the figures beside the page, see `quakedesign.report.figure_files.FORMATS`.
+        Of the figures beside the page, see `quakedesign.report.drawing.FORMATS`.
     command : str
         With which the report is made, for its readers.
     tell : callable

@@ -1,31 +1,347 @@
-"""The report as one HTML page that holds its figures and equations and loads nothing."""
+"""HTML report on one page with its figures and equations, without external resources.
 
+Chapters: units and numbers as HTML; equations as MathML; account of every controller; parameter table;
+information for reproduction; captions.
+"""
+
+import os
+import platform
+import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from datetime import UTC, datetime
+from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-from markupsafe import Markup
+from latex2mathml.converter import convert
+from markupsafe import Markup, escape
 
-from quakedesign.certificates.guarantee import NoGuarantee
-from quakedesign.report.account import ASKED, Account, accounts
-from quakedesign.report.captions import CAPTIONS
-from quakedesign.report.grade import GRADES
-from quakedesign.report.headlines import FEEDFORWARD_COLUMNS, scheme_sentence
-from quakedesign.report.html_text import typeset
-from quakedesign.report.mathml import mathml
-from quakedesign.report.parameter_table import HEADINGS, parameter_rows
-from quakedesign.report.reproduction import Reproduction
-from quakedesign.report.state_runs import cycle_sentence, left_out_lines
+from quakedesign.fault import Fault, fault_toml
+from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, WIDTHS
+from quakedesign.guarantees import NoGuarantee, SlidingGuarantee
+from quakedesign.lyapunov import Verdict
+from quakedesign.report.sentences import (
+    FEEDFORWARD_COLUMNS,
+    GRADES,
+    beside_guarantee,
+    cycle_sentence,
+    domain_sentence,
+    feedforward_rows,
+    grade,
+    guarantee_lines,
+    left_out_lines,
+    limit_lines,
+    run_sentences,
+    scheme_sentence,
+    sentences,
+)
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
-from quakedesign.studies.equations import coordinates, plant_latex
-from quakedesign.studies.facts import fault_sentences
-from quakedesign.studies.state_runs import StateRun
+from quakedesign.studies.facts import coordinates, fault_sentences, law_latex, plant_latex
+from quakedesign.studies.runs import StateRun
 from quakedesign.text import visible
 
 if TYPE_CHECKING:
-    from quakedesign.fault import Fault
+    from quakedesign.laws import Controller
+    from quakedesign.lyapunov.exact.premises import Premise
     from quakedesign.studies.comparison import Compared, Entry
+
+
+# ----------------------------------------------------------------------
+# Units, numbers and sentences as HTML.
+
+_SIGNS = (("&lt;=", "≤"), ("&gt;=", "≥"), ("T_s", "T<sub>s</sub>"))
+
+
+def unit_html(unit: str) -> Markup:
+    """``Pa s/m^2`` with a raised exponent and dots between factors; nothing for a pure number."""
+    return Markup("") if unit in ("", "-") else _set(unit.replace(" ", "·"))
+
+
+def typeset(text: object) -> object:
+    """A sentence of a program as people set it: signs, raised exponents, powers of ten; markup stays as it is."""
+    return _set(text) if isinstance(text, str) and not isinstance(text, Markup) else text
+
+
+def _set(text: str) -> Markup:
+    said = str(escape(visible(text)))
+    for written, shown in _SIGNS:
+        said = said.replace(written, shown)
+    said = re.sub(r"\^(?:\(([-\d/]+)\)|(-?\d+))", lambda power: f"<sup>{power[1] or power[2]}</sup>", said)
+    said = re.sub(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([-+]\d+)\b", _power_of_ten, said)
+    return Markup(re.sub(r"(?<![\w<>./^;])-(?=\d)", "−", said))
+
+
+def _power_of_ten(number: re.Match[str]) -> str:
+    power = str(int(number[2])).replace("-", "−")
+    return f"{number[1]}·10<sup>{power}</sup>"
+
+
+# ----------------------------------------------------------------------
+# Equations as MathML, which browsers draw without a script or a network.
+
+
+def mathml(latex: str, *, display: str = "block") -> Markup:
+    """MathML of an equation in LaTeX."""
+    drawn = convert(latex, display=display)
+    return Markup(drawn.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', ""))
+
+
+# ----------------------------------------------------------------------
+# What the page tells of every controller: guarantee, run, limits, proof, each in sentences and rows.
+
+ASKED = {
+    "sampling_time": "the pressure is renewed at least this often",
+    "delay": "no more time passes from the measurement to the pressure",
+    "control_coefficient": "the input gain β stays in the certified range",
+    "friction_slope": "friction changes with slip no faster than certified",
+    "along_reference": "reference and disturbance alone change h no faster than the law withstands",
+    "level_set": "a start at rest lies in the certified region, at every phase of the disturbance",
+    "on_trajectory": "h changes in the run that is shown no faster than the law withstands",
+    "constant_reference": "the reference stands still",
+    "vanishing_disturbance": "the disturbance vanishes at the equilibrium",
+    "pressure_at_rest": "the pressure that the task needs lies inside the limits of the law",
+    "differentiator": "the slip rate is estimated by a differentiator that is fast enough",
+}
+"""What every premise asks, in words; those of users' laws by their own notes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Account:
+    """What is told of one controller.
+
+    Attributes
+    ----------
+    label, badge : str
+    good : bool
+        Whether the loop that ran has a guarantee, or its proof covers it.
+    guarantee, run, limits, verdict, proof : list of str
+        Sentences without a full stop.
+    law : list of Markup
+        Equations with the numbers of the design.
+    gains : list of (str, str, Markup)
+        Name, value, unit.
+    premises, base_premises, known : list of tuple
+        Rows of their tables: premises of what is proved first, of the certificate of base gains in continuous time, and
+        what is certified with a feed-forward.
+    """
+
+    label: str
+    badge: str
+    good: bool
+    guarantee: list[str]
+    run: list[str]
+    limits: list[str]
+    verdict: list[str]
+    proof: list[str]
+    law: list[Markup]
+    gains: list[tuple[str, str, Markup]]
+    premises: list[tuple[str, ...]]
+    base_premises: list[tuple[str, ...]]
+    known: list[tuple[str, ...]]
+
+
+def accounts(comparison: "Compared") -> list[Account]:
+    """Of all controllers, designed ones first."""
+    return [_account(entry) for origin in ("designed", "published") for entry in comparison.of(origin)]
+
+
+def _account(entry: "Entry") -> Account:
+    design = entry.design
+    run = run_sentences(entry.run, design.fault) if entry.run else []
+    said, limits = guarantee_lines(entry), limit_lines(entry)
+    compensated = [entry.answer.compensation.sentence()] if entry.answer and entry.answer.compensation else []
+    domain = [domain_sentence(design.domain)] if design.domain else []
+    return Account(
+        label=entry.label,
+        badge=badge(entry),
+        good=entry.guaranteed is not None or grade(entry) == "proved for this loop and task",
+        guarantee=[line for line in said if line not in (*limits, *compensated)],
+        run=run,
+        limits=limits,
+        verdict=beside_guarantee([sentence for sentence in sentences(entry) if sentence not in run], entry),
+        proof=[*compensated, *_stepping(design.controller), *_slowly(entry), *domain],
+        law=[mathml(equation) for equation in law_latex(design.controller)],
+        gains=_gains(entry),
+        premises=[_row(p) for p in design.conditions],
+        base_premises=[_row(p) for p in design.premises if p not in design.conditions],
+        known=feedforward_rows(entry.variants) if entry.variants else [],
+    )
+
+
+def _stepping(law: "Controller | None") -> list[str]:
+    """How a law of samples runs; nothing for a law in continuous time."""
+    sampling = law.sampling if law else None
+    return [f"it runs in the scheme {sampling.scheme}, once every {float(sampling.step):g} s"] if sampling else []
+
+
+def _slowly(entry: "Entry") -> list[str]:
+    """How a guarantee of slow sliding is found; nothing for others."""
+    found = entry.guaranteed
+    if not isinstance(found, SlidingGuarantee):
+        return []
+    cells = "one cell" if len(found.cells) == 1 else f"{len(found.cells)} cells"
+    return [
+        "the pressure at the well is p beside what the nominal fault needs along its reference, kV/(μ*A) more a second",
+        "about slow sliding at V, with v = V e^y and θ = (D_c/V) e^z, the loop is linear but for the exponentials, "
+        "which stand in sectors on |y| ≤ Y, for inertia, whose fast mode is bounded, and for modes of the rock that "
+        "the loop leaves out, bounded too; peaks of the responses of the linear loop bound all errors, and claims that "
+        f"follow from themselves hold {found.lasts}; the box of constants falls into {cells}",
+    ]
+
+
+def badge(entry: "Entry") -> str:
+    """Verdict in two or three words."""
+    if entry.guaranteed is not None:
+        step = entry.design.fault.sampling_time
+        return f"not guaranteed at T_s = {step:g} s" if entry.design.other_step else "guaranteed as it runs"
+    found = entry.design.verdict
+    return "proved in continuous time only" if found is Verdict.PROVED else str(found)
+
+
+def _row(premise: "Premise") -> tuple[str, ...]:
+    ratio = "–" if premise.ratio is None else f"{premise.ratio:.3g}"
+    return (premise.name, *premise.sides, ratio, "yes" if premise.holds else "no", premise.note)
+
+
+_OTHER_UNITS = {"scale": "", "weight": "", "divisor": "m^2/kg", "authority": "m^2/kg"}
+_OTHER_UNITS |= {"rest_width": "Pa", "rest_per_slip": "Pa/m", "rest_resolution": "m"}
+_OTHER_UNITS |= {"rest_least": "Pa", "rest_largest": "Pa", "rest_fastest": "m"}
+
+
+def _gains(entry: "Entry") -> list[tuple[str, str, Markup]]:
+    units: dict[str, Any] = _OTHER_UNITS | (dict(entry.design.controller.gain_units) if entry.design.controller else {})
+    return [(n, f"{float(v):.6g}", unit_html(units.get(n, ""))) for n, v in entry.design.gains.items()]
+
+
+# ----------------------------------------------------------------------
+# Parameters of a fault with symbols and units, as rows for people.
+
+_DERIVED = {
+    "mass": ("m", "kg"),
+    "stiffness": ("k", "N/m"),
+    "specific_stiffness": (r"\hat k", "1/s^2"),
+    "specific_damping": (r"\hat\eta", "1/s"),
+    "authority": (r"\hat N", "m^2/kg"),
+    "natural_frequency": (r"\omega_n", "rad/s"),
+    "damping_ratio": (r"\zeta", ""),
+}
+_STEP = "sampling_time"
+Row = tuple[Any, ...]
+HEADINGS = ("parameter", "symbol", "value", "unit", "where")
+
+
+def parameter_rows(fault: Fault) -> list[Row]:
+    """One row a parameter under `HEADINGS`: those of the fault file, its uncertainty, and what follows from them.
+
+    No disturbance of friction with a state: what pushes such a fault is the stress of its guarantee.
+    """
+    rows = [
+        *_told(fault, PLANT, "fault"),
+        *_told(fault.friction, fault.friction.quantities(), "friction"),
+        *_told(fault.reference, [name for name in TASK if name != _STEP], "task"),
+        *_told(fault, [_STEP], "task"),
+        *([] if fault.friction.state_names else _told(fault.disturbance, DISTURBANCE, "disturbance")),
+    ]
+    rows += [
+        _parameter_row(f"half-width of {name}", float(getattr(fault.box, name)), "", "uncertainty", "±")
+        for name in WIDTHS
+    ]
+    rows += [
+        _parameter_row(name, getattr(fault, name), unit, "follows", symbol) for name, (symbol, unit) in _DERIVED.items()
+    ]
+    return [row for row in rows if row[2] is not None]
+
+
+def _told(part: Any, names: Iterable[str], where: str) -> Iterator[Row]:
+    """Rows of the fields of a dataclass with these names."""
+    known = {each.name: each.metadata for each in fields(part)}
+    for name in names:
+        yield _parameter_row(name, getattr(part, name), known[name]["unit"], where, known[name].get("symbol"))
+
+
+def _parameter_row(name: str, value: float | None, unit: str, where: str, symbol: str | None = None) -> Row:
+    shown = Markup("") if symbol is None else Markup("±") if symbol == "±" else mathml(symbol, display="inline")
+    return (name.replace("_", " "), shown, None if value is None else f"{value:.6g}", unit_html(unit) or "–", where)
+
+
+# ----------------------------------------------------------------------
+# What it takes to make a report again: when, with which versions, by which command, from which numbers.
+
+_PACKAGES = ("quakedesign", "sympy", "cvxpy", "clarabel", "casadi", "numpy", "scipy", "control", "python-flint")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduction:
+    """How a report was made.
+
+    Attributes
+    ----------
+    date : str
+        UTC; that of SOURCE_DATE_EPOCH where it is set, for pages that are the same byte for byte.
+    command : str
+        As it was typed; empty where the report was not made by one.
+    versions : mapping of str to str
+        Of the package, of all libraries that numbers depend on, and of Python.
+    scenario : list of str
+        Lines of the fault as TOML.
+    """
+
+    date: str
+    command: str
+    versions: Mapping[str, str]
+    scenario: list[str]
+
+
+def versions() -> dict[str, str]:
+    """Versions by package."""
+    return {package: version(package) for package in _PACKAGES}
+
+
+def reproduction(fault: Fault, command: str = "") -> Reproduction:
+    """How a report of a fault is made now."""
+    given = os.environ.get("SOURCE_DATE_EPOCH", "")
+    now = datetime.fromtimestamp(int(given), UTC) if given.isdecimal() else datetime.now(UTC)
+    return Reproduction(
+        date=f"{now:%Y-%m-%d %H:%M} UTC",
+        command=command,
+        versions=versions() | {"Python": platform.python_version(), "machine": platform.machine()},
+        scenario=fault_toml(fault).splitlines(),
+    )
+
+
+# ----------------------------------------------------------------------
+# What every figure shows, in words: below it in the report, and for readers who do not see it.
+
+CAPTIONS = {
+    "uncontrolled": "Without control: slip, with the slip at which the statics let the fault rest, and slip rate of "
+    "the natural earthquake.",
+    "cycle": "Without control, loaded from afar at the reference rate of the law: slip and slip rate; dotted: the "
+    "loading rate.",
+    "slow-sliding": "Held in slow sliding under the stress that the guarantee allows, as a sine: slip and its "
+    "reference, slip rate with what it never exceeds, fluid pressure in the fault, and state of friction over that of "
+    "steady sliding.",
+    "sliding-errors": "How far slip and slip rate are from their references in that run.",
+    "states": "Closed loop: slip and its reference on top, then the band that the slip rate of every law fills. The "
+    "scale is linear near the reference rate and logarithmic beyond; dashed: the peak of the natural earthquake.",
+    "pressure": "Fluid pressure that every law asks for; below zero fluid is withdrawn.",
+    "errors": "How far slip and slip rate are from their references, the largest of every 40 kept samples. Lower is "
+    "better.",
+    "metrics": "Largest errors, root mean square and total variation of the pressure after a quarter of the task. "
+    "Hatched: published gains.",
+    "friction-law": "Friction coefficient over slip, and the line along which the spring unloads: where friction falls "
+    "faster than the spring, the fault is unstable.",
+    "earthquakes": "Natural earthquake and the one that a constant injection induces.",
+    "friction-coefficient": "Friction coefficient in closed loop between its smallest and largest value.",
+    "errors-and-power": "Errors and pressure over those of the e-LQR; bars to the left of one are better.",
+    "peak-against-tracking": "What tracking costs: errors that were seen over the peak that is guaranteed, one point a "
+    "design.",
+}
+
+
+# ----------------------------------------------------------------------
+# The report as one HTML page that holds its figures and equations and loads nothing.
 
 MODEL_LIMITS = (
     "the model is a block with one degree of freedom: it says nothing of where an earthquake ends, of rupture speed, "

@@ -1,12 +1,14 @@
-"""Figures of the paper that show simulations, drawn anew for any fault, published gains beside designed ones.
+"""Figures of the paper that show simulations, redrawn for any fault.
 
-Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Control, sections II-D and IV. Its figures of
-the laboratory show experiments; here the laboratory fault is simulated like any other.
+Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Control, sections II-D and IV.
+The laboratory fault is simulated here; its figures in the paper show experiments.
 """
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.report.closed_loop_figures import pressure
+from quakedesign.report.comparison_table import Comparison
 from quakedesign.report.drawing import (
     INDUCED,
     NATURAL,
@@ -23,14 +25,20 @@ from quakedesign.report.drawing import (
     style,
     with_diverged,
 )
-from quakedesign.report.figures import end, figures
-from quakedesign.studies.paper_numbers import BARS, baseline, relative
-from quakedesign.studies.paper_study import friction_curve
+from quakedesign.report.figures import end, figures, pressure
+from quakedesign.studies.paper import BARS, PaperRuns, baseline, friction_curve, paper_runs, relative
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Compared, Entry
-    from quakedesign.studies.paper_study import PaperRuns
+
+
+# ----------------------------------------------------------------------
+# Figures of the paper that show simulations, drawn anew for any fault, published gains beside designed ones.
+#
+# Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Control, sections II-D and IV. Its figures
+# of
+# the laboratory show experiments; here the laboratory fault is simulated like any other.
 
 PAPER = {
     "friction-law": "fig:mu",
@@ -205,3 +213,26 @@ def _notes(axis: Any, basis: "Entry") -> None:
 
 def _superscript(unit: str) -> str:
     return unit.replace("^2", "²")
+
+
+# ----------------------------------------------------------------------
+# Figures of the paper from the runs that they need.
+
+
+class PaperStudy(PaperRuns):
+    """Runs of all figures, see `PaperRuns`, and the figures themselves."""
+
+    comparison: Comparison
+
+    def figures(self) -> dict[str, Any]:
+        """Matplotlib figures by name, drawn once."""
+        return self._drawn
+
+    @cached_property
+    def _drawn(self) -> dict[str, Any]:
+        return paper_figures(self)
+
+
+def paper_study(comparison: Comparison, *, progress: Callable[[str, float], None] | None = None) -> PaperStudy:
+    """Make the short runs that the figures of the paper need beside a comparison; see `paper_runs`."""
+    return PaperStudy(**vars(paper_runs(comparison, progress=progress)))

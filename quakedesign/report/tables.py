@@ -1,13 +1,18 @@
-"""The two tables of a comparison, as plain rows for every medium: what every run came to, and its numbers."""
+"""Tables of a comparison as plain rows, and as CSV."""
 
-from typing import TYPE_CHECKING
+import csv
+import io
+from typing import TYPE_CHECKING, Any
 
-from quakedesign.report.grade import grade
-from quakedesign.report.outcomes import OUTCOME_COLUMNS, outcome_cells
+from quakedesign.report.sentences import OUTCOME_COLUMNS, grade, outcome_cells
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Compared
+
+
+# ----------------------------------------------------------------------
+# The two tables of a comparison, as plain rows for every medium: what every run came to, and its numbers.
 
 OUTCOMES = ("controller", *OUTCOME_COLUMNS, "verdict")
 COLUMNS = (
@@ -52,3 +57,17 @@ def _cells(run: "Trajectory | None") -> tuple[str, ...]:
         "–" if v is None else f"{v:.2f}" if name == "reverse_slip_fraction" else f"{v + 0.0:.2e}"
         for name, v in values.items()
     )
+
+
+# ----------------------------------------------------------------------
+# Tables of numbers as CSV.
+
+
+def csv_text(rows: list[dict[str, Any]]) -> str:
+    """Rows as CSV with a head line; what does not apply is empty."""
+    heads = list(dict.fromkeys(name for row in rows for name in row))
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, heads, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return stream.getvalue()

@@ -5,27 +5,29 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from quakedesign.report.comparison import Comparison
-from quakedesign.report.grade import GRADES, grade
-from quakedesign.report.headlines import (
+from quakedesign.report.comparison_table import Comparison
+from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
+    GRADES,
     beside_guarantee,
+    cycle_sentence,
     domain_sentence,
     feedforward_rows,
+    grade,
     guarantee_lines,
     headline,
+    left_out_lines,
     remarks,
+    run_sentences,
     scheme_sentence,
 )
-from quakedesign.report.outcomes import run_sentences
-from quakedesign.report.state_runs import cycle_sentence, left_out_lines
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.studies.facts import fault_sentences
-from quakedesign.studies.state_runs import StateRun
+from quakedesign.studies.runs import StateRun
 
 if TYPE_CHECKING:
-    from quakedesign.certificates.premises import Premise
     from quakedesign.fault import Fault
+    from quakedesign.lyapunov.exact.premises import Premise
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Entry
 

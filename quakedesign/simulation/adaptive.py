@@ -10,11 +10,10 @@ import numpy as np
 import sympy as sp
 
 from quakedesign.errors import ParameterError, SimulationError
-from quakedesign.loop.law_expressions import law_expressions
-from quakedesign.loop.schemes import Scheme
-from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.energy import WORKS
-from quakedesign.simulation.integrators.adaptive import AdaptiveIntegrator, Flow, StoppedError
+from quakedesign.laws.sampled_controller import law_expressions
+from quakedesign.loop import Scheme
+from quakedesign.simulation.closed_loop import WORKS, ClosedLoop
+from quakedesign.simulation.integrators import AdaptiveIntegrator, Flow, StoppedError
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.symbolic import SignedPower
 from quakedesign.symbolic.signed_power import AbsolutePower

@@ -1,7 +1,13 @@
-"""Plant, law and reference of one closed loop, from SymPy to CasADi functions."""
+"""Closed loop of plant, control law and reference as CasADi functions.
 
+Chapters: far-field loading and user-defined perturbation; parameter variation within the uncertainty box
+without new derivation or compilation; energy budget of a run [J].
+"""
+
+import math
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, astuple, dataclass, fields, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
@@ -9,24 +15,357 @@ import casadi as ca
 import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
-from quakedesign.controllers import Controller
-from quakedesign.controllers.feed_forward import NONE
-from quakedesign.fault import Fault
-from quakedesign.loop.law_expressions import integral_symbols, law_expressions, r, r_acceleration, r_rate
-from quakedesign.rationals import rational
-from quakedesign.simulation.energy import Meter, Metered
+from quakedesign.errors import ParameterError
+from quakedesign.exact import rational
+from quakedesign.fault import Fault, FrictionLaw
+from quakedesign.fault.model import require_nonnegative
+from quakedesign.laws import Controller
+from quakedesign.laws.feed_forward import NONE
+from quakedesign.laws.sampled_controller import integral_symbols, law_expressions, r, r_acceleration, r_rate
+from quakedesign.loop.schemes.base import Stepped
 from quakedesign.simulation.integrators import Integrator
-from quakedesign.simulation.loading import NOTHING, Load
-from quakedesign.simulation.variation import (
-    WeakenedFriction,
-    complete,
-    symbol,
-    symbols,
-    varied_disturbance,
-    varied_values,
-)
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_casadi
+
+# ----------------------------------------------------------------------
+# What acts on a run beside the fault's own disturbance: the far field, and a perturbation of the user's.
+
+SYMBOLS = ("slip", "slip_rate", "time")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """Drift of the far end of the spring, and a perturbation φ_e(slip, slip rate, time).
+
+    The far end is at rest until t = 0 in the sense that the fault is then on the verge of slip, moves at the drift rate
+    from then on, and so adds k̂·drift·t to x2' (ERRATA 24); a perturbation is added to that of the fault.
+
+    Attributes
+    ----------
+    drift : float
+        v_∞ [m/s], not negative.
+    perturbation : Expr or None
+        φ̂_e [m/s²], a SymPy expression of the symbols ``slip`` [m] (x1), ``slip_rate`` [m/s] (x2) and ``time`` [s].
+
+    Raises
+    ------
+    ParameterError
+        For a drift that is negative or not finite, or a perturbation in other symbols.
+    """
+
+    drift: float = 0.0
+    perturbation: "sp.Expr | None" = None
+
+    def __post_init__(self) -> None:
+        require_nonnegative(drift=self.drift)
+        if self.perturbation is None:
+            return
+        try:
+            expression = sp.sympify(self.perturbation, strict=True)
+        except sp.SympifyError:
+            expression = None
+        names = {symbol.name for symbol in expression.free_symbols} if isinstance(expression, sp.Expr) else {"?"}
+        if not names <= set(SYMBOLS):
+            raise ParameterError(
+                f"perturbation must be a SymPy expression of the symbols {', '.join(SYMBOLS)}, in m/s². "
+                f"Received {self.perturbation!r}."
+            )
+        object.__setattr__(self, "perturbation", expression)
+
+    @cached_property
+    def acceleration(self) -> "sp.Expr":
+        """φ̂_e [m/s²] of the user alone, in x1, x2 and t of `quakedesign.symbolic.plant`."""
+        if self.perturbation is None:
+            return sp.Integer(0)
+        meant = dict(zip(SYMBOLS, (plant.x1, plant.x2, plant.t), strict=True))
+        named = {symbol: meant[symbol.name] for symbol in self.perturbation.free_symbols}
+        return self.perturbation.subs(named, simultaneous=True)
+
+    def push(self, fault: "Fault") -> "sp.Expr":
+        """k̂·drift·t [m/s²] of the far end on a fault, in t of `quakedesign.symbolic.plant`."""
+        return plant.plant_values(fault)[plant.k_hat] * sp.Rational(str(rational(self.drift))) * plant.t
+
+
+NOTHING = Load()
+
+
+# ----------------------------------------------------------------------
+# A fault that differs from the nominal one within its uncertainty box, without deriving or compiling anything anew.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variation:
+    """True parameters over nominal ones; the controller keeps what it was designed with.
+
+    Attributes
+    ----------
+    stiffness, damping, authority : float
+        Factors of k̂, η̂ and N̂ [-], each within the fault's box.
+    weakening : float
+        Share of the friction drop that takes place [-], 0 … 1: μ = μ_res + weakening·(μ_law − μ_res). With the
+        authority it sets β; every value keeps μ and its slope within the bounds of every box.
+    amplitude : float
+        Share of the amplitude of the fault's sinusoidal disturbance that acts [-], 0 … 1.
+    phase : float
+        Of that sine at the start [rad], 0 … 2π.
+    """
+
+    stiffness: float = 1.0
+    damping: float = 1.0
+    authority: float = 1.0
+    weakening: float = 1.0
+    amplitude: float = 1.0
+    phase: float = 0.0
+
+    def require_within(self, fault: Fault) -> None:
+        """Refuse what the fault's uncertainty box excludes.
+
+        Raises
+        ------
+        ParameterError
+        """
+        box = fault.box
+        for name in ("stiffness", "damping", "authority"):
+            width = getattr(box, name)
+            _require(name, getattr(self, name), float(1 - width), float(1 + width), f"the box {box.name!r}")
+        for name, highest in (("weakening", 1.0), ("amplitude", 1.0), ("phase", 2 * math.pi)):
+            _require(name, getattr(self, name), 0.0, highest, "every box")
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The factors in the order of `symbols`."""
+        return astuple(self)
+
+
+def _require(name: str, value: float, low: float, high: float, where: str) -> None:
+    if not low - 1e-12 <= value <= high + 1e-12:
+        raise ParameterError(
+            f"{name} of a variation must be {low:g} to {high:g} in {where}. Received {value!r}. "
+            "Choose a value inside, or a fault with a wider box."
+        )
+
+
+def names() -> tuple[str, ...]:
+    """Names of the factors, in order."""
+    return tuple(field.name for field in fields(Variation))
+
+
+def complete(factors: tuple[Any, ...]) -> tuple[Any, ...]:
+    """All factors, those left out at the end as in the nominal fault."""
+    return factors + astuple(Variation())[len(factors) :]
+
+
+def symbols() -> tuple[sp.Symbol, ...]:
+    """Symbols of the factors, none of which is negative."""
+    return tuple(map(symbol, names()))
+
+
+def symbol(name: str) -> sp.Symbol:
+    """Symbol of one factor."""
+    return sp.Symbol(f"factor_{name}", nonnegative=True)
+
+
+def varied_disturbance(disturbance: sp.Expr) -> sp.Expr:
+    """The disturbance of a fault with share and phase of its sine."""
+    return disturbance.replace(sp.sin, lambda angle: symbol("amplitude") * sp.sin(angle + symbol("phase")))
+
+
+@dataclass(frozen=True)
+class WeakenedFriction:
+    """A friction law of which only a share of the drop takes place."""
+
+    law: FrictionLaw
+    share: Any
+
+    def coefficient(self, slip: Any, rate: Any) -> Any:
+        """Friction coefficient [-]."""
+        return self._weakened(self.law.coefficient(slip, rate))
+
+    def extended(self, slip: Any, rate: Any) -> Any:
+        """Friction coefficient [-] continued to all slips and rates."""
+        return self._weakened(self.law.extended(slip, rate))
+
+    def _weakened(self, value: Any) -> Any:
+        residual = sp.sympify(self.law.bounds[0])
+        return residual + self.share * (value - residual)
+
+
+def varied_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
+    """Value of every hatted parameter, nominal number times symbol."""
+    stiffness, damping, authority, *_ = symbols()
+    factors = {plant.k_hat: stiffness, plant.eta_hat: damping, plant.N_hat: authority}
+    return {hatted: value * factors.get(hatted, 1) for hatted, value in plant.plant_values(fault).items()}
+
+
+# ----------------------------------------------------------------------
+# Where the energy of a run went: forces times rates on one side, stored energies on the other.
+
+WORKS = ("work_weakening", "work_injection", "work_viscous", "work_disturbance", "sum_slip")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyBudget:
+    """Energies between the start and the end of a run [J]; what was stored or dissipated came from some work.
+
+    kinetic + elastic + frictional + viscous − far_field − disturbance − residual = 0.
+
+    Attributes
+    ----------
+    kinetic, elastic : float
+        Change of ½m·x2² and of ½k·stretch² [J].
+    frictional : float
+        Heat of friction under the pressure that acted, ∫μA(σ' − p)·x2 dt [J].
+    injection : float
+        Share of the frictional work that the pressure relieved, ∫μAp·x2 dt [J]: without it friction would have taken
+        frictional + injection on the same way.
+    viscous : float
+        Heat of the dashpot (radiation damping, where that is the damping), ∫η(x2 − v_∞)² dt [J].
+    far_field : float
+        Work of the drifting far end on spring and dashpot [J]; 0 without drift.
+    disturbance : float
+        Work of φ_e, ∫mφ̂_e·x2 dt [J].
+    """
+
+    kinetic: float
+    elastic: float
+    frictional: float
+    injection: float
+    viscous: float
+    far_field: float
+    disturbance: float
+
+    @property
+    def residual(self) -> float:
+        """What is missing [J]: the error of the integration, since works are integrated along with the motion."""
+        return self.kinetic + self.elastic + self.frictional + self.viscous - self.far_field - self.disturbance
+
+    @property
+    def relative_residual(self) -> float:
+        """|Residual| over the largest other entry [-]; 0 where nothing happened."""
+        entries = self.to_dict()
+        return abs(entries.pop("residual")) / largest if (largest := max(map(abs, entries.values()))) else 0.0
+
+    def to_dict(self) -> dict[str, float]:
+        """Return the energies [J] by name."""
+        return asdict(self) | {"residual": self.residual}
+
+    @staticmethod
+    def unit(name: str) -> str:
+        """SI unit of one entry."""
+        return "" if name == "relative_residual" else "J"
+
+
+class Meter:
+    """A loop in its own place while steps of it are written down, which adds up the works of its forces.
+
+    Attributes
+    ----------
+    loop : ClosedLoop
+    works : SX
+        So far, in the order of `WORKS`.
+    """
+
+    def __init__(self, loop: Any, works: Any) -> None:
+        self.loop, self.works = loop, works
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.loop, name)
+
+    def advance(self, method: Any, motion: Any, state: Any, step: float) -> Any:
+        """See `Stepped.advance`; the works are integrated along with the motion."""
+        size = state.shape[0]
+
+        def with_powers(plant: Any, passed: Any, now: Any) -> Any:
+            seen: list[Any] = []
+
+            def watched(time: Any, x: Any, pressure: Any) -> Any:
+                seen[:] = [self.loop.powers(time, x, pressure, getattr(plant, "direction", 1))]
+                return plant(time, x, pressure)
+
+            return ca.vertcat(motion(watched, passed, now[:size]), seen[0])
+
+        end = self.loop.advance(method, with_powers, ca.vertcat(state, ca.SX.zeros(len(WORKS))), step)
+        self.works = self.works + end[size:]
+        return end[:size]
+
+    def advance_often(self, method: Any, motion: Any, given: Any, state: Any, step: float, times: int) -> Any:
+        """See `Stepped.advance_often`."""
+        state, self.works = self.loop.metered_often(method, motion, given, (state, self.works), step, times)
+        return state
+
+
+class Metered(Stepped):
+    """A loop whose forces do work that can be integrated along with its motion; functions on CasADi SX.
+
+    Attributes
+    ----------
+    load : Load
+    factors : tuple of float or SX
+        True over nominal parameters; empty for the nominal fault.
+    """
+
+    load: Load
+    factors: tuple[Any, ...]
+
+    @property
+    @abstractmethod
+    def friction(self) -> Any:
+        """Function x [m, m/s] → friction coefficient [-]."""
+
+    @property
+    @abstractmethod
+    def static_friction(self) -> Any:
+        """Friction coefficient [-] on the verge of slip."""
+
+    @property
+    @abstractmethod
+    def shaken(self) -> Any:
+        """Function (t [s], x [m, m/s]) → φ̂_e [m/s²]."""
+
+    def powers(self, time: Any, x: Any, pressure: Any, direction: Any = 1) -> Any:
+        """Integrands per unit mass in the order of `WORKS` (SX): [W/kg], and x1 [m] for the last.
+
+        Friction counts relative to its static value under the whole normal stress, whose work is exact in the slip; it
+        acts against `direction`.
+        """
+        _, normal, damping, stress = self.hats()
+        rate, relief = (ca.fabs(x[1]), ca.fmin(pressure, stress)) if self.sticks else (x[1], pressure)
+        friction, way = self.friction(ca.vertcat(x[0], rate)), direction * x[1]
+        return ca.vertcat(
+            normal * stress * (friction * way - self.static_friction * x[1]),
+            normal * friction * relief * way,
+            damping * x[1] * x[1],
+            self.shaken(time, x) * x[1],
+            x[0],
+        )
+
+    def budget(self, integrals: Mapping[str, float], time: float, slip: float, rate: float) -> EnergyBudget:
+        """Budget of a run from rest that has taken a time [s], from the integrals of `powers` and its last state."""
+        mass, drift = self.fault.mass, self.load.drift
+        stiffness, normal, damping, stress = self.hats()
+        static = normal * stress * float(self.static_friction)
+        tension, opened = static - damping * drift, drift * time - slip
+        pull = tension * time + stiffness * (drift * time**2 / 2 - integrals["sum_slip"]) + damping * opened
+        return EnergyBudget(
+            kinetic=mass * rate**2 / 2,
+            elastic=mass * (tension + stiffness * opened / 2) * opened,
+            frictional=mass * (integrals["work_weakening"] + static * slip - integrals["work_injection"]),
+            injection=mass * integrals["work_injection"],
+            viscous=mass * (integrals["work_viscous"] + damping * drift * (drift * time - 2 * slip)),
+            far_field=mass * drift * pull,
+            disturbance=mass * integrals["work_disturbance"],
+        )
+
+    def hats(self) -> tuple[Any, Any, Any, float]:
+        """k̂ [1/s²], N̂ [m²/kg], η̂ [1/s] with the factors of the loop, and σ' [Pa]."""
+        numbers = plant.plant_values(self.fault)
+        stiffness, damping, authority = self.factors[:3] or (1.0,) * 3
+        k, eta, N, sigma = (float(numbers[s]) for s in (plant.k_hat, plant.eta_hat, plant.N_hat, plant.sigma))
+        return k * stiffness, N * authority, eta * damping, sigma
+
+
+# ----------------------------------------------------------------------
+# Plant, law and reference of one closed loop, from SymPy to CasADi functions.
 
 Motion = Callable[[Callable[[Any, Any, Any], Any], Any, Any], Any]
 
@@ -45,7 +384,7 @@ def reference_expressions(fault: Fault) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
 def acceleration_expression(fault: Fault, varied: bool = False) -> sp.Expr:
     """x2' [m/s²] of eq. shift in x1, x2, p and the disturbance φ, with friction continued to slip < 0 (ERRATA 12).
 
-    With `varied` also in the factors of `quakedesign.simulation.variation.symbols`, here and below.
+    With `varied` also in the factors of `quakedesign.simulation.closed_loop.symbols`, here and below.
     """
     return _with_numbers(plant.shifted_acceleration(), fault, varied)
 

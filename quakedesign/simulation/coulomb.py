@@ -7,12 +7,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import sympy as sp
 
-from quakedesign.simulation.closed_loop import (
-    ClosedLoop,
-    Motion,
-    acceleration_expression,
-    friction_expression,
-)
+from quakedesign.simulation.closed_loop import ClosedLoop, Motion, acceleration_expression, friction_expression
 from quakedesign.simulation.integrators import Integrator
 from quakedesign.symbolic import plant
 
@@ -76,7 +71,7 @@ class CoulombLoop(ClosedLoop):
 
     def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
         """State after one step, with at most one change between slip forward, slip backward and rest."""
-        course = _Course(self.directed, method, motion, step)
+        course = _StepMotion(self.directed, method, motion, step)
         direction = ca.if_else(state[1] == 0, course.start(0.0, state), ca.sign(state[1]))
         ahead = course.move(direction, 0.0, 1.0, state)
         rests, leaving = direction == 0, course.start(1.0, ahead)
@@ -93,7 +88,7 @@ class CoulombLoop(ClosedLoop):
 
 
 @dataclass(frozen=True)
-class _Field:
+class _DirectedPlant:
     """The plant while it keeps a direction."""
 
     directed: Any
@@ -104,7 +99,7 @@ class _Field:
 
 
 @dataclass(frozen=True)
-class _Course:
+class _StepMotion:
     """The motion within one step, split at shares [-] of its length."""
 
     directed: Any
@@ -114,7 +109,7 @@ class _Course:
 
     def rates(self, direction: Any, passed: Any, state: Any) -> Any:
         """Time derivative of the state while it keeps a direction."""
-        return self.motion(_Field(self.directed, direction), passed, state)
+        return self.motion(_DirectedPlant(self.directed, direction), passed, state)
 
     def move(self, direction: Any, passed: Any, share: Any, state: Any) -> Any:
         """State after a share of the step in one direction."""

@@ -1,25 +1,237 @@
-"""A sampled controller as C, for the computer of a laboratory."""
+"""Export of a sampled controller as C source or as an FMU (FMI 2.0, co-simulation)."""
 
+import io
 import os
-from dataclasses import fields, is_dataclass, replace
+import platform
+import subprocess
+import textwrap
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
+from uuid import UUID
 
 import casadi as ca
 
-from quakedesign.controllers import Controller
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import Fault
-from quakedesign.fault.checks import require_positive
-from quakedesign.loop.schemes import Scheme, own_way, simulation_scheme
-from quakedesign.loop.steps.sampled import Sampled
-from quakedesign.output import require_room, whole_folder, write_whole
-from quakedesign.simulation.c_source import HEADER, SOURCE, ControllerStep, header_text, source_text
+from quakedesign.fault.model import require_positive
+from quakedesign.files import require_room, temporary_folder, whole_folder, write_whole
+from quakedesign.laws import Controller
+from quakedesign.loop import Scheme, simulation_scheme
+from quakedesign.loop.schemes import own_way
+from quakedesign.loop.schemes.base import Sampled
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.fmu import UNIT, model_unit
-from quakedesign.simulation.instructions import expanded
+from quakedesign.simulation.compiled import c_file, compiler, expanded, shared_library
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.run import library_versions
+
+# ----------------------------------------------------------------------
+# A sampled step of a controller, and the text of its C files.
+
+SOURCE, HEADER = "controller.c", "controller.h"
+_WIDTH = 110
+_USE = """
+Call controller_reset once, and controller_step every CONTROLLER_STEP seconds: it reads CONTROLLER_MEASUREMENTS
+numbers and the pressure [Pa] that was applied since the last call, updates CONTROLLER_MEMORY numbers, and writes the
+fluid pressure [Pa] to hold until the next call (zero-order hold). Where pump or valve limit the pressure, tell it what
+was applied: the law does not wind up then, as in simulate --saturation; else give a null pointer. The reference of
+the fault is computed from the number of calls. The functions keep nothing between calls but the memory they are given,
+allocate nothing, and may be called from several threads with different memories. Numbers that
+are not finite are not caught: check measurement and pressure.
+"""
+_COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and link with -lm."
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerStep:
+    """What a controller does once per sample, as one function of its measurement and its memory.
+
+    Attributes
+    ----------
+    function : casadi.Function
+        (measurement, applied pressure since the last sample [Pa], memory) → memory, pressure [Pa].
+    measurement : mapping of str to str
+        Unit of every measured signal, in order.
+    start : mapping of str to float
+        Memory before the first sample, in order, SI units.
+    step : float
+        Sampling period T_s [s].
+    facts : mapping of str to str
+        Where it comes from: fault, law, gains, scheme, versions.
+    remarks : tuple of str
+        What is said first of it, a sentence each.
+    """
+
+    function: Any
+    measurement: Mapping[str, str]
+    start: Mapping[str, float]
+    step: float
+    facts: Mapping[str, str]
+    remarks: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able facts."""
+        return {
+            "step": self.step,
+            "measurement": dict(self.measurement),
+            "memory": dict(self.start),
+            "facts": dict(self.facts),
+            "remarks": list(self.remarks),
+        }
+
+
+def header_text(exported: ControllerStep) -> str:
+    """Header with the meaning of every number."""
+    measured = (f"measurement[{i}]: {name} [{unit}]" for i, (name, unit) in enumerate(exported.measurement.items()))
+    kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(exported.start.items()))
+    facts = (f"{name}: {value}" for name, value in exported.facts.items())
+    said = [part for remark in exported.remarks for part in (*_wrapped(remark), "")]
+    lines = [
+        *said,
+        "A sampled controller for a fault, in SI units.",
+        "",
+        *_wrapped(_USE),
+        "",
+        _COMPILE,
+        "",
+        *measured,
+        *kept,
+    ]
+    comment = _comment([*lines, "", "Where it comes from:", *facts])
+    sizes = {"step": repr(exported.step), "measurements": len(exported.measurement), "memory": len(exported.start)}
+    return comment + c_file("controller.h", **sizes)
+
+
+def source_text(exported: ControllerStep, header: str) -> str:
+    """CasADi's C for the step, followed by the two functions of the header."""
+    generator = ca.CodeGenerator("sampled_step.c", {"with_export": False})
+    generator.add(exported.function)
+    start = ",\n".join(f"    {value!r}" for value in exported.start.values())
+    return generator.dump() + c_file(
+        "controller.c",
+        header=header,
+        start=start,
+        held=list(exported.start).index("held_0"),
+        **_sizes(exported.function),
+    )
+
+
+def _sizes(function: Any) -> dict[str, int]:
+    sizes = {
+        "arguments": function.sz_arg(),
+        "results": function.sz_res(),
+        "integers": function.sz_iw(),
+        "work": function.sz_w(),
+    }
+    return {name: max(1, size) for name, size in sizes.items()}
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(" ".join(text.split()), _WIDTH)
+
+
+def _comment(lines: list[str]) -> str:
+    """Lines in one comment of C, which no text of the user can end."""
+    wrapped = [part for line in lines for part in (textwrap.wrap(" ".join(line.split()), _WIDTH) or [""])]
+    safe = "\n".join(f" * {line}".rstrip() for line in wrapped).replace("*/", "* /")
+    return "/*\n" + safe + "\n */\n"
+
+
+# ----------------------------------------------------------------------
+# A sampled controller as a model unit of the Functional Mock-up Interface 2.0, for co-simulation.
+
+UNIT = "controller.fmu"
+_UNITS = {"m": {"m": "1"}, "m/s": {"m": "1", "s": "-1"}, "Pa": {"kg": "1", "m": "-1", "s": "-2"}}
+_BEFORE_ZIP = (1980, 1, 1, 0, 0, 0)  # the same bytes whenever it is written
+_PLATFORMS = {"Linux": ("linux64", "so"), "Darwin": ("darwin64", "dylib")}
+
+
+def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
+    """Bytes of an FMU of a sampled step, and for which platform it holds a binary or why for none.
+
+    Inputs are the measurement, the output ``pressure`` [Pa] is what is held since the last sample; the samples lie
+    T_s apart from the start of the experiment. The sources lie inside, so that any platform can compile them.
+
+    Parameters
+    ----------
+    exported : ControllerStep
+
+    Returns
+    -------
+    tuple of bytes and str
+
+    References
+    ----------
+    Functional Mock-up Interface for Model Exchange and Co-Simulation, version 2.0.4, sections 2.2 and 4.
+    """
+    interface = c_file("fmu.c")
+    plain = {SOURCE: source_text(exported, HEADER), "fmu.c": interface}
+    guid = f"{{{UUID(sha256(''.join([header_text(exported), *plain.values()]).encode()).hexdigest()[:32])}}}"
+    sources = plain | {HEADER: f'#define CONTROLLER_GUID "{guid}"\n{header_text(exported)}'}
+    members: dict[str, bytes] = {"modelDescription.xml": _description(exported, guid)}
+    members |= {f"sources/{name}": text.encode() for name, text in sources.items()}
+    binary, where = _binary(sources)
+    return _zipped(members | binary), where
+
+
+def _binary(sources: dict[str, str]) -> tuple[dict[str, bytes], str]:
+    """Compiled interface of this platform, where a compiler works."""
+    if platform.system() not in _PLATFORMS or platform.machine() not in {"x86_64", "AMD64"}:
+        return {}, "sources only: this platform has no name in FMI 2.0 that is built here"
+    name, suffix = _PLATFORMS[platform.system()]
+    try:
+        with temporary_folder() as folder:
+            for file, text in sources.items():
+                (folder / file).write_text(text, encoding="utf-8")
+            included = "".join(f'#include "{file}"\n' for file in (SOURCE, "fmu.c"))
+            data = shared_library(included, Path(folder), compiler()).read_bytes()
+    except (OSError, subprocess.SubprocessError) as error:
+        return {}, f"sources only: {str(error).splitlines()[0]}"
+    return {f"binaries/{name}/controller.{suffix}": data}, name
+
+
+def _description(exported: ControllerStep, guid: str) -> bytes:
+    """``modelDescription.xml``."""
+    told = "; ".join(f"{name}: {value}" for name, value in exported.facts.items())
+    root = ET.Element("fmiModelDescription", fmiVersion="2.0", modelName="controller", guid=guid)
+    root.attrib |= {"description": told, "generationTool": f"quakedesign {exported.facts['version_quakedesign']}"}
+    kind = {"modelIdentifier": "controller", "canHandleVariableCommunicationStepSize": "true"}
+    kind |= {"canGetAndSetFMUstate": "true", "canNotUseMemoryManagementFunctions": "true"}
+    listed = ET.SubElement(ET.SubElement(root, "CoSimulation", kind), "SourceFiles")
+    for file in (SOURCE, "fmu.c"):
+        ET.SubElement(listed, "File", name=file)
+    signals = dict(exported.measurement) | {"pressure": "Pa"}
+    units = ET.SubElement(root, "UnitDefinitions")
+    for unit in dict.fromkeys(signals.values()):
+        ET.SubElement(ET.SubElement(units, "Unit", name=unit), "BaseUnit", _UNITS[unit])
+    ET.SubElement(ET.SubElement(root, "LogCategories"), "Category", name="logStatusError")
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stepSize=repr(exported.step))
+    variables = ET.SubElement(root, "ModelVariables")
+    for reference, (name, unit) in enumerate(signals.items()):
+        is_output = name == "pressure"
+        variable = {"name": name, "valueReference": str(reference), "variability": "discrete"}
+        variable |= {"causality": "output", "initial": "exact"} if is_output else {"causality": "input"}
+        ET.SubElement(ET.SubElement(variables, "ScalarVariable", variable), "Real", unit=unit, start="0")
+    outputs = ET.SubElement(ET.SubElement(root, "ModelStructure"), "Outputs")
+    ET.SubElement(outputs, "Unknown", index=str(len(signals)), dependencies="")
+    ET.indent(root)
+    return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
+
+
+def _zipped(members: dict[str, bytes]) -> bytes:
+    written = io.BytesIO()
+    with zipfile.ZipFile(written, "w") as archive:
+        for name, data in members.items():
+            archive.writestr(zipfile.ZipInfo(name, _BEFORE_ZIP), data, zipfile.ZIP_DEFLATED)
+    return written.getvalue()
+
+
+# ----------------------------------------------------------------------
+# A sampled controller as C, for the computer of a laboratory.
 
 FILES = (HEADER, SOURCE, UNIT)
 HELD = "held_0"  # of the memory: the pressure of the sample before

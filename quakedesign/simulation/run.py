@@ -1,6 +1,10 @@
-"""A recorder's loop, run with a fixed step or to a tolerance."""
+"""Settings of a run, its integration with fixed or adaptive step, and its trajectory."""
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
@@ -8,28 +12,164 @@ from typing import Any
 
 import casadi as ca
 
-from quakedesign.controllers import Controller
-from quakedesign.errors import ParameterError, require_known
-from quakedesign.loop.actuators import Actuator
-from quakedesign.loop.schemes import Scheme, simulation_scheme
+from quakedesign.errors import ParameterError, SimulationError, require_known
+from quakedesign.exact import rational
+from quakedesign.fault import Fault, fault_toml
+from quakedesign.laws import Controller
+from quakedesign.loop import Actuator, Scheme, simulation_scheme
+from quakedesign.loop.schemes.base import MOST_SUBSTEPS, NoClock
 from quakedesign.loop.sensing import Sensor
-from quakedesign.loop.steps.no_clock import NoClock
-from quakedesign.loop.steps.sampled import MOST_SUBSTEPS
-from quakedesign.simulation import kept_runs
+from quakedesign.simulation import stepping
 from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
-from quakedesign.simulation.assembly import trajectory
-from quakedesign.simulation.backend import STEP, prepare
-from quakedesign.simulation.checkpoint import Checkpoint
-from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.simulation.closed_loop import ClosedLoop, names
+from quakedesign.simulation.compiled import STEP, prepare
 from quakedesign.simulation.coulomb import CoulombLoop
-from quakedesign.simulation.integrators import AdaptiveIntegrator, Integrator
-from quakedesign.simulation.integrators.adaptive import FLOOR
-from quakedesign.simulation.outcome import OutcomeCriterion
-from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.setting import Setting
-from quakedesign.simulation.stepping import Advancer, instants, march
-from quakedesign.simulation.trajectory import Trajectory
-from quakedesign.simulation.variation import names
+from quakedesign.simulation.integrators import FLOOR, AdaptiveIntegrator, Integrator
+from quakedesign.simulation.recorder import Recorder, events, metrics
+from quakedesign.simulation.stepping import Advancer, Checkpoint, instants, march
+from quakedesign.simulation.trajectory import OutcomeCriterion, SampledTrajectory, Trajectory
+
+# ----------------------------------------------------------------------
+# How far and how finely a run goes.
+
+MOST_STEPS = 10**10
+_ALMOST_A_STEP = Fraction(1, 10**6)
+
+
+@dataclass(frozen=True, slots=True)
+class RunSetting:
+    """How far and how finely to go: times in s, checked."""
+
+    step: float
+    steps: int
+    samples: int
+    settled_from: float
+
+    @classmethod
+    def of(
+        cls,
+        fault: Fault,
+        step: float | None,
+        duration: float | None,
+        samples: int,
+        settled_from: float | None,
+    ) -> "RunSetting":
+        """Setting from what `simulate` was given; None stands for its defaults."""
+        task = fault.reference.operation_time
+        length = _positive("duration", task if duration is None else duration)
+        pace = _positive("step", fault.sampling_time if step is None else step)
+        steps = int(rational(length) / rational(pace) + _ALMOST_A_STEP)
+        if not 1 <= steps <= MOST_STEPS:
+            raise ParameterError(f"duration must hold 1 to {MOST_STEPS:.0e} steps. Received {steps}. Change the step.")
+        if isinstance(samples, bool) or not isinstance(samples, int) or samples < 1:
+            raise ParameterError(f"samples must be a whole number of at least 1. Received {samples!r}.")
+        start = min(task, length) / 4 if settled_from is None else settled_from
+        if not 0 <= start < length:
+            raise ParameterError(
+                f"settled_from must be from 0 to below the duration, {length!r} s. Received {start!r} s."
+            )
+        return cls(pace, steps, samples, float(start))
+
+
+def _positive(name: str, value: float) -> float:
+    if not (math.isfinite(value) and value > 0):
+        raise ParameterError(f"{name} must be positive and finite. Received {value!r} s.")
+    return float(value)
+
+
+# ----------------------------------------------------------------------
+# From the vectors that a run kept to the trajectory that it returns.
+
+
+def trajectory(
+    recorder: Recorder,
+    setting: RunSetting,
+    kept: Any,
+    criterion: OutcomeCriterion,
+    provenance: dict[str, Any],
+    began: tuple[float, float],
+) -> Trajectory:
+    """Trajectory from the kept vectors, of which those before a divergence are shown.
+
+    Parameters
+    ----------
+    recorder : Recorder
+    setting : RunSetting
+    kept : ndarray
+        Vectors of the recorder, shape (their length, number of instants).
+    criterion : OutcomeCriterion
+    provenance : dict
+    began : tuple of float
+        Readings of the clock when the work and when the stepping began [s].
+
+    Raises
+    ------
+    SimulationError
+        When nothing is finite, not even the start.
+    """
+    observe, signals = _watchers(recorder)
+    end = observe(kept[:, -1]).full().ravel()
+    watched, ended = recorder.watched(end), perf_counter()
+    if watched["diverged"] >= 0:
+        kept = kept[:, kept[0] * setting.step < watched["diverged"]]
+    if not kept.size:
+        raise SimulationError(
+            "the loop must have finite values at the start. Received values that are not. Check gains and disturbance."
+        )
+    took = {"preparation_seconds": began[1] - began[0], "stepping_seconds": ended - began[1]}
+    loop = recorder.loop
+    measured = metrics(
+        watched,
+        controlled=loop.controller is not None,
+        step=setting.step,
+        steps=setting.steps,
+        settled_from=setting.settled_from,
+        seconds=ended - began[0],
+        sticks=loop.sticks,
+        further=recorder.scheme.described,
+    )
+    columns = _columns(recorder, kept, signals)
+    described = recorder.scheme.described
+    further = {name: (columns.pop(name), *said) for name, said in described.items()}
+    kind = partial(SampledTrajectory, actuation=further) if further else Trajectory
+    return kind(
+        **columns,
+        moment_per_slip=loop.fault.shear_modulus * loop.fault.area,
+        metrics=measured,
+        energy=None if watched["diverged"] >= 0 else recorder.energy(end),
+        events=events(watched),
+        criterion=criterion,
+        provenance=provenance | took | {"scenario": fault_toml(loop.fault)},
+        integral_units=loop.controller.integral_units if loop.controller else (),
+        name=f"{loop.fault.name}, {_law_title(loop.controller)}{loop.plant_title}",
+    )
+
+
+def _law_title(controller: Controller | None) -> str:
+    return controller.title if controller else "no control"
+
+
+def _watchers(recorder: Recorder) -> tuple[Any, Any]:
+    """CasADi Functions of the vector: the watching of one instant, and all signals."""
+    vector = ca.SX.sym("z", recorder.size)
+    signals = recorder.signals(vector)
+    return (
+        ca.Function("observe", [vector], [recorder.observe(vector)]),
+        ca.Function("signals", [vector], list(signals.values()), ["z"], list(signals)),
+    )
+
+
+def _columns(recorder: Recorder, kept: Any, signals: Any) -> dict[str, Any]:
+    """Arrays of a trajectory from the kept vectors; without a controller nothing is followed."""
+    values = signals.call([kept])
+    columns = {name: value.full().ravel() for name, value in zip(signals.name_out(), values, strict=True)}
+    if recorder.loop.controller is None:
+        columns |= dict.fromkeys(("reference", "reference_rate", "matched_perturbation"))
+    return columns | {"integrals": kept[4 : 4 + len(recorder.loop.integrals)]}
+
+
+# ----------------------------------------------------------------------
+# A recorder's loop, run with a fixed step or to a tolerance.
 
 
 def sampled_scheme(
@@ -104,7 +244,7 @@ def loop_class(plant: str) -> type[ClosedLoop]:
 
 def run(
     recorder: Recorder,
-    setting: Setting,
+    setting: RunSetting,
     method: type[Integrator],
     criterion: OutcomeCriterion,
     *,
@@ -118,7 +258,7 @@ def run(
     wanted = instants(setting.steps, setting.samples)
     file = Checkpoint.of(checkpoint, step, start, wanted) if checkpoint else None
     steps = setting.steps * recorder.scheme.settings.get("substeps", 1)
-    known = kept_runs.Question.of(step, start, wanted, compiled, steps)
+    known = stepping.RunInputs.of(step, start, wanted, compiled, steps)
     if file is None and (answer := known.recall()) is not None:
         kept, told, ready = answer.vectors, answer.told, perf_counter()
     else:
@@ -126,13 +266,13 @@ def run(
         ready = perf_counter()
         kept = march(Advancer.of(backend, start), wanted, recorder.index("diverged"), progress, file)
         told = {"backend": backend.name, "backend_reason": backend.reason}
-        known.keep(kept_runs.Answer(kept, told))
+        known.keep(stepping.SteppedRun(kept, told))
     return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | told, (began, ready))
 
 
 def run_adaptive(
     recorder: Recorder,
-    setting: Setting,
+    setting: RunSetting,
     method: type[AdaptiveIntegrator],
     criterion: OutcomeCriterion,
     *,

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError, SimulationError, require_known
 from quakedesign.fault import Fault
+from quakedesign.laws import Controller
 from quakedesign.loop.sensing.measurement import Measurement
+from quakedesign.simulation.closed_loop import Variation
 from quakedesign.simulation.simulate import simulate
-from quakedesign.simulation.variation import Variation
 
 if TYPE_CHECKING:
     from quakedesign.simulation.trajectory import Trajectory
+
 
 SCHEMES = ("explicit", "implicit", "semi-implicit", "compensated")
 QUANTITIES = {

@@ -5,25 +5,21 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.fault import Fault, require_fault
-from quakedesign.fault.checks import require_nonnegative
-from quakedesign.loop.actuators import Actuator
-from quakedesign.loop.schemes import Scheme, own_way
+from quakedesign.fault.model import require_nonnegative
+from quakedesign.laws import Controller
+from quakedesign.loop import Actuator, Scheme
+from quakedesign.loop.schemes import own_way
 from quakedesign.loop.sensing import Sensor, Transducer
-from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator
-from quakedesign.simulation.integrators.adaptive import require_tolerance
-from quakedesign.simulation.loading import Load
-from quakedesign.simulation.memoryless_earthquake import natural_peak
-from quakedesign.simulation.outcome import OutcomeCriterion
+from quakedesign.simulation.closed_loop import Load, Variation
+from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator, require_tolerance
+from quakedesign.simulation.natural import natural_peak
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import by_no_clock, loop_class, own_path, run, run_adaptive, sampled_scheme
-from quakedesign.simulation.setting import Setting
-from quakedesign.simulation.sliding_conditions import PressurePath, SlidingVariation, Tide
+from quakedesign.simulation.run import RunSetting, by_no_clock, loop_class, own_path, run, run_adaptive, sampled_scheme
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
-from quakedesign.simulation.trajectory import Trajectory
-from quakedesign.simulation.variation import Variation
+from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
+from quakedesign.simulation.trajectory import OutcomeCriterion, Trajectory
 
 
 def simulate(
@@ -139,7 +135,7 @@ def simulate(
     require_tolerance(rtol)
     scheme, step, own = own_way(controller, scheme, step, "continuous")
     step, own = by_no_clock(controller, scheme, step, own)
-    setting = Setting.of(fault, step, duration, samples, settled_from)
+    setting = RunSetting.of(fault, step, duration, samples, settled_from)
     if variation:
         variation.require_within(fault)
     factors = variation.values if variation else ()

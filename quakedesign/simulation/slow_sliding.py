@@ -12,21 +12,16 @@ import numpy as np
 
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault import Fault, SlidingReference
-from quakedesign.fault.checks import require_positive
-from quakedesign.loop import LinearLaw
-from quakedesign.loop.actuators import SampledStage
+from quakedesign.fault.model import require_positive
+from quakedesign.laws import LinearLaw
+from quakedesign.loop.actuators.base import SampledStage
 from quakedesign.loop.sensing import Transducer
-from quakedesign.simulation.integrators import adaptive_integrators
-from quakedesign.simulation.integrators.adaptive import StoppedError
-from quakedesign.simulation.metrics import Metrics
-from quakedesign.simulation.outcome import OutcomeCriterion
-from quakedesign.simulation.recording import signal
-from quakedesign.simulation.run import library_versions
-from quakedesign.simulation.setting import Setting
-from quakedesign.simulation.sliding_conditions import Instruments, PressurePath, SlidingVariation, Tide
-from quakedesign.simulation.slip_events import dynamic_rate
-from quakedesign.simulation.state_plants import SpringSlider
-from quakedesign.simulation.trajectory import Trajectory
+from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
+from quakedesign.simulation.recorder import Metrics
+from quakedesign.simulation.run import RunSetting, library_versions
+from quakedesign.simulation.state_plant import Instruments, PressurePath, SlidingVariation, SpringSlider, Tide
+from quakedesign.simulation.stick_slip import dynamic_rate
+from quakedesign.simulation.trajectory import OutcomeCriterion, Trajectory, signal
 
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run is recorded
 _RTOL = 1e-11
@@ -127,7 +122,7 @@ def simulate_sliding(
     require_known(method, adaptive_integrators(), "method")
     began, length = perf_counter(), fault.reference.operation_time if duration is None else duration
     require_positive(duration=length, step=float(step))
-    setting = Setting.of(fault, float(step), max(length, float(step)), samples or 1, settled_from)
+    setting = RunSetting.of(fault, float(step), max(length, float(step)), samples or 1, settled_from)
     path = PressurePath(lag=lag, diffusion=diffusion, stages=tuple(stages))
     loop = _Loop.of(fault, path, tide or Tide(), variation or SlidingVariation(), inertia)
     around = Instruments.of(path, transducer, float(step))
@@ -276,7 +271,7 @@ def criterion_of(fault: Fault) -> OutcomeCriterion:
     )
 
 
-def _metrics(run: SlidingRun, setting: Setting, seconds: float) -> Metrics:
+def _metrics(run: SlidingRun, setting: RunSetting, seconds: float) -> Metrics:
     """Figures of all instants of a run that followed its reference; none of one that diverged."""
     if "diverged" in run.events:
         return Metrics(settled_from=setting.settled_from, steps=len(run.time) - 1, seconds=seconds)

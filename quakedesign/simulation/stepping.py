@@ -1,15 +1,114 @@
-"""Running a backend over many steps and keeping some instants."""
+"""Long runs in steps: checkpoints, kept instants, and cached results.
 
-from collections.abc import Callable
-from dataclasses import dataclass
+An interrupted run continues with bitwise the same numbers.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from io import BytesIO
 from itertools import pairwise
+from pathlib import Path
+from time import monotonic
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
-from quakedesign.errors import SimulationError
-from quakedesign.simulation.backend import LEVELS, RADIX, Backend, MachineCode
-from quakedesign.simulation.checkpoint import Checkpoint
+from quakedesign import cache
+from quakedesign.errors import OutputError, SimulationError
+from quakedesign.files import sweep, write_whole
+from quakedesign.simulation.compiled import LEVELS, RADIX, Backend, MachineCode, compilation
+
+# ----------------------------------------------------------------------
+# Long runs that can be interrupted at any moment and go on later with the same digits.
+
+SECONDS = 30.0
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """File that holds what a run has kept so far, written whole or not at all.
+
+    Attributes
+    ----------
+    path : Path
+    fingerprint : str
+        Of everything that determines the digits of the run; a file of another run is refused.
+    """
+
+    path: Path
+    fingerprint: str
+    _written: list[float] = field(default_factory=lambda: [monotonic()], repr=False)
+
+    @classmethod
+    def of(cls, path: str | Path, step: Any, start: Sequence[float], kept: Sequence[int]) -> "Checkpoint":
+        """Checkpoint of a run.
+
+        Parameters
+        ----------
+        path : str or Path
+        step : casadi.Function
+            One step of the run.
+        start : sequence of float
+            Vector at time zero.
+        kept : sequence of int
+            Numbers of the steps to keep.
+        """
+        told = (step.serialize(), *(float(x).hex() for x in start), *map(str, kept), version("casadi"))
+        return cls(Path(path), hashlib.sha256("\n".join(told).encode()).hexdigest())
+
+    def read(self) -> "list[np.ndarray]":
+        """Vectors kept so far; none where there is no file yet.
+
+        Raises
+        ------
+        OutputError
+            When the file cannot be read.
+        SimulationError
+            When it is no checkpoint, or that of another run.
+        """
+        sweep(self.path.parent)
+        try:
+            with np.load(BytesIO(self.path.read_bytes()), allow_pickle=False) as held:
+                fingerprint, vectors = str(held["fingerprint"]), held["vectors"]
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise OutputError(f"checkpoint {self.path} cannot be read: {error.strerror or error}.") from None
+        except (ValueError, KeyError, EOFError, BadZipFile):
+            fingerprint, vectors = "", np.empty((0, 0))
+        if fingerprint != self.fingerprint:
+            raise SimulationError(
+                f"checkpoint {self.path} must be that of this very run. Received that of another run, or another file. "
+                "Delete it, or choose another name."
+            )
+        return list(vectors)
+
+    def write(self, vectors: "Sequence[np.ndarray]", *, now: bool = False) -> None:
+        """Write the vectors kept so far, if the last time is long enough ago or `now`.
+
+        Raises
+        ------
+        OutputError
+            When the file cannot be written.
+        """
+        if not now and monotonic() - self._written[0] < SECONDS:
+            return
+        content = BytesIO()
+        np.savez(content, fingerprint=np.array(self.fingerprint), vectors=np.array(vectors))
+        write_whole(self.path, content.getvalue())
+        self._written[0] = monotonic()
+
+    def remove(self) -> None:
+        """Delete the file of a run that has ended."""
+        self.path.unlink(missing_ok=True)
+
+
+# ----------------------------------------------------------------------
+# Running a backend over many steps and keeping some instants.
 
 GOLDEN = (5**0.5 - 1) / 2
 
@@ -117,3 +216,66 @@ def march(
     if checkpoint:
         checkpoint.remove()
     return np.array(found).T
+
+
+# ----------------------------------------------------------------------
+# Long runs are kept on the user's disk, see `quakedesign.cache`: the same code from the same start ends the same.
+
+LONG = 100_000_000
+"""Instructions of a run from which on it is worth a place."""
+
+
+@dataclass(frozen=True)
+class SteppedRun:
+    """What was computed.
+
+    Attributes
+    ----------
+    vectors : ndarray
+        At the kept instants, one a column.
+    told : dict of str to str
+        Backend and why, as in the provenance of a run.
+    """
+
+    vectors: "np.ndarray"
+    told: dict[str, str]
+
+
+@dataclass(frozen=True)
+class RunInputs:
+    """Everything that determines the digits of a run.
+
+    Attributes
+    ----------
+    parts : tuple of bytes
+        Empty for a run that is not kept.
+    """
+
+    parts: tuple[bytes, ...]
+
+    @classmethod
+    def of(
+        cls, step: Any, start: Sequence[float], instants: Sequence[int], compiled: bool | None, steps: int
+    ) -> "RunInputs":
+        """Question of a run of one step function (casadi.Function) over so many steps."""
+        if not cache.in_use() or compiled is False or steps * step.n_instructions() < LONG:
+            return cls(())
+        how = compilation()
+        return cls((step.serialize().encode(), np.array(start).tobytes(), np.array(instants).tobytes(), how.encode()))
+
+    def recall(self) -> SteppedRun | None:
+        """What was kept."""
+        content = cache.recall("run", *self.parts) if self.parts else None
+        if content is None:
+            return None
+        head, _, rest = content.partition(b"\n")
+        told = json.loads(head)
+        told["backend_reason"] += "; from the cache"
+        return SteppedRun(np.load(BytesIO(rest), allow_pickle=False), told)
+
+    def keep(self, answer: SteppedRun) -> None:
+        """Keep an answer."""
+        if self.parts and answer.told["backend"] == "compiled":
+            content = BytesIO()
+            np.save(content, answer.vectors, allow_pickle=False)
+            cache.keep("run", json.dumps(answer.told).encode() + b"\n" + content.getvalue(), *self.parts)

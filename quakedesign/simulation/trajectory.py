@@ -1,17 +1,400 @@
-"""What a simulation returns."""
+"""Trajectories of runs with export to xarray, pandas and NetCDF, their outcome and figure.
+
+The trajectory classes cover runs with a law, with an actuator, and uncontrolled runs with friction state.
+The outcome is tracked, slow slip, earthquake, diverged or opened.
+"""
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from quakedesign.simulation.energy import EnergyBudget
-from quakedesign.simulation.metrics import Metrics
-from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
-from quakedesign.simulation.plotting import NOTHING, Panel, figure, stress_figure
-from quakedesign.simulation.recording import Recording, signal
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault
+from quakedesign.files import write_whole
+from quakedesign.simulation.closed_loop import EnergyBudget
+from quakedesign.simulation.recorder import Metrics
+
+# ----------------------------------------------------------------------
+# What every run can be handed on as: xarray, pandas, NetCDF.
+
+CONVENTIONS = "CF-1.11"
+
+
+def signal(title: str, unit: str) -> Any:
+    """Field that is a signal, with its long name and SI unit; one that is None is none."""
+    return field(repr=False, metadata={"title": title, "unit": unit})
+
+
+class Recording(ABC):
+    """Signals over time, each with its long name and SI unit.
+
+    Attributes
+    ----------
+    name : str
+    time : ndarray
+        [s], shape (n,).
+    """
+
+    name: str
+    time: "np.ndarray"
+
+    def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
+        """Values, long name and SI unit of every signal that this run has, by name."""
+        known = ((each.name, getattr(self, each.name), each.metadata) for each in fields(self))  # type: ignore[arg-type]
+        return {name: (v, told["title"], told["unit"]) for name, v, told in known if told and v is not None}
+
+    @abstractmethod
+    def attributes(self) -> Mapping[str, Any]:
+        """Texts and numbers about the run as a whole."""
+
+    def to_xarray(self) -> Any:
+        """Return an xarray Dataset over ``time``, with the attributes of the CF conventions.
+
+        The time [s] is that since the start of the run. It is not marked as CF's axis T, which is for dates: its unit
+        would have to name a day that a simulation does not have. Nothing is missing, so there are no fill values.
+        """
+        import xarray as xr
+
+        variables = {
+            name: ("time", values, {"long_name": title, "units": unit or "1"})
+            for name, (values, title, unit) in self.signals().items()
+        }
+        time = ("time", self.time, {"long_name": "time since the start of the run", "units": "s"})
+        source = f"quakedesign {self.attributes().get('version_quakedesign', '')}".strip()
+        head = {"Conventions": CONVENTIONS, "title": self.name, "source": source, "history": f"simulated by {source}"}
+        found = xr.Dataset(variables, coords={"time": time}, attrs=head | dict(self.attributes()))
+        for variable in found.variables.values():
+            variable.encoding["_FillValue"] = None
+        return found
+
+    def resample(self, dt: float) -> Any:
+        """Return an xarray Dataset at uniform instants, as filters and spectra need them, interpolated linearly.
+
+        Parameters
+        ----------
+        dt : float
+            [s]. No shorter than the mean distance of the instants that are kept, between which nothing is known.
+
+        Raises
+        ------
+        ParameterError
+            For a shorter one, or one longer than the run.
+        """
+        duration, kept = float(self.time[-1] - self.time[0]), max(len(self.time) - 1, 1)
+        if not duration / kept * (1 - 1e-9) <= dt <= duration:
+            raise ParameterError(
+                f"dt must be between {duration / kept:.4g} s, the mean distance of the instants that are kept, and "
+                f"{duration:.4g} s, the run. Received {dt!r}. Ask simulate for more samples."
+            )
+        count = int(duration / dt * (1 + 1e-12)) + 1
+        return self.to_xarray().interp(time=self.time[0] + dt * np.arange(count))
+
+    def to_pandas(self) -> Any:
+        """Return a pandas DataFrame over the time [s]; the columns carry their units."""
+        import pandas as pd
+
+        columns = {f"{name} [{unit or '-'}]": values for name, (values, _, unit) in self.signals().items()}
+        return pd.DataFrame(columns, index=pd.Index(self.time, name="time [s]"))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the run as NetCDF, wholly or not at all.
+
+        Raises
+        ------
+        OutputError
+            When the file cannot be written.
+        """
+        target, content = Path(path), BytesIO()
+        self.to_xarray().to_netcdf(content, engine="h5netcdf")
+        write_whole(target, content.getvalue())
+        return target
+
+
+# ----------------------------------------------------------------------
+# What a simulation of a spring-slider with state returns.
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StateTrajectory(Recording):
+    """One run of a spring-slider without control.
+
+    Attributes
+    ----------
+    name : str
+    time : ndarray
+        [s], shape (n,); the same one twice where the pressure steps, before and after.
+    load_point, slip, stretch : ndarray
+        Displacement of the load point, slip, and stretch of the spring [m], shape (n,).
+    slip_rate : ndarray
+        [m/s], shape (n,).
+    friction : ndarray
+        Friction coefficient [-], shape (n,).
+    pressure : ndarray
+        Fluid pressure [Pa], shape (n,).
+    states : ndarray
+        State of friction, shape (number of variables, n), named `state_names`, in `state_units`.
+    state_names, state_units : tuple of str
+    imbalance : ndarray
+        Driving less resisting stress, as a share of the normal stress [-], shape (n,): what accelerates the mass.
+        Without mass it must vanish, and what is left of it is an error of the integration.
+    onsets : ndarray
+        Times [s] at which the slip rate rises through `onset_rate`.
+    onset_rate : float
+        [m/s].
+    energy : EnergyBudget
+        [J], of the fault, or of 1 m² of a `SpringSlider`. Works are forces along the path through the instants of
+        `time`; without mass the residual is the work of `imbalance`.
+    provenance : mapping
+        Method, tolerance, evaluations and versions.
+    """
+
+    name: str
+    time: "np.ndarray" = field(repr=False)
+    load_point: "np.ndarray" = signal("displacement of the load point", "m")
+    slip: "np.ndarray" = signal("slip", "m")
+    slip_rate: "np.ndarray" = signal("slip rate", "m/s")
+    stretch: "np.ndarray" = signal("stretch of the spring", "m")
+    friction: "np.ndarray" = signal("friction coefficient", "")
+    pressure: "np.ndarray" = signal("fluid pressure", "Pa")
+    states: "np.ndarray" = field(repr=False)
+    state_names: tuple[str, ...]
+    state_units: tuple[str, ...]
+    imbalance: "np.ndarray" = field(repr=False)
+    onsets: "np.ndarray" = field(repr=False)
+    onset_rate: float
+    energy: EnergyBudget = field(repr=False)
+    provenance: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def recurrence_intervals(self) -> "np.ndarray":
+        """Times between successive onsets [s]."""
+        return np.diff(self.onsets)
+
+    @property
+    def event_slips(self) -> "np.ndarray":
+        """Slip [m] of every event that has ended: from its onset until the slip rate is back at `onset_rate`.
+
+        Between the instants of `time` by straight lines. `Fault.moment_of` makes it a seismic moment.
+        """
+        at = self._at_arrest(self.slip)
+        return np.asarray(at - np.interp(self.onsets[: len(at)], self.time, self.slip))
+
+    @property
+    def arrests(self) -> "np.ndarray":
+        """Times [s] at which the slip rate is back at `onset_rate`, of every event that has ended."""
+        return self._at_arrest(self.time)
+
+    def _at_arrest(self, values: "np.ndarray") -> "np.ndarray":
+        """Values where the slip rate falls through `onset_rate` after every onset, by straight lines."""
+        below = self.slip_rate <= self.onset_rate
+        falls = np.flatnonzero(~below[:-1] & below[1:]).tolist()
+        ends = [next((i for i in falls if self.time[i + 1] > onset), None) for onset in self.onsets]
+        at = np.array([i for i in ends if i is not None], dtype=int)
+        fast, slow = self.slip_rate[at], self.slip_rate[at + 1]
+        return np.asarray(values[at] + (values[at + 1] - values[at]) * (fast - self.onset_rate) / (fast - slow))
+
+    def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
+        """Values, long name and SI unit of every signal, by name."""
+        found = super().signals()
+        for name, values, unit in zip(self.state_names, self.states, self.state_units, strict=True):
+            found[name] = (values, f"state of friction {name}", unit)
+        return found
+
+    def attributes(self) -> Mapping[str, Any]:
+        """Provenance."""
+        return self.provenance
+
+
+# ----------------------------------------------------------------------
+# What a run comes to: tracked, slow slip, earthquake, diverged or opened.
+
+KINDS = ("tracked", "slow slip", "earthquake", "diverged", "opened")
+HARMLESS = ("tracked", "slow slip")
+EARTHQUAKE_SHARE = 0.1
+"""Of the natural peak: a run that goes faster than its reference by this share or more is an earthquake."""
+TRACKED_SHARE = 0.01
+"""Of the natural peak: a tracked run never goes faster than its reference by more."""
+SLIP_BAND = 0.02
+"""Of the target slip: a tracked run stays this close to its reference, the usual band for settling."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What one run comes to, as `OutcomeCriterion` decides.
+
+    Attributes
+    ----------
+    kind : str
+        One of `KINDS`.
+    peak_slip_rate : float or None
+        Largest |x2| of the whole run [m/s], or until the numbers of its law overflow; None where those of the plant do.
+    share_of_natural : float or None
+        The same over the peak of the natural earthquake [-]; None also for a fault that has none.
+    """
+
+    kind: str
+    peak_slip_rate: float | None
+    share_of_natural: float | None
+
+    @property
+    def harmless(self) -> bool:
+        """Whether the run neither is an earthquake nor diverges nor opens the fault."""
+        return self.kind in HARMLESS
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys of DESIGN.md."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutcomeCriterion:
+    """What the outcome of a run is decided by.
+
+    In this order, a run is
+
+    - ``diverged``, if the motion of the plant overflows; ``opened``, if that event happened;
+    - ``tracked``, if it has a controller, its slip error never exceeds 2 % of the target slip (over the time in which
+      errors count), and its slip rate never exceeds the largest of the reference by more than 1 % of the natural peak
+      (over the whole run);
+    - an ``earthquake``, if its slip rate exceeds that of the reference by 10 % of the natural peak or more at any time;
+    - ``slow slip`` otherwise, or ``diverged`` if the numbers of its law overflow, after which nothing is known.
+
+    A stable fault has no natural earthquake. What it is compared with instead is the speed at which its own spring and
+    mass would swing through the whole target slip, ω_n·d_max; friction with a state always with its `dynamic_rate`.
+
+    Attributes
+    ----------
+    natural_peak : float or None
+        Largest slip rate of the fault without control [m/s]; None for a stable fault.
+    inertial_rate : float
+        ω_n·d_max [m/s].
+    reference_rate : float
+        Largest r' [m/s].
+    target_slip : float
+        d_max [m].
+    dynamic_rate : float, optional
+        aσ'A/(η + √(km)) [m/s] of friction with a state, whose natural peak takes a cycle to know.
+    """
+
+    natural_peak: float | None
+    inertial_rate: float
+    reference_rate: float
+    target_slip: float
+    dynamic_rate: float | None = None
+
+    @classmethod
+    def of(cls, fault: Fault, natural_peak: float | None) -> "OutcomeCriterion":
+        """Criterion of a fault and its task."""
+        target = fault.reference.target_slip
+        return cls(
+            natural_peak=natural_peak or None,
+            inertial_rate=fault.natural_frequency * target,
+            reference_rate=fault.reference.largest_rate,
+            target_slip=target,
+        )
+
+    def outcome(
+        self, peak_slip_rate: float | None, max_slip_error: float | None, events: Mapping[str, float], *, followed: bool
+    ) -> Outcome:
+        """Outcome of one run.
+
+        Parameters
+        ----------
+        peak_slip_rate : float or None
+            [m/s]; None where the motion of the plant overflows.
+        max_slip_error : float or None
+            [m]; where none counts, because the run is too short, the slip rate alone decides.
+        events : mapping of str to float
+            Time of first occurrence [s].
+        followed : bool
+            Whether there was a controller, and so a reference to follow.
+        """
+        if peak_slip_rate is None:
+            return Outcome(kind="diverged", peak_slip_rate=None, share_of_natural=None)
+        share = peak_slip_rate / self.natural_peak if self.natural_peak else None
+        kind = "opened" if "opening" in events else self._kind(peak_slip_rate, max_slip_error or 0.0, followed)
+        kind = "diverged" if "diverged" in events and kind in HARMLESS else kind
+        return Outcome(kind=kind, peak_slip_rate=peak_slip_rate, share_of_natural=share)
+
+    def _kind(self, peak_slip_rate: float, slip_error: float, followed: bool) -> str:
+        excess = peak_slip_rate - (self.reference_rate if followed else 0.0)
+        scale = self.dynamic_rate or self.natural_peak or self.inertial_rate
+        if followed and slip_error <= SLIP_BAND * self.target_slip and excess <= TRACKED_SHARE * scale:
+            return "tracked"
+        return "earthquake" if excess >= EARTHQUAKE_SHARE * scale else "slow slip"
+
+
+# ----------------------------------------------------------------------
+# The figure of one run.
+
+Panel = tuple[str, str, Any, tuple[str, Any]]
+"""Name, SI unit and values of a signal, and name and values of one that is drawn beside it."""
+NOTHING = ("", None)
+_TIMES = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"), (2 * 60.0, 60.0, "min"), (0.0, 1.0, "s"))
+_PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def figure(title: str, time: Any, panels: Sequence[Panel]) -> Any:
+    """Return a Figure of signals over time [s], one panel each."""
+    from matplotlib.figure import Figure
+
+    drawing = Figure(figsize=(7, 1.9 * len(panels)), layout="constrained")
+    axes = drawing.subplots(len(panels), 1, sharex=True)
+    divisor, unit = next((size, name) for least, size, name in _TIMES if time[-1] >= least)
+    for axis, (name, si_unit, values, beside) in zip(axes, panels, strict=True):
+        _panel(axis, time / divisor, name, si_unit, values, beside)
+    axes[-1].set_xlabel(f"time [{unit}]")
+    drawing.suptitle(title)
+    return drawing
+
+
+def stress_figure(title: str, time: Any, slip: Any, shear_stress: Any, moment_rate: Any) -> Any:
+    """Return a Figure of shear stress against slip (the area under it is the work per area), and of the moment rate."""
+    from matplotlib.figure import Figure
+
+    drawing = Figure(figsize=(7, 4.5), layout="constrained")
+    above, below = drawing.subplots(2, 1)
+    size, prefix = _prefix(float(abs(slip).max()))
+    _panel(above, slip / size, "shear stress", "Pa", shear_stress, NOTHING)
+    above.set_xlabel(f"slip [{prefix}m]")
+    divisor, unit = next((size, name) for least, size, name in _TIMES if time[-1] >= least)
+    below.plot(time / divisor, moment_rate, linewidth=1)
+    below.set_ylabel("moment rate [N m/s]")
+    below.set_xlabel(f"time [{unit}]")
+    below.grid(visible=True, alpha=0.3)
+    drawing.suptitle(title)
+    return drawing
+
+
+def _panel(axis: Any, time: Any, title: str, unit: str, values: Any, beside: tuple[str, Any]) -> None:
+    name, others = beside
+    largest = max(float(abs(curve).max()) for curve in (values, others) if curve is not None)
+    # No prefix where the unit is a power, which would belong to what is inside of it.
+    size, prefix = (1.0, "") if "^" in unit else _prefix(largest)
+    if others is not None:
+        axis.plot(time, others / size, "--", color="black", linewidth=1, label=name)
+    axis.plot(time, values / size, linewidth=1, label="fault", zorder=2.5 if name == "reference" else 1.5)
+    if others is not None:
+        axis.legend(loc="best")
+    axis.set_ylabel(f"{title} [{prefix}{unit.replace('^2', '²').replace('^3', '³')}]")
+    axis.grid(visible=True, alpha=0.3)
+
+
+def _prefix(largest: float) -> tuple[float, str]:
+    return next(
+        ((size, prefix) for size, prefix in _PREFIXES if largest >= size),
+        _PREFIXES[-1] if largest else (1.0, ""),
+    )
+
+
+# ----------------------------------------------------------------------
+# What a simulation returns.
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -150,3 +533,34 @@ class Trajectory(Recording):
     def plot_stress(self) -> Any:
         """Return a matplotlib Figure of the shear stress against slip, and of the moment rate over time."""
         return stress_figure(self.heading, self.time, self.slip, self.shear_stress, self.moment_rate)
+
+
+# ----------------------------------------------------------------------
+# What a simulation with an actuator returns.
+
+Signal = tuple["np.ndarray", str, str]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SampledTrajectory(Trajectory):
+    """A run whose pressure reaches the fault through an actuator; `pressure` is that in the fault.
+
+    Attributes
+    ----------
+    actuation : mapping of str to tuple
+        Values, shape (n,), long name and SI unit of ``well_pressure`` [Pa], and where the actuator stores fluid of
+        ``injected_volume`` [m³] and ``flow_rate`` [m³/s].
+    """
+
+    actuation: Mapping[str, Signal] = field(repr=False)
+
+    def signals(self) -> dict[str, Signal]:
+        """Values, long name and SI unit of every signal that this run has, by name."""
+        return super().signals() | dict(self.actuation)
+
+    def panels(self) -> list[Panel]:
+        """The pressure at the well in the panel of that in the fault, and what the actuator tells beside."""
+        found, further = super().panels(), dict(self.actuation)
+        if "well_pressure" in further:
+            found[2] = (*found[2][:3], ("at the well", further.pop("well_pressure")[0]))
+        return [*found, *((title, unit, values, NOTHING) for values, title, unit in further.values())]

@@ -9,15 +9,15 @@ if TYPE_CHECKING:
     from quakedesign.sos.exact.answer import Positivity as Positivity
     from quakedesign.sos.exact.attraction import Attraction as Attraction
     from quakedesign.sos.exact.attraction import Region as Region
-    from quakedesign.sos.exact.attraction_files import save_attraction as save_attraction
+    from quakedesign.sos.exact.attraction import save_attraction as save_attraction
     from quakedesign.sos.exact.polynomial import Polynomial as Polynomial
+    from quakedesign.sos.exact.polynomial_statement import Statement as Statement
+    from quakedesign.sos.exact.polynomial_statement import statement as statement
     from quakedesign.sos.exact.proofs import Functional as Functional
     from quakedesign.sos.exact.proofs import Point as Point
     from quakedesign.sos.exact.proofs import Square as Square
     from quakedesign.sos.exact.proofs import SumOfSquares as SumOfSquares
     from quakedesign.sos.exact.proofs import holds as holds
-    from quakedesign.sos.exact.statement import Statement as Statement
-    from quakedesign.sos.exact.statement import statement as statement
 
     def __getattr__(name: str) -> Any: ...
 
@@ -29,9 +29,10 @@ face(
     decide=f"{_SEARCH}.engine",
     Program=f"{_SEARCH}.program",
     largest=f"{_SEARCH}.program",
-    Membership=f"{_SEARCH}.membership",
-    stability=f"{_SEARCH}.attraction",
-    region_of_attraction=f"{_SEARCH}.attraction",
+    Membership=f"{_SEARCH}.program",
+    stability=f"{_SEARCH}.attraction_search",
+    region_of_attraction=f"{_SEARCH}.attraction_search",
     verify=f"{_SEARCH}.verification",
-    read_gram=f"{_SEARCH}.gram_files",
+    read_gram=f"{_SEARCH}.verification",
+    stated_problems=f"{_SEARCH}.conic",
 )

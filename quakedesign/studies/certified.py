@@ -1,28 +1,35 @@
 """Answers about given gains of a homogeneous law, as facts for JSON and as sentences."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import takewhile
 from time import perf_counter
 from typing import Any
 
-from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates import Certificate, Loop, Verdict
 from quakedesign.errors import CertificateError, ParameterError, require_known
-from quakedesign.rationals import rational
-from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.synthesis.analysis.certify import Number, closed_loop, proof
-from quakedesign.synthesis.analysis.margins import (
-    Reach,
+from quakedesign.exact import LowerBound, UpperBound, rational
+from quakedesign.fault import Fault
+from quakedesign.laws import Controller
+from quakedesign.lyapunov import Certificate, Loop, Verdict
+from quakedesign.lyapunov.exact.domain import certified_lipschitz
+from quakedesign.lyapunov.exact.premises import Premise
+from quakedesign.lyapunov.search.certify import (
+    CertifiedLimit,
+    Number,
     against,
+    closed_loop,
     largest_gain_range,
     largest_lipschitz,
     necessary_limit,
+    proof,
 )
-from quakedesign.synthesis.analysis.settling_time import Settling, fastest_settling
-from quakedesign.synthesis.lyapunov.infeasibility import dual
-from quakedesign.synthesis.lyapunov.search import candidate_degrees, refute
+from quakedesign.lyapunov.search.infeasibility import dual
+from quakedesign.lyapunov.search.search import candidate_degrees, refute
+from quakedesign.lyapunov.search.settling import Settling, fastest_settling
+from quakedesign.simulation import Trajectory, simulate
+from quakedesign.symbolic.term_expressions import signed_monomials
+from quakedesign.synthesis import Design
 
 _LARGEST_FAMILY = 24  # monomials of V
 MAXIMIZE = ("lipschitz", "beta", "beta-factor", "decay")
@@ -79,7 +86,7 @@ def certified(
     Raises
     ------
     ParameterError, UnknownNameError, CertificateError
-        For unknown wishes, and as `quakedesign.synthesis.certify`.
+        For unknown wishes, and as `quakedesign.lyapunov.certify`.
     """
     began = perf_counter()
     low, high = (rational(v, "gain_range") for v in gain_range)
@@ -183,7 +190,9 @@ def _nothing_lines(certificate: Certificate | None, kind: str, excluded: list[in
     return [_AGAINST[kind], f"an exact dual was found: {family} is positive and falls, whatever the proof"]
 
 
-def _of_reach(name: str, gains: tuple[Number, ...], reach: Reach, ends: Ends, lipschitz: Number | None) -> Answer:
+def _of_reach(
+    name: str, gains: tuple[Number, ...], reach: CertifiedLimit, ends: Ends, lipschitz: Number | None
+) -> Answer:
     """How far gains reach in L̄ or in the range of β."""
     tried = ends if reach.quantity == "lipschitz" else (ends[0], ends[0])
     lowest = closed_loop(
@@ -218,7 +227,7 @@ def _of_reach(name: str, gains: tuple[Number, ...], reach: Reach, ends: Ends, li
     return reach.certificate, facts, lines
 
 
-def _reach_lines(reach: Reach) -> list[str]:
+def _reach_lines(reach: CertifiedLimit) -> list[str]:
     names = {"lipschitz": "bound on |h'|", "beta": "upper end of beta", "beta-factor": "factor f of beta in [b/f, b f]"}
     degrees = ", ".join(map(str, reach.degrees))
     if reach.value is None:
@@ -256,3 +265,85 @@ def _settling_lines(told: Settling) -> list[str]:
 
 def _text(value: Fraction | None) -> str | None:
     return None if value is None else str(value)
+
+
+# ----------------------------------------------------------------------
+# How finely a loop must be sampled for its premise on |h'| to hold on the run itself.
+
+_WINDOW = 4000
+_FINEST = 1000.0
+_HALVINGS = 6
+
+
+def on_trajectory(lipschitz: float, run: Trajectory) -> Premise | None:
+    """Largest |Δh/Δt| of a run against the certified bound; None for a run that diverged."""
+    measured = run.metrics.max_h_rate
+    if measured is None:
+        return None
+    return Premise(
+        name="on_trajectory",
+        required=measured,
+        certified=lipschitz,
+        unit="m/s^3",
+        measured=True,
+        note=f"largest |Δh/Δt| of the run, scheme {run.provenance['scheme']}, step {run.provenance['step']:g} s",
+    )
+
+
+def largest_sampling_time(fault: Fault, controller: Controller, lipschitz: float) -> float | None:
+    """Largest T_s [s] for which a run stays inside |Δh/Δt| ≤ lipschitz, by bisection on a window of 4000 T_s.
+
+    Measured on the first part of the task only, so an indication; None when even a thousandth of T_s does not do.
+    """
+    window = min(_WINDOW * fault.sampling_time, fault.reference.operation_time)
+
+    def holds(step: float) -> bool:
+        run = simulate(fault, controller, step=step, duration=window, samples=2)
+        rate = run.metrics.max_h_rate
+        return rate is not None and rate <= lipschitz
+
+    high = fault.sampling_time
+    if holds(high):
+        return high
+    low = high / 4
+    while not holds(low):
+        high, low = low, low / 4
+        if low < fault.sampling_time / _FINEST:
+            return None
+    for _ in range(_HALVINGS):
+        middle = (low * high) ** 0.5
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return float(f"{low * 0.995:.2g}")
+
+
+# ----------------------------------------------------------------------
+# The premise that a run itself decides: |h'| along it against what is certified.
+
+
+def certified_bound(design: Design | None) -> Fraction | None:
+    """Bound on |h'| for λ = 1 [m/s³] that a design is proved with; None for a linear law, and without a proof."""
+    law = design.controller if design else None
+    if design is None or design.certificate is None or law is None or law.lipschitz_limit is None:
+        return None
+    return certified_lipschitz(design.certificate) if design.verdict is Verdict.PROVED else None
+
+
+def trajectory_premise(law: Controller, lipschitz: float | None, run: Trajectory) -> Premise | None:
+    """Largest |Δh/Δt| of a run against the certified bound; None for a run that diverged, or a law without a limit.
+
+    Parameters
+    ----------
+    law : Controller
+    lipschitz : float or None
+        Certified bound on |h'| [m/s³]. None where there is no certificate: then nothing is certified, the premise does
+        not hold whatever the run does, and its note names the limit that no certificate of these gains exceeds.
+    run : Trajectory
+    """
+    if law.lipschitz_limit is None:
+        return None
+    limit = float(law.lipschitz_limit)
+    premise = on_trajectory(limit if lipschitz is None else lipschitz, run)
+    if premise is None or lipschitz is not None:
+        return premise
+    said = f"{premise.note}; no certificate is at hand, and none of these gains exceeds {limit:.4g} {premise.unit}"
+    return replace(premise, certified=0.0, proved=False, note=said)

@@ -1,4 +1,7 @@
-"""All controllers of one fault side by side, in closed loop."""
+"""Comparison of all controllers of one fault in closed loop, and the required pressure.
+
+The second chapter gives the equilibrium pressure [Pa] of a task and tests whether a run supplied it.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -6,24 +9,35 @@ from fractions import Fraction
 from functools import partial
 from typing import Any
 
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.guarantee import ContinuousPeaks, Guarantee, NoGuarantee
-from quakedesign.certificates.premises import Variant
-from quakedesign.certificates.sectors import sectors
-from quakedesign.certificates.slow_sliding import SlidingGuarantee
-from quakedesign.controllers import Controller, published
+from quakedesign.errors import ParameterError
+from quakedesign.exact import Enclosure, rational
 from quakedesign.fault import Fault, require_fault
-from quakedesign.simulation import Trajectory, natural_earthquake, simulate, simulation_scheme
-from quakedesign.simulation.step_stability import amplification
-from quakedesign.studies.on_trajectory import certified_bound
-from quakedesign.studies.state_runs import StateRun, designed_run, natural_run
+from quakedesign.guarantees import (
+    CLASSES,
+    ContinuousPeaks,
+    Guarantee,
+    LoopAnswer,
+    NoGuarantee,
+    SlidingGuarantee,
+    attacked,
+)
+from quakedesign.guarantees.guarantee_result import SlidingAnswer
+from quakedesign.laws import Controller, published
+from quakedesign.linear.riccati import vertex_poles
+from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.loop import simulation_scheme
+from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.fault_bounds import equilibrium_pressure, sectors
+from quakedesign.lyapunov.exact.premises import Variant
+from quakedesign.simulation import Trajectory, natural_earthquake, simulate
+from quakedesign.simulation.integrators import amplification
+from quakedesign.studies.certified import certified_bound, largest_sampling_time, on_trajectory
+from quakedesign.studies.runs import StateRun, designed_run, natural_run
 from quakedesign.synthesis import Design, assess, designable, left_out
 from quakedesign.synthesis import design as synthesise
-from quakedesign.synthesis.analysis.lipschitz_on_run import largest_sampling_time, on_trajectory
-from quakedesign.synthesis.guaranteed import CLASSES, Answer, attacked
-from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
-from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
-from quakedesign.synthesis.linear.sampled.held import HeldLoop
+
+# ----------------------------------------------------------------------
+# All controllers of one fault side by side, in closed loop.
 
 Tell = Callable[[str, float], None]
 Run = Trajectory | StateRun
@@ -57,7 +71,7 @@ class Entry:
         For a linear law: what is decided when p is held over T_s, see `Design.held_loop`.
     peaks : mapping of str to ContinuousPeaks
         For a designed linear law that is proved: peaks in continuous time by class; no class without any.
-    answer : Answer, SlidingAnswer or None
+    answer : LoopAnswer, SlidingAnswer or None
         For a designed law: what is guaranteed of it with p held over T_s, see `Design.guarantee`, and the worst found.
     """
 
@@ -70,7 +84,7 @@ class Entry:
     variants: tuple[Variant, ...] = ()
     held: HeldLoop | None = None
     peaks: Mapping[str, ContinuousPeaks] = field(default_factory=dict)
-    answer: Answer | SlidingAnswer | None = None
+    answer: LoopAnswer | SlidingAnswer | None = None
 
     @property
     def guarantee(self) -> Guarantee | SlidingGuarantee | NoGuarantee | None:
@@ -178,7 +192,7 @@ def behind_path(fault: Fault) -> dict[str, str]:
     return {name: why for name in designable(fault) if name != "elqr"}
 
 
-def _answer(fault: Fault, design: Design) -> Answer | SlidingAnswer | None:
+def _answer(fault: Fault, design: Design) -> LoopAnswer | SlidingAnswer | None:
     found = design.guarantee
     if isinstance(found, SlidingGuarantee):
         return design.sliding
@@ -259,3 +273,74 @@ def _with_rate(entry: Entry, law: Controller, limit: float, run: Trajectory, tel
         step = largest_sampling_time(design.fault, law, bound)
     tell(f"{entry.label}: feed-forward", 0.0)
     return replace(entry, design=judged, largest_step=step, variants=design.feedforward_variants())
+
+
+# ----------------------------------------------------------------------
+# The pressure that a task needs at equilibrium, and whether a run had it.
+
+_MARGIN = 0.01
+"""Of the range that is needed: what is closer to zero, or to the range, makes no difference."""
+
+
+def needed_pressure(fault: Fault, slip: float | None = None) -> Enclosure | None:
+    """Pressure [Pa] that holds the nominal fault at rest at references up to a slip [m], the target unless given.
+
+    None for friction with a state, and where no finite range is found.
+    """
+    if fault.friction.state_names:
+        return None
+    try:
+        return Enclosure.of(
+            *equilibrium_pressure(fault, rational(fault.reference.target_slip if slip is None else slip))
+        )
+    except ParameterError:
+        return None
+
+
+def ways(needed: Enclosure) -> tuple[str, ...]:
+    """What a range of pressures takes: ``withdrawal`` below zero, ``injection`` above."""
+    margin = _margin(needed)
+    taken = {"withdrawal": needed.low < -margin, "injection": needed.high > margin}
+    return tuple(way for way, needs in taken.items() if needs)
+
+
+def need_sentence(needed: Enclosure) -> str:
+    """Range of the pressure that a task needs, and what it takes."""
+    taken = f"the task needs {' and '.join(ways(needed))} of fluid" if ways(needed) else "the task needs no fluid"
+    ends = f"{needed.low.quantity('Pa')} to {needed.high.quantity('Pa')}"
+    return f"pressure at equilibrium along the reference {ends} (p < 0 is withdrawal): {taken}"
+
+
+def pressure_extremes(run: "Trajectory") -> tuple[float, float] | None:
+    """Least and largest pressure [Pa] of a run; None without a controller, and for one that diverged."""
+    least, largest = run.metrics.min_pressure, run.metrics.max_pressure
+    return None if least is None or largest is None else (least, largest)
+
+
+def shortfall(run: "Trajectory", fault: Fault) -> str | None:
+    """Pressure that the reference of a run needs at equilibrium and the run never had; None for a run that tracked."""
+    extremes = pressure_extremes(run)
+    if run.reference is None or extremes is None or run.outcome.kind == "tracked":
+        return None
+    needed = needed_pressure(fault, float(run.reference.max()))
+    if needed is None:
+        return None
+    (least, largest), margin = extremes, _margin(needed)
+    if least > needed.low + margin:
+        end, had = needed.low.quantity("Pa"), f"has no less than {_mega(least)}" if least < 0 else "never withdraws"
+    elif largest < needed.high - margin:
+        end, had = (
+            needed.high.quantity("Pa"),
+            "never injects" if largest <= 0 else f"has no more than {_mega(largest)}",
+        )
+    else:
+        return None
+    return f"falls short of its task: the reference needs {end} at equilibrium, and this run {had}"
+
+
+def _mega(pressure: float) -> str:
+    return f"{pressure / 1e6:.3g} MPa"
+
+
+def _margin(needed: Enclosure) -> float:
+    return _MARGIN * float(needed.high - needed.low)

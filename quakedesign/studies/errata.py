@@ -32,7 +32,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class ErrataRow:
     """One point at which the paper is corrected, with its check.
 
     Attributes
@@ -80,7 +80,7 @@ def errata_folder() -> Path:
 
 
 @cache
-def errata_rows() -> tuple[Row, ...]:
+def errata_rows() -> tuple[ErrataRow, ...]:
     """Every row, by number.
 
     Raises
@@ -109,7 +109,7 @@ def _load(path: Path) -> ModuleType:
     return module
 
 
-def find_rows(numbers: Iterable[int | str] = ()) -> tuple[Row, ...]:
+def find_rows(numbers: Iterable[int | str] = ()) -> tuple[ErrataRow, ...]:
     """Rows of given numbers in the order asked for, each once; all of them without numbers.
 
     Raises
@@ -150,7 +150,7 @@ def run_rows(numbers: Iterable[int | str] = ()) -> list[dict[str, Any]]:
     return [_run(row) for row in find_rows(numbers)]
 
 
-def _run(row: Row) -> dict[str, Any]:
+def _run(row: ErrataRow) -> dict[str, Any]:
     began = perf_counter()
     finding = row.check()
     return {

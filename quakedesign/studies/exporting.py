@@ -3,15 +3,15 @@
 from pathlib import Path
 from typing import Any
 
-from quakedesign.controllers import Controller
 from quakedesign.fault import Fault
+from quakedesign.laws import Controller
 from quakedesign.loop.schemes import own_way
 from quakedesign.loop.sensing import OutputFeedback
 from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.simulation import export_controller
 from quakedesign.simulation.export import FILES
 from quakedesign.simulation.run import sampled_scheme
-from quakedesign.studies.estimation import differentiator_premise, sensor
+from quakedesign.studies.runs import differentiator_premise, sensor
 
 
 def export_answer(

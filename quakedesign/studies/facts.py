@@ -1,20 +1,330 @@
-"""What a fault is, in numbers and in sentences."""
+"""Facts about a fault: equations in LaTeX, stability regions, sampling, derived quantities.
 
+Stability regions are in stiffness, effective normal stress and injected pressure. The sampling period is
+compared with the fastest unstable pole.
+"""
+
+import cmath
+from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from math import isfinite
 from typing import Any
 
-from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates.guarantee import task_of
-from quakedesign.certificates.impossibility import longest_reaction
+import numpy as np
+import sympy as sp
+
 from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault, fault_toml
-from quakedesign.fault.defaults import AGEINGS, beyond_rates, mean_rate, sliding_step
-from quakedesign.rationals import rational
-from quakedesign.studies.needed_pressure import need_sentence, needed_pressure, ways
-from quakedesign.symbolic import derive
-from quakedesign.synthesis.analysis.sampling_adequacy import LARGEST_PRODUCT, SamplingAdequacy, sampling_adequacy
+from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, mean_rate, sliding_step
+from quakedesign.guarantees import task_of
+from quakedesign.guarantees.exact.impossibility import longest_reaction
+from quakedesign.guarantees.search.lqg import sliding_model, sliding_poles
+from quakedesign.laws import Controller, Signals
+from quakedesign.simulation.state_plant import spring_acceleration, stretch
+from quakedesign.studies.comparison import need_sentence, needed_pressure, ways
+from quakedesign.symbolic import derive, plant, rate_and_state_plant
+from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols
+from quakedesign.symbolic.stability import StabilityVerdict, nucleation_length, stability
 from quakedesign.text import lasting
+
+# ----------------------------------------------------------------------
+# Equations of a fault and of its laws in LaTeX, as their expressions are.
+
+_LONG = 100  # numerators and denominators of more are written as decimals
+
+
+def coordinates(fault: Fault) -> str:
+    """What the plant is written in, for a sentence that goes on with its equations."""
+    if not fault.friction.state_names:
+        return "Slip x₁ and slip rate x₂, measured from the equilibrium without pressure,"
+    return "Slip x₁, slip rate v, the stretch s of the spring, whose far end rests, and the state of friction"
+
+
+def plant_latex(fault: Fault) -> list[str]:
+    """Plant of a fault, and its friction law."""
+    if fault.friction.state_names:
+        return _with_state(fault)
+    friction = plant.mu(plant.x1, plant.x2)
+    acceleration = plant.shifted_acceleration().subs(friction, sp.Symbol("mu"))
+    law = sp.sympify(fault.friction.symbolic().coefficient(plant.x1, plant.x2))
+    motion = rf"\dot x_1 = x_2, \qquad \dot x_2 = {sp.latex(acceleration)}"
+    return [motion, rf"\mu = {sp.latex(law)}"]
+
+
+def _with_state(fault: Fault) -> list[str]:
+    states = state_symbols(fault.friction.state_names)
+    law, mu, named = fault.friction.symbolic(), sp.Symbol("mu"), {stretch: sp.Symbol("s", real=True)}
+    acceleration = spring_acceleration().replace(plant.mu, lambda *_: mu).subs(named)
+    moved = zip(states, law.state_rates(plant.x1, rate, *states), strict=True)
+    return [
+        rf"\dot x_1 = v, \qquad \dot s = -v, \qquad \dot v = {sp.latex(acceleration)}",
+        rf"\mu = {sp.latex(sp.sympify(law.coefficient(plant.x1, rate, *states)))}",
+        *(rf"\dot {{{sp.latex(state)}}} = {sp.latex(sp.sympify(change))}" for state, change in moved),
+    ]
+
+
+def law_latex(law: Controller | None) -> list[str]:
+    """Pressure that a law asks for while a fault moves and the rates of its states, in four digits; none of no law."""
+    if law is None:
+        return []
+    law = law.while_moving
+    states = sp.symbols([f"z_{i}" for i in range(1, len(law.integral_units) + 1)], real=True)
+    signals = Signals(
+        slip=plant.x1,
+        slip_rate=plant.x2,
+        slip_error=plant.e1,
+        slip_rate_error=plant.e2,
+        integrals=tuple(states),
+        reference_acceleration=plant.reference(plant.t).diff(plant.t, 2),
+    )
+    rates = zip(states, law.integral_rates(signals), strict=True)
+    named = [("p", law.pressure(signals)), *((rf"\dot {{{z}}}", rate) for z, rate in rates)]
+    return [f"{name} = {_written(expression)}" for name, expression in named]
+
+
+def _written(expression: Any) -> str:
+    """LaTeX with numbers of many digits to four of them."""
+    sums = sp.expand(sp.sympify(expression))
+    numbers = {part for part in sums.atoms(sp.Pow) if part.is_number}
+    numbers |= {n for n in sums.atoms(sp.Rational) if max(abs(n.p), n.q) > _LONG}
+    short = sums.xreplace({number: number.evalf(4) for number in numbers})
+    whole = sp.Add(
+        *(sp.Mul(*(f.evalf(4) if f.is_Float else f for f in sp.Mul.make_args(t))) for t in sp.Add.make_args(short))
+    )
+    return str(sp.latex(whole))
+
+
+# ----------------------------------------------------------------------
+# Where a fault slides stably: regions of stiffness, effective normal stress and injected pressure.
+
+_GRID = 240
+
+Function = Callable[..., Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plane:
+    """Stiffness against one quantity that sets the effective stress under pressure.
+
+    Attributes
+    ----------
+    across : numpy.ndarray
+        That quantity [Pa], shape (points,).
+    stable : numpy.ndarray of bool
+        Shape (stiffnesses, points).
+    critical : numpy.ndarray
+        Critical stiffness per area [Pa/m], shape (points,); nan where there is none.
+    limits : tuple of float
+        Where the damping alone decides [Pa]; nan outside of the plane.
+    own : float
+        Where the fault is [Pa].
+    """
+
+    across: np.ndarray
+    stable: np.ndarray
+    critical: np.ndarray
+    limits: tuple[float, ...]
+    own: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class StabilityRegions:
+    """Stable and unstable regions of a fault; its own verdict is exact.
+
+    Attributes
+    ----------
+    verdict : StabilityVerdict
+        Of the fault itself.
+    stiffness : numpy.ndarray
+        Stiffnesses per area of both planes [Pa/m].
+    own : float
+        That of the fault [Pa/m].
+    critical : float
+        Critical stiffness per area at the fault's effective stress [Pa/m]; not positive or nan where there is none.
+    nucleation_length : float or None
+        [m]; None without a critical stiffness.
+    over_stress, over_pressure : Plane
+        The effective normal stress σ' varies at the given pressure, or the pressure at the fault's σ'.
+    """
+
+    verdict: StabilityVerdict
+    stiffness: np.ndarray
+    own: float
+    critical: float
+    nucleation_length: float | None
+    over_stress: Plane
+    over_pressure: Plane
+
+
+def stability_regions(fault: Fault, *, pressure: float, loading_rate: float | None, inertia: bool) -> StabilityRegions:
+    """Regions from the symbolic stability conditions; the arguments and errors are those of `stability`."""
+    verdict = stability(fault, pressure=pressure, loading_rate=loading_rate, inertia=inertia)
+    rate = float(verdict.loading_rate)
+    conditions, boundary, limits = _functions(fault, rate, inertia)
+    normal, own = fault.effective_normal_stress, fault.stiffness / fault.area
+    critical = float(boundary(normal - pressure))
+    top = 2 * max(own, critical if np.isfinite(critical) else own)
+    stiffness = np.linspace(top / _GRID, top, _GRID)
+    stresses = np.linspace(max(pressure, 0), max(2 * normal, normal + pressure), _GRID + 1)[1:]
+    pressures = np.linspace(-normal, normal, _GRID + 1)[:-1]
+
+    def plane(across: np.ndarray, effective: np.ndarray, at: float) -> Plane:
+        S, K = np.meshgrid(effective, stiffness)
+        order = np.argsort(effective)
+        places = (np.interp(x, effective[order], across[order], left=np.nan, right=np.nan) for x in limits)
+        return Plane(
+            across=across,
+            stable=np.min([np.sign(c(S, K) + 0 * S) for c in conditions], axis=0) > 0,
+            critical=boundary(effective),
+            limits=tuple(map(float, places)),
+            own=at,
+        )
+
+    return StabilityRegions(
+        verdict=verdict,
+        stiffness=stiffness,
+        own=own,
+        critical=critical,
+        nucleation_length=nucleation_length(fault, pressure=pressure, loading_rate=rate or None)
+        if 0 < critical < np.inf
+        else None,
+        over_stress=plane(stresses, stresses - pressure, normal),
+        over_pressure=plane(pressures, normal - pressures, pressure),
+    )
+
+
+def _functions(fault: Fault, rate: float, inertia: bool) -> tuple[list[Function], Function, list[float]]:
+    """What bounds the regions, from the symbolic conditions.
+
+    The conditions as functions of effective stress [Pa] and stiffness per area [Pa/m], the critical stiffness as
+    function of effective stress, and the effective stresses at which a condition without stiffness is zero.
+    """
+    law = fault.friction
+    at = sp.Rational(str(rational(rate)))
+    values = {s: v for s, v in plant.plant_values(fault).items() if s not in (plant.k_hat, plant.sigma)}
+    slopes = rate_and_state_plant.slopes(law.exact(), at)
+    stress, per_area = rate_and_state_plant.effective_stress, sp.Symbol("K", positive=True)
+    per_stiffness = {plant.k_hat: per_area * values[plant.N_hat]}
+    numeric = [
+        c.subs(slopes).subs(values).subs(per_stiffness)
+        for c in rate_and_state_plant.stability_conditions(law.state_names, inertia=inertia)
+    ]
+    conditions = [sp.lambdify((stress, per_area), sp.N(c)) for c in numeric]
+    fixed = [sp.Poly(c, stress) for c in numeric if stress in c.free_symbols and per_area not in c.free_symbols]
+    limits = [float(sp.re(r)) for c in fixed for r in c.nroots() if sp.im(r) == 0 and sp.re(r) > 0]
+    try:
+        critical = rate_and_state_plant.critical_stiffness(law.symbolic(), inertia=inertia) / plant.N_hat
+    except UnsupportedError:
+        return conditions, lambda s: np.full(np.shape(s), np.nan), limits
+    known = {**law.values(), **values, rate_and_state_plant.loading_rate: at, plant.sigma: stress, plant.p: 0}
+    function = sp.lambdify(stress, sp.N(critical.subs(known)))
+    return conditions, lambda s: function(s) + 0 * np.asarray(s, dtype=float), limits
+
+
+# ----------------------------------------------------------------------
+# Whether a fault is sampled fast enough for how fast it runs away.
+
+LARGEST_PRODUCT = 0.2
+"""Of T_s and the unstable pole: five samples while an error grows e-fold, so that what one sample has not seen grows by
+at most 22 % until the next one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SamplingAdequacy:
+    """Sampling time of a fault beside its instability.
+
+    Attributes
+    ----------
+    step : float
+        T_s [s].
+    pole : float
+        Modulus of the fastest pole that grows [1/s]; 0 where none does.
+    over_box : bool
+        Whether `pole` is the fastest over the uncertainty box, at any pressure that equilibrium along the reference may
+        need there; if not, that of the nominal fault at its operating point: at rest, or with one state in slow sliding
+        along its task, whose mean rate sets it.
+    """
+
+    step: float
+    pole: float
+    over_box: bool
+
+    @property
+    def pole_times_step(self) -> float:
+        """T_s times the pole [-]: logarithm of the growth of an error between two samples."""
+        return self.pole * self.step
+
+    @property
+    def adequate(self) -> bool:
+        """Whether that is at most 1/5."""
+        return self.pole_times_step <= LARGEST_PRODUCT
+
+    @property
+    def adequate_step(self) -> float | None:
+        """Largest adequate T_s [s]; None where any is."""
+        return LARGEST_PRODUCT / self.pole if self.pole else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys of DESIGN.md, with the pole [1/s], the limit [-] and the largest adequate step [s]."""
+        return {
+            "step": self.step,
+            "pole": self.pole,
+            "over_box": self.over_box,
+            "pole_times_step": self.pole_times_step,
+            "limit": LARGEST_PRODUCT,
+            "adequate": self.adequate,
+            "adequate_step": self.adequate_step,
+        }
+
+
+@lru_cache(maxsize=64)
+def sampling_adequacy(fault: Fault) -> SamplingAdequacy:
+    """Compare a fault's sampling time with its fastest unstable pole.
+
+    The rule is one of thumb, necessary in spirit: a sampled law answers what happens between two samples only after it
+    has grown by e^{pT_s}. It is no proof; what a given law bears is certified by its largest step.
+
+    Parameters
+    ----------
+    fault : Fault
+    """
+    try:
+        poles, over_box = _box_poles(fault), True
+    except ParameterError:
+        poles, over_box = _nominal_poles(fault), False
+    pole = max((abs(z) for z in poles if z.real > 0), default=0.0)
+    return SamplingAdequacy(step=fault.sampling_time, pole=pole, over_box=over_box)
+
+
+def _nominal_poles(fault: Fault) -> list[complex]:
+    if len(fault.friction.state_names) == 1:
+        return list(sliding_poles(sliding_model(fault)))
+    return [complex(z) for z in derive(fault).eigenvalues]
+
+
+def _box_poles(fault: Fault) -> list[complex]:
+    """Poles [1/s] of λ² + wλ − s at the corners: real ones grow with s and fall with w, of others |λ|² = −s.
+
+    Raises
+    ------
+    ParameterError
+        When no finite range of s is found, or friction has a state.
+    """
+    fault.require_memoryless("the range of unstable poles")
+    task = task_of(fault)
+    poles = []
+    for slope in map(float, task.slip_chord):
+        for damping in map(float, task.rate_chord):
+            root = cmath.sqrt(damping**2 + 4 * slope)
+            poles += [(-damping + root) / 2, (-damping - root) / 2]
+    return poles
+
+
+# ----------------------------------------------------------------------
+# What a fault is, in numbers and in sentences.
 
 SHEAR_SPEEDS = 500.0, 6000.0  # of soft sediments and of the mantle, m/s
 IN_A_LABORATORY = 10.0  # m; below it what slides need not be rock

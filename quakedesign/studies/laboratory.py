@@ -13,20 +13,22 @@ from typing import Any, Self
 import numpy as np
 import sympy as sp
 
-from quakedesign.certificates.guarantee import Guarantee
-from quakedesign.controllers import Controller, published
 from quakedesign.fault import Disturbance, Fault, load_fault
-from quakedesign.loop.actuators import Actuator, Delay, Lag, Saturation, Stage
-from quakedesign.loop.schemes import own_way, simulation_scheme
+from quakedesign.files import temporary_folder
+from quakedesign.guarantees import Guarantee
+from quakedesign.guarantees.guarantee_result import LoopAnswer
+from quakedesign.laws import Controller, published
+from quakedesign.loop import Actuator, Delay, Lag, Saturation, simulation_scheme
+from quakedesign.loop.actuators.base import Stage
+from quakedesign.loop.schemes import own_way
 from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Sensor, SlipStage, Transducer
 from quakedesign.loop.sensing.measurement import Measurement
+from quakedesign.parallel import SerialExecutor
 from quakedesign.simulation import Load, natural_earthquake
-from quakedesign.simulation.campaign import Campaign, Problem, SerialExecutor, Space, campaign_problem, run_campaign
-from quakedesign.simulation.lanes import LANES
-from quakedesign.simulation.outcome import KINDS
+from quakedesign.simulation.campaign import Campaign, CampaignProblem, Space, campaign_problem, run_campaign
+from quakedesign.simulation.compiled import LANES
+from quakedesign.simulation.trajectory import KINDS
 from quakedesign.synthesis import answer
-from quakedesign.synthesis.guaranteed.answer import Answer
-from quakedesign.temporary import temporary_folder
 
 PRESET = "lab-apparatus"
 _WAVES = 3
@@ -152,7 +154,7 @@ class Apparatus:
 
     def problem(
         self, law: Controller, seed: int, *, duration: float | None = None, measurement: Sensor | None = None
-    ) -> Problem:
+    ) -> CampaignProblem:
         """Campaign of a law over specimens: stiffness, damping, area, friction drop, start and noise differ by seed.
 
         Parameters
@@ -191,7 +193,7 @@ def numbers() -> Mapping[str, Mapping[str, Any]]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class LaboratoryFinding:
     """What one law does under one condition.
 
     Attributes
@@ -272,8 +274,8 @@ def explain(
     seed: int = 0,
     duration: float | None = None,
     laws: Sequence[str] = ("cta", "dia", "elqr"),
-    tell: Callable[[Finding], None] = lambda _: None,
-) -> list[Finding]:
+    tell: Callable[[LaboratoryFinding], None] = lambda _: None,
+) -> list[LaboratoryFinding]:
     """The published laboratory gains under conditions, over specimens.
 
     Parameters
@@ -291,17 +293,19 @@ def explain(
     gains, findings = published("lab-fault"), []
     for name, one in chosen.items():
         for law in laws:
-            findings.append(Finding.of(name, law, _run(one.problem(gains[law], seed, duration=duration), specimens)))
+            findings.append(
+                LaboratoryFinding.of(name, law, _run(one.problem(gains[law], seed, duration=duration), specimens))
+            )
             tell(findings[-1])
     return findings
 
 
-def _run(problem: Problem, specimens: int) -> Campaign:
+def _run(problem: CampaignProblem, specimens: int) -> Campaign:
     with temporary_folder() as folder:
         return run_campaign(problem, specimens, folder / "specimens", executor=SerialExecutor(), batch=specimens)
 
 
-def guarantees() -> dict[str, Answer]:
+def guarantees() -> dict[str, LoopAnswer]:
     """What is guaranteed of an e-LQR of the slip alone, in less and more of the apparatus, by its conditions."""
     fault = load_fault(PRESET)
     return {
@@ -332,13 +336,15 @@ def guaranteed_in(
     seed: int = 0,
     duration: float | None = None,
     name: str = "guaranteed",
-) -> Finding:
+) -> LaboratoryFinding:
     """A guaranteed law in an apparatus, for readings off by anything within the bound of the proof."""
     problem = guaranteed_problem(one, proof, seed, duration=duration)
-    return Finding.of(name, "elqr", _run(problem, specimens))
+    return LaboratoryFinding.of(name, "elqr", _run(problem, specimens))
 
 
-def guaranteed_problem(one: Apparatus, proof: Guarantee, seed: int, *, duration: float | None = None) -> Problem:
+def guaranteed_problem(
+    one: Apparatus, proof: Guarantee, seed: int, *, duration: float | None = None
+) -> CampaignProblem:
     """Campaign of a guaranteed law in an apparatus; duration in s, the whole task unless given."""
     noise = Measurement(slip_noise=float(proof.held.slip_noise), bounded=True)
     return one.problem(proof.controller, seed, duration=duration, measurement=noise)

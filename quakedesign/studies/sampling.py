@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from quakedesign.certificates.premises import Premise
-from quakedesign.controllers import Controller, published
 from quakedesign.errors import ParameterError
+from quakedesign.exact import rational
 from quakedesign.fault import Fault
-from quakedesign.rationals import rational
+from quakedesign.laws import Controller, published
+from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.simulation import Study, Trajectory, accuracy, gain_sensitivity, noise_sensitivity, simulate
 from quakedesign.simulation.sensitivity import SCHEMES
-from quakedesign.studies.on_trajectory import certified_bound, trajectory_premise
+from quakedesign.studies.certified import certified_bound, trajectory_premise
 from quakedesign.synthesis import Design
 
 PUBLISHED_SCHEMES = ("continuous", "explicit", "compensated")
@@ -24,7 +24,7 @@ Tell = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class SchemeRow:
     """One law under one scheme.
 
     Attributes
@@ -74,14 +74,14 @@ class SamplingReport:
     Attributes
     ----------
     fault : Fault
-    rows : tuple of Row
+    rows : tuple of SchemeRow
         The law under every scheme, then the published ones: as in the paper, held, and with the compensated scheme.
     studies : dict of str to Study
         ``orders`` (of a sliding mode without feed-forward), ``slip_noise``, ``rate_noise``, ``input_gain``.
     """
 
     fault: Fault
-    rows: tuple[Row, ...]
+    rows: tuple[SchemeRow, ...]
     studies: dict[str, Study]
 
     def to_dict(self) -> dict[str, Any]:
@@ -163,13 +163,13 @@ def _row(
     bound: Fraction | None,
     duration: float | None,
     tell: Tell,
-) -> Row:
+) -> SchemeRow:
     label = f"{law.title}{f', λ {float(law.scale):.3g}' if law.scale is not None else ''}"
     label = f"{law.title}, published" if origin == "published" else label
     said = f"{label}, {scheme}"
     run = simulate(fault, law, scheme=scheme, duration=duration, samples=1000, progress=lambda done: tell(said, done))
     premise = trajectory_premise(law, None if bound is None else float(bound * (law.scale or 1)), run)
-    return Row(label=label, origin=origin, controller=law, scheme=scheme, run=run, premise=premise)
+    return SchemeRow(label=label, origin=origin, controller=law, scheme=scheme, run=run, premise=premise)
 
 
 def _studies(

@@ -4,24 +4,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from quakedesign.certificates.premises import least_authority
-from quakedesign.controllers import Controller, control_law
-from quakedesign.controllers import published as published_controllers
-from quakedesign.controllers.scaling import (
-    UNROUNDED,
-    CarriedGains,
-    Form,
-    agrees,
-    carry,
-    law_dimensions,
-    printed_gains,
-)
+from quakedesign.exact import rational
 from quakedesign.fault import Fault, load_fault
-from quakedesign.fault.radical import Radical, radical
-from quakedesign.fault.scales import Scales
-from quakedesign.fault.scaling import TOLERANCE, GroupComparison, Similarity, similarity
-from quakedesign.rationals import rational
-from quakedesign.studies.single import chosen_controller
+from quakedesign.fault.similarity import TOLERANCE, GroupComparison, Radical, Scales, Similarity, radical, similarity
+from quakedesign.laws import Controller, control_law
+from quakedesign.laws import published as published_controllers
+from quakedesign.laws.dimensions import UNROUNDED, CarriedGains, Form, agrees, carry, law_dimensions, printed_gains
+from quakedesign.lyapunov.exact.fault_bounds import least_authority
+from quakedesign.studies.runs import chosen_controller
 
 SCALED = {
     "slip": ("λ_δ", "slip_m"),

@@ -9,12 +9,11 @@ from math import inf
 import sympy as sp
 
 from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.exact import fraction_of, rational
 from quakedesign.fault import FrictionLaw
-from quakedesign.rationals import fraction_of, rational
-from quakedesign.symbolic.intervals import EVERYTHING, Box
-from quakedesign.symbolic.maximum import Excess, Undecided, upper_limit
+from quakedesign.symbolic.enclosure import EVERYTHING, Box, Excess, Undecided, upper_limit
+from quakedesign.symbolic.rate_and_state_plant import without_overflow
 from quakedesign.symbolic.signed_power import SignedPower, slope_off_kinks
-from quakedesign.symbolic.state_plant import without_overflow
 
 SLACK = Fraction(1, 10**9)  # relative; what is declared may be rounded inward by less
 _NOTHING = Fraction(0)
@@ -45,7 +44,7 @@ class FrictionBounds:
 
 
 @dataclass(frozen=True)
-class _Course:
+class _FrictionRange:
     """Friction on a range of slip, slip rate and state, and its slopes there."""
 
     friction: sp.Expr
@@ -91,7 +90,7 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
     return bounds
 
 
-def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_Course]:
+def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_FrictionRange]:
     """The law within its domain, and its continuation where it has no state."""
     slip, rate = sp.symbols("slip rate", nonnegative=True)
     states = sp.symbols([*law.state_names], positive=True)
@@ -105,12 +104,14 @@ def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_Course]:
     carried = sum(
         (slope_off_kinks(friction, x) * dx / rate for x, dx in zip(states, changes, strict=True)), sp.Integer(0)
     )
-    yield _Course(friction, slope_off_kinks(friction, slip) + sp.expand(carried), slope_off_kinks(friction, rate), box)
+    yield _FrictionRange(
+        friction, slope_off_kinks(friction, slip) + sp.expand(carried), slope_off_kinks(friction, rate), box
+    )
     if not states:
         slip, rate = sp.symbols("slip rate", real=True)
         friction = _continuous(law, exact.extended(slip, rate))
         box = {slip: EVERYTHING, rate: EVERYTHING}
-        yield _Course(friction, slope_off_kinks(friction, slip), slope_off_kinks(friction, rate), box)
+        yield _FrictionRange(friction, slope_off_kinks(friction, slip), slope_off_kinks(friction, rate), box)
 
 
 def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
@@ -124,10 +125,10 @@ def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
 
 def _confirmed(
     law: FrictionLaw,
-    courses: list[_Course],
+    courses: list[_FrictionRange],
     what: str,
     declared: Fraction,
-    parts: Callable[[_Course], list[sp.Expr]],
+    parts: Callable[[_FrictionRange], list[sp.Expr]],
 ) -> Fraction:
     """A bound that a law declares, if none of the parts exceeds it."""
     bound = declared

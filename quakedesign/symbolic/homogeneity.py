@@ -1,4 +1,9 @@
-"""Weighted homogeneity of functions and of fields with signs, with a proof or an exact counterexample."""
+"""Weighted homogeneity of functions and vector fields, weights, and relative degree.
+
+Homogeneity is proved symbolically or refuted by an exact counterexample. The weights are computed from
+the terms of the field. The relative degree is the number of derivatives of an output until the control
+appears.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -8,8 +13,12 @@ from typing import Any
 import sympy as sp
 
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.symbolic.balls import enclose
-from quakedesign.symbolic.normal_form import normal_form, signs, symbols_of
+from quakedesign.symbolic.enclosure import enclose
+from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, normal_form, signs, symbols_of
+from quakedesign.symbolic.term_expressions import lie_derivative
+
+# ----------------------------------------------------------------------
+# Weighted homogeneity of functions and of fields with signs, with a proof or an exact counterexample.
 
 Weights = Mapping[sp.Symbol, int | sp.Rational]
 epsilon = sp.Dummy("epsilon", positive=True)  # never the same as a symbol of the user's
@@ -258,3 +267,104 @@ def _differ(left: sp.Expr, right: sp.Expr) -> bool:
     except (UnsupportedError, AttributeError):
         return False
     return bool(enclosure.is_finite() and not enclosure.contains(0))
+
+
+# ----------------------------------------------------------------------
+# Weights found from a field's terms, instead of guessed.
+
+
+def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -> dict[sp.Symbol, sp.Rational]:
+    """Weights that make a field homogeneous of a degree, from the linear equations that its terms impose, then proved.
+
+    Parameters
+    ----------
+    rates : mapping of Symbol to Expr
+        Of the field.
+    degree : int or Rational
+        Such as −1 for sliding modes with a discontinuous integral.
+
+    Returns
+    -------
+    dict of Symbol to Rational
+
+    Raises
+    ------
+    ParameterError
+        When no weights exist, or they are not unique.
+    """
+    unknown = {state: sp.Dummy(f"r_{state}", positive=True) for state in rates}
+    equations: list[sp.Expr] = []
+    for state, rate in rates.items():
+        for term in sp.Add.make_args(normal_form(rate)):
+            if any(f.has(*rates) for f in term.atoms(sp.Function) - term.atoms(SignedPower, AbsolutePower)):
+                raise ParameterError(f"{term} is not built from signed powers; it has no weight.")
+            if term != 0:
+                equations.append(size_of(term, unknown, equations) - unknown[state] - degree)
+    solution = sp.linsolve([e for e in equations if e != 0], *unknown.values())
+    values = next(iter(solution), ())
+    if not values or not all(v.is_Rational and v > 0 for v in values):
+        raise ParameterError(
+            f"the terms impose no unique positive weights for degree {degree}. Solving gives {solution}. "
+            "Try another degree."
+        )
+    weights = dict(zip(rates, values, strict=True))
+    if not homogeneous(rates, weights, degree):
+        raise ParameterError(
+            f"with the weights {weights} that the terms impose, homogeneity of degree {degree} is not proved."
+        )
+    return weights
+
+
+def size_of(e: sp.Expr, sizes: Mapping[sp.Symbol, sp.Expr], equations: list[sp.Expr]) -> sp.Expr:
+    """How an expression grows with what its symbols grow with: exponents that add up in products.
+
+    What sums, extremes and arguments of functions ask of the sizes is added to `equations`, as expressions that vanish.
+
+    Parameters
+    ----------
+    e : Expr
+    sizes : mapping of Symbol to Expr
+        Linear in what is unknown; any other symbol does not grow.
+    equations : list of Expr
+    """
+    if e in sizes or not e.has(*sizes):
+        return sizes.get(e, sp.Integer(0))
+    parts = [size_of(part, sizes, equations) for part in e.args]
+    if e.is_Mul:
+        return sum(parts, start=sp.Integer(0))
+    if e.is_Pow or isinstance(e, SignedPower | AbsolutePower):
+        if not e.args[1].is_Rational:
+            raise ParameterError(f"an exponent must be rational. Received {e.args[1]} in {e}.")
+        return parts[0] * e.args[1]
+    if isinstance(e, sp.Add | sp.Max | sp.Min | sp.Abs):
+        equations += [parts[0] - other for other in parts[1:]]
+        return parts[0]
+    if not isinstance(e, sp.sign):
+        equations += parts
+    return sp.Integer(0)
+
+
+# ----------------------------------------------------------------------
+# How many derivatives of an output it takes until the control appears.
+
+
+def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control: sp.Symbol) -> int | None:
+    """Least n for which the nth derivative of the output along the field depends on the control.
+
+    Parameters
+    ----------
+    output : Expr
+    field : mapping of Symbol to Expr
+        Rate of every state.
+    control : Symbol
+
+    Returns
+    -------
+    int or None
+        None where as many derivatives as there are states do not depend on it, and so no later one does at all points.
+    """
+    for degree, _ in enumerate(field, start=1):
+        output = sp.expand(lie_derivative(output, field))
+        if output.has(control):
+            return degree
+    return None

@@ -1,18 +1,77 @@
-"""From the force balance to the shifted plant, the error dynamics and the instability conditions.
+"""Symbolic plant and error dynamics, derived from the force balance of the spring-slider.
 
-Nothing here is typed in but the force balance; SymPy derives the rest.
+SymPy derives the shifted plant, the error dynamics, the matched perturbation and the instability
+conditions. Further chapters: notation in LaTeX or plain text, and cached derivations (`derived.json`,
+re-derived by a test).
 """
 
-from collections.abc import Mapping
+import json
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
+from functools import cache, wraps
+from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
 
 import sympy as sp
+from sympy.printing.latex import LatexPrinter
+from sympy.printing.str import StrPrinter
 
+from quakedesign.exact import rational
 from quakedesign.fault import Fault, FrictionLaw
-from quakedesign.rationals import rational
-from quakedesign.symbolic.kept import kept
+
+# ----------------------------------------------------------------------
+# Derivations that are the same for every fault, kept beside the code that derives them.
+#
+# `derived.json` has what SymPy needs half a second for, by function and names of states; what it does not have is
+# derived. A test derives every entry again and compares; ``write_whole(FILE, derived_again())`` brings it up to date.
+
+FILE = Path(str(files(__package__))) / "derived.json"
+_TEXTS: dict[str, str] = json.loads(FILE.read_text(encoding="utf-8"))
+_Given = ParamSpec("_Given")
+_Result = TypeVar("_Result")
+
+
+def kept(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
+    """Read the results of a derivation where they are kept. Its one argument, if any, are names of states."""
+    home = derivation.__module__.rpartition(".")[2]
+
+    @cache
+    @wraps(derivation)
+    def result(*names: Any, **options: Any) -> Any:
+        text = None if options else _TEXTS.get(" ".join([f"{home}.{derivation.__name__}", *sum(names, ())]))
+        return derivation(*names, **options) if text is None else _read(text)
+
+    return result  # type: ignore[return-value]
+
+
+def derived_again() -> str:
+    """Content of the file, derived now."""
+    before, found = dict(_TEXTS), {}
+    _TEXTS.clear()
+    try:
+        for key in before:
+            name, *states = key.split()
+            home, function = name.split(".")
+            derivation = getattr(import_module(f"{__package__}.{home}"), function)
+            derivation.cache_clear()
+            found[key] = sp.srepr(derivation(*([tuple(states)] if states else [])))
+    finally:
+        _TEXTS.update(before)
+    return json.dumps(found, indent=1) + "\n"
+
+
+def _read(text: str) -> Any:
+    """Expression of its ``srepr``, which leaves out that the functions of the plant are real."""
+    return eval(text, vars(sp) | {"Function": lambda name: sp.Function(name, real=True)})
+
+
+# ----------------------------------------------------------------------
+# From the force balance to the shifted plant, the error dynamics and the instability conditions.
+#
+# Nothing here is typed in but the force balance; SymPy derives the rest.
 
 PARAMETERS = ("density", "shear_modulus", "damping", "effective_normal_stress")
 
@@ -238,3 +297,38 @@ def _named(h: sp.Expr) -> sp.Expr:
     for part, name in ((r.diff(t, 2), r2), (r.diff(t), r1), (r, r0)):
         h = h.subs(part, name)
     return h
+
+
+# ----------------------------------------------------------------------
+# One way to write derived equations: dots for rates, the reference without its argument, in LaTeX or plain text.
+
+
+class _Latex(LatexPrinter):  # type: ignore[misc]
+    def _print_Derivative(self, rate: sp.Derivative) -> str:
+        dots = {1: r"\dot", 2: r"\ddot"}.get(rate.derivative_count)
+        return f"{dots} r" if dots and rate.expr == reference(t) else str(super()._print_Derivative(rate))
+
+    def _print_Function(self, call: sp.Function, exp: Any = None) -> str:
+        return "r" if call == reference(t) else str(super()._print_Function(call, exp))
+
+
+class _Plain(StrPrinter):  # type: ignore[misc]
+    def _print_Derivative(self, rate: sp.Derivative) -> str:
+        known = rate.expr == reference(t)
+        return "r" + "'" * rate.derivative_count if known else str(super()._print_Derivative(rate))
+
+    def _print_Function(self, call: sp.Function) -> str:
+        return "r" if call == reference(t) else str(super()._print_Function(call))
+
+
+def latex(expression: Any) -> str:
+    r"""LaTeX of a derived expression: r, \dot r and \ddot r for the reference and its rates."""
+    return str(_Latex().doprint(expression))
+
+
+def plain(expression: Any) -> str:
+    """Text of a derived expression: r, r' and r'' for the reference and its rates, k_hat for a symbol with a hat."""
+    if isinstance(expression, sp.MatrixBase):
+        return f"Matrix({plain(expression.tolist())})"
+    said = _Plain().doprint(expression).replace(r"\mu_0\hat{N}_0", "(mu_0*N_hat_0)").replace(r"\mu^*", "mu_star")
+    return re.sub(r"\\hat\{\\?(\w+)\}", r"\1_hat", said).replace("\\", "")

@@ -1,6 +1,10 @@
-"""Signed powers ⌈x⌋^a = |x|^a sign(x) and absolute powers |x|^a as SymPy functions."""
+"""Signed powers ⌈x⌋^a = |x|^a sign(x) and absolute powers |x|^a as SymPy functions.
 
-from collections.abc import Iterator
+The normal form of an expression in signed powers reduces the proof of an identity to a comparison with
+zero.
+"""
+
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from typing import Any, ClassVar
@@ -9,6 +13,9 @@ import sympy as sp
 from sympy.core.cache import clear_cache
 
 from quakedesign.errors import KinkError
+
+# ----------------------------------------------------------------------
+# Signed powers ⌈x⌋^a = |x|^a sign(x) and absolute powers |x|^a as SymPy functions.
 
 _ALLOW_KINKS: ContextVar[bool] = ContextVar("allow_kinks", default=False)
 
@@ -114,3 +121,138 @@ class AbsolutePower(_Power):
         if x.could_extract_minus_sign():
             return cls(-x, a)
         return None
+
+
+# ----------------------------------------------------------------------
+# One normal form for expressions in signed powers: an identity between them becomes a comparison with zero.
+
+_ROUNDS = 6
+
+
+def normal_form(expression: sp.Expr) -> sp.Expr:
+    """Equal expression, expanded, with every product of powers of one base merged and every nested power flattened.
+
+    Rules, for real arguments: ⌈⌈x⌋^a⌋^b = ⌈x⌋^{ab}, |⌈x⌋^a|^b = |x|^{ab}, ⌈xy⌋^a = ⌈x⌋^a⌈y⌋^a, |x|^a⌈x⌋^b = ⌈x⌋^{a+b},
+    ⌈x⌋^a⌈x⌋^b = |x|^{a+b}; `sympy.sign` and `sympy.Abs` become ⌈·⌋⁰ and |·|. A product of two signs of one argument is
+    1, as for the limits that make up a Filippov set.
+
+    Parameters
+    ----------
+    expression : Expr
+        In real symbols.
+
+    Returns
+    -------
+    Expr
+
+    Raises
+    ------
+    KinkError
+        Where a negative power of zero remains.
+    """
+    current = sp.sympify(expression)
+    for _ in range(_ROUNDS):
+        following = _collected(sp.expand(_flat(current)))
+        if following == current:
+            break
+        current = following
+    for power in current.atoms(AbsolutePower, SignedPower):
+        if power.args[0].is_zero and power.args[1].is_negative:
+            raise KinkError(
+                f"a negative power {power.args[1]} of zero remains: the expression is not defined on this set."
+            )
+    return current
+
+
+def signs(expression: sp.Expr) -> tuple[sp.Expr, ...]:
+    """Arguments P of the signs ⌈P⌋⁰ in an expression, in a fixed order."""
+    found = {power.args[0] for power in expression.atoms(SignedPower) if power.args[1] == 0}
+    return tuple(sorted(found, key=sp.default_sort_key))
+
+
+def _flat(e: sp.Expr) -> sp.Expr:
+    """Flatten nested powers, from the inside out."""
+    if e.is_Atom:
+        return e
+    if isinstance(e, SignedPower | AbsolutePower):
+        return _spread(type(e), normal_form(e.args[0]), e.args[1])
+    if isinstance(e, sp.Abs):
+        return _spread(AbsolutePower, normal_form(e.args[0]), sp.Integer(1))
+    if isinstance(e, sp.sign):
+        return _spread(SignedPower, normal_form(e.args[0]), sp.Integer(0))
+    arguments = [_flat(argument) for argument in e.args]
+    if e.is_Pow and isinstance(arguments[0], AbsolutePower):
+        x, a = arguments[0].args
+        return AbsolutePower(x, a * arguments[1])
+    if e.is_Pow and arguments[0].is_Add and arguments[0].is_nonnegative and not arguments[1].is_Integer:
+        return _spread(AbsolutePower, normal_form(arguments[0]), arguments[1])
+    return e.func(*arguments)
+
+
+def _spread(kind: type, inner: sp.Expr, a: sp.Expr) -> sp.Expr:
+    """⌈Π y_i^n_i⌋^a or |Π y_i^n_i|^a as a product of powers of the single y_i."""
+    content, rest = _content(inner)
+    result = sp.Integer(1)
+    for factor in (*sp.Mul.make_args(content), *sp.Mul.make_args(rest)):
+        plain = factor.is_positive or (factor.is_nonnegative and a.is_positive and not factor.is_Add)
+        result *= factor**a if plain else _spread_factor(kind, factor, a)
+    return result
+
+
+def _spread_factor(kind: type, factor: sp.Expr, a: sp.Expr) -> sp.Expr:
+    base, n = factor.as_base_exp()
+    if not (n.is_Integer and n > 0):
+        return kind(factor, a)
+    odd = kind is SignedPower and n % 2 == 1
+    if isinstance(base, AbsolutePower):
+        return AbsolutePower(base.args[0], base.args[1] * n * a)
+    if isinstance(base, SignedPower):
+        return (SignedPower if odd else AbsolutePower)(base.args[0], base.args[1] * n * a)
+    return (SignedPower if odd else AbsolutePower)(base, n * a)
+
+
+def _content(inner: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """Positive factor and rest of an expanded sum: powers of positive symbols and whole powers that all terms share."""
+    terms = sp.Add.make_args(inner)
+    if len(terms) == 1:
+        return sp.Integer(1), inner
+    shared = [term.as_powers_dict() for term in terms]
+    factor = sp.Integer(1)
+    for symbol in sorted({b for powers in shared for b in powers if b.is_Symbol}, key=sp.default_sort_key):
+        exponents = [powers.get(symbol, sp.Integer(0)) for powers in shared]
+        usable = all(n.is_Rational if symbol.is_positive else n.is_Integer for n in exponents)
+        if usable and (least := min(exponents)) and (symbol.is_positive or least > 0):
+            factor *= symbol**least
+    content, rest = sp.expand(inner / factor).primitive()
+    return factor * content, rest
+
+
+def _collected(e: sp.Expr) -> sp.Expr:
+    return sp.Add(*(_merged(term) for term in sp.Add.make_args(e)))
+
+
+def _merged(term: sp.Expr) -> sp.Expr:
+    """Merge the powers of every base that occurs in a signed or absolute power."""
+    factors = [factor.as_base_exp() for factor in sp.Mul.make_args(term)]
+    bases = {base.args[0] for base, n in factors if isinstance(base, SignedPower | AbsolutePower) and n.is_Integer}
+    rest, totals = sp.Integer(1), dict.fromkeys(sorted(bases, key=sp.default_sort_key), (sp.Integer(0), 0))
+    for base, n in factors:
+        power = isinstance(base, SignedPower | AbsolutePower)
+        y, a = base.args if power else (base, sp.Integer(1))
+        if y in totals and n.is_Integer:
+            odd = int(n) if not isinstance(base, AbsolutePower) else 0
+            totals[y] = (totals[y][0] + a * n, totals[y][1] + odd)
+        else:
+            rest *= base**n
+    return rest * sp.Mul(*(_rebuilt(y, total, odd % 2 == 1) for y, (total, odd) in totals.items()))
+
+
+def _rebuilt(y: sp.Expr, total: sp.Expr, odd: bool) -> sp.Expr:
+    if total.is_Integer and total >= 0 and (total % 2 == 1) == odd:
+        return y**total
+    return (SignedPower if odd else AbsolutePower)(y, total)
+
+
+def symbols_of(expressions: Iterable[sp.Expr]) -> tuple[sp.Symbol, ...]:
+    """All free symbols, in a fixed order."""
+    return tuple(sorted(set().union(*(e.free_symbols for e in expressions)), key=sp.default_sort_key))

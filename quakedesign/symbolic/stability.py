@@ -1,21 +1,30 @@
-"""Whether a fault slides stably, decided with exact rationals where they suffice and in ball arithmetic otherwise."""
+"""Stability of steady sliding, critical stiffness, and the derived model of a fault.
+
+Decisions use exact rationals where these suffice and ball arithmetic otherwise. `derive` returns the
+equations of one fault, its eigenvalues and the cause of its instability.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
+from functools import cached_property
 
+import mpmath
 import sympy as sp
 from flint import arb, ctx
 
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.fault import Fault
-from quakedesign.rationals import end_of, fraction_of, rational, to_sympy
-from quakedesign.symbolic import plant, state_plant
-from quakedesign.symbolic.balls import Box, enclose
-from quakedesign.symbolic.equilibrium import operating_rate
-from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, p, sigma
-from quakedesign.symbolic.state_plant import effective_stress
+from quakedesign.exact import end_of, fraction_of, rational, to_sympy
+from quakedesign.fault import Fault, require_fault
+from quakedesign.symbolic import plant, rate_and_state_plant
+from quakedesign.symbolic import rate_and_state_plant as state_plant
+from quakedesign.symbolic.enclosure import BallBox, enclose
+from quakedesign.symbolic.plant import ErrorDynamics, N_hat, eta_hat, k_hat, p, sigma
+from quakedesign.symbolic.rate_and_state_plant import effective_stress, operating_rate
+
+# ----------------------------------------------------------------------
+# Whether a fault slides stably, decided with exact rationals where they suffice and in ball arithmetic otherwise.
 
 Interval = tuple[Fraction, Fraction]
 Pressure = float | str | Fraction | tuple[float | str | Fraction, float | str | Fraction]
@@ -125,11 +134,13 @@ def stability(
     at = operating_rate(fault, loading_rate)
     pressures = _interval(pressure, fault)
     ranges = _ranges(fault, pressures, uncertain)
-    slopes = state_plant.slopes(fault.friction.symbolic(), state_plant.loading_rate if at else sp.Integer(0))
-    parameters = {**fault.friction.values(), state_plant.loading_rate: sp.Rational(str(at))}
+    slopes = rate_and_state_plant.slopes(
+        fault.friction.symbolic(), rate_and_state_plant.loading_rate if at else sp.Integer(0)
+    )
+    parameters = {**fault.friction.values(), rate_and_state_plant.loading_rate: sp.Rational(str(at))}
     conditions = tuple(
         _condition(expression, slopes, parameters, ranges)
-        for expression in state_plant.stability_conditions(fault.friction.state_names, inertia=inertia)
+        for expression in rate_and_state_plant.stability_conditions(fault.friction.state_names, inertia=inertia)
     )
     return StabilityVerdict(
         outcome=_outcome(conditions), conditions=conditions, pressure=pressures, loading_rate=at, inertia=inertia
@@ -196,7 +207,7 @@ def _parts(expression: sp.Expr) -> list[sp.Expr]:
     return [sp.factor(c) * k_hat**n for (n,), c in powers if c != 0]
 
 
-def _enclosed(terms: list[sp.Expr], box: Box) -> Interval:
+def _enclosed(terms: list[sp.Expr], box: BallBox) -> Interval:
     """Enclosure of Σ terms/Σ |terms| over a box: more digits at a point, more pieces on a range."""
     before = ctx.prec
     try:
@@ -211,7 +222,7 @@ def _enclosed(terms: list[sp.Expr], box: Box) -> Interval:
     return low, high
 
 
-def _over_pieces(terms: list[sp.Expr], box: Box) -> Interval:
+def _over_pieces(terms: list[sp.Expr], box: BallBox) -> Interval:
     pieces, done = [dict(box)], list[Interval]()
     while pieces:
         piece = pieces.pop()
@@ -226,7 +237,7 @@ def _over_pieces(terms: list[sp.Expr], box: Box) -> Interval:
     return min(low for low, _ in done), max(high for _, high in done)
 
 
-def _ratio(terms: list[sp.Expr], box: Box) -> Interval:
+def _ratio(terms: list[sp.Expr], box: BallBox) -> Interval:
     balls = [enclose(t, box) for t in terms]
     total, size = sum(balls, start=arb(0)), sum((abs(b) for b in balls), start=arb(0))
     whole = (Fraction(-1), Fraction(1))
@@ -249,7 +260,7 @@ def critical_stiffness(
     pressure, loading_rate, inertia
         As in `stability`.
     """
-    expression = state_plant.critical_stiffness(fault.friction.symbolic(), inertia=inertia)
+    expression = rate_and_state_plant.critical_stiffness(fault.friction.symbolic(), inertia=inertia)
     return float(_number(expression, fault, pressure, loading_rate)) * fault.mass
 
 
@@ -262,7 +273,7 @@ def nucleation_length(fault: Fault, *, pressure: float = 0, loading_rate: float 
     pressure, loading_rate
         As in `stability`.
     """
-    expression = state_plant.nucleation_length(fault.friction.symbolic())
+    expression = rate_and_state_plant.nucleation_length(fault.friction.symbolic())
     length = float(_number(expression, fault, pressure, loading_rate))
     return length if length > 0 else float("inf")
 
@@ -273,7 +284,133 @@ def _number(expression: sp.Expr, fault: Fault, pressure: float, rate: float | No
         **plant.plant_values(fault),
         **fault.friction.values(),
         p: sp.Rational(str(held)),
-        state_plant.loading_rate: sp.Rational(str(operating_rate(fault, rate))),
-        state_plant.shear_modulus: sp.Rational(str(rational(fault.shear_modulus))),
+        rate_and_state_plant.loading_rate: sp.Rational(str(operating_rate(fault, rate))),
+        rate_and_state_plant.shear_modulus: sp.Rational(str(rational(fault.shear_modulus))),
     }
     return sp.N(sp.sympify(expression).subs(values), 30)
+
+
+# ----------------------------------------------------------------------
+# The derived model of one fault, for people: equations, eigenvalues, and why it is unstable.
+
+_DIGITS = 50
+
+
+@dataclass(frozen=True)
+class Model:
+    """Equations of one fault, derived from its force balance.
+
+    A law without state is studied at rest, a law with state (rate and state) in steady sliding at its
+    ``operating_rate``; then the plant has one more dimension for every state variable.
+
+    Attributes
+    ----------
+    fault : Fault
+    """
+
+    fault: Fault
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return self.fault.friction.state_names
+
+    @cached_property
+    def acceleration(self) -> sp.Expr:
+        """x2' of eq. shift [m/s²] with the fault's friction law, in symbols; v' about steady sliding with state."""
+        law = self.fault.friction.symbolic()
+        if self._names:
+            return state_plant.third_order_rates(law)[1]
+        return plant.with_law(plant.shifted_acceleration(), law)
+
+    @cached_property
+    def error_dynamics(self) -> ErrorDynamics:
+        """β and h of eq. esystem3, in symbols; with state, slip is ahead of steady sliding at v_∞."""
+        return state_plant.error_dynamics(self._names)
+
+    @cached_property
+    def jacobian(self) -> sp.Matrix:
+        """Jacobian at the origin (ERRATA 1), or in steady sliding, in symbols."""
+        return state_plant.jacobian(self._names) if self._names else plant.jacobian()
+
+    @cached_property
+    def instability(self) -> sp.Basic:
+        """Condition for an unstable origin (ERRATA 2) or unstable steady sliding (Routh–Hurwitz), in symbols."""
+        return state_plant.instability(self.fault.friction.symbolic()) if self._names else plant.instability()
+
+    @cached_property
+    def values(self) -> dict[sp.Symbol, sp.Expr]:
+        """Exact value of every symbol of `jacobian` and `instability` at zero pressure."""
+        law = self.fault.friction.exact()
+        at = sp.Rational(str(operating_rate(self.fault)))
+        return {
+            **plant.plant_values(self.fault),
+            **self.fault.friction.values(),
+            plant.p: sp.Integer(0),
+            state_plant.loading_rate: at,
+            plant.mu_star: sp.sympify(law.steady_coefficient(at)),
+            **state_plant.slopes(law, at),
+        }
+
+    @cached_property
+    def stability(self) -> StabilityVerdict:
+        """Verdict at zero pressure, with the margin of every condition."""
+        return stability(self.fault)
+
+    @property
+    def unstable(self) -> bool:
+        """Whether the fault is unstable without control; decided in exact or ball arithmetic."""
+        return self.stability.outcome is Stability.UNSTABLE
+
+    @cached_property
+    def reasons(self) -> tuple[str, ...]:
+        """Which of the conditions for instability hold, with their numbers [1/s², 1/s]."""
+        if not self.unstable:
+            return ()
+        said = {
+            plant.k_hat: "the spring unloads slower than friction weakens with slip: stiffness {} < {} 1/s²",
+            plant.eta_hat: "damping is weaker than the rate weakening of friction: {} < {} 1/s",
+        }
+        if self._names:
+            said[plant.k_hat] = "the spring is softer than steady sliding needs: stiffness {} < {} 1/s²"
+        other = "a condition of Routh and Hurwitz fails: {} < {}"
+        conditions = self.instability.args if isinstance(self.instability, sp.Or) else (self.instability,)
+        found = [(c, [sp.N(side.subs(self.values), _DIGITS) for side in c.args]) for c in conditions]
+        return tuple(
+            said.get(c.args[0], other).format(*(f"{float(side):.4g}" for side in (low, high)))
+            for c, (low, high) in found
+            if low < high
+        )
+
+    @cached_property
+    def eigenvalues(self) -> tuple[complex, ...]:
+        """Eigenvalues of the uncontrolled fault [1/s], largest real part first."""
+        values = self.values | {state_plant.effective_stress: self.values[plant.sigma]}
+        coefficients = [c.subs(values) for c in state_plant.characteristic(self._names)]
+        with mpmath.workdps(_DIGITS):
+            numbers = [mpmath.mpmathify(sp.N(c, _DIGITS)) for c in coefficients]
+            roots = mpmath.polyroots(numbers, maxsteps=500, extraprec=400)
+        return tuple(sorted((complex(z) for z in roots), key=lambda z: (-z.real, -z.imag)))
+
+    def _repr_latex_(self) -> str:
+        acceleration = state_plant.sliding_acceleration(self._names) if self._names else plant.shifted_acceleration()
+        rows = [
+            rf"\ddot x_1 &= {sp.latex(acceleration)}",
+            rf"J(0,0) &= {sp.latex(self.jacobian)}",
+            rf"\text{{unstable}} &\iff {sp.latex(self.instability)}",
+        ]
+        return r"$\displaystyle\begin{aligned}" + r"\\".join(rows) + r"\end{aligned}$"
+
+
+def derive(fault: Fault) -> Model:
+    """Derive the equations of a fault from its force balance.
+
+    Parameters
+    ----------
+    fault : Fault
+
+    Returns
+    -------
+    Model
+        With ``instability``, ``error_dynamics``, ``jacobian`` (SymPy) and ``_repr_latex_``.
+    """
+    return Model(require_fault(fault))

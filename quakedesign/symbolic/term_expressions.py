@@ -1,17 +1,22 @@
-"""Sums of products of signed powers, to and from SymPy; see `quakedesign.symbolic.terms`."""
+"""Conversion between SymPy and sums of signed-power terms, and Lyapunov candidates.
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+Candidates are homogeneous functions generated from weights and degree.
+"""
+
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from itertools import count
+from itertools import count, product
 
 import sympy as sp
 
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.rationals import fraction_of
-from quakedesign.symbolic.normal_form import normal_form
-from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
+from quakedesign.exact import fraction_of
+from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, normal_form
 from quakedesign.symbolic.terms import Factor, Term, collected, multiplied
 from quakedesign.text import shown
+
+# ----------------------------------------------------------------------
+# Sums of products of signed powers, to and from SymPy; see `quakedesign.symbolic.terms`.
 
 
 def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ...]:
@@ -132,3 +137,43 @@ def real_symbols(names: Iterable[str]) -> dict[str, sp.Symbol]:
     if wrong := [name for name in listed if not isinstance(name, str)]:
         raise ParameterError(f"names must be texts. Received {shown(wrong[0])}. Write 'x', say.")
     return {name: sp.Symbol(name, real=True) for name in listed}
+
+
+# ----------------------------------------------------------------------
+# Candidates for homogeneous Lyapunov functions, generated from weights and degree.
+
+
+def signed_monomials(weights: Mapping[str, int], degree: int, domain: str) -> tuple[Term, ...]:
+    """Every C¹ product of signed powers of the degree that is even under x → −x.
+
+    Parameters
+    ----------
+    weights : mapping of state to int
+    degree : int
+    domain : str
+        ``"cells"``, or ``"reals"`` for polynomials only.
+
+    Returns
+    -------
+    tuple of Term
+        With coefficient 1.
+    """
+    terms = []
+    for degrees in product(range(degree + 1), repeat=len(weights)):
+        if sum(degrees) != degree:
+            continue
+        powers = [(s, Fraction(n, weights[s])) for s, n in zip(weights, degrees, strict=True) if n]
+        for factors in _kinds(powers, domain):
+            if sum(kind == "s" for _, _, kind in factors) % 2 == 0:
+                terms.append(Term(Fraction(1), (), factors))
+    return tuple(terms)
+
+
+def _kinds(powers: list[tuple[str, Fraction]], domain: str) -> Iterator[tuple[Factor, ...]]:
+    if any(a < 1 for _, a in powers):
+        return
+    for kinds in product("sa", repeat=len(powers)):
+        factors = tuple((s, a, kind) for (s, a), kind in zip(powers, kinds, strict=True))
+        smooth = all(kind == "s" or a > 1 for _, a, kind in factors)
+        if smooth and (domain == "cells" or all((kind == "s") == (a % 2 == 1) for _, a, kind in factors)):
+            yield factors

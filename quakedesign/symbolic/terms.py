@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.errors import CertificateError
-from quakedesign.rationals import exact_text
+from quakedesign.exact import exact_text
 
 Factor = tuple[str, Fraction, str]
 """State, exponent, kind: ``s`` for ⌈x⌋^a, ``a`` for |x|^a."""

@@ -7,20 +7,18 @@ from fractions import Fraction
 from functools import partial
 from typing import Any, TypeVar, Unpack
 
-from quakedesign.certificates.guarantee import NoGuarantee, task_of
-from quakedesign.certificates.guarantee.held import Around
-from quakedesign.certificates.guarantee.pump import Pump
-from quakedesign.certificates.impossibility import hopeless, too_slow
-from quakedesign.controllers import Controller, control_law
 from quakedesign.errors import ParameterError, QuakedesignError, require_known
-from quakedesign.executors import crew_or_here
+from quakedesign.exact import exact_text, rational
 from quakedesign.fault import Fault
 from quakedesign.fault.units import exact_value
-from quakedesign.rationals import exact_text, rational
-from quakedesign.synthesis.guaranteed import CLASSES, MEASURED, OBJECTIVES, Answer
-from quakedesign.synthesis.guaranteed.longest_times import nearest_setup
-from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer, answer_sliding
-from quakedesign.synthesis.methods.base import Wanted, method_of
+from quakedesign.guarantees import CLASSES, MEASURED, OBJECTIVES, LoopAnswer, NoGuarantee, task_of
+from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
+from quakedesign.guarantees.exact.loop import Around, Pump
+from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
+from quakedesign.guarantees.search.linear_design import nearest_setup
+from quakedesign.laws import Controller, control_law
+from quakedesign.parallel import crew_or_here
+from quakedesign.synthesis.method import Wanted, method_of
 
 Found = TypeVar("Found")
 
@@ -80,7 +78,7 @@ def answer(
     measured: str = MEASURED[0],
     disturbance_class: str = CLASSES[0],
     **around: Unpack[Around],
-) -> Answer:
+) -> LoopAnswer:
     """Guarantee of given e-LQR gains with summed integrals, of a law that is designed for it, or of a sliding mode.
 
     Nothing is designed for a delay or rock beyond what any controller can do that withdraws at most σ′.
@@ -121,7 +119,7 @@ def answer(
     beyond = hopeless(task, rational(fault.effective_normal_stress), late, far)
     if beyond and not gains:
         near = nearest_setup(task, period, measured=measured, **around) if controller == "elqr" else None
-        return Answer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None), nearest=near)
+        return LoopAnswer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None), nearest=near)
     wanted = Wanted(gains=gains, objective=objective, scheme=scheme, measured=measured, around=around)
     given = method_of(law).sampled(fault, task, law, period, wanted)
     longest = max(period, around.get("longest_step", period))
@@ -164,7 +162,7 @@ def guarantee(
     stress: Quantity | None = None,
     spread: Quantity = 0,
     **around: Quantity,
-) -> Answer | SlidingAnswer:
+) -> LoopAnswer | SlidingAnswer:
     """Prove how far slip, slip rate and pressure of the loop that runs can go, as the command `guarantee` does.
 
     Every quantity is a number in SI units, a decimal or p/q as text, or a text with its unit, such as ``"80 ms"``.
@@ -203,7 +201,7 @@ def guarantee(
 
     Returns
     -------
-    Answer or SlidingAnswer
+    LoopAnswer or SlidingAnswer
         Its ``lines()`` are what the command prints; ``found`` is the guarantee, which has a ``controller`` for
         `simulate`, `loop_transfer` and `export_controller`, or the reason why there is none.
 
@@ -273,7 +271,7 @@ def exact_surroundings(
 
 def question(
     fault: Fault, *, step: Fraction | None, stress: Fraction | None, spread: Fraction, **asked: Any
-) -> Callable[[], Answer | SlidingAnswer]:
+) -> Callable[[], LoopAnswer | SlidingAnswer]:
     """What `guarantee` is asked, known to other processes; refuses what the friction of the fault has no use for.
 
     Raises

@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
-from quakedesign.cli.hardware import ActuatorOptions
+from quakedesign.cli.options import ActuatorOptions
 from quakedesign.errors import ParameterError
-from quakedesign.simulation import Delay, Diffusion, Lag, Quantisation, RateLimit, Saturation, stages
+from quakedesign.loop import Delay, Diffusion, Lag, Quantisation, RateLimit, Saturation, stages
 
 
 def actuator(step, **options):

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from quakedesign.cli import main
-from quakedesign.executors import Given, SerialExecutor
+from quakedesign.parallel import Given, SerialExecutor
 from quakedesign.simulation.campaign import Campaign, running
 
 CALL = ["campaign", "lab-fault", "--controller", "elqr", "--duration", "0.2", "--initial-slip", "1e-4", "--box"]

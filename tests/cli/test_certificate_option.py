@@ -8,10 +8,9 @@ import pytest
 import xarray as xr
 
 import quakedesign as qd
-from quakedesign.certificates import save_guarantee
-from quakedesign.certificates.guarantee import Guarantee, Held, guarantee, task_of
 from quakedesign.cli import main
-from quakedesign.loop import Prediction, disturbance_estimate
+from quakedesign.guarantees import Guarantee, Held, guarantee, save_guarantee, task_of
+from quakedesign.laws import Prediction, disturbance_estimate
 
 REAL = qd.load_fault("real-fault")
 STEP = F(3, 20)

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
-from quakedesign.certificates import Verdict, save_guarantee
 from quakedesign.cli import main
-from quakedesign.cli.options import LawOptions
-from quakedesign.cli.state import SpreadOptions
+from quakedesign.cli.options import LawOptions, SpreadOptions
 from quakedesign.errors import ParameterError
+from quakedesign.guarantees import save_guarantee
 from quakedesign.loop.sensing import Transducer
-from quakedesign.simulation.sliding_conditions import TIDE, Tide
-from quakedesign.studies import state_runs
-from quakedesign.studies.state_runs import run_held
+from quakedesign.lyapunov import Verdict
+from quakedesign.simulation.state_plant import TIDE, Tide
+from quakedesign.studies import runs as state_runs
+from quakedesign.studies.runs import run_held
 
 FILE = Path(__file__).parents[2] / "proofs" / "certificates" / "sliding_crustal-patch.json"
 CRUSTAL = qd.load_fault("crustal-patch")

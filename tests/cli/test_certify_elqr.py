@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.cli import main
-from quakedesign.cli.design import DesignOptions
+from quakedesign.cli.design_commands import DesignOptions
 
 SLOW = ("230909365.4", "327662.0266", "39426629850", "2484414953000")
 

@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quakedesign.certificates.command import check_files
-from quakedesign.certificates.guarantee import Held, NoGuarantee, guarantee, task_of
-from quakedesign.certificates.guarantee.files import parse_guarantee
+from quakedesign.checking import check_files
 from quakedesign.cli import main
-from quakedesign.cli.design import DesignOptions
-from quakedesign.cli.guarantee import Surroundings
+from quakedesign.cli.design_commands import DesignOptions
+from quakedesign.cli.guarantee_commands import Surroundings
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.fault.sources import source_text as load_text
+from quakedesign.fault.fault_toml import source_text as load_text
+from quakedesign.guarantees import Held, LoopAnswer, NoGuarantee, guarantee, task_of
+from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.search import linear_design as design
+from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.synthesis import answer
-from quakedesign.synthesis.guaranteed import Answer, design
-from quakedesign.synthesis.guaranteed.families import family_of
-from quakedesign.synthesis.methods.state_feedback import StateFeedback
+from quakedesign.synthesis.state_feedback import StateFeedback
 
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
 
@@ -82,7 +82,7 @@ def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks():
     """A design one period late with larger gains, run on a fault at rest whatever it asks for: its own recursion."""
     fault, late = load_fault("real-fault"), F("0.184")
     law = family_of(task_of(fault), late, "slip-and-rate", {"delay": late}).law(np.array((0.6, 1.0, 0.1)))
-    found = Answer(fault=fault, found=guarantee(task_of(fault), Held(law=law, step=late, delay=late)))
+    found = LoopAnswer(fault=fault, found=guarantee(task_of(fault), Held(law=law, step=late, delay=late)))
     assert found.proved
     rows, seen = (np.array(m, dtype=float) for m in (law.update, law.measured))
     states, sizes = np.zeros(len(rows)), []
@@ -151,7 +151,7 @@ def test_everything_else_is_designed_for(monkeypatch, name, least, most):
 def test_where_no_controller_renews_its_pressure_so_slowly_the_answer_says_so(monkeypatch, step, slow):
     """17.9 s on real-fault: a constant push needs 50 MPa by then."""
     fault = load_fault("real-fault")
-    none = Answer(fault=fault, found=NoGuarantee(reason="small gain 7", small_gain=None))
+    none = LoopAnswer(fault=fault, found=NoGuarantee(reason="small gain 7", small_gain=None))
     monkeypatch.setattr(StateFeedback, "sampled", lambda *_: none)
     said = answer(fault, step=step).found.reason
     assert said.startswith("no controller whatever that withdraws at most 50 MPa holds it with T_s") is slow
@@ -223,7 +223,7 @@ def test_what_cannot_be_understood_is_one_line(call, arguments, words):
 @pytest.fixture
 def unattacked(monkeypatch):
     """Without the search for the worst, which has tests of its own."""
-    module = import_module("quakedesign.synthesis.guaranteed.answer")
+    module = import_module("quakedesign.guarantees.guarantee_result")
     monkeypatch.setattr(module, "worst_found", lambda *_, **__: None)
 
 
@@ -270,7 +270,7 @@ def test_noise_that_is_none_is_refused_in_a_line(call, options, said):
 
 def test_gains_that_know_nothing_of_the_rock_say_what_fails(call, monkeypatch):
     none = NoGuarantee(reason="a design through rock is another test's", small_gain=None)
-    family = import_module("quakedesign.synthesis.methods.state_feedback")
+    family = import_module("quakedesign.synthesis.state_feedback")
     for name, found in (("design_held", none), ("longest_step", None), ("nearest_setup", None)):
         monkeypatch.setattr(family, name, lambda *_, a=found, **__: a)
     code, out, _ = call("real-fault", "--gains", *GAINS, "--diffusion", "1 s")

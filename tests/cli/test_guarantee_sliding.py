@@ -7,22 +7,19 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.bounds import UpperBound
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.guarantee import Held, NoGuarantee
-from quakedesign.certificates.guarantee.files import parse_guarantee
-from quakedesign.certificates.guarantee.pump import Pump
-from quakedesign.certificates.slow_sliding import WHOLE, SlidingClaims, SlidingGuarantee
 from quakedesign.cli import main
-from quakedesign.fault import load_fault
-from quakedesign.fault.friction import friction_law
-from quakedesign.fault.template import fault_toml
-from quakedesign.loop import LinearLaw
+from quakedesign.exact import UpperBound
+from quakedesign.fault import friction_law, load_fault
+from quakedesign.fault.fault_toml import fault_toml
+from quakedesign.guarantees import WHOLE, Held, NoGuarantee, SlidingClaims, SlidingGuarantee
+from quakedesign.guarantees import guarantee_result as sliding_answer
+from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.exact.loop import Pump
+from quakedesign.guarantees.search.sliding_design import WellReach, proved_sliding
+from quakedesign.laws import LinearLaw
+from quakedesign.lyapunov import Verdict
 from quakedesign.synthesis import design as synthesise
-from quakedesign.synthesis.guaranteed import sliding_answer
-from quakedesign.synthesis.guaranteed.sliding_reach import Reach
-from quakedesign.synthesis.guaranteed.slow_sliding import proved_sliding
-from quakedesign.synthesis.methods import state_feedback
+from quakedesign.synthesis import state_feedback
 
 LAW = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(Fraction(1), Fraction(0)))
 HELD = Held(law=LAW, step=Fraction(300))
@@ -96,7 +93,7 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
 def test_a_well_that_is_impossible_is_said_to_be_that_before_what_would_do(monkeypatch):
     """Beyond 1.3e6 s for 25 kPa on this fault, whatever law is looked for."""
     monkeypatch.setattr(sliding_answer, "designed_sliding", lambda *_, **__: NONE)
-    monkeypatch.setattr(sliding_answer, "farthest", lambda *_, **__: Reach(share=Fraction(1, 2)))
+    monkeypatch.setattr(sliding_answer, "farthest", lambda *_, **__: WellReach(share=Fraction(1, 2)))
     monkeypatch.setattr(sliding_answer, "what_would_do", lambda *_, **__: "another")
     fault = load_fault("crustal-patch")
 
@@ -126,7 +123,7 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
     with monkeypatch.context() as patched:
         found_below = lambda task, step, **around: HELD if task.stress < 35_000 else none  # noqa: E731
         patched.setattr(sliding_answer, "designed_sliding", found_below)
-        patched.setattr(sliding_answer, "farthest", lambda *_, **__: Reach(share=Fraction(1)))
+        patched.setattr(sliding_answer, "farthest", lambda *_, **__: WellReach(share=Fraction(1)))
         found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found
     assert found.reason.startswith("no law was found that holds the fault under 40 kPa; a proof was found for a stress")
     monkeypatch.setattr(sliding_answer, "proved_sliding", lambda task, design, *, log_rate: NONE)

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from quakedesign.cli import main
-from quakedesign.executors import Given, SerialExecutor
+from quakedesign.parallel import Given, SerialExecutor
 from quakedesign.simulation.campaign import running
 
 

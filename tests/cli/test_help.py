@@ -5,13 +5,13 @@ import re
 import pytest
 
 from quakedesign.cli import main
-from quakedesign.controllers import control_laws
-from quakedesign.controllers.feed_forward import FEED_FORWARDS
 from quakedesign.fault import BOXES, presets
-from quakedesign.loop.schemes import schemes
-from quakedesign.simulation.integrators import integrators
+from quakedesign.guarantees import MEASURED
+from quakedesign.laws import control_laws
+from quakedesign.laws.feed_forward import FEED_FORWARDS
+from quakedesign.loop import schemes
+from quakedesign.simulation import integrators
 from quakedesign.synthesis import designable
-from quakedesign.synthesis.guaranteed import MEASURED
 
 CHOICES = {
     "simulate": (control_laws(), schemes(), integrators(), FEED_FORWARDS, presets()),

@@ -11,7 +11,7 @@ import numpy as np
 import psutil
 import pytest
 
-from quakedesign.temporary import FAMILY
+from quakedesign.files import FAMILY
 
 MAP = "map super-twisting --gains 1.5 1.1 --over k1 k2 --points 5 --lipschitz 1 --interior 2 --workers 2 --out out"
 GAINS = "synthesise super-twisting --workers 2 --starts 2 --out out"
@@ -20,7 +20,7 @@ ALONE = "simulate lab-fault --scheme explicit --duration 60 --out out"
 WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
 READY = """
 import sys
-from quakedesign.interruption import ending
+from quakedesign.parallel import ending
 with ending(process=True):
     print("ready", flush=True)
     from quakedesign.__main__ import main

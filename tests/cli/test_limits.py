@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.certificates.guarantee import NoGuarantee
-from quakedesign.certificates.guarantee.files import parse_guarantee
-from quakedesign.certificates.guarantee.pump import Pump
 from quakedesign.cli import main
 from quakedesign.fault import fault_toml, load_fault
-from quakedesign.studies import impossible_and_proved
-from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
+from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.exact.loop import Pump
+from quakedesign.guarantees.guarantee_result import SlidingAnswer
+from quakedesign.studies import performance_limits as impossible_and_proved
 
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
 KEYS = ("peak_slip_rate_error", "largest_step", "largest_delay", "largest_diffusion_time", "farthest_well")
@@ -21,13 +21,13 @@ KEYS = ("peak_slip_rate_error", "largest_step", "largest_delay", "largest_diffus
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
-    monkeypatch.setattr("quakedesign.studies.fundamental_limits.natural_peak", lambda _fault: 0.05)
+    monkeypatch.setattr("quakedesign.studies.performance_limits.natural_peak", lambda _fault: 0.05)
     monkeypatch.setattr(
-        "quakedesign.studies.impossible_and_proved.design_held",
+        "quakedesign.studies.performance_limits.design_held",
         lambda *_, **__: NoGuarantee(reason="none", small_gain=None),
     )
     for name in ("longest_step", "longest_delay", "farthest_rock"):
-        monkeypatch.setattr(f"quakedesign.studies.impossible_and_proved.{name}", lambda *_, **__: None)
+        monkeypatch.setattr(f"quakedesign.studies.performance_limits.{name}", lambda *_, **__: None)
 
 
 def run(*arguments):
@@ -200,7 +200,7 @@ def test_designs_are_proved_with_the_whole_setup(monkeypatch, capsys):
     for name in ("design_held", "longest_step"):
         none = NoGuarantee(reason="none", small_gain=None) if name == "design_held" else None
         monkeypatch.setattr(
-            f"quakedesign.studies.impossible_and_proved.{name}",
+            f"quakedesign.studies.performance_limits.{name}",
             lambda *_, n=name, a=none, **around: told.__setitem__(n, around) or a,
         )
     setup = ("--delay", "20 ms", "--lag", "0.3 s", "--well", "2 m", "--diffusivity", "0.5", "--jitter", "1 ms")

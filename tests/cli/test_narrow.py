@@ -7,8 +7,8 @@ import subprocess
 import pytest
 from rich.cells import cell_len
 
-from quakedesign.cli import app, main
-from quakedesign.cli.shared import progress
+from quakedesign.cli import main
+from quakedesign.cli.app import app, progress
 
 COMMANDS = sorted(name for name in app if not name.startswith("-"))
 CHEAP = [

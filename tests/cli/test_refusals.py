@@ -14,7 +14,7 @@ import pytest
 
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError
-from quakedesign.rationals import rational
+from quakedesign.exact import rational
 
 
 def run(capsys, *arguments):
@@ -93,8 +93,8 @@ def test_what_is_misspelt_is_asked_for_by_its_nearest_name(capsys, tmp_path, mon
     ],
 )
 def test_a_place_that_cannot_be_written_is_refused_before_the_work(capsys, tmp_path, monkeypatch, arguments):
-    search = "quakedesign.synthesis.lyapunov.search"
-    for module in ("quakedesign.simulation.simulate", search, "quakedesign.synthesis.analysis.gain_map"):
+    search = "quakedesign.lyapunov.search.search"
+    for module in ("quakedesign.simulation.simulate", search, "quakedesign.lyapunov.maps.gain_map"):
         __import__(module)
     monkeypatch.setattr(f"{search}.find_certificate", lambda *_, **__: pytest.fail("searched"))
     code, out, err = run(capsys, *arguments, tmp_path / "none" / "there")
@@ -120,7 +120,7 @@ def test_a_step_has_a_unit_or_is_a_fraction_of_seconds(capsys, monkeypatch):
         steps.append(rational(step, "step"))
         raise ParameterError("that is all")
 
-    monkeypatch.setattr("quakedesign.synthesis.linear.analysis.verdict.judge", told)
+    monkeypatch.setattr("quakedesign.linear.verdict.judge", told)
     for written in ("92 ms", "23/250", "0.092", "9.2E-2"):
         assert run(capsys, *asked, written)[0] == 2
     assert steps == [Fraction(92, 1000)] * 4

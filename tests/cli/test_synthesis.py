@@ -43,7 +43,7 @@ def test_an_existing_file_is_kept(capsys, tmp_path):
 
 
 def test_nothing_proved_is_exit_code_one(capsys, monkeypatch):
-    from quakedesign.synthesis.gains import synthesise as gains
+    from quakedesign.lyapunov.gains import synthesise as gains
 
     monkeypatch.setattr(gains, "synthesise", lambda *a, **k: None)
     code, out, _ = run(capsys, "cta", "--json")
@@ -62,7 +62,7 @@ def test_people_get_a_table(capsys):
 
 
 def test_the_smallest_sampled_error_on_a_fault(capsys, tmp_path, monkeypatch):
-    from quakedesign.synthesis.gains import simulated_error
+    from quakedesign.synthesis import simulated_error
 
     search = cache(partial(simulated_error.synthesise_sampled, rounds=2))  # so that the second call is short
     monkeypatch.setattr(simulated_error, "synthesise", lambda *_, **__: None)
@@ -85,7 +85,7 @@ def test_the_smallest_sampled_error_on_a_fault(capsys, tmp_path, monkeypatch):
 
 
 def test_a_folder_that_does_not_exist_is_refused_before_the_search(capsys, tmp_path, monkeypatch):
-    from quakedesign.synthesis.gains import synthesise as gains
+    from quakedesign.lyapunov.gains import synthesise as gains
 
     monkeypatch.setattr(gains, "synthesise", lambda *_, **__: pytest.fail("searched"))
     for path in (tmp_path / "none" / "gains.json", tmp_path):

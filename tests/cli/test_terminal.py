@@ -11,7 +11,7 @@ import pytest
 
 import quakedesign
 from quakedesign.cli import main
-from quakedesign.cli.shared import console, print_lines
+from quakedesign.cli.app import console, print_lines
 
 LAB = (files("quakedesign.fault") / "presets" / "lab-fault.toml").read_text(encoding="utf-8")
 

@@ -7,16 +7,16 @@ from typing import Any, ClassVar
 
 import sympy as sp
 
-from quakedesign.controllers import Controller, LoopField
-from quakedesign.controllers.base import BaseGains
-from quakedesign.controllers.cta import ContinuousTwisting
 from quakedesign.errors import ParameterError
 from quakedesign.fault import FrictionLaw
-from quakedesign.loop.actuators import SampledStage
+from quakedesign.laws import Controller, LoopField
+from quakedesign.laws.base import BaseGains
+from quakedesign.laws.cta import ContinuousTwisting
+from quakedesign.loop.actuators.base import SampledStage
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.sensing import Sensor, SlipStage
 from quakedesign.sos.exact.proofs import Square, SumOfSquares
-from quakedesign.sos.solve.methods.base import Method
+from quakedesign.sos.solve.engine import Method
 
 X1, X2, XI, K1, K2, K3, BETA, S, W, B = sp.symbols("x1 x2 xi k1 k2 k3 beta s w b", real=True)
 

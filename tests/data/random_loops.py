@@ -6,10 +6,10 @@ from fractions import Fraction as F
 import numpy as np
 from scipy.linalg import LinAlgError
 
-from quakedesign.certificates.guarantee import Held, SlowGain, Task, task_of
 from quakedesign.fault import load_fault
-from quakedesign.loop import summed_integrals
-from quakedesign.synthesis.guaranteed.families import family_of
+from quakedesign.guarantees import Held, SlowGain, Task, task_of
+from quakedesign.guarantees.search.lqg import family_of
+from quakedesign.laws import summed_integrals
 
 REAL = task_of(load_fault("real-fault"))
 

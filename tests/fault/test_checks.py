@@ -5,7 +5,7 @@ import math
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault.checks import (
+from quakedesign.fault.model import (
     require_count,
     require_finite,
     require_name,

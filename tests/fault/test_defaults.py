@@ -7,7 +7,7 @@ import pytest
 
 from quakedesign.errors import ParameterError, ScenarioError
 from quakedesign.fault import friction_laws, load_fault, parse_fault
-from quakedesign.fault.defaults import radiation_damping
+from quakedesign.fault.fault_toml import radiation_damping
 from quakedesign.symbolic import derive
 
 PLAIN = """name = "own"

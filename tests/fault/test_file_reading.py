@@ -8,11 +8,11 @@ from importlib.resources import files
 
 import pytest
 
-from quakedesign.certificates.guarantee import task_of
 from quakedesign.errors import ParameterError, ScenarioError, UnitError, UnknownNameError
+from quakedesign.exact import rational
 from quakedesign.fault import friction_law, load_fault, parse_fault, presets
-from quakedesign.fault.template import fault_toml
-from quakedesign.rationals import rational
+from quakedesign.fault.fault_toml import fault_toml
+from quakedesign.guarantees import task_of
 
 REAL = (files("quakedesign.fault") / "presets" / "real-fault.toml").read_text(encoding="utf-8")
 LENGTH, BOX, DROP = 'length = "5 km"', 'uncertainty = "paper"', "drop = 0.1"

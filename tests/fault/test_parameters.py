@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, friction_law, load_fault
-from quakedesign.fault.parameters import magnitude as magnitude_of
+from quakedesign.fault.model import magnitude as magnitude_of
 from quakedesign.studies.facts import fault_dict, fault_sentences
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")

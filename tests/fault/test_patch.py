@@ -5,11 +5,11 @@ from fractions import Fraction
 
 import pytest
 
-from quakedesign.certificates.guarantee import task_of
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault, parse_fault, scaled_fault
-from quakedesign.fault.scaling import similarity
-from quakedesign.fault.template import fault_toml
+from quakedesign.fault.fault_toml import fault_toml
+from quakedesign.fault.similarity import similarity
+from quakedesign.guarantees import task_of
 from quakedesign.symbolic.plant import plant_values
 
 SQUARE = load_fault("real-fault")

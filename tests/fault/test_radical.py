@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault.radical import Radical, radical
+from quakedesign.fault.similarity import Radical, radical
 
 positive = st.fractions(min_value=Fraction(1, 10**4), max_value=10**6, max_denominator=10**4)
 powers = st.fractions(min_value=-3, max_value=3, max_denominator=6)

@@ -8,7 +8,7 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Reference, SlidingReference, fault_toml, load_fault
-from quakedesign.fault.file_reading import parse_fault
+from quakedesign.fault.fault_toml import parse_fault
 
 REFERENCE = Reference(target_slip=0.785, operation_time=3600.0)
 s = sp.Symbol("s")

@@ -13,17 +13,21 @@ from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError, UnitError, UnknownNameError
 from quakedesign.fault import Disturbance, Fault, FrictionLaw, friction_law, load_fault
-from quakedesign.fault.dimensions import (
+from quakedesign.fault.similarity import (
     BASES,
     PLANT_UNITS,
+    Scales,
     dimension,
     dimensional_matrix,
+    ordered,
+    pi_groups,
     quantities,
+    radical,
+    scaled_fault,
+    scaled_parameters,
+    similarity,
     stretches,
 )
-from quakedesign.fault.radical import radical
-from quakedesign.fault.scales import Scales
-from quakedesign.fault.scaling import ordered, pi_groups, scaled_fault, scaled_parameters, similarity
 from quakedesign.fault.units import si_value
 from quakedesign.symbolic import plant
 

@@ -7,7 +7,7 @@ import jsonschema
 import pytest
 
 from quakedesign.fault import Fault, fault_toml, friction_laws, load_fault, parse_fault, presets
-from quakedesign.fault.template import fault_schema, template
+from quakedesign.fault.fault_toml import fault_schema, template
 
 VALIDATOR = jsonschema.Draft202012Validator(fault_schema())
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
-from quakedesign.identification import Record
+from quakedesign.identification.record import Record
 
 MICRON = 1e-6
 NORMAL = 5e6

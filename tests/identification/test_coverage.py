@@ -9,8 +9,8 @@ import pytest
 
 from quakedesign.fault import friction_law
 from quakedesign.identification.fitting import fit
-from quakedesign.identification.setup import set_up
-from quakedesign.identification.thinning import thinned
+from quakedesign.identification.identify import set_up
+from quakedesign.identification.record import thinned
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
 synthetic = importlib.util.module_from_spec(SPECIFICATION)

@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 
 from quakedesign.fault import friction_law
 from quakedesign.identification.experiment import Difference
-from quakedesign.identification.rosenbrock import step
-from quakedesign.identification.setup import set_up
-from quakedesign.identification.straight import first_rate
+from quakedesign.identification.identify import set_up
+from quakedesign.identification.record import first_rate
+from quakedesign.identification.sliding_experiment import step
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
 synthetic = importlib.util.module_from_spec(SPECIFICATION)

@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.errors import RecordError
 from quakedesign.identification.experiment import Coordinate, Experiment
-from quakedesign.identification.fitting import Fit, Search, _finite, _starts, advantage, fit, minimised, outliers
+from quakedesign.identification.fitting import Fit, FitSearch, _finite, _starts, advantage, fit, minimised, outliers
 
 
 def coordinate(name, low=-10.0, high=10.0, start=(-1.0, 1.0)):
@@ -82,13 +82,13 @@ def test_searches_agree_when_their_squares_differ_by_less_than_a_thousandth(shar
     noise = np.resize([1.0, -1.0], 20) / 20**0.5
     measured = np.concatenate([[0.0, 0.0], noise])
     wells, start = Wells(share**0.5, 22), np.array([-1.0])
-    found = fit(wells, measured, seed=0, near=start, search=Search(least=2))
+    found = fit(wells, measured, seed=0, near=start, search=FitSearch(least=2))
     assert (found.starts, found.agreeing) == (searches, 2)
     assert found.fitted[0] == pytest.approx(1, abs=1e-4)
     assert fit(wells, measured, seed=0, near=start).starts == 4
-    alone = fit(wells, measured, seed=0, near=start, search=Search(least=1, most=1))
+    alone = fit(wells, measured, seed=0, near=start, search=FitSearch(least=1, most=1))
     assert alone.starts == 2
-    itself = fit(wells, measured, seed=0, search=Search(least=1, most=1, agreement=0.0))
+    itself = fit(wells, measured, seed=0, search=FitSearch(least=1, most=1, agreement=0.0))
     assert (itself.starts, itself.agreeing) == (1, 1)
 
 
@@ -101,8 +101,8 @@ def test_a_mean_of_four_counts_as_four_in_a_fit():
 def test_searches_start_from_the_sixteen_nearest_of_many_between_the_ends():
     """By the sum of absolute residuals, each with the root of its count."""
     experiment, measured, roots = Linear(np.array([[1.0], [-1.0], [0.5]])), np.array([0.7, 0.1, 0.2]), np.arange(1, 4)
-    _, starts = _starts(experiment, measured, roots, 5, Search())
-    _, every = _starts(experiment, measured, roots, 5, Search(most=100))
+    _, starts = _starts(experiment, measured, roots, 5, FitSearch())
+    _, every = _starts(experiment, measured, roots, 5, FitSearch(most=100))
     assert (len(starts), len(every)) == (16, 64)
     assert [q[0] for q in starts] == [q[0] for q in every[:16]]
     costs = [abs(0.7 - q) + 2 * abs(0.1 + q) + 3 * abs(0.2 - q / 2) for (q,) in every]
@@ -131,7 +131,7 @@ def test_steps_suit_the_scatter_between_samples_first_and_no_more_than_six_round
     assert [accuracy for _, accuracy in asked[:2]] == pytest.approx([0.01, 0.01], rel=0.05)
     assert asked[-1][1] == pytest.approx(3e-3 * 0.01, rel=0.05)
     asked.clear()
-    _starts(Restless(line(9).matrix, asked), np.arange(9.0), np.ones(9), 0, Search())
+    _starts(Restless(line(9).matrix, asked), np.arange(9.0), np.ones(9), 0, FitSearch())
     assert [accuracy for _, accuracy in asked] == [1e-9, 1e-9]
 
 
@@ -176,7 +176,7 @@ def test_more_than_two_in_a_row_are_no_accident(run, left_out):
     for first in (0, 7, 40 - run):
         residuals = np.resize([1.0, -1.0], 40)
         residuals[first : first + run] = 50.0
-        assert outliers(residuals, Search().longest_outlier).nonzero()[0].tolist() == (
+        assert outliers(residuals, FitSearch().longest_outlier).nonzero()[0].tolist() == (
             list(range(first, first + run)) if left_out else []
         )
 

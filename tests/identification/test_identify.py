@@ -10,27 +10,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quakedesign.certificates.slow_sliding import sliding_task
 from quakedesign.errors import ParameterError, RecordError
+from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, friction_law, load_fault
-from quakedesign.fault.defaults import step_assumed
-from quakedesign.fault.template import template
-from quakedesign.identification import (
-    Estimate,
-    Record,
+from quakedesign.fault.fault_toml import step_assumed, template
+from quakedesign.guarantees import sliding_task
+from quakedesign.identification.fault_file import (
     cover,
     identified_fault,
-    identify,
     law_remarks,
     next_command,
     other_parts,
     save_fault,
     task_remarks,
 )
-from quakedesign.identification.result import Rival
-from quakedesign.identification.setup import set_up
-from quakedesign.rationals import rational
-from quakedesign.report.identification import identification_lines
+from quakedesign.identification.identification_result import ParameterEstimate, Rival
+from quakedesign.identification.identify import identify, set_up
+from quakedesign.identification.record import Record
+from quakedesign.report.identification_page import identification_lines
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
 synthetic = importlib.util.module_from_spec(SPECIFICATION)
@@ -189,7 +186,7 @@ def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, nam
         for name in ("direct_effect", "evolution_effect", "critical_slip", "reference_coefficient")
     }
     estimates = {
-        name: Estimate(name=name, unit="", value=v, low=v, high=v, least=0.99 * v, most=1.01 * v)
+        name: ParameterEstimate(name=name, unit="", value=v, low=v, high=v, least=0.99 * v, most=1.01 * v)
         for name, v in values.items()
     }
     b = estimates["evolution_effect"]
@@ -265,7 +262,7 @@ def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(wea
 @pytest.mark.parametrize(("slip", "said"), [(4e-8, "40 nm is far shorter"), (0.02, "2 cm is far longer"), (1e-6, "")])
 def test_a_critical_slip_of_no_laboratory_points_at_the_unit(weak, slip, said):
     law = load_fault("crustal-patch").friction
-    told = Estimate(name="critical_slip", unit="m", value=slip, low=slip, high=slip, least=slip, most=slip)
+    told = ParameterEstimate(name="critical_slip", unit="m", value=slip, low=slip, high=slip, least=slip, most=slip)
     found = replace(weak, law=law, estimates={"critical_slip": told})
     lines = " ".join(" ".join(identification_lines(found)).split())
     assert ("check the unit" in lines) == bool(said)

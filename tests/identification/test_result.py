@@ -8,10 +8,10 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import friction_law
-from quakedesign.identification import Estimate, Identification, Record
 from quakedesign.identification.experiment import Coordinate, Experiment
 from quakedesign.identification.fitting import Fit
-from quakedesign.identification.result import Outlier, Rival, estimate
+from quakedesign.identification.identification_result import Identification, Outlier, ParameterEstimate, Rival, estimate
+from quakedesign.identification.record import Record
 
 LAW = friction_law("exponential-slip-weakening")(residual=0.4, drop=0.17, critical_slip=2.5e-3)
 
@@ -47,7 +47,7 @@ def made(values=(0.5, -0.5, 0.25, -0.25, 0.0), *, kept=(True,) * 5):
 
 
 def told(name="drop", *, low=1.0, high=3.0, least=0.5, most=4.0, unit=""):
-    return Estimate(name=name, unit=unit, value=2.0, low=low, high=high, least=least, most=most)
+    return ParameterEstimate(name=name, unit=unit, value=2.0, low=low, high=high, least=least, most=most)
 
 
 def identification(fit=None, *, estimates=None, difference=None, rival=None, law=LAW):

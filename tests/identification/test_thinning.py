@@ -10,12 +10,10 @@ import pytest
 
 from quakedesign.errors import RecordError
 from quakedesign.fault import friction_law
-from quakedesign.identification import Record, identify
 from quakedesign.identification.fitting import fit
-from quakedesign.identification.setup import set_up
-from quakedesign.identification.straight import reading_step, straight_beginning
-from quakedesign.identification.thinning import _edges, thinned
-from quakedesign.report.identification import identification_lines
+from quakedesign.identification.identify import identify, set_up
+from quakedesign.identification.record import Record, _edges, reading_step, straight_beginning, thinned
+from quakedesign.report.identification_page import identification_lines
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
 synthetic = importlib.util.module_from_spec(SPECIFICATION)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from quakedesign.controllers import Signals
-from quakedesign.controllers.elqr import ExtendedLQR
 from quakedesign.errors import ParameterError
-from quakedesign.loop import ContinuousLaw, Model, continuous_loop, exact_integrals, held_loop, summed_integrals
+from quakedesign.laws import NominalModel, Signals, summed_integrals
+from quakedesign.laws.elqr import ExtendedLQR
+from quakedesign.loop import ContinuousLaw, continuous_loop, exact_integrals, held_loop
 
 GAINS = tuple(map(F, ("2e9", "5e8", "3e9", "1e9")))
-MODEL = Model(slip=F("0.45"), rate=F("1.6"), gain=F("2.3e-8"))
+MODEL = NominalModel(slip=F("0.45"), rate=F("1.6"), gain=F("2.3e-8"))
 AUTHORITY = F("1.9e-8")
 
 

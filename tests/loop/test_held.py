@@ -8,24 +8,24 @@ import pytest
 from scipy.linalg import expm
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop import (
+from quakedesign.laws import (
     NOISES,
     ErrorPrediction,
     ImplicitRoot,
     LinearLaw,
-    Model,
+    NominalModel,
     Power,
     Prediction,
     compensated,
     disturbance_estimate,
-    held_loop,
     slip_observer,
     summed_integrals,
 )
-from quakedesign.loop.held import steady_states
+from quakedesign.loop import held_loop
+from quakedesign.loop.error_loop import steady_states
 
 STEP = F(1, 5)
-MODEL = Model(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
+MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
 AUTHORITY = F(2)
 PROPORTIONAL = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(F(-3), F(-2)))
 ESTIMATE = disturbance_estimate(

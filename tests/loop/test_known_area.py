@@ -8,12 +8,13 @@ import pytest
 from scipy.linalg import expm
 from scipy.special import erfc
 
-from quakedesign.loop import Layer, LinearLaw, Model, held_loop, with_known_area
+from quakedesign.laws import LinearLaw, NominalModel
+from quakedesign.loop import Layer, held_loop, with_known_area
 from quakedesign.loop.layer import MODES
 
 TIME, STEP, AUTHORITY, GAIN = F(3, 2), F(1, 5), F(2), F(6, 5)
 LAYER = Layer(time=TIME)
-MODEL = Model(slip=F(1, 2), rate=F(3, 2), gain=GAIN * AUTHORITY)
+MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=GAIN * AUTHORITY)
 MANY = 400
 ODD = 2 * np.arange(MANY) + 1
 RATES, SHARES = (ODD * np.pi / 2) ** 2 / float(TIME), 4 / np.pi * (-1.0) ** np.arange(MANY) / ODD

@@ -9,13 +9,13 @@ from mpmath import mp
 from scipy.special import erfc
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop import Fading, Layer, LinearLaw, Model, held_loop, summed_integrals
-from quakedesign.loop.actuators import Diffusion
+from quakedesign.laws import LinearLaw, NominalModel, summed_integrals
+from quakedesign.loop import Diffusion, Fading, Layer, held_loop
 from quakedesign.loop.layer import MODES
 
 TIME = F(3, 2)
 LAYER = Layer(time=TIME)
-MODEL = Model(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
+MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
 
 
 def step_response(t):

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.certificates import checking, parse_certificate, term_files
 from quakedesign.errors import CertificateError
+from quakedesign.lyapunov import parse_certificate
+from quakedesign.lyapunov.exact import certificate as checking
+from quakedesign.lyapunov.exact import certificate_files as term_files
 from quakedesign.sos.exact import polynomial_files as files
 from quakedesign.sos.exact import reduction, strict, work
 from quakedesign.sos.exact.polynomial_files import load

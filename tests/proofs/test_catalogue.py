@@ -9,15 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.certificates import Verdict, certificate_text, load_certificate, loop_of
-from quakedesign.certificates.command import check_files
-from quakedesign.certificates.guarantee import task_of
-from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, read_guarantee
-from quakedesign.certificates.slow_sliding import sliding_task
-from quakedesign.controllers import family, law
+from quakedesign.checking import check_files
 from quakedesign.fault import load_fault
+from quakedesign.guarantees import design_compensated, design_held, sliding_task, task_of, tightened
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, read_guarantee
+from quakedesign.laws import family, law
+from quakedesign.lyapunov import Verdict, certificate_text, load_certificate, loop_of
 from quakedesign.sos.exact import polynomial_files
-from quakedesign.synthesis.guaranteed import design_compensated, design_held, tightened
 
 ROOT = Path(__file__).parents[2] / "proofs"
 FILES = sorted((ROOT / "certificates").glob("*.json"))
@@ -118,7 +116,7 @@ def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
     assert stored.task == task_of(fault)
     assert stored.held.step == F(str(fault.sampling_time))
     if stored.held.longest_step:
-        return  # its search is tested in tests/synthesis/guaranteed/test_unclocked.py
+        return  # its search is tested in tests/guarantees/search/test_unclocked.py
     if "cta" in path.stem:
         base = replace(family("cta")[0].law, gains=dict(family("cta")[0].law.gains), divisor=stored.task.authority)
         again = tightened(design_compensated(stored.task, base, stored.held.step).found)
@@ -129,7 +127,7 @@ def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
     assert float(again.claims.slip_error) == pytest.approx(float(stored.claims.slip_error), rel=0.02)
 
 
-# every claim of a few loops, each a file of its own, is made smaller in tests/certificates/guarantee/test_files.py
+# every claim of a few loops, each a file of its own, is made smaller in tests/guarantees/exact/test_files.py
 KEYS = ("slip_error", "slip_rate_error", "peak_slip_rate", "largest_pressure", "least_pressure")
 SMALLER = list(zip(GUARANTEES, KEYS, strict=True))
 

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.errors import CertificateError, PolynomialError
-from quakedesign.sos.exact.attraction import Region
-from quakedesign.sos.exact.attraction_files import load, save_attraction, text
+from quakedesign.sos.exact.attraction import Region, load, save_attraction, text
 from quakedesign.sos.exact.proofs import Point
 
 ROOT = Path(__file__).parents[2]

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 import quakedesign as qd
-from quakedesign.certificates import certificate_text, load_certificate
-from quakedesign.synthesis.lyapunov.balancing import balance
-from quakedesign.synthesis.lyapunov.claimed_rates import with_largest_decay
+from quakedesign.lyapunov import certificate_text, load_certificate
+from quakedesign.lyapunov.search.search import balance, with_largest_decay
 
 PATH = Path(__file__).parents[2] / "proofs" / "check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("laws_check", PATH)

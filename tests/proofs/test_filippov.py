@@ -10,11 +10,10 @@ import mpmath as mp
 import pytest
 import sympy as sp
 
-from quakedesign.controllers import control_law
 from quakedesign.errors import KinkError, ParameterError
+from quakedesign.laws import control_law
 from quakedesign.symbolic import SignedPower, off_kinks
-from quakedesign.symbolic.normal_form import normal_form
-from quakedesign.symbolic.signed_power import AbsolutePower
+from quakedesign.symbolic.signed_power import AbsolutePower, normal_form
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "proofs"))
 filippov, sets = map(importlib.import_module, ("filippov", "set_valued"))

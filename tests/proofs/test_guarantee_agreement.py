@@ -7,8 +7,8 @@ import pytest
 from random_loops import random_loop
 from standalone_guarantee import checker
 
-from quakedesign.certificates.guarantee import Guarantee, guarantee
-from quakedesign.certificates.guarantee.files import guarantee_text
+from quakedesign.guarantees import Guarantee, guarantee
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 
 
 def bounds_of_both(number):

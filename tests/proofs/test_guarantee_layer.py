@@ -8,14 +8,14 @@ from functools import cache
 import pytest
 from standalone_guarantee import checker
 
-from quakedesign.certificates.claim import Verdict
-from quakedesign.certificates.guarantee import Guarantee, Held, SlowGain, guarantee, task_of
-from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
-from quakedesign.certificates.guarantee.norms import norms
-from quakedesign.certificates.guarantee.slow_gain import grown
 from quakedesign.fault import load_fault
-from quakedesign.loop import Prediction, disturbance_estimate
-from quakedesign.synthesis.guaranteed.estimate import gains_of
+from quakedesign.guarantees import Guarantee, Held, SlowGain, guarantee, task_of
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
+from quakedesign.guarantees.exact.norms import norms
+from quakedesign.guarantees.exact.small_gain import grown
+from quakedesign.guarantees.search.estimate import gains_of
+from quakedesign.laws import Prediction, disturbance_estimate
+from quakedesign.lyapunov.exact.claim import Verdict
 
 STEP = F("0.184")
 TASK = task_of(load_fault("real-fault"))

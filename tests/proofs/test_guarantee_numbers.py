@@ -11,12 +11,14 @@ from mpmath import mp
 from scipy.linalg import expm
 from standalone_guarantee import checker
 
-from quakedesign.certificates.guarantee import ball_matrices, sector, slowest_mode
-from quakedesign.certificates.guarantee import norms as package
-from quakedesign.certificates.guarantee.flow_norms import flow_norms
-from quakedesign.certificates.guarantee.norms import norms
 from quakedesign.errors import ParameterError
-from quakedesign.loop import ImplicitRoot, PeriodicLoop, Power, Segment
+from quakedesign.guarantees.exact import norms as ball_matrices
+from quakedesign.guarantees.exact import norms as package
+from quakedesign.guarantees.exact import norms as slowest_mode
+from quakedesign.guarantees.exact import small_gain as sector
+from quakedesign.guarantees.exact.norms import flow_norms, norms
+from quakedesign.laws import ImplicitRoot, Power
+from quakedesign.loop import PeriodicLoop, Segment
 
 
 def some(random, low, high, parts):

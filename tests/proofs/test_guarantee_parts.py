@@ -10,33 +10,17 @@ from random import Random
 import pytest
 from standalone_guarantee import checker
 
-from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates.guarantee import (
-    Bounds,
-    Claims,
-    ContinuousPeaks,
-    Guarantee,
-    Held,
-    Task,
-    small_gain,
-)
-from quakedesign.certificates.guarantee import task as package_task
-from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
-from quakedesign.certificates.guarantee.inputs import channels_of
-from quakedesign.certificates.guarantee.pump import Pump
-from quakedesign.certificates.guarantee.small_gain import bounds_from, certified_bounds
-from quakedesign.certificates.guarantee.task import Friction
 from quakedesign.errors import ParameterError
-from quakedesign.loop import (
-    NOISES,
-    ContinuousLaw,
-    ImplicitRoot,
-    LinearLaw,
-    PeriodicLoop,
-    Power,
-    Segment,
-    exact_integrals,
-)
+from quakedesign.exact import LowerBound, UpperBound
+from quakedesign.guarantees import Bounds, Claims, ContinuousPeaks, Guarantee, Held, Task
+from quakedesign.guarantees.exact import small_gain
+from quakedesign.guarantees.exact import task as package_task
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
+from quakedesign.guarantees.exact.loop import Pump, channels_of
+from quakedesign.guarantees.exact.small_gain import bounds_from, certified_bounds
+from quakedesign.guarantees.exact.task import Friction
+from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, Power
+from quakedesign.loop import ContinuousLaw, PeriodicLoop, Segment, exact_integrals
 
 SHAPES = [(0, 0, 3, -2), (0, 0, 0, 10, -15, 6), (0, 0, 0, 4, -3), (0, 0, 6, -8, 3)]
 OUTPUTS = ("slip_error", "slip_rate_error", "push")

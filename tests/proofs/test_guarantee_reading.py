@@ -7,9 +7,9 @@ from fractions import Fraction as F
 import pytest
 from standalone_guarantee import checker
 
-from quakedesign.certificates.guarantee import task as package_task
-from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee, read_guarantee
 from quakedesign.errors import CertificateError
+from quakedesign.guarantees.exact import task as package_task
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, read_guarantee
 
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
 HELD = {

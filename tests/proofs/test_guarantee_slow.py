@@ -12,15 +12,15 @@ import pytest
 from scipy.linalg import expm
 from standalone_guarantee import checker
 
-from quakedesign.bounds import UpperBound
-from quakedesign.certificates.claim import Verdict
-from quakedesign.certificates.guarantee import Guarantee, Held, NoGuarantee, SlowGain, guarantee, statement, task_of
-from quakedesign.certificates.guarantee.files import guarantee_text, parse_guarantee
-from quakedesign.certificates.guarantee.slow_gain import grown, slow_gains
-from quakedesign.certificates.guarantee.small_gain import Bounds
 from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.loop import Model, Prediction, disturbance_estimate
+from quakedesign.guarantees import Guarantee, Held, NoGuarantee, SlowGain, guarantee, task_of
+from quakedesign.guarantees.exact import statement
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
+from quakedesign.guarantees.exact.small_gain import Bounds, grown, slow_gains
+from quakedesign.laws import NominalModel, Prediction, disturbance_estimate
+from quakedesign.lyapunov.exact.claim import Verdict
 
 STEP, SLOW = F("0.184"), SlowGain(parts=2, growth=F(1, 4))
 TASK = task_of(load_fault("real-fault"))
@@ -262,7 +262,7 @@ def _bounds_with(task, slow, slope):
 def test_a_model_of_a_part_changes_the_pressure_alone():
     loop, other = (
         HELD.loop(TASK),
-        HELD.loop(TASK, Model(slip=TASK.model.slip, rate=TASK.model.rate, gain=TASK.authority)),
+        HELD.loop(TASK, NominalModel(slip=TASK.model.slip, rate=TASK.model.rate, gain=TASK.authority)),
     )
     assert other.flow[1][-1] == 1
     assert loop.flow[1][:2] == other.flow[1][:2]

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.certificates.command import check_files
+from quakedesign.checking import check_files
 from quakedesign.errors import ParameterError
-from quakedesign.fault.checks import require_name
+from quakedesign.fault.model import require_name
 
 FILES = Path(__file__).parents[2] / "proofs" / "certificates"
 KINDS = ("guarantee_no-clock_lab-fault.json", "sliding_crustal-patch.json")

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from standalone_guarantee import CHECK
 
-from quakedesign.certificates import checking
-from quakedesign.certificates.command import check_files
-from quakedesign.certificates.entries import entry_lines
-from quakedesign.certificates.guarantee import guarantee_document, read_guarantee
+from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError
+from quakedesign.guarantees import guarantee_document, read_guarantee
+from quakedesign.lyapunov.exact import certificate as checking
+from quakedesign.lyapunov.exact.certificate_files import entry_lines
 
 CERTIFICATES = Path(__file__).parents[2] / "proofs" / "certificates"
 RATIONAL = re.compile(r"-?\d+(/\d+)?")

@@ -7,15 +7,16 @@ from dataclasses import replace
 
 import pytest
 
-from quakedesign.certificates import Verdict
-from quakedesign.cli.shared import console
-from quakedesign.controllers import published
+from quakedesign.cli.app import console
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Reference, load_fault
-from quakedesign.report import compare, comparison, headline
+from quakedesign.laws import published
+from quakedesign.lyapunov import Verdict
+from quakedesign.report import compare, headline
+from quakedesign.report import comparison_table as comparison
 from quakedesign.report.folder import write_folder
-from quakedesign.report.headlines import sentences
-from quakedesign.report.paper_study import paper_study
+from quakedesign.report.paper_figures import paper_study
+from quakedesign.report.sentences import sentences
 from quakedesign.report.tables import outcome_rows, rows
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate

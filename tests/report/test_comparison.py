@@ -8,17 +8,18 @@ from types import SimpleNamespace
 import pytest
 
 import quakedesign as qd
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.premises import Premise
-from quakedesign.cli.shared import console
+from quakedesign.cli.app import console
 from quakedesign.errors import OutputError
 from quakedesign.fault import Reference
-from quakedesign.report import Comparison, Entry, headline
+from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.premises import Premise
+from quakedesign.report import Comparison, headline
 from quakedesign.report.figures import metrics
 from quakedesign.report.folder import write_folder
-from quakedesign.report.headlines import remarks
+from quakedesign.report.sentences import remarks
 from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
 from quakedesign.report.terminal import print_comparison
+from quakedesign.studies import Entry
 from quakedesign.synthesis import Design
 
 

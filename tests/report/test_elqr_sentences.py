@@ -6,14 +6,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.guarantee import Bounds, Claims, ContinuousPeaks, NoGuarantee, task_of
+from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
+from quakedesign.guarantees import Bounds, Claims, ContinuousPeaks, NoGuarantee, task_of
+from quakedesign.linear.sampled_stability import HeldLoop, LargestVaryingStep, VaryingVerdict
 from quakedesign.loop import exact_integrals
-from quakedesign.report.elqr_sentences import held_sentences, margin_lines, peaks_sentence
-from quakedesign.synthesis.linear.sampled.held import HeldLoop
-from quakedesign.synthesis.linear.sampled.varying_parameters import LargestVaryingStep, VaryingVerdict
+from quakedesign.lyapunov import Verdict
+from quakedesign.report.sentences import held_sentences, margin_lines, peaks_sentence
 
 LONGEST = LargestVaryingStep(proved=LowerBound("0.15769"), refuted=UpperBound("0.15822"), proofs=())
 

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from matplotlib.collections import PathCollection, QuadMesh
 
-from quakedesign.certificates import Verdict, load_certificate
 from quakedesign.errors import OutputError
-from quakedesign.report import gain_map as report
-from quakedesign.synthesis.analysis.certify import closed_loop
-from quakedesign.synthesis.analysis.gain_map import GainMap, gain_map
-from quakedesign.synthesis.analysis.gain_map_workers import Sheet
+from quakedesign.lyapunov import Verdict, load_certificate
+from quakedesign.lyapunov.maps.gain_map import GainMap, Sheet, gain_map
+from quakedesign.lyapunov.search.certify import closed_loop
+from quakedesign.report import gain_map_figure as report
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from quakedesign import cache
 from quakedesign.fault import load_fault
-from quakedesign.report import kept_figures
-from quakedesign.report.kept_figures import drawn_once
+from quakedesign.report import drawing as kept_figures
+from quakedesign.report.drawing import drawn_once
 from quakedesign.simulation import simulate
 
 
@@ -109,7 +109,7 @@ def test_what_cannot_be_told_is_drawn_each_time(drawn):
 
 
 def test_what_draws_is_not_loaded_for_what_is_kept():
-    code = "import sys; from quakedesign.report.kept_figures import _stated; _stated({}, 1); print(*sys.modules)"
+    code = "import sys; from quakedesign.report.drawing import _stated; _stated({}, 1); print(*sys.modules)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert "matplotlib.font_manager" in found
     assert not {"matplotlib.figure", "matplotlib.pyplot"} & set(found)

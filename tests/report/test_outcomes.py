@@ -5,19 +5,18 @@ from types import SimpleNamespace
 
 import pytest
 
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.guarantee import ContinuousPeaks
-from quakedesign.certificates.premise import Premise
-from quakedesign.cli.design import positive
-from quakedesign.controllers import control_law
+from quakedesign.cli.design_commands import positive
 from quakedesign.fault import load_fault
-from quakedesign.report import Entry, headline
-from quakedesign.report.grade import grade
-from quakedesign.report.headlines import sentences
-from quakedesign.report.outcomes import outcome_cells, outcome_sentence, pressure_sentence
+from quakedesign.guarantees import ContinuousPeaks
+from quakedesign.laws import control_law
+from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.premises import Premise
+from quakedesign.report import headline
+from quakedesign.report.sentences import grade, outcome_cells, outcome_sentence, pressure_sentence, sentences
 from quakedesign.simulation import simulate
+from quakedesign.studies import Entry
 from quakedesign.synthesis import Design
-from quakedesign.synthesis.linear.sampled.held import HeldLoop
 
 FAULT = load_fault(Path(__file__).parent.parent / "data" / "undersampled_fault.toml")
 LAW = control_law("cta").from_values(("7", "5", "2.3", "1.1"), divisor="27/260000000").scaled("0.000136822")

@@ -7,14 +7,13 @@ from fractions import Fraction as F
 import pytest
 
 import quakedesign as qd
-from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.premise import Premise
-from quakedesign.report.elqr_sentences import held_sentences, peaks_sentence, verdict_lines
-from quakedesign.report.headlines import domain_sentence, sentences
+from quakedesign.exact import LowerBound, UpperBound
+from quakedesign.linear.verdict import judge
+from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.premises import Premise
+from quakedesign.report.sentences import domain_sentence, held_sentences, peaks_sentence, sentences, verdict_lines
 from quakedesign.report.terminal import _line
 from quakedesign.studies.comparison import Entry
-from quakedesign.synthesis.linear.analysis.verdict import judge
 
 LAB = qd.load_fault("lab-fault")
 NUMBER = r"(-?\d+(?:\.\d+)?(?:e[-+]\d+)?)"

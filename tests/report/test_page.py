@@ -16,20 +16,13 @@ import pytest
 import sympy as sp
 
 import quakedesign as qd
-from quakedesign.cli.shared import command_line, typed
+from quakedesign.cli.app import command_line, typed
 from quakedesign.fault import parse_fault
 from quakedesign.report import page
-from quakedesign.report.account import ASKED
-from quakedesign.report.captions import CAPTIONS
-from quakedesign.report.drawing import figure
-from quakedesign.report.figure_files import FORMATS, figure_bytes
-from quakedesign.report.html_text import typeset, unit_html
-from quakedesign.report.mathml import mathml
+from quakedesign.report.drawing import FORMATS, figure, figure_bytes, inline_svg
+from quakedesign.report.page import ASKED, CAPTIONS, mathml, parameter_rows, reproduction, typeset, unit_html
 from quakedesign.report.paper_figures import PAPER
-from quakedesign.report.parameter_table import parameter_rows
-from quakedesign.report.reproduction import reproduction
-from quakedesign.report.vector import inline_svg
-from quakedesign.studies.equations import law_latex, plant_latex
+from quakedesign.studies.facts import law_latex, plant_latex
 
 FAULT = qd.load_fault("real-fault")
 
@@ -183,7 +176,7 @@ def test_a_report_says_how_it_is_made_again(monkeypatch):
 
 
 def test_numbers_of_many_digits_become_decimals_and_no_others():
-    from quakedesign.studies.equations import _written
+    from quakedesign.studies.facts import _written
 
     x = sp.Symbol("x", real=True)
     assert _written(sp.Rational(1, 3) * x) == r"\frac{x}{3}"

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
-from quakedesign.bounds import UpperBound
-from quakedesign.certificates import Verdict
 from quakedesign.errors import OutputError
+from quakedesign.exact import UpperBound
 from quakedesign.fault import Reference
-from quakedesign.report import Comparison, Entry
-from quakedesign.report.csv_tables import csv_text
+from quakedesign.lyapunov import Verdict
+from quakedesign.report import Comparison
 from quakedesign.report.drawing import band, clock, colour, made, scaled
 from quakedesign.report.folder import study_results, write_folder
-from quakedesign.report.paper_figures import PAPER, paper_figures
-from quakedesign.report.paper_study import PaperStudy, paper_study
+from quakedesign.report.paper_figures import PAPER, PaperStudy, paper_figures, paper_study
+from quakedesign.report.tables import csv_text
 from quakedesign.report.terminal import printed_lines
 from quakedesign.simulation import Metrics, natural_earthquake
-from quakedesign.studies.paper_numbers import BARS, baseline, printed, relative, table
+from quakedesign.studies import Entry
+from quakedesign.studies.paper import BARS, baseline, printed, relative, table
 from quakedesign.synthesis import Design
 
 EVERY = 2001

@@ -13,26 +13,22 @@ import pytest
 from rich.console import Console
 
 from quakedesign import compare
-from quakedesign.certificates.guarantee import NoGuarantee
-from quakedesign.certificates.guarantee.files import parse_guarantee
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError, SimulationError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.report.account import accounts
+from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.guarantee_result import SlidingAnswer
+from quakedesign.report.figures import cycle, errors, slow_sliding
 from quakedesign.report.folder import write_folder
-from quakedesign.report.headlines import part_of_task, sentences
-from quakedesign.report.page import answer
-from quakedesign.report.parameter_table import parameter_rows
-from quakedesign.report.state_figures import cycle, errors, slow_sliding
-from quakedesign.report.state_runs import cycle_sentence, state_run_lines
+from quakedesign.report.page import accounts, answer, parameter_rows
+from quakedesign.report.sentences import cycle_sentence, part_of_task, sentences, state_run_lines
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
-from quakedesign.simulation.starting_state import sliding
+from quakedesign.simulation.stick_slip import sliding
 from quakedesign.studies import comparison as compared_in
-from quakedesign.studies import state_runs
-from quakedesign.synthesis import design, designable, left_out
-from quakedesign.synthesis.guaranteed.sliding_answer import SlidingAnswer
-from quakedesign.synthesis.methods import state_feedback
+from quakedesign.studies import runs as state_runs
+from quakedesign.synthesis import design, designable, left_out, state_feedback
 
 PROOF = Path(__file__).parents[2] / "proofs" / "certificates" / "sliding_crustal-patch.json"
 PATCH = load_fault("crustal-patch")

@@ -7,7 +7,7 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import friction_law, load_fault
-from quakedesign.report.stability_map import stability_map
+from quakedesign.report.figures import stability_map
 from quakedesign.symbolic.stability import Stability, stability
 
 REAL = load_fault("real-fault")

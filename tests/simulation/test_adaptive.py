@@ -8,13 +8,11 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError, SimulationError
-from quakedesign.fault import Disturbance, load_fault
-from quakedesign.fault.friction import friction_law
+from quakedesign.fault import Disturbance, friction_law, load_fault
+from quakedesign.laws import published
 from quakedesign.simulation import adaptive, simulate
-from quakedesign.simulation.loading import Load
-from quakedesign.simulation.variation import Variation
+from quakedesign.simulation.closed_loop import Load, Variation
 
 REAL = load_fault("real-fault")
 ADAPTIVE = ("cvodes", "idas")

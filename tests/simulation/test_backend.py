@@ -6,8 +6,8 @@ import signal
 import psutil
 import pytest
 
-from quakedesign.simulation import backend
-from quakedesign.temporary import temporary_folder
+from quakedesign.files import temporary_folder
+from quakedesign.simulation import compiled as backend
 
 COMPILER = """#!/bin/sh
 touch "$TMPDIR/of-the-compiler"
@@ -18,9 +18,9 @@ wait
 PROGRAM = """
 import sys
 from pathlib import Path
-from quakedesign.interruption import ending
-from quakedesign.simulation.backend import shared_library
-from quakedesign.temporary import temporary_folder
+from quakedesign.parallel import ending
+from quakedesign.simulation.compiled import shared_library
+from quakedesign.files import temporary_folder
 
 with ending(process=True), temporary_folder() as folder:
     shared_library("int i;", folder, (sys.argv[1],))

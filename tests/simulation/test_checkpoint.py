@@ -5,24 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quakedesign.controllers import published
 from quakedesign.errors import SimulationError
 from quakedesign.fault import load_fault
-from quakedesign.simulation import (
-    Actuator,
-    Averaging,
-    Delay,
-    Differentiator,
-    Diffusion,
-    Lag,
-    OutputFeedback,
-    Quantisation,
-    RateLimit,
-    Saturation,
-    Transducer,
-    checkpoint,
-    simulate,
-)
+from quakedesign.laws import published
+from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Quantisation, RateLimit, Saturation
+from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Transducer
+from quakedesign.simulation import simulate
+from quakedesign.simulation import stepping as checkpoint
 
 REAL = load_fault("real-fault")
 SETTING = {"duration": 4000.0, "samples": 300, "compiled": False}
@@ -97,7 +86,7 @@ def test_a_killed_run_goes_on(start, tmp_path):
     """SIGKILL in the middle of writing again and again."""
     path = tmp_path / "run.checkpoint"
     program = (
-        "from quakedesign.controllers import published\nfrom quakedesign.fault import load_fault\n"
+        "from quakedesign.laws import published\nfrom quakedesign.fault import load_fault\n"
         "from quakedesign.simulation import checkpoint, simulate\ncheckpoint.SECONDS = 0.0\n"
         "done = lambda share: print(share, flush=True)\n"
         "simulate(load_fault('real-fault'), published('real-fault')['cta'], duration=4000.0, samples=300,"

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from quakedesign.controllers import published
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.laws import published
 from quakedesign.simulation.closed_loop import ClosedLoop, reference_expressions
 from quakedesign.symbolic import plant
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.laws import published
 from quakedesign.simulation import Metrics, natural_earthquake, simulate
-from quakedesign.simulation.coulomb import CoulombLoop, _Course, _onset, _stop
-from quakedesign.simulation.integrators.rk4 import ClassicRungeKutta
+from quakedesign.simulation.coulomb import CoulombLoop, _onset, _StepMotion, _stop
+from quakedesign.simulation.integrators import ClassicRungeKutta
 
 REAL = load_fault("real-fault")
 BLOCK = dataclasses.replace(REAL, damping=0.0, friction=dataclasses.replace(REAL.friction, drop=0.0))
@@ -236,7 +236,7 @@ def test_the_monitor_agrees_with_numpy():
 
 @pytest.mark.parametrize("law", ["cta", "elqr"])
 def test_both_backends_give_the_same_digits(law, monkeypatch):
-    monkeypatch.setattr("quakedesign.simulation.backend._WORTH", 0)
+    monkeypatch.setattr("quakedesign.simulation.compiled._WORTH", 0)
     setting = {"duration": 1001 * REAL.sampling_time, "samples": 40, "plant": "coulomb"}
     fast, slow = (simulate(REAL, published("real-fault")[law], compiled=c, **setting) for c in (None, False))
     if fast.provenance["backend"] != "compiled":
@@ -397,7 +397,10 @@ def test_where_the_cubic_misses_the_stop_a_linear_step_comes_closer(length, sens
     def motion(plant, passed, now):
         return plant(passed * length, now[:2], 0)
 
-    course, rate = _Course(directed, ClassicRungeKutta, motion, length), np.polynomial.Polynomial([0.6, -1, 0, 0, -2])
+    course, rate = (
+        _StepMotion(directed, ClassicRungeKutta, motion, length),
+        np.polynomial.Polynomial([0.6, -1, 0, 0, -2]),
+    )
     root = next(z.real for z in rate.roots() if abs(z.imag) < 1e-9 and 0 < z.real < 1)
     start = ca.DM([0, sense * 0.6])
     ahead = course.move(sense, 0.0, 1.0, start)
@@ -429,7 +432,7 @@ def test_a_stop_is_never_later_than_the_step(length, onset, share):
     def motion(plant, passed, now):
         return plant(passed * length, now[:2], 0)
 
-    course = _Course(lambda _, x, __, sense: ca.vertcat(x[1], -sense / length), ClassicRungeKutta, motion, length)
+    course = _StepMotion(lambda _, x, __, sense: ca.vertcat(x[1], -sense / length), ClassicRungeKutta, motion, length)
     start = ca.DM([0, 2])
     found, turning = course.stop(1, start, course.move(1, 0.0, 1.0, start), onset)
     assert float(found) == pytest.approx(share, rel=1e-14)

@@ -8,11 +8,15 @@ import mpmath
 import numpy as np
 import pytest
 
-from quakedesign.simulation import elementary
-from quakedesign.simulation.backend import compiler, shared_library
-from quakedesign.simulation.elementary import verbatim
-from quakedesign.simulation.lanes import LANE_FLAGS, processor_flags
-from quakedesign.simulation.portable_c import elementary_c
+from quakedesign.simulation import compiled as elementary
+from quakedesign.simulation.compiled import (
+    LANE_FLAGS,
+    compiler,
+    elementary_c,
+    processor_flags,
+    shared_library,
+    verbatim,
+)
 
 COUNT = 1500
 RANDOM = np.random.default_rng(4)

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from quakedesign.controllers import published
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.laws import published
 from quakedesign.simulation import natural_earthquake, simulate
-from quakedesign.simulation.energy import EnergyBudget
-from quakedesign.simulation.loading import Load
-from quakedesign.simulation.variation import Variation
+from quakedesign.simulation.closed_loop import EnergyBudget, Load, Variation
 
 REAL = load_fault("real-fault")
 BLOCK = dataclasses.replace(REAL, damping=0.0, friction=dataclasses.replace(REAL.friction, drop=0.0))
@@ -71,11 +69,12 @@ def test_a_dashpot_takes_what_a_closed_form_says():
 
 def test_a_held_pressure_relieves_friction_of_its_share():
     """Constant friction under p: ∫μAp dx1 = μApx1, which the push of the pressure gives to the spring."""
-    from quakedesign.loop.schemes import simulation_scheme
-    from quakedesign.simulation.integrators import integrator
-    from quakedesign.simulation.outcome import OutcomeCriterion
+    from quakedesign.loop import simulation_scheme
+    from quakedesign.simulation import integrator
     from quakedesign.simulation.recorder import Recorder
-    from quakedesign.simulation.run import Setting, loop_class, run
+    from quakedesign.simulation.run import RunSetting as Setting
+    from quakedesign.simulation.run import loop_class, run
+    from quakedesign.simulation.trajectory import OutcomeCriterion
 
     pressure, half = 2e6, math.pi / FREQUENCY
     setting = Setting.of(BLOCK, half / 400, half, 10, 0.0)

@@ -9,12 +9,12 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quakedesign.controllers import control_law, published
 from quakedesign.errors import QuakedesignError, SimulationError
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.laws import control_law, published
 from quakedesign.simulation import simulate
-from quakedesign.simulation.loading import Load
-from quakedesign.simulation.metrics import EVENTS, events
+from quakedesign.simulation.closed_loop import Load
+from quakedesign.simulation.recorder import EVENTS, events
 
 REAL = load_fault("real-fault")
 DIVISOR = {"divisor": published("real-fault")["cta"].divisor}

@@ -11,31 +11,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quakedesign.certificates.guarantee.files import load_guarantee
-from quakedesign.controllers import published
-from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import OutputError, ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.loop import (
+from quakedesign.guarantees.exact.guarantee_files import load_guarantee
+from quakedesign.guarantees.search.compensated_search import recovered
+from quakedesign.laws import (
     ErrorPrediction,
     Prediction,
     RestLimit,
     SampledController,
     disturbance_estimate,
+    published,
     slip_observer,
 )
+from quakedesign.laws.feed_forward import feed_forward
+from quakedesign.loop import simulation_scheme
 from quakedesign.loop.actuators.chain import Actuator
-from quakedesign.loop.actuators.delay import Delay
-from quakedesign.loop.actuators.lag import Lag
-from quakedesign.loop.actuators.rate_limit import RateLimit
-from quakedesign.loop.actuators.saturation import Saturation
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop.actuators.flow_stages import Lag
+from quakedesign.loop.actuators.sampled_stages import Delay, RateLimit, Saturation
 from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Transducer
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import simulate
 from quakedesign.simulation.export import controller_step, export_controller
-from quakedesign.studies.single import certified_choice
-from quakedesign.synthesis.guaranteed.compensated import recovered
+from quakedesign.studies.runs import certified_choice
 
 LAB = load_fault("lab-fault")
 PUBLISHED = published("lab-fault")

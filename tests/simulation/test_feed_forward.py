@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
-from quakedesign.certificates import premises as certificates
-from quakedesign.controllers import control_law, published
-from quakedesign.controllers.feed_forward import feed_forward
+from quakedesign.laws import control_law, published
+from quakedesign.laws.feed_forward import feed_forward
+from quakedesign.lyapunov.exact import premises as certificates
 from quakedesign.simulation import to_casadi, to_iosystem
 from quakedesign.simulation.closed_loop import ClosedLoop
 

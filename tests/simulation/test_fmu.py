@@ -8,9 +8,9 @@ import pytest
 from fmpy.fmi2 import FMU2Slave, fmi2FMUstate
 from fmpy.validation import validate_fmu
 
-from quakedesign.controllers import published
 from quakedesign.fault import load_fault
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.laws import published
+from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing import Differentiator, OutputFeedback
 from quakedesign.simulation.export import controller_step, export_controller
 

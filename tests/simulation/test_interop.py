@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, friction_law, friction_laws, load_fault
+from quakedesign.laws import published
 from quakedesign.simulation import simulate, to_casadi, to_iosystem
-from quakedesign.simulation.state_plants import SpringSlider
+from quakedesign.simulation.state_plant import SpringSlider
 from quakedesign.symbolic import derive
 
 LAB = load_fault("lab-fault")

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from quakedesign import cache
-from quakedesign.controllers import published
 from quakedesign.fault import load_fault
-from quakedesign.simulation import backend, kept_runs, simulate
+from quakedesign.laws import published
+from quakedesign.simulation import compiled as backend
 from quakedesign.simulation import run as running
+from quakedesign.simulation import simulate
+from quakedesign.simulation import stepping as kept_runs
 
 REAL = load_fault("real-fault")
 LAW = published("real-fault")["cta"]

@@ -6,15 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from quakedesign.controllers import published
 from quakedesign.fault import load_fault
-from quakedesign.loop.actuators import Actuator, Diffusion
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.laws import published
+from quakedesign.loop import Actuator, Diffusion, simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
-from quakedesign.simulation.backend import compiler, shared_library
 from quakedesign.simulation.campaign import campaign_problem
-from quakedesign.simulation.campaign.program import Library, mover
-from quakedesign.simulation.lanes import LANE_FLAGS, processor_flags
+from quakedesign.simulation.campaign.problem import Library, mover
+from quakedesign.simulation.compiled import LANE_FLAGS, compiler, processor_flags, shared_library
 
 LAB = load_fault("lab-fault", box="ten-percent")
 NOISY = simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-7))

@@ -13,9 +13,9 @@ from scipy.optimize import brentq
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.loop import Prediction, SampledController, disturbance_estimate
-from quakedesign.loop.actuators import Actuator, Delay, Diffusion, Lag, Saturation
-from quakedesign.simulation.linear_models import resting_pressure
+from quakedesign.laws import Prediction, SampledController, disturbance_estimate
+from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Saturation
+from quakedesign.simulation.interop import resting_pressure
 
 REAL = qd.load_fault("real-fault")
 LAW = qd.published("real-fault")["elqr"]

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.laws import published
 from quakedesign.simulation import simulate
-from quakedesign.simulation.loading import Load
+from quakedesign.simulation.closed_loop import Load
 
 REAL = load_fault("real-fault")
 QUIET = REAL.with_disturbance(Disturbance())

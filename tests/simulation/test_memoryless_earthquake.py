@@ -5,7 +5,8 @@ import pytest
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import friction_law, load_fault
-from quakedesign.simulation import memoryless_earthquake, natural_earthquake
+from quakedesign.simulation import natural as memoryless_earthquake
+from quakedesign.simulation import natural_earthquake
 
 REAL = load_fault("real-fault")
 

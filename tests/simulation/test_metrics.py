@@ -5,9 +5,9 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.laws import published
 from quakedesign.simulation import Metrics, simulate
 
 REAL = load_fault("real-fault")

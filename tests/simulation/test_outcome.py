@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from quakedesign.controllers import control_law, published
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.loop import LinearLaw, SampledController
-from quakedesign.report.outcomes import outcome_sentence
-from quakedesign.simulation import Outcome, OutcomeCriterion, memoryless_earthquake, natural_earthquake, simulate
+from quakedesign.laws import LinearLaw, SampledController, control_law, published
+from quakedesign.report.sentences import outcome_sentence
+from quakedesign.simulation import Outcome, OutcomeCriterion, natural_earthquake, simulate
+from quakedesign.simulation import natural as memoryless_earthquake
 from quakedesign.simulation.campaign import SampleResult, campaign_problem
-from quakedesign.simulation.campaign.result import Campaign
-from quakedesign.simulation.memoryless_earthquake import natural_peak
-from quakedesign.simulation.outcome import KINDS
+from quakedesign.simulation.campaign.campaign_result import Campaign
+from quakedesign.simulation.natural import natural_peak
+from quakedesign.simulation.trajectory import KINDS
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
 UNDERSAMPLED = load_fault(Path(__file__).parent.parent / "data" / "undersampled_fault.toml")

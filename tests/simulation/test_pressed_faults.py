@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from quakedesign.errors import ParameterError, SimulationError
-from quakedesign.fault.friction import friction_law
+from quakedesign.fault import friction_law
 from quakedesign.simulation import PressureCourse, SpringSlider, simulate_state
 
 A, B, D, V0, MU, ALPHA = 0.01, 0.015, 1e-5, 1e-5, 0.6, 0.2

@@ -6,8 +6,8 @@ import sys
 import pytest
 
 import quakedesign.simulation as room
-from quakedesign.loop.actuators import Stage, stages
-from quakedesign.loop.schemes import Scheme, schemes
+from quakedesign.loop import Scheme, schemes, stages
+from quakedesign.loop.actuators.base import Stage
 
 
 def test_every_stage_of_an_actuator_has_its_name_in_the_room():

@@ -6,10 +6,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from quakedesign.controllers import control_law, published
 from quakedesign.fault import load_fault
-from quakedesign.loop.actuators import Actuator, Lag
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.laws import control_law, published
+from quakedesign.loop import Actuator, Lag, simulation_scheme
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.coulomb import CoulombLoop
 from quakedesign.simulation.recorder import Recorder

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Disturbance, load_fault
+from quakedesign.laws import published
 from quakedesign.simulation import simulate
 
 REAL = load_fault("real-fault")
@@ -97,7 +97,7 @@ def test_a_fault_without_weakening_is_a_forced_oscillator():
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("fault", [REAL, LAB], ids=["real", "lab"])
 def test_both_backends_give_the_same_digits(fault, law, monkeypatch):
-    monkeypatch.setattr("quakedesign.simulation.backend._WORTH", 0)
+    monkeypatch.setattr("quakedesign.simulation.compiled._WORTH", 0)
     setting = {"duration": 5003 * fault.sampling_time, "samples": 40}
     fast = simulate(fault, published(fault.name)[law], **setting)
     if fast.provenance["backend"] != "compiled":
@@ -124,7 +124,7 @@ def test_a_run_that_is_shorter_than_a_compilation_is_not_compiled():
 
 
 def test_a_broken_compiler_falls_back_or_is_reported(monkeypatch):
-    monkeypatch.setattr("quakedesign.simulation.backend._WORTH", 0)
+    monkeypatch.setattr("quakedesign.simulation.compiled._WORTH", 0)
     monkeypatch.setenv("CC", "false")
     run = simulate(LAB, published("lab-fault")["cta"], duration=0.1)
     assert run.provenance["backend"] == "virtual-machine"

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.laws import control_law
 from quakedesign.simulation.sensitivity import accuracy, gain_sensitivity, noise_sensitivity
 
 REAL = load_fault("real-fault")

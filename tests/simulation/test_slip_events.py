@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault import load_fault
-from quakedesign.fault.friction import friction_law
+from quakedesign.fault import friction_law, load_fault
 from quakedesign.simulation import simulate_state
-from quakedesign.simulation.slip_events import cycle_outcome, dynamic_rate, slip_events
-from quakedesign.simulation.starting_state import late_in_cycle, locked, sliding
+from quakedesign.simulation.stick_slip import cycle_outcome, dynamic_rate, late_in_cycle, locked, sliding, slip_events
 
 RATE, YEAR = 1e-9, 3.15576e7
 QUASI = {"inertia": False, "method": "dop853", "rtol": 1e-8}

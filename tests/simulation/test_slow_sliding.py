@@ -11,19 +11,17 @@ from scipy.linalg import expm
 from scipy.special import lambertw
 
 from quakedesign import simulate
-from quakedesign.certificates.guarantee import Held
 from quakedesign.errors import ParameterError, UnknownNameError
-from quakedesign.fault import Reference, load_fault
-from quakedesign.fault.friction import friction_law
-from quakedesign.loop import LinearLaw, sliding_loop
-from quakedesign.loop.actuators import Delay
+from quakedesign.fault import Reference, friction_law, load_fault
+from quakedesign.guarantees import Held
+from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_model
+from quakedesign.laws import LinearLaw
+from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Saturation, sliding_loop
 from quakedesign.loop.sensing import Transducer
-from quakedesign.simulation import Actuator, Diffusion, Lag, Saturation, Variation
-from quakedesign.simulation.sliding_conditions import PressurePath, SlidingVariation, Tide
+from quakedesign.simulation import Variation
 from quakedesign.simulation.slow_sliding import _Loop, simulate_sliding
+from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
 from quakedesign.symbolic import derive
-from quakedesign.synthesis.linear.plant.sliding_model import growth_rate, sliding_model
-from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
 
 A, B, D, V, MU, NORMAL = 0.010, 0.015, 1e-3, 1.2e-6, 0.6, 50e6
 STIFFNESS, DAMPING = 30e9 / 5e3, 5e14 / 25e6

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from quakedesign.simulation.smooth import Problem, Ramp
+from quakedesign.simulation.smooth import Ramp, SmoothProblem
 
 FAST = 1e-5
 
@@ -13,7 +13,7 @@ def problem():
     """y' = load − y/FAST."""
     y, load = ca.SX.sym("y"), ca.SX.sym("load")
     rates = load - y / FAST
-    return Problem(ca.Function("rates", [y, load], [rates, ca.jacobian(rates, y)]), np.array([1.0]), 0, 10.0)
+    return SmoothProblem(ca.Function("rates", [y, load], [rates, ca.jacobian(rates, y)]), np.array([1.0]), 0, 10.0)
 
 
 def follow(times, method, *, every_step=False):

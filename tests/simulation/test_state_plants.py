@@ -8,10 +8,10 @@ import pytest
 import sympy as sp
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault import load_fault
-from quakedesign.fault.friction import friction_law
+from quakedesign.fault import friction_law, load_fault
 from quakedesign.simulation import SpringSlider
-from quakedesign.symbolic import plant, state_plant
+from quakedesign.symbolic import plant
+from quakedesign.symbolic import rate_and_state_plant as state_plant
 
 PARAMETERS = {
     "reference_coefficient": 0.6,

@@ -15,11 +15,10 @@ from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from quakedesign.errors import ParameterError, SimulationError
-from quakedesign.fault import load_fault
-from quakedesign.fault.friction import friction_law
-from quakedesign.fault.parameters import magnitude
+from quakedesign.fault import friction_law, load_fault
+from quakedesign.fault.model import magnitude
 from quakedesign.simulation import SpringSlider, simulate_state, velocity_step
-from quakedesign.symbolic import state_plant
+from quakedesign.symbolic import rate_and_state_plant as state_plant
 
 DATA = Path(__file__).parent.parent / "data"
 MICRON = 1e-6

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from quakedesign.controllers import published
 from quakedesign.fault import load_fault
+from quakedesign.laws import published
 from quakedesign.simulation import simulate
 from quakedesign.simulation.stepping import instants
 

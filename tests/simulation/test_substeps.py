@@ -5,14 +5,12 @@ import numpy as np
 import pytest
 
 from quakedesign import load_fault, published
-from quakedesign.loop.actuators import Actuator, Diffusion
-from quakedesign.loop.schemes import simulation_scheme
-from quakedesign.simulation.backend import _source
-from quakedesign.simulation.energy import WORKS, Meter
-from quakedesign.simulation.integrators import integrator
+from quakedesign.loop import Actuator, Diffusion, simulation_scheme
+from quakedesign.simulation import integrator
+from quakedesign.simulation.closed_loop import WORKS, Meter, Variation
+from quakedesign.simulation.compiled import _source
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import _step, loop_class
-from quakedesign.simulation.variation import Variation
 
 LAB = load_fault("lab-fault")
 LAW = published("lab-fault")["cta"]

@@ -6,20 +6,12 @@ import pint
 import pytest
 import xarray as xr
 
-from quakedesign.controllers import published
 from quakedesign.errors import OutputError
-from quakedesign.fault import Disturbance, load_fault
-from quakedesign.fault.friction import friction_law
-from quakedesign.simulation import (
-    Actuator,
-    Diffusion,
-    Lag,
-    Saturation,
-    natural_earthquake,
-    simulate,
-    velocity_step,
-)
-from quakedesign.simulation.recording import Recording
+from quakedesign.fault import Disturbance, friction_law, load_fault
+from quakedesign.laws import published
+from quakedesign.loop import Actuator, Diffusion, Lag, Saturation
+from quakedesign.simulation import natural_earthquake, simulate, velocity_step
+from quakedesign.simulation.trajectory import Recording
 
 LAB = load_fault("lab-fault")
 

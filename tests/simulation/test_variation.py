@@ -6,12 +6,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.fault.uncertainty import UncertaintyBox
-from quakedesign.simulation import backend, simulate
-from quakedesign.simulation.variation import Variation
+from quakedesign.fault.model import UncertaintyBox
+from quakedesign.laws import published
+from quakedesign.simulation import compiled as backend
+from quakedesign.simulation import simulate
+from quakedesign.simulation.closed_loop import Variation
 
 REAL = dataclasses.replace(
     load_fault("real-fault"),
@@ -68,7 +69,7 @@ def test_one_machine_code_serves_every_variation(monkeypatch):
     built = []
     compile_ = backend._compile.__wrapped__
     backend._compile.cache_clear()
-    monkeypatch.setattr("quakedesign.simulation.backend._WORTH", 0)
+    monkeypatch.setattr("quakedesign.simulation.compiled._WORTH", 0)
 
     def counted(*arguments):
         built.append(arguments)

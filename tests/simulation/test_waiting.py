@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.report.outcomes import run_sentences
+from quakedesign.report.sentences import run_sentences
 from quakedesign.simulation import simulate
-from quakedesign.simulation.waiting import waiting
+from quakedesign.simulation.natural import waiting
 
 REAL = load_fault("real-fault")
 QUIET = REAL.with_disturbance(Disturbance())

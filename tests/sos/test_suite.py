@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign import sos
-from quakedesign.sos.exact.text import names, parse, parse_constraint
+from quakedesign.sos.exact.polynomial_text import names_in_text, parse, parse_constraint
 
 ROWS = tomllib.loads((Path(__file__).parent / "suite.toml").read_text(encoding="utf-8"))["row"]
 NAMES = [row["name"] for row in ROWS]
@@ -65,7 +65,7 @@ def written(polynomial, order, columns):
 def transformed(row, *, permutation=lambda n: range(n), scales=lambda n: [F(1)] * n, factor=F(1)):
     """Arguments of the same question after a change of variables and a positive factor."""
     on = row.get("on", [])
-    order = names(row["polynomial"], *on, row.get("multiplier", "1"))
+    order = names_in_text(row["polynomial"], *on, row.get("multiplier", "1"))
     columns, chosen = list(permutation(len(order))), scales(len(order))
     renamed = [f"v{i}" for i in range(len(order))]
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from quakedesign.sos.exact.text import names, parse, parse_constraint
+from quakedesign.sos.exact.polynomial_text import names_in_text, parse, parse_constraint
 
 HERE = Path(__file__).parent
 ROWS = {row["name"]: row for row in tomllib.loads((HERE / "suite.toml").read_text(encoding="utf-8"))["row"]}
@@ -70,7 +70,7 @@ def read(row):
 
 def variables(row):
     texts = [row["polynomial"], *row.get("on", []), row.get("multiplier", "0"), row.get("denominator", "0")]
-    return names(*texts)
+    return names_in_text(*texts)
 
 
 def bound(target, inequalities, equalities):

@@ -5,9 +5,9 @@ from fractions import Fraction as F
 
 import pytest
 
-from quakedesign.certificates import Verdict
-from quakedesign.controllers.dia import DiscontinuousIntegral
 from quakedesign.errors import ParameterError
+from quakedesign.laws.dia import DiscontinuousIntegral
+from quakedesign.lyapunov import Verdict
 from quakedesign.studies.certified import certified
 
 KEYS = {

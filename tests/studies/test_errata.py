@@ -12,7 +12,7 @@ import pytest
 
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.studies import errata
-from quakedesign.studies.errata import Finding, Row, find_rows, run_rows
+from quakedesign.studies.errata import ErrataRow, Finding, find_rows, run_rows
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -38,12 +38,12 @@ def test_an_unknown_row_is_refused_before_anything_runs(wrong, monkeypatch):
 
 def test_an_unknown_kind_is_refused():
     with pytest.raises(ParameterError, match="kind of an erratum must be one of symbolic identity"):
-        Row(number=1, printed="p", correct="c", kind="opinion", check=lambda: Finding(True, ""))
+        ErrataRow(number=1, printed="p", correct="c", kind="opinion", check=lambda: Finding(True, ""))
 
 
 MODULE = """
-from quakedesign.studies.errata import Finding, Row
-ROWS = (Row(number=5, printed="p", correct="c", kind="counterexample", check=lambda: Finding(True, "1")),)
+from quakedesign.studies.errata import ErrataRow, Finding
+ROWS = (ErrataRow(number=5, printed="p", correct="c", kind="counterexample", check=lambda: Finding(True, "1")),)
 """
 
 

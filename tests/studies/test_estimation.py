@@ -2,12 +2,12 @@
 
 import pytest
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.laws import published
+from quakedesign.loop.sensing import Measurement, joint_condition
 from quakedesign.loop.sensing.measurement import EXACT
-from quakedesign.simulation import Measurement, joint_condition
-from quakedesign.studies.estimation import differentiator_premise, largest_acceleration, sensor
+from quakedesign.studies.runs import differentiator_premise, largest_acceleration, sensor
 
 LAB = load_fault("lab-fault")
 LAW = published("lab-fault")["cta"]

@@ -2,9 +2,9 @@
 
 import json
 
-from quakedesign.controllers import published
 from quakedesign.fault import load_fault
-from quakedesign.report.exporting import export_lines
+from quakedesign.laws import published
+from quakedesign.report.plain import export_lines
 from quakedesign.studies.exporting import export_answer
 
 LAB = load_fault("lab-fault")

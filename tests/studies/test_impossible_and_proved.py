@@ -7,17 +7,16 @@ from fractions import Fraction as F
 import pytest
 
 import quakedesign as qd
-from quakedesign.bounds import LowerBound, UpperBound
-from quakedesign.certificates.guarantee import Claims, Guarantee, Held, NoGuarantee, task_of
-from quakedesign.certificates.impossibility import longest_reaction
 from quakedesign.errors import ParameterError
+from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Disturbance
-from quakedesign.loop import summed_integrals
-from quakedesign.rationals import rational
-from quakedesign.report.impossibility_table import limits_figure, limits_lines
+from quakedesign.guarantees import Claims, Guarantee, Held, NoGuarantee, task_of
+from quakedesign.guarantees.exact.impossibility import longest_reaction
+from quakedesign.guarantees.search.linear_design import Longest
+from quakedesign.laws import summed_integrals
+from quakedesign.report.limits_table import limits_figure, limits_lines
 from quakedesign.studies import limits as study
 from quakedesign.studies.facts import beyond_control
-from quakedesign.synthesis.guaranteed.longest_times import Longest
 
 REAL = qd.load_fault("real-fault")
 LAW = summed_integrals((F(1), F(1), F(1), F(1)), F(1))
@@ -32,7 +31,7 @@ CLAIMS = Claims(
 
 @pytest.fixture(autouse=True)
 def _natural_peak(monkeypatch):
-    monkeypatch.setattr("quakedesign.studies.fundamental_limits.natural_peak", lambda fault: 0.25)
+    monkeypatch.setattr("quakedesign.studies.performance_limits.natural_peak", lambda fault: 0.25)
 
 
 @pytest.fixture
@@ -67,7 +66,7 @@ def designs(monkeypatch):
         "farthest_rock": lambda task, step, **_: claimed(task, step, diffusion=F(5)),
     }
     for name, search in found.items():
-        monkeypatch.setattr(f"quakedesign.studies.impossible_and_proved.{name}", search)
+        monkeypatch.setattr(f"quakedesign.studies.performance_limits.{name}", search)
     return asked, longest, tellings
 
 

@@ -8,14 +8,14 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from quakedesign.controllers import published
 from quakedesign.fault import load_fault
-from quakedesign.fault.statics import rest_slip
+from quakedesign.fault.model import rest_slip
+from quakedesign.laws import published
 from quakedesign.simulation.campaign import Campaign
 from quakedesign.simulation.campaign.problem import SampleResult
 from quakedesign.studies.laboratory import (
     Apparatus,
-    Finding,
+    LaboratoryFinding,
     as_proved,
     conditions,
     explain,
@@ -122,14 +122,14 @@ def test_a_finding_is_least_median_and_largest_of_the_specimens():
         for n, share in enumerate(shares, start=1)
     ]
     results = [SampleResult(figures=one, events={}) for one in figures]
-    found = Finding.of("any", "dia", Campaign(problem=problem, results=tuple(results)))
+    found = LaboratoryFinding.of("any", "dia", Campaign(problem=problem, results=tuple(results)))
     assert found.outcomes == {"tracked": 2, "slow slip": 1, "earthquake": 1, "diverged": 0, "opened": 0}
     assert found.harmless == 3
     assert found.slip_error == pytest.approx((1e-5, 2e-5, 4e-5))
     assert found.peak_slip_rate == pytest.approx((0.001 * peak, 0.002 * peak, 0.5 * peak))
     assert found.rms_pressure == pytest.approx((1e3, 2e3, 4e3))
     broken = Campaign(problem=problem, results=(*results[1:], SampleResult(figures={}, events={"diverged": 3.0})))
-    assert Finding.of("any", "dia", broken).slip_error == pytest.approx((2e-5, 3e-5, math.inf))
+    assert LaboratoryFinding.of("any", "dia", broken).slip_error == pytest.approx((2e-5, 3e-5, math.inf))
 
 
 @pytest.mark.slow  # some minutes of simulated loops
@@ -140,7 +140,7 @@ def test_stick_and_a_quick_differentiator_explain_it_together_and_not_alone():
     stick = replace(PRINTED, stick=1)
     quick = replace(stick, bound=KNOWN.bound)
     chosen = {"stick": stick, "both": quick, "quick": replace(quick, stick=0)}
-    found: dict[tuple[str, str], Finding] = {}
+    found: dict[tuple[str, str], LaboratoryFinding] = {}
     for one in explain(chosen, specimens=4, duration=600.0):
         found[one.condition, one.law] = one
     assert {f.harmless for (name, _), f in found.items() if name == "both"} == {4}

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from quakedesign.cli import main
-from quakedesign.controllers import published
 from quakedesign.fault import Reference, load_fault
-from quakedesign.report.outcomes import run_sentences
-from quakedesign.simulation import Actuator, Saturation, simulate
+from quakedesign.laws import published
+from quakedesign.loop import Actuator, Saturation
+from quakedesign.report.sentences import run_sentences
+from quakedesign.simulation import simulate
+from quakedesign.studies.comparison import needed_pressure, shortfall, ways
 from quakedesign.studies.facts import fault_dict, fault_sentences
-from quakedesign.studies.needed_pressure import needed_pressure, shortfall, ways
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
 UNDERSAMPLED = load_fault(Path(__file__).parent.parent / "data" / "undersampled_fault.toml")

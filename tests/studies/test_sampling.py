@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from quakedesign.controllers import control_law
-from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.report.sampling import COLUMNS, order_rows, print_sampling, row_cells, study_rows, write_sampling
+from quakedesign.laws import control_law
+from quakedesign.laws.feed_forward import feed_forward
+from quakedesign.report.sampling_table import COLUMNS, order_rows, print_sampling, row_cells, study_rows, write_sampling
 from quakedesign.simulation import Study
 from quakedesign.studies.sampling import noise_levels, sampling_report
 
@@ -44,7 +44,7 @@ def test_json_holds_all_of_it(report):
 
 
 def test_the_folder_and_the_terminal_show_it(report, tmp_path):
-    from quakedesign.cli.shared import console as terminal
+    from quakedesign.cli.app import console as terminal
 
     write_sampling(report, tmp_path / "out", ("svg",))
     names = {str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*.*")}

@@ -6,11 +6,11 @@ from fractions import Fraction
 
 import pytest
 
-from quakedesign.certificates.premises import least_authority
 from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.exact import rational
 from quakedesign.fault import load_fault
-from quakedesign.rationals import rational
-from quakedesign.report.scaling import scale_lines
+from quakedesign.lyapunov.exact.fault_bounds import least_authority
+from quakedesign.report.plain import scale_lines
 from quakedesign.studies.scaling import scale_answer
 
 LAB, REAL = load_fault("lab-fault"), load_fault("real-fault")

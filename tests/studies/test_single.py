@@ -7,15 +7,16 @@ from unittest.mock import Mock
 
 import pytest
 
-from quakedesign.certificates.guarantee import Guarantee, NoGuarantee
-from quakedesign.controllers import published
-from quakedesign.controllers.feed_forward import feed_forward
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import load_fault
-from quakedesign.simulation import Actuator, Lag, Load, Measurement, simulate, simulation_scheme
-from quakedesign.studies import single
-from quakedesign.studies.estimation import sensor
-from quakedesign.studies.single import Choice, choice, chosen_controller, run_single
+from quakedesign.guarantees import Guarantee, NoGuarantee
+from quakedesign.laws import published
+from quakedesign.laws.feed_forward import feed_forward
+from quakedesign.loop import Actuator, Lag, simulation_scheme
+from quakedesign.loop.sensing import Measurement
+from quakedesign.simulation import Load, simulate
+from quakedesign.studies import runs as single
+from quakedesign.studies.runs import Choice, choice, chosen_controller, run_single, sensor
 
 LAB = load_fault("lab-fault")
 USUAL = {"step": None, "scheme": "continuous", "method": "dormand-prince", "plant": "smooth", "substeps": 1}
@@ -49,7 +50,7 @@ def test_an_unknown_feed_forward_is_refused():
 def test_designed_gains_are_those_of_the_design(monkeypatch):
     from types import SimpleNamespace
 
-    from quakedesign.studies import single
+    from quakedesign.studies import runs as single
 
     law = chosen_controller(LAB, "cta", BASE)
     for found in (law, None):
@@ -107,7 +108,7 @@ def test_without_a_certificate_the_premise_on_the_run_says_so():
 
 def test_a_certified_bound_goes_with_the_scale(monkeypatch):
     """λ multiplies what is certified for λ = 1."""
-    from quakedesign.studies import single
+    from quakedesign.studies import runs as single
 
     law = chosen_controller(LAB, "cta", BASE)
     monkeypatch.setattr(single, "design", lambda fault, name, **_: law)
@@ -123,8 +124,8 @@ def test_a_certified_bound_goes_with_the_scale(monkeypatch):
 def test_the_bound_of_a_proved_design_is_that_of_its_certificate():
     from types import SimpleNamespace
 
-    from quakedesign.certificates import Verdict
-    from quakedesign.studies.on_trajectory import certified_bound
+    from quakedesign.lyapunov import Verdict
+    from quakedesign.studies.certified import certified_bound
 
     law = chosen_controller(LAB, "cta", BASE)
     design = SimpleNamespace(controller=law, certificate=None, verdict=Verdict.PROVED)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.symbolic import AbsolutePower, SignedPower
-from quakedesign.symbolic.balls import ball, enclose, upper_bound
+from quakedesign.symbolic.enclosure import ball, enclose, upper_bound
 
 x, y = sp.symbols("x y", real=True)
 SLACK = 1e-7  # a ball rounds its radius outward to 30 bits

@@ -7,8 +7,7 @@ import pytest
 import sympy as sp
 
 from quakedesign.symbolic import AbsolutePower, SignedPower
-from quakedesign.symbolic.candidates import signed_monomials
-from quakedesign.symbolic.term_expressions import from_terms, lie_derivative
+from quakedesign.symbolic.term_expressions import from_terms, lie_derivative, signed_monomials
 from quakedesign.symbolic.terms import Term
 
 WEIGHTS = {"e1": 3, "e2": 2, "e3": 1}

@@ -7,8 +7,8 @@ import mpmath as mp
 import pytest
 import sympy as sp
 
-from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
+from quakedesign.laws import control_law
 from quakedesign.symbolic import SignedPower, dilate, homogeneous, weights_for
 from quakedesign.symbolic.homogeneity import Counterexample, Identity, dilation, epsilon
 from quakedesign.symbolic.signed_power import AbsolutePower

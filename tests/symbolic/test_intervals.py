@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from quakedesign.errors import UnsupportedError
 from quakedesign.symbolic import AbsolutePower, SignedPower
-from quakedesign.symbolic.intervals import EVERYTHING, add, interval, negative, regular, times
+from quakedesign.symbolic.enclosure import EVERYTHING, add, interval, negative, regular, times
 
 x, y = sp.symbols("x y", real=True)
 HALF_LINE, LINE = (F(0), inf), (-inf, inf)

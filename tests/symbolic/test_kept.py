@@ -4,7 +4,9 @@ import json
 
 import sympy as sp
 
-from quakedesign.symbolic import kept, plant, state_plant
+from quakedesign.symbolic import plant
+from quakedesign.symbolic import plant as kept
+from quakedesign.symbolic import rate_and_state_plant as state_plant
 
 
 def test_every_entry_is_derived_again():
@@ -17,7 +19,9 @@ def test_what_is_read_is_what_was_derived():
     assert kept._read(texts["plant.shifted_acceleration"]) == derived
     assert derived.has(plant.disturbance(plant.x1, plant.x2, plant.t))
     names = ("theta",)
-    assert kept._read(texts["state_plant.jacobian theta"]) == state_plant.jacobian.__wrapped__.__wrapped__(names)
+    assert kept._read(texts["rate_and_state_plant.jacobian theta"]) == state_plant.jacobian.__wrapped__.__wrapped__(
+        names
+    )
 
 
 def test_what_is_not_kept_is_derived():

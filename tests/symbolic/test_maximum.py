@@ -6,8 +6,9 @@ from math import inf
 import pytest
 import sympy as sp
 
-from quakedesign.symbolic import AbsolutePower, SignedPower, maximum
-from quakedesign.symbolic.maximum import Excess, Undecided, upper_limit
+from quakedesign.symbolic import AbsolutePower, SignedPower
+from quakedesign.symbolic import enclosure as maximum
+from quakedesign.symbolic.enclosure import Excess, Undecided, upper_limit
 
 x, y = sp.symbols("x y", real=True)
 INVERSE_E = F("0.36787944117144233")  # rounded up

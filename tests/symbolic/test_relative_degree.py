@@ -5,8 +5,8 @@ from itertools import pairwise
 import pytest
 import sympy as sp
 
-from quakedesign.controllers import control_laws, laws
-from quakedesign.symbolic.relative_degree import relative_degree
+from quakedesign.laws import control_laws, laws
+from quakedesign.symbolic.homogeneity import relative_degree
 
 u = sp.Symbol("u", real=True)
 

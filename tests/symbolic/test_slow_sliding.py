@@ -4,9 +4,9 @@ import pytest
 import sympy as sp
 
 from quakedesign.errors import UnsupportedError
-from quakedesign.fault.friction import friction_law
-from quakedesign.symbolic import state_plant
-from quakedesign.symbolic.slow_sliding import log_rate, log_state, sliding_errors, sliding_rate
+from quakedesign.fault import friction_law
+from quakedesign.symbolic import rate_and_state_plant as state_plant
+from quakedesign.symbolic.rate_and_state_plant import log_rate, log_state, sliding_errors, sliding_rate
 
 PARAMETERS = {
     "reference_coefficient": 0.6,

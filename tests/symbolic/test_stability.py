@@ -13,7 +13,7 @@ import sympy as sp
 from quakedesign import derive
 from quakedesign.errors import ParameterError
 from quakedesign.fault import FrictionLaw, friction_law, friction_laws, load_fault
-from quakedesign.symbolic.equilibrium import operating_rate
+from quakedesign.symbolic.rate_and_state_plant import operating_rate
 from quakedesign.symbolic.stability import Stability, critical_stiffness, nucleation_length, stability
 
 VALUES = {

@@ -11,9 +11,10 @@ import sympy as sp
 
 from quakedesign.errors import UnsupportedError
 from quakedesign.fault import FrictionLaw, friction_law, friction_laws
-from quakedesign.symbolic import plant, state_plant
+from quakedesign.symbolic import plant
+from quakedesign.symbolic import rate_and_state_plant as state_plant
 from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, p, sigma
-from quakedesign.symbolic.state_plant import loading_rate, rate
+from quakedesign.symbolic.rate_and_state_plant import loading_rate, rate
 
 VALUES = {
     "residual": 0.3,

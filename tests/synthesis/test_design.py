@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
-from quakedesign.certificates import Verdict
-from quakedesign.certificates.sectors import sectors
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Disturbance
-from quakedesign.simulation.step_stability import amplification
+from quakedesign.laws import published
+from quakedesign.linear.riccati import riccati_design, vertex_poles
+from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.simulation.integrators import amplification
 from quakedesign.synthesis import assess
-from quakedesign.synthesis.linear.design.nondimensional import vertex_poles
-from quakedesign.synthesis.linear.design.riccati import riccati_design
-from quakedesign.synthesis.methods.sliding_mode import smallest_root
+from quakedesign.synthesis.sliding_mode_design import smallest_root
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import Field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from quakedesign.rationals import rational
+from quakedesign.exact import rational
 
 if TYPE_CHECKING:
     import sympy as sp

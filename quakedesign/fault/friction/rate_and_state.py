@@ -1,17 +1,26 @@
-"""What the rate-and-state laws share: parameters, working range, and bounds on it."""
+"""Rate-and-state friction: ageing law, slip law, and the regularised form.
+
+The base class holds the parameters a, b and D_c, the range of validity and bounds of friction on it. The
+state evolves by Dieterich's ageing law or Ruina's slip law; the regularised form is finite at zero slip
+rate.
+"""
 
 from abc import abstractmethod
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from quakedesign.errors import ParameterError
-from quakedesign.fault.checks import require_all, require_nonnegative, require_positive
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.exact import float_above, float_below, fraction_of, rational
 from quakedesign.fault.friction.base import FrictionLaw
-from quakedesign.rationals import float_above, float_below, fraction_of, rational
+from quakedesign.fault.model import require_all, require_nonnegative, require_positive
 
 if TYPE_CHECKING:
     import sympy as sp
+
+
+# ----------------------------------------------------------------------
+# What the rate-and-state laws share: parameters, working range, and bounds on it.
 
 _DIGITS = 40
 _ROUNDING = Fraction(1, 10**30)
@@ -200,3 +209,109 @@ def logarithmic(law: Any, rate: Any, theta: Any) -> Any:
         + law.direct_effect * sp.log(rate / law.reference_rate)
         + law.evolution_effect * sp.log(law.reference_rate * theta / law.critical_slip)
     )
+
+
+# ----------------------------------------------------------------------
+# Rate-and-state friction with Dieterich's evolution of the state.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateAndStateAging(RateAndState):
+    """μ = μ_0 + a log(v/v_0) + b log(v_0 θ/d_c), θ' = 1 − vθ/d_c: parameters and working range of `RateAndState`."""
+
+    name: ClassVar[str] = "rate-and-state-aging"
+    source: ClassVar[str] = (
+        "Dieterich (1979), J. Geophys. Res. 84(B5), 2161; Ruina (1983), J. Geophys. Res. 88(B12), 10359"
+    )
+
+    def friction(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] (Dieterich 1979, in the notation of Ruina 1983)."""
+        return logarithmic(self, rate, theta)
+
+    def ageing(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
+        """θ' = 1 − vθ/d_c [-]."""
+        return aging_rate(rate, theta, self.critical_slip)
+
+    @property
+    def _state_slope(self) -> "sp.Expr":
+        return aging_slope(self.slowest_rate, self.fastest_rate)
+
+
+# ----------------------------------------------------------------------
+# Rate-and-state friction with Ruina's evolution of the state.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateAndStateSlip(RateAndState):
+    """μ = μ_0 + a log(v/v_0) + b log(v_0 θ/d_c), θ' = −(vθ/d_c) log(vθ/d_c): parameters of `RateAndState`."""
+
+    name: ClassVar[str] = "rate-and-state-slip"
+    source: ClassVar[str] = "Ruina (1983), J. Geophys. Res. 88(B12), 10359"
+
+    def friction(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] (Ruina 1983)."""
+        return logarithmic(self, rate, theta)
+
+    def ageing(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
+        """θ' = −(vθ/d_c) log(vθ/d_c) [-]."""
+        return slip_rate(rate, theta, self.critical_slip)
+
+    @property
+    def _state_slope(self) -> "sp.Expr":
+        return slip_law_slope(self.slowest_rate, self.fastest_rate)
+
+
+# ----------------------------------------------------------------------
+# Rate-and-state friction that stays finite at zero slip rate.
+
+EVOLUTIONS = {"aging": (aging_rate, aging_slope), "slip": (slip_rate, slip_law_slope)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegularisedRateAndState(RateAndState):
+    """μ = a arsinh(v/(2v_0) · exp((μ_0 + b log(v_0 θ/d_c))/a)): thermally activated contacts in both directions.
+
+    Odd in v, so μ(0) = 0 and no positive lower bound of friction exists but on a working range (ERRATA 13). The
+    slope ∂μ/∂v is below that of the logarithmic law everywhere, as is ∂μ/∂θ.
+
+    Attributes
+    ----------
+    reference_coefficient, direct_effect, evolution_effect, critical_slip, reference_rate, slowest_rate, fastest_rate
+        As in `RateAndState`.
+    evolution : str
+        ``"aging"`` (Dieterich) or ``"slip"`` (Ruina).
+
+    Raises
+    ------
+    ParameterError
+        As `RateAndState`, and for another evolution.
+    """
+
+    name: ClassVar[str] = "regularised-rate-and-state"
+    source: ClassVar[str] = (
+        "Rice and Ben-Zion (1996), Proc. Natl. Acad. Sci. 93, 3811; Lapusta, Rice, Ben-Zion and Zheng (2000), "
+        "J. Geophys. Res. 105(B10), 23765; Rice, Lapusta and Ranjith (2001), J. Mech. Phys. Solids 49, 1865"
+    )
+
+    evolution: str = field(default="aging", metadata={"choices": tuple(EVOLUTIONS)})
+
+    def __post_init__(self) -> None:
+        RateAndState.__post_init__(self)
+        require_known(self.evolution, EVOLUTIONS, "evolution")
+
+    def friction(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] (Rice and Ben-Zion 1996)."""
+        import sympy as sp
+
+        ratio = self.evolution_effect / self.direct_effect
+        strength = sp.exp(self.reference_coefficient / self.direct_effect)
+        strength *= sp.exp(ratio * sp.log(self.reference_rate * theta / self.critical_slip))
+        return self.direct_effect * sp.asinh(rate / (2 * self.reference_rate) * strength)
+
+    def ageing(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
+        """θ' [-] of the chosen evolution."""
+        return EVOLUTIONS[self.evolution][0](rate, theta, self.critical_slip)
+
+    @property
+    def _state_slope(self) -> "sp.Expr":
+        return EVOLUTIONS[self.evolution][1](self.slowest_rate, self.fastest_rate)

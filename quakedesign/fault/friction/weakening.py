@@ -1,13 +1,20 @@
-"""What friction laws share that fall from a static to a residual coefficient."""
+"""Friction laws that weaken from a static to a residual coefficient.
+
+Exponential slip weakening, linear slip weakening and slip-rate weakening, with their common base class.
+"""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
-from quakedesign.fault.checks import require_all, require_nonnegative, require_positive
 from quakedesign.fault.friction.base import FrictionLaw
+from quakedesign.fault.model import require_all, require_nonnegative, require_positive
 
 if TYPE_CHECKING:
     import sympy as sp
+
+
+# ----------------------------------------------------------------------
+# What friction laws share that fall from a static to a residual coefficient.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,3 +84,97 @@ class SlipWeakening(Weakening):
     def slip_slope(self) -> float:
         """drop/d_c [1/m], reached at slip 0."""
         return self.drop / self.critical_slip
+
+
+# ----------------------------------------------------------------------
+# Exponential slip weakening.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExponentialSlipWeakening(SlipWeakening):
+    """μ(slip) = residual + drop · exp(−slip/critical_slip), eq. mu of the paper, whose Δμ is −drop.
+
+    The law meets the bounds of eq. mug only for slip ≥ 0; `extended` holds μ at its static value for
+    slip < 0 (ERRATA 12).
+    """
+
+    name: ClassVar[str] = "exponential-slip-weakening"
+    source: ClassVar[str] = "Kanamori and Brodsky (2004), Rep. Prog. Phys. 67, 1429; eq. mu of the paper"
+    domain: ClassVar[str] = "slip >= 0"
+
+    def coefficient(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] for slip ≥ 0 (eq. mu)."""
+        import sympy as sp
+
+        return self.residual + self.drop * sp.exp(-slip / self.critical_slip)
+
+
+# ----------------------------------------------------------------------
+# Linear slip weakening.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearSlipWeakening(SlipWeakening):
+    """μ(slip) = residual + drop · max(0, 1 − slip/critical_slip).
+
+    Friction has a kink at the critical slip, and would grow without bound for slip < 0; `extended` holds it there.
+
+    Attributes
+    ----------
+    critical_slip : float
+        Slip at which friction is kinetic d_c [m], positive.
+    """
+
+    name: ClassVar[str] = "linear-slip-weakening"
+    source: ClassVar[str] = "Ida (1972), J. Geophys. Res. 77(20), 3796; Andrews (1976), J. Geophys. Res. 81(20), 3575"
+    domain: ClassVar[str] = "slip >= 0"
+
+    def coefficient(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] for slip ≥ 0."""
+        import sympy as sp
+
+        return self.residual + self.drop * sp.Max(0, 1 - slip / self.critical_slip)
+
+
+# ----------------------------------------------------------------------
+# Slip-rate weakening.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlipRateWeakening(Weakening):
+    """μ(rate) = residual + drop/(1 + rate/critical_rate) for rate ≥ 0, even in the rate when extended.
+
+    The coefficient is that of motion forward; whether friction opposes motion is the plant's matter (ERRATA 14).
+
+    Attributes
+    ----------
+    critical_rate : float
+        Rate v_c [m/s] at which half of the drop has happened, positive.
+    """
+
+    name: ClassVar[str] = "slip-rate-weakening"
+    source: ClassVar[str] = (
+        "Carlson and Langer (1989), Phys. Rev. A 40, 6470; Huang and Turcotte (1992), Pure Appl. Geophys. 138, 569; "
+        "with a residual as in Cochard and Madariaga (1994), Pure Appl. Geophys. 142, 419"
+    )
+    domain: ClassVar[str] = "rate >= 0"
+
+    critical_rate: float = field(metadata={"unit": "m/s", "symbol": "v_c"})
+
+    def __post_init__(self) -> None:
+        require_all(lambda: Weakening.__post_init__(self), lambda: require_positive(critical_rate=self.critical_rate))
+
+    def coefficient(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] for rate ≥ 0."""
+        return self.residual + self.drop / (1 + rate / self.critical_rate)
+
+    def extended(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
+        """Friction coefficient [-] of the size of the rate."""
+        import sympy as sp
+
+        return self.coefficient(slip, sp.Abs(rate))
+
+    @property
+    def rate_slope(self) -> float:
+        """drop/v_c [s/m], reached at rest."""
+        return self.drop / self.critical_rate

@@ -6,12 +6,8 @@ from quakedesign.arguments import check_arguments
 from quakedesign.discovery import discovered
 from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
 from quakedesign.loop.actuators.chain import DIRECT, Actuator
-from quakedesign.loop.actuators.delay import Delay
-from quakedesign.loop.actuators.diffusion import Diffusion
-from quakedesign.loop.actuators.lag import Lag
-from quakedesign.loop.actuators.quantisation import Quantisation
-from quakedesign.loop.actuators.rate_limit import RateLimit
-from quakedesign.loop.actuators.saturation import Saturation
+from quakedesign.loop.actuators.flow_stages import Diffusion, Lag
+from quakedesign.loop.actuators.sampled_stages import Delay, Quantisation, RateLimit, Saturation
 
 __all__ = [
     "DIRECT",

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from quakedesign.controllers import Sampling
 from quakedesign.errors import ParameterError
+from quakedesign.laws import Sampling
 from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
-from quakedesign.loop.actuators.delay import Delay
-from quakedesign.loop.actuators.diffusion import Diffusion
-from quakedesign.loop.actuators.lag import Lag
+from quakedesign.loop.actuators.flow_stages import Diffusion, Lag
+from quakedesign.loop.actuators.sampled_stages import Delay
 
 LONGEST = 2.5  # of a substep times the fastest rate: below the limits 2.78 and 3.3 of the Runge–Kutta methods
 

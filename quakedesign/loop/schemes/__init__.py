@@ -5,10 +5,13 @@ from functools import cache
 from typing import Any
 
 from quakedesign.arguments import check_arguments
-from quakedesign.controllers import Controller
 from quakedesign.discovery import discovered, named
 from quakedesign.errors import ParameterError, require_known
+from quakedesign.laws import Controller
 from quakedesign.loop.schemes.base import Scheme, Stepped
+
+# ----------------------------------------------------------------------
+# Ways to carry a law out over a step, one a file, found by looking into this folder.
 
 __all__ = ["Scheme", "Stepped", "own_way", "schemes", "simulation_scheme"]
 

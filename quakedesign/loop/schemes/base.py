@@ -1,12 +1,30 @@
-"""What every scheme offers."""
+"""Base classes of discretisation schemes, the sampled control step, and aperiodic sampling.
 
+One step of a closed loop is a CasADi expression. A sampled scheme evaluates the law once per T_s with
+zero-order hold; with aperiodic sampling, the interval is a random whole number of steps.
+"""
+
+import math
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any, ClassVar, Self
 
+import casadi as ca
 import sympy as sp
 
-from quakedesign.controllers import Controller
+from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
+from quakedesign.laws import Controller
+from quakedesign.loop import discrete_law
+from quakedesign.loop.actuators.base import FLOWS
+from quakedesign.loop.actuators.chain import DIRECT, Actuator
+from quakedesign.loop.discrete_law import DiscreteLaw, Lifted, Values
+from quakedesign.loop.sensing.measurement import EXACT, Measurement, Sensor, generator, uniform
+
+# ----------------------------------------------------------------------
+# What every scheme offers.
 
 
 class Stepped(ABC):
@@ -99,3 +117,385 @@ class Scheme(ABC):
     def settings(self) -> dict[str, Any]:
         """Numbers and texts that say how the scheme was set, for the provenance of a run."""
         return {}
+
+
+# ----------------------------------------------------------------------
+# What a sampled controller computes at one sample, as one CasADi Function.
+
+SIGNALS = (
+    discrete_law.slip,
+    discrete_law.rate,
+    discrete_law.slip_error,
+    discrete_law.rate_error,
+    discrete_law.acceleration,
+    discrete_law.next_reference,
+    discrete_law.next_reference_rate,
+    discrete_law.step,
+    discrete_law.authority,
+    discrete_law.held,
+)
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What a controller decides at one sample.
+
+    Attributes
+    ----------
+    pressure : SX
+        That it asks for [Pa].
+    integrals : list of SX
+        ξ at the next sample.
+    own : list of SX
+        Memory of the scheme itself at the next sample.
+    """
+
+    pressure: Any
+    integrals: list[Any]
+    own: list[Any]
+
+
+class Decided(ABC):
+    """What a controller does with a law at one sample: one part of a scheme that samples.
+
+    Attributes
+    ----------
+    own_size : int
+        Entries of its own memory.
+    """
+
+    own_size: ClassVar[int] = 0
+
+    @staticmethod
+    @abstractmethod
+    def derive(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
+        """Return the expressions that `decide` evaluates, with the numbers of the law in them."""
+
+    @classmethod
+    @abstractmethod
+    def decide(cls, found: tuple[sp.Expr, ...], law: DiscreteLaw, known: Values, own: list[Any]) -> Decision:
+        """What the controller does, given the expressions, the values of their symbols, and its own memory."""
+
+
+@dataclass(frozen=True)
+class ControlStep:
+    """The sampled-step function of a controller, without plant and actuator.
+
+    Attributes
+    ----------
+    function : casadi.Function
+        (signals in the order of `SIGNALS`, integrals ξ, numbers of the law, memory of the scheme) → pressure [Pa],
+        integrals and memory at the next sample, and push, the change of the pressure [Pa] that the change of ξ makes.
+    numbers : tuple of float
+        Of this law; another law of the same kind has the same function.
+    """
+
+    function: Any
+    numbers: tuple[float, ...]
+
+
+@lru_cache(maxsize=64)
+def control_step(kind: type[Decided], law: DiscreteLaw) -> ControlStep:
+    """Sampled-step function of a law under a scheme."""
+    slopes = tuple(slope_of(law.pressure, symbol) for symbol in law.integrals)
+    lifted = Lifted.of((*kind.derive(law), *slopes))
+    symbols = {"signals": SIGNALS, "integrals": law.integrals, "numbers": lifted.numbers}
+    inputs = {name: ca.SX.sym(name, len(parts)) for name, parts in symbols.items()}
+    own = ca.SX.sym("own", kind.own_size)
+    known = {s: inputs[name][i] for name, parts in symbols.items() for i, s in enumerate(parts)}
+    split = len(lifted.expressions) - len(slopes)
+    decision = kind.decide(lifted.expressions[:split], law, known, ca.vertsplit(own) if kind.own_size else [])
+    changes = (after - known[s] for s, after in zip(law.integrals, decision.integrals, strict=True))
+    slope = discrete_law.values(lifted.expressions[split:], known)
+    push = sum((k * change for k, change in zip(slope, changes, strict=True)), start=ca.SX(0))
+    results = [decision.pressure, _column(decision.integrals), _column(decision.own), push]
+    names = ["pressure", "integrals", "own", "push"]
+    function = ca.Function("control", [*inputs.values(), own], results, [*inputs, "own"], [f"{n}_next" for n in names])
+    return ControlStep(function, lifted.values)
+
+
+def slope_of(pressure: sp.Expr, integral: sp.Symbol) -> sp.Expr:
+    """Slope of the pressure in an integral state; 0 where the law limits itself and so looks after its own windup."""
+    limited = pressure.has(sp.Min, sp.Max, sp.Piecewise)
+    return sp.Integer(0) if limited else sp.diff(pressure, integral)
+
+
+def _column(entries: list[Any]) -> Any:
+    return ca.vertcat(*entries) if entries else ca.SX(0, 1)
+
+
+# ----------------------------------------------------------------------
+# Samples that follow no clock.
+
+GRAINS = range(8, 101)  # steps of a simulation in the shortest interval
+MOST_STEPS = 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoClock:
+    """The next sample comes any whole number of steps after the last, drawn anew each time, each equally likely.
+
+    Attributes
+    ----------
+    shortest, longest : int
+        Steps from one sample to the next, 1 … 1000.
+    seed : int
+        Of what is drawn, not negative.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    shortest: int
+    longest: int
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        whole = all(isinstance(v, int) and not isinstance(v, bool) for v in (self.shortest, self.longest))
+        if not (whole and 1 <= self.shortest <= self.longest <= MOST_STEPS):
+            raise ParameterError(
+                f"intervals by no clock must be whole numbers of steps, 1 to {MOST_STEPS}, the shortest first. "
+                f"Received {self.shortest!r} and {self.longest!r}. Change them."
+            )
+        Measurement(seed=self.seed)
+
+    @classmethod
+    def of(cls, shortest: Fraction, longest: Fraction) -> Self:
+        """In 8 to 100 steps of the shortest interval [s], so many that the longest is nearly reached, never passed."""
+        ratio = longest / shortest
+        grain = max(GRAINS, key=lambda count: (Fraction(int(count * ratio), count), -count))
+        return cls(shortest=grain, longest=min(int(grain * ratio), MOST_STEPS))
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Steps to wait for the first sample, none, and the generator."""
+        return (0.0, *generator(self.seed))
+
+    def after(self, memory: list[Any]) -> tuple[Any, list[Any]]:
+        """Whether there is a sample now, and the memory one step later."""
+        wait, *state = memory
+        now = wait < 1
+        following, drawn = uniform(state)
+        fresh = self.shortest + ca.floor((self.longest - self.shortest + 1) * drawn)
+        kept = [ca.if_else(now, new, old) for new, old in zip(following, state, strict=True)]
+        return now, [ca.if_else(now, fresh, wait) - 1, *kept]
+
+
+# ----------------------------------------------------------------------
+# What the sampled schemes share: the law once per T_s, its pressure held while the plant moves on.
+
+MOST_SUBSTEPS = 100
+
+
+@dataclass(frozen=True)
+class ControlSample:
+    """Everything known at one sample (SX): the pressures held before and from it, and the memory afterwards."""
+
+    before: Any
+    held: Any
+    integrals: list[Any]
+    numbers: list[Any]
+    own: list[Any]
+    kept: list[Any]
+    noise: list[Any]
+    clock: list[Any]
+    flow: list[Any]
+    push: Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampled(Scheme, Decided):
+    """A controller that measures every T_s and holds its pressure in between (zero-order hold).
+
+    The entries of the memory are: the law's numbers, those of actuator and measurement, the scheme's own memory, the
+    pressure that was held last, and the memories of the actuator, of the noise generator and of what no clock tells.
+
+    Attributes
+    ----------
+    substeps : int
+        Steps of the integrator per sample, 1 … 100.
+    actuator : Actuator
+    measurement : Measurement or Sensor
+        A sensor is told the true slip alone, once per sample of its own period.
+    authority : float or None
+        Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
+    clock : NoClock or None
+        When samples are taken, in steps; None: at every step, by a clock.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    substeps: int = 1
+    actuator: Actuator = DIRECT
+    measurement: Sensor = EXACT
+    authority: float | None = None
+    clock: NoClock | None = None
+
+    def __post_init__(self) -> None:
+        whole = isinstance(self.substeps, int) and not isinstance(self.substeps, bool)
+        if not (whole and 1 <= self.substeps <= MOST_SUBSTEPS):
+            raise ParameterError(f"substeps must be a whole number, 1 to {MOST_SUBSTEPS}. Received {self.substeps!r}.")
+        if self.authority is not None and not 0 < self.authority < float("inf"):
+            raise ParameterError(f"authority must be positive and finite. Received {self.authority!r} m²/kg.")
+        if self.clock and self.actuator.part:
+            raise ParameterError(
+                "by no clock a pressure acts at a sample. Received a delay that is no whole number of steps. Change it."
+            )
+
+    @property
+    def starts(self) -> tuple[float, ...]:
+        """The scheme's own memory at the start, `own_size` entries."""
+        return ()
+
+    def nominal(self, loop: Stepped) -> float:
+        """B0 [m²/kg] unless told: the smallest μN̂ of the fault's uncertainty box."""
+        return loop.fault.authority_range[0]
+
+    def memory(self, loop: Stepped, step: float) -> dict[str, float]:
+        """See `Scheme.memory`; refuses a sensor that was made for another step."""
+        self.actuator.require_resolved(step / self.substeps)
+        self.measurement.require_step(step)
+        parts = self._parts(loop)
+        return {f"{name}_{i}": float(v) for name, values in parts.items() for i, v in enumerate(values)}
+
+    def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+        """See `Scheme.pressure`."""
+        sample = self._sample(loop, counter, state, step)
+        return self.actuator.flow(sample.numbers, sample.flow, self._sections(sample)[0][0])[1]
+
+    def push(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+        """Which way ξ moves the pressure at a sample (SX): ξ stays where a limit keeps the pressure from that."""
+        return self._sample(loop, counter, state, step).push
+
+    def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:
+        """See `Scheme.outputs`."""
+        if not self.actuator.stages:
+            return {}
+        sample = self._sample(loop, counter, state, step)
+        well = self._sections(sample)[0][0]
+        return {"well_pressure": well} | self.actuator.flow(sample.numbers, sample.flow, well)[2]
+
+    @property
+    def described(self) -> dict[str, tuple[str, str]]:
+        """See `Scheme.described`."""
+        well = {"well_pressure": ("pressure at the well", "Pa")}
+        return (well | (FLOWS if self.actuator.stores else {})) if self.actuator.stages else {}
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """See `Scheme.settings`."""
+        said: dict[str, Any] = {"substeps": self.substeps}
+        said |= {"actuator": ", ".join(map(repr, self.actuator.stages))} if self.actuator.stages else {}
+        said |= {"authority": self.authority} if self.authority else {}
+        said |= {"clock": repr(self.clock)} if self.clock else {}
+        return said | ({"measurement": repr(self.measurement)} if self.measurement.noisy else {})
+
+    def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
+        """See `Scheme.advance`."""
+        sample = self._sample(loop, counter, state, step)
+        moving = ca.vertcat(state[:2], *sample.flow)
+        for held, begin, share in self._sections(sample):
+            # With one entry more than the section before: repetitions are told apart by their numbers of arguments.
+            given = ca.vertcat(counter, held, *sample.numbers, *([begin] if begin else []))
+            times = math.ceil(share * self.substeps)
+            motion = self._motion(step, begin, share, times)
+            moving = loop.advance_often(method, motion, given, moving, share * step / times, times)
+        rest = ca.vertcat(*sample.own, sample.held, *sample.kept, *sample.noise, *sample.clock)
+        first = 2 + len(sample.integrals)
+        count = state.shape[0] - first - rest.shape[0] - len(sample.flow)
+        constants = state[first : first + count]
+        return ca.vertcat(moving[:2], *sample.integrals, constants, rest, moving[2:])
+
+    def _sections(self, sample: ControlSample) -> tuple[tuple[Any, float, float], ...]:
+        """Pressures that are held between two samples, from which share of the period, and for which."""
+        late = self.actuator.part
+        return ((sample.before, 0, late), (sample.held, late, 1 - late)) if late else ((sample.held, 0, 1),)
+
+    def _motion(self, step: float, begin: float, share: float, times: int) -> Any:
+        """Rates of plant and actuator under a pressure held, as `Stepped.advance_often` takes them."""
+
+        def motion(plant: Any, passed: Any, now: Any, given: Any) -> Any:
+            counter, held, *numbers = ca.vertsplit(given)
+            time = (counter + (begin + passed * share / times)) * step
+            rates, pressure, _ = self.actuator.flow(numbers, ca.vertsplit(now[2:]), held)
+            return ca.vertcat(plant(time, now[:2], pressure), *rates)
+
+        return motion
+
+    def _parts(self, loop: Stepped) -> dict[str, tuple[float, ...]]:
+        """Values of the memory at the start."""
+        sampled, flowing = self.actuator.sampled, self.actuator.flowing
+        return {
+            "law": self.control_step(loop).numbers,
+            "authority": (self.authority or self.nominal(loop),),
+            "sampled": tuple(v for stage in sampled for v in stage.numbers),
+            "flowing": tuple(v for stage in flowing for v in stage.numbers),
+            "deviation": self.measurement.numbers,
+            "own": self.starts,
+            "held": (0.0,),
+            "kept": tuple(v for stage in sampled for v in stage.start),
+            "noise": self.measurement.start,
+            "clock": self.clock.start if self.clock else (),
+            "flow": self.actuator.flow_start,
+        }
+
+    def control_step(self, loop: Stepped) -> ControlStep:
+        """What the controller of a loop computes at one sample."""
+        return control_step(type(self), DiscreteLaw.of(loop.controller, loop.constant_pressure))
+
+    def _sample(self, loop: Stepped, counter: Any, state: Any, step: float) -> ControlSample:
+        """Measure, decide, and pass the decision on to the actuator; ξ does not wind up where a stage limits."""
+        count = len(loop.integrals)
+        entries = iter(ca.vertsplit(state[2 + count :]))
+        part = {name: [next(entries) for _ in values] for name, values in self._parts(loop).items()}
+        seen, noise = self.measurement.measure(part["deviation"], part["noise"], state[:2])
+        ahead = self.clock.shortest if self.clock else 1
+        known = self._known(loop, counter, step, seen, ahead)
+        known |= {discrete_law.authority: part["authority"][0], discrete_law.held: part["held"][0]}
+        signals = ca.vertcat(*(known[symbol] for symbol in SIGNALS))
+        before = state[2 : 2 + count]
+        given = signals, before, ca.vertcat(*part["law"]), ca.vertcat(*part["own"])
+        pressure, after, own, push = self.control_step(loop).function(*given)
+        held, excess, kept = self.actuator.hold(part["sampled"], part["kept"], pressure, ahead * step)
+        winds = excess * push > 0
+        integrals = [ca.if_else(winds, before[i], after[i]) for i in range(count)]
+        memory = [own[i] for i in range(self.own_size)]
+        found = ControlSample(
+            part["held"][0], held, integrals, part["flowing"], memory, kept, noise, [], part["flow"], push
+        )
+        return self._if_now(found, ca.vertsplit(before) if count else [], part) if self.clock else found
+
+    def _if_now(self, sample: ControlSample, integrals: list[Any], part: dict[str, list[Any]]) -> ControlSample:
+        """The sample, or what there was before where none is taken now."""
+        now, clock = self.clock.after(part["clock"]) if self.clock else (True, [])
+
+        def chosen(new: list[Any], old: list[Any]) -> list[Any]:
+            return [ca.if_else(now, a, b) for a, b in zip(new, old, strict=True)]
+
+        return replace(
+            sample,
+            held=ca.if_else(now, sample.held, sample.before),
+            integrals=chosen(sample.integrals, integrals),
+            own=chosen(sample.own, part["own"]),
+            kept=chosen(sample.kept, part["kept"]),
+            noise=chosen(sample.noise, part["noise"]),
+            clock=clock,
+        )
+
+    @staticmethod
+    def _known(loop: Stepped, counter: Any, step: float, seen: Any, ahead: int) -> Values:
+        """Values of the signals of one sample, the next expected so many steps ahead."""
+        now, later = loop.reference(counter * step), loop.reference((counter + ahead) * step)
+        return {
+            discrete_law.slip: seen[0],
+            discrete_law.rate: seen[1],
+            discrete_law.slip_error: seen[0] - now[0],
+            discrete_law.rate_error: seen[1] - now[1],
+            discrete_law.acceleration: now[2],
+            discrete_law.next_reference: later[0],
+            discrete_law.next_reference_rate: later[1],
+            discrete_law.step: ca.SX(ahead * step),
+        }

@@ -9,16 +9,12 @@ import casadi as ca
 import sympy as sp
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop.compensation import answered, followed
-from quakedesign.loop.law_expressions import cut_off
-from quakedesign.loop.rest_limit import RestLimit
-from quakedesign.loop.schemes.base import Stepped
-from quakedesign.loop.steps import discrete_law
-from quakedesign.loop.steps.backward import backward_euler, inclusion
-from quakedesign.loop.steps.control_step import Decision, slope_of
-from quakedesign.loop.steps.discrete_law import Law, Values
-from quakedesign.loop.steps.inclusion import end_rate
-from quakedesign.loop.steps.sampled import Sampled
+from quakedesign.laws.sampled_controller import compensation_answered, cut_off, followed
+from quakedesign.laws.sampled_law import RestLimit
+from quakedesign.loop import discrete_law
+from quakedesign.loop.discrete_law import DiscreteLaw, Values
+from quakedesign.loop.schemes.base import Decision, Sampled, Stepped, slope_of
+from quakedesign.loop.schemes.implicit import backward_euler, end_rate, inclusion
 
 _LIMIT = sp.symbols("asked slip reference width per_slip resolution least largest fastest highest last", real=True)
 _CUT = cut_off(_LIMIT[0], _LIMIT[9:], *_LIMIT[1:6], within=_LIMIT[6:9])
@@ -77,7 +73,7 @@ class Compensated(Sampled):
             RestLimit(**{name: Fraction(value) for name, value in given.items() if value is not None})
 
     @staticmethod
-    def derive(law: Law) -> tuple[sp.Expr, ...]:
+    def derive(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
         """Pull [m/s] and feed-forward [Pa] of the law with ξ = 0 at every sample, and ∂p/∂ξ where there is one ξ."""
         none = dict.fromkeys(law.integrals, sp.Integer(0))
         pull, feed_forward, *_ = backward_euler(law)
@@ -104,7 +100,7 @@ class Compensated(Sampled):
         return super().settings | {"weight": self.weight} | {name: getattr(self, name) for name in names}
 
     @classmethod
-    def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
+    def decide(cls, found: tuple[sp.Expr, ...], law: DiscreteLaw, known: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
         begun, before, ahead_before, estimate, weight, *limit = own
         pull, feed_forward, slope = found
@@ -114,7 +110,7 @@ class Compensated(Sampled):
         estimate = ca.if_else(follows, followed(rate_error, before, pushed, estimate, weight, gain), 0)
         solved = inclusion(pull).solve(known)
         ahead, share = discrete_law.values((feed_forward, slope), solved)
-        asked = answered(rate_error, solved[end_rate], estimate, gain) + ahead
+        asked = compensation_answered(rate_error, solved[end_rate], estimate, gain) + ahead
         reference = known[discrete_law.slip] - known[discrete_law.slip_error]
         passing = dict(zip(_LIMIT, (asked, known[discrete_law.slip], reference, *limit), strict=True))
         pressure, *passed = discrete_law.values(_CUT, passing)

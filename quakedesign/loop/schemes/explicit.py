@@ -1,14 +1,17 @@
-"""The law at the measured state."""
+"""Explicit sampled scheme (law at the measured state) and the law in continuous time."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import casadi as ca
 import sympy as sp
 
-from quakedesign.loop.steps import discrete_law
-from quakedesign.loop.steps.control_step import Decision
-from quakedesign.loop.steps.discrete_law import Law, Values
-from quakedesign.loop.steps.sampled import Sampled
+from quakedesign.loop import discrete_law
+from quakedesign.loop.discrete_law import DiscreteLaw, Values
+from quakedesign.loop.schemes.base import Decision, Sampled, Scheme, Stepped
+
+# ----------------------------------------------------------------------
+# The law at the measured state.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,13 +24,47 @@ class Explicit(Sampled):
     name: ClassVar[str] = "explicit"
 
     @staticmethod
-    def derive(law: Law) -> tuple[sp.Expr, ...]:
+    def derive(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
         """Pressure [Pa] and ξ'."""
         return law.pressure, *law.rates
 
     @classmethod
-    def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
+    def decide(cls, found: tuple[sp.Expr, ...], law: DiscreteLaw, known: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`."""
         pressure, *rates = discrete_law.values(found, known)
         after = [known[s] + known[discrete_law.step] * rate for s, rate in zip(law.integrals, rates, strict=True)]
         return Decision(pressure, after, [])
+
+
+# ----------------------------------------------------------------------
+# The law as a differential equation.
+
+
+class Continuous(Scheme):
+    """Evaluates the law in every Runge–Kutta stage and integrates ξ with the plant, as the paper's runs do.
+
+    It hides what a sampled controller would do (ERRATA 22).
+    """
+
+    name: ClassVar[str] = "continuous"
+
+    def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+        """Pressure [Pa] that the law asks for now."""
+        return loop.law(state[:2], state[2:], loop.reference(counter * step))[0]
+
+    def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
+        """State after one step of the integrator on plant and law together."""
+
+        def motion(plant: Any, passed: Any, now: Any) -> Any:
+            return self._motion(loop, plant, (counter + passed) * step, now)
+
+        return loop.advance(method, motion, state, step)
+
+    def rates(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+        """Time derivative of the state; None where friction is set-valued."""
+        return None if loop.sticks else self._motion(loop, loop.plant, counter * step, state)
+
+    @staticmethod
+    def _motion(loop: Stepped, plant: Any, time: Any, now: Any) -> Any:
+        pressure, integral_rates = loop.law(now[:2], now[2:], loop.reference(time))
+        return ca.vertcat(plant(time, now[:2], pressure), integral_rates)

@@ -1,16 +1,323 @@
-"""Backward Euler of the law."""
+"""Implicit and semi-implicit schemes: backward Euler of the law on the double integrator.
 
-from dataclasses import dataclass
+The implicit step is a scalar set-valued equation for the slip-rate error at the end of the step. It has
+exactly one solution if the pressure does not increase with the slip-rate error, and is solved without a
+tolerance. The semi-implicit scheme takes magnitudes at the start of the step and signs at its end.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial, reduce
 from typing import Any, ClassVar
 
+import casadi as ca
 import sympy as sp
 
-from quakedesign.loop.steps import discrete_law
-from quakedesign.loop.steps.backward import backward_euler, inclusion
-from quakedesign.loop.steps.control_step import Decision
-from quakedesign.loop.steps.discrete_law import Law, Values
-from quakedesign.loop.steps.inclusion import end_rate
-from quakedesign.loop.steps.sampled import Sampled
+from quakedesign.errors import ParameterError
+from quakedesign.loop import discrete_law
+from quakedesign.loop.discrete_law import DiscreteLaw, Values
+from quakedesign.loop.schemes.base import Decision, Sampled
+from quakedesign.symbolic import AbsolutePower, SignedPower
+from quakedesign.symbolic.casadi_printer import to_casadi
+
+# ----------------------------------------------------------------------
+# One implicit step: a scalar set-valued equation for the slip-rate error at the end, solved without a tolerance.
+#
+# With e2⁺ = w and e1⁺ = e1 + T_s·w (backward Euler on the double integrator e1' = e2, e2' = B0·p) the law turns into
+#
+#     0 ∈ F(w) = w − e2 − T_s·B0·p(e1 + T_s·w, w, ξ⁺(w)),
+#
+# where every ⌈·⌋⁰ is the set-valued sign. If p never rises with w (`direction` shows it from the structure of the
+# expression: sums and non-negative multiples of odd increasing powers of increasing arguments), then F(w) − w is
+# monotone, F is strongly monotone, and there is exactly one solution.
+#
+# - At a jump of a sign, where its argument vanishes, the two ends of F tell on which side the solution lies, or that
+#   it
+#   is there; in that case the selection from [−1, 1] follows from a linear equation. Thereby all signs are known.
+# - With the signs fixed, w = g(w) with g continuous and not rising. The solution lies between 0 and g(0): for g(0) ≥
+#   0
+#   is 0 − g(0) ≤ 0 and g(0) − g(g(0)) ≥ 0, as g(g(0)) ≤ g(0); likewise with the signs reversed. Cutting this bracket
+#   to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; three points at once keep a processor busier than one does. Where the
+#   solution lies at a jump, that is left out: a loop that is held there by its signs spends most of its time on it.
+
+ROUNDS = 27
+AT_ONCE = 3  # rounds in the body of a loop in C: all of them would take half a second to compile
+end_slip, end_rate = sp.symbols("end_slip end_rate", real=True)
+
+InclusionValues = dict[sp.Symbol, Any]
+
+
+def direction(expression: sp.Expr) -> int | None:
+    """1, 0 or −1 where an expression never falls, never changes or never rises with the end of the step; else None."""
+    if not expression.free_symbols & {end_slip, end_rate}:
+        return 0
+    if expression in (end_slip, end_rate):
+        return 1
+    if expression.is_Add or isinstance(expression, sp.Min | sp.Max):
+        return _same([direction(part) for part in expression.args])
+    if expression.is_Mul:
+        moving = [part for part in expression.args if direction(part) != 0]
+        fixed = sp.Mul(*(part for part in expression.args if part not in moving))
+        way = direction(moving[0])
+        if len(moving) > 1 or way is None or not fixed.is_real:
+            return None
+        return way if fixed.is_nonnegative else -way if fixed.is_nonpositive else None
+    if isinstance(expression, SignedPower) and expression.args[1].is_nonnegative:
+        return direction(expression.args[0])
+    return None
+
+
+def _same(ways: list[int | None]) -> int | None:
+    found = {way for way in ways if way != 0}
+    return found.pop() if len(found) == 1 else None if found else 0
+
+
+@dataclass(frozen=True)
+class Inclusion:
+    """0 ∈ end_rate − free − pull(end_slip, end_rate) with end_slip = slip_error + step·end_rate.
+
+    Attributes
+    ----------
+    free : Expr
+        e2 [m/s]; whatever does not change with the end of the step.
+    pull : Expr
+        T_s·B0·p [m/s], which never rises with the end of the step.
+    slip_error, step : Symbol
+        e1 [m], T_s [s].
+
+    Raises
+    ------
+    ParameterError
+        When the law is not monotone, or a sign has an argument whose zero cannot be enclosed.
+    """
+
+    free: sp.Expr
+    pull: sp.Expr
+    slip_error: sp.Symbol
+    step: sp.Symbol
+
+    def __post_init__(self) -> None:
+        if direction(self.pull) not in (0, -1):
+            raise ParameterError(
+                "an implicit step needs a law whose pressure never rises with slip and slip rate at the end of the "
+                "step. Received one that may. Check the signs of its gains, or use the scheme explicit."
+            )
+        for argument in self.arguments:
+            self._linear(argument)
+
+    @cached_property
+    def arguments(self) -> tuple[sp.Expr, ...]:
+        """Arguments of the signs, each rising with the end of the step."""
+        signs = (atom for atom in self.pull.atoms(SignedPower) if atom.args[1] == 0)
+        return tuple(sorted({_rising(atom.args[0])[0] for atom in signs}, key=sp.default_sort_key))
+
+    @cached_property
+    def signs(self) -> tuple[sp.Symbol, ...]:
+        """Symbol of every sign's selection from [−1, 1]."""
+        return tuple(sp.Symbol(f"sign_{i}", real=True) for i in range(len(self.arguments)))
+
+    def selected(self, expression: sp.Expr) -> sp.Expr:
+        """Expression with the selections in place of the signs."""
+        by_argument = dict(zip(self.arguments, self.signs, strict=True))
+
+        def select(base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
+            if exponent != 0:
+                return SignedPower(base, exponent)
+            rising, turn = _rising(base)
+            return turn * by_argument[rising]
+
+        return expression.replace(SignedPower, select)
+
+    def solve(self, known: InclusionValues) -> InclusionValues:
+        """Values (SX) of `end_slip`, `end_rate` and the signs, from those of all other symbols."""
+        excess = self.selected(end_rate - self.free - self.pull)
+        jumps = [self._jump(argument, known) for argument in self.arguments]
+        sides, there = [], []
+        for number, point in enumerate(jumps):
+            low, high = (self._beside(excess, known, jumps, number, s) for s in (-1.0, 1.0))
+            at = ca.logic_and(low <= 0, high >= 0)
+            share = -(high + low) / ca.if_else(high > low, high - low, 1)
+            there.append((at, point | self._signs(jumps, number, share)))
+            sides.append(ca.if_else(high < 0, 1, -1))
+        elsewhere = ca.logic_not(reduce(ca.logic_or, (at for at, _ in there), ca.SX(0)))
+        smooth = self._smooth(known | dict(zip(self.signs, sides, strict=True)), elsewhere)
+        return known | reduce(lambda other, case: _choose(case[0], case[1], other), reversed(there), smooth)
+
+    def _jump(self, argument: sp.Expr, known: InclusionValues) -> InclusionValues:
+        """Ends of the step at which an argument vanishes."""
+        if argument == end_slip:
+            return {end_slip: 0.0 * known[self.slip_error], end_rate: -known[self.slip_error] / known[self.step]}
+        if argument == end_rate:
+            return {end_slip: known[self.slip_error], end_rate: 0.0 * known[self.slip_error]}
+        slope = self._linear(argument)
+        start = self._value(argument, known, 0.0)
+        bound = start / to_casadi([slope], known)[0]
+        return self._ends(known, self._quarter(-argument, known, -bound))
+
+    def _linear(self, argument: sp.Expr) -> sp.Expr:
+        """Slope that an argument has at least: that of its linear part."""
+        part = argument.subs(end_slip, self.slip_error + self.step * end_rate)
+        slope = sp.expand_mul(part).coeff(end_rate)
+        if argument not in (end_slip, end_rate) and not slope.is_positive:
+            raise ParameterError(
+                "an implicit step needs signs of arguments that grow at least linearly with slip or slip rate. "
+                f"Received the sign of {argument}. Use the scheme explicit."
+            )
+        return slope
+
+    def _signs(self, jumps: list[InclusionValues], number: int, own: Any) -> InclusionValues:
+        """Selections at a jump; those whose jumps coincide with it go along."""
+        here = jumps[number][end_rate]
+        ways = [ca.sign(here - point[end_rate]) for point in jumps]
+        found = [own if i == number else ca.if_else(way == 0, own, way) for i, way in enumerate(ways)]
+        return dict(zip(self.signs, found, strict=True))
+
+    def _beside(
+        self, excess: sp.Expr, known: InclusionValues, jumps: list[InclusionValues], number: int, side: float
+    ) -> Any:
+        """F on one side of a jump."""
+        return to_casadi([excess], known | jumps[number] | self._signs(jumps, number, side))[0]
+
+    def _smooth(self, known: InclusionValues, needed: Any) -> InclusionValues:
+        """Solution with all signs fixed; where it is not needed, any number."""
+        target = self.free + self.selected(self.pull)
+        straight = sp.Poly(_straight(target, self.slip_error, self.step), end_rate) if _is_straight(target) else None
+        if straight is None:
+            end = _where(needed, self._used(target, known), partial(self._free_end, target))
+        else:
+            end = to_casadi([straight.coeff_monomial(1) / (1 - straight.coeff_monomial(end_rate))], known)[0]
+        return {sign: known[sign] for sign in self.signs} | self._ends(known, end)
+
+    def _free_end(self, target: sp.Expr, known: InclusionValues) -> Any:
+        """Zero of target − w."""
+        return self._quarter(target - end_rate, known, self._value(target, known, 0.0))
+
+    def _quarter(self, falling: sp.Expr, known: InclusionValues, width: Any) -> Any:
+        """Zero of a falling function of the end of the step, between 0 and `width`."""
+        test, known = _sign_only(falling), self._used(falling, known)
+        before = ca.SX.sym("before", 2 + len(known))
+        low, length, *values = ca.vertsplit(before)
+        told = dict(zip(known, values, strict=True))
+        for _ in range(AT_ONCE):
+            length = length / 4
+            passed = sum(self._value(test, told, low + share * length) >= 0 for share in (1, 2, 3))
+            low = low + passed * length
+        rounds = ca.Function("rounds", [before], [ca.vertcat(low, length, *values)])
+        start = ca.vertcat(ca.fmin(width, 0), ca.fabs(width), *known.values())
+        return rounds.fold(ROUNDS // AT_ONCE, {"never_inline": True})(start)[0]
+
+    def _used(self, expression: sp.Expr, known: InclusionValues) -> InclusionValues:
+        """What the value of an expression depends on: what is told to a call counts as if it did."""
+        names = expression.free_symbols | {self.slip_error, self.step}
+        return {symbol: value for symbol, value in known.items() if symbol in names}
+
+    def _value(self, expression: sp.Expr, known: InclusionValues, end: Any) -> Any:
+        return to_casadi([expression], known | self._ends(known, end))[0]
+
+    def _ends(self, known: InclusionValues, end: Any) -> InclusionValues:
+        return {end_rate: ca.SX(end), end_slip: known[self.slip_error] + known[self.step] * end}
+
+
+def _choose(at: Any, case: InclusionValues, other: InclusionValues) -> InclusionValues:
+    return {symbol: ca.if_else(at, case[symbol], other[symbol]) for symbol in other}
+
+
+def _where(needed: Any, known: InclusionValues, solution: Callable[[InclusionValues], Any]) -> Any:
+    """Solution (SX) where it is needed, 0 elsewhere."""
+    given = ca.SX.sym("given", len(known))
+    found = solution(dict(zip(known, ca.vertsplit(given), strict=True)))
+    return where_needed(ca.Function("solved", [given], [found]))(needed, ca.vertcat(*known.values()))
+
+
+def where_needed(function: Any) -> Any:
+    """CasADi Function (needed, vector) → value of another where it is needed, else 0: a call runs one of two branches.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        Of scalar operations, one vector in and one out; its name is ``solved``.
+    """
+    vector, told = ca.SX.sym("given", function.size1_in(0)), ca.MX.sym("needed")
+    left_out = ca.Function("left_out", [vector], [ca.SX.zeros(function.size1_out(0))])
+    given = ca.MX.sym("given", function.size1_in(0))
+    either = ca.Function.if_else("either", function, left_out)(told, given)
+    return ca.Function("where_needed", [told, given], [either], {"never_inline": True})
+
+
+def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:
+    """Argument, or its negative, that rises with the end of the step, freed of its scale; and the sign taken out."""
+    way = direction(argument)
+    if not way:
+        raise ParameterError(
+            f"an implicit step needs signs of arguments that rise with slip and slip rate. Received {argument}. "
+            "Use the scheme explicit."
+        )
+    moving = argument.as_independent(end_slip, end_rate, as_Add=False)[1]
+    return (direction(moving) or 1) * moving, way
+
+
+def _is_straight(expression: sp.Expr) -> bool:
+    """Whether an expression is a polynomial of degree 1 at most in the end of the step."""
+    return all(
+        not atom.free_symbols & {end_slip, end_rate} for atom in expression.atoms(SignedPower, AbsolutePower)
+    ) and bool(expression.is_polynomial(end_slip, end_rate))
+
+
+def _straight(expression: sp.Expr, slip: sp.Expr, step: sp.Expr) -> sp.Expr:
+    return sp.expand(expression.subs(end_slip, slip + step * end_rate))
+
+
+def _sign_only(expression: sp.Expr) -> sp.Expr:
+    """An expression of the same sign without its first cube root: that of a + c⌈x⌋^⅓ is that of a³ + c³x."""
+    expanded = sp.expand_mul(expression)
+    for term in sp.Add.make_args(expanded):
+        factor, root = term.as_independent(end_slip, end_rate, as_Add=False)
+        if isinstance(root, SignedPower) and root.args[1] == sp.Rational(1, 3):
+            return (expanded - term) ** 3 + factor**3 * root.args[0]
+    return expanded
+
+
+# ----------------------------------------------------------------------
+# A law at the end of the step, for the double integrator that the controller has in mind.
+
+ERRORS = {discrete_law.slip_error: end_slip, discrete_law.rate_error: end_rate}
+AHEAD = {
+    discrete_law.slip: end_slip + discrete_law.next_reference,
+    discrete_law.rate: end_rate + discrete_law.next_reference_rate,
+}
+
+
+def backward_euler(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
+    """Pull [m/s], feed-forward [Pa] and ξ⁺ in `end_slip`, `end_rate` and the symbols of `discrete_law`.
+
+    The pull is T_s·B0·p without the feed-forward, which is what the law asks for at zero errors and integral states: it
+    answers to forces of the plant that the double integrator does not have. Slip and slip rate themselves are taken at
+    the end of the step if the pressure then never rises with them, at its start otherwise. Every ξ' has the ξ before it
+    at the end, and the others at the start of the step.
+    """
+    pressure, ends = _at_end(law, ERRORS | AHEAD)
+    if direction(pressure) != -1:
+        pressure, ends = _at_end(law, ERRORS)
+    feed_forward = pressure.xreplace(dict.fromkeys((end_slip, end_rate, *law.integrals), sp.Integer(0)))
+    pull = discrete_law.step * discrete_law.authority * (pressure - feed_forward)
+    return sp.expand_mul(pull), feed_forward, *map(sp.expand_mul, ends)
+
+
+def inclusion(pull: sp.Expr) -> Inclusion:
+    """The implicit step of a pull from `backward_euler`."""
+    return Inclusion(discrete_law.rate_error, pull, discrete_law.slip_error, discrete_law.step)
+
+
+def _at_end(law: DiscreteLaw, place: dict[sp.Symbol, sp.Expr]) -> tuple[sp.Expr, list[sp.Expr]]:
+    """Pressure and ξ⁺ with the signals at the end of the step."""
+    ends: dict[sp.Symbol, sp.Expr] = {}
+    for symbol, rate in zip(law.integrals, law.rates, strict=True):
+        ends[symbol] = symbol + discrete_law.step * rate.xreplace(place | ends)
+    return law.pressure.xreplace(place | ends), list(ends.values())
+
+
+# ----------------------------------------------------------------------
+# Backward Euler of the law.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,12 +333,12 @@ class Implicit(Sampled):
     name: ClassVar[str] = "implicit"
 
     @staticmethod
-    def derive(law: Law) -> tuple[sp.Expr, ...]:
+    def derive(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
         """See `backward_euler`."""
         return backward_euler(law)
 
     @classmethod
-    def decide(cls, found: tuple[sp.Expr, ...], law: Law, known: Values, own: list[Any]) -> Decision:
+    def decide(cls, found: tuple[sp.Expr, ...], law: DiscreteLaw, known: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`."""
         pull, feed_forward, *ends = found
         problem = inclusion(pull)
@@ -40,3 +347,37 @@ class Implicit(Sampled):
         pressure = (solved[end_rate] - solved[discrete_law.rate_error]) / gain
         ahead, *after = discrete_law.values((feed_forward, *map(problem.selected, ends)), solved)
         return Decision(pressure + ahead, after, [])
+
+
+# ----------------------------------------------------------------------
+# Magnitudes of the law at the start of the step, signs at its end.
+
+_START = {symbol: sp.Dummy(symbol.name, real=True) for symbol in (discrete_law.slip_error, discrete_law.rate_error)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SemiImplicit(Implicit):
+    """Splits every ⌈x⌋^a into |x|^a at the start and the set-valued sign of x at the end of the step.
+
+    The homogeneous semi-implicit Euler method of Michel, Ghanes, Plestan, Aoustin and Barbot (2021), Automatica 129,
+    109582 (a differentiator there), applied to the law. The inclusion is that of `Implicit` with jumps only.
+    """
+
+    name: ClassVar[str] = "semi-implicit"
+
+    @staticmethod
+    def derive(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
+        """See `backward_euler`."""
+        split = replace(law, pressure=_split(law.pressure), rates=tuple(map(_split, law.rates)))
+        back = {dummy: symbol for symbol, dummy in _START.items()}
+        return tuple(part.subs(back) for part in backward_euler(split))
+
+
+def _split(expression: sp.Expr) -> sp.Expr:
+    """Expression with every outermost power split into its size before and its sign after the step."""
+    if isinstance(expression, SignedPower) and expression.args[1] != 0:
+        base, exponent = expression.args
+        return AbsolutePower(base.subs(_START), exponent) * SignedPower(base, 0)
+    if expression.is_Add or expression.is_Mul:
+        return expression.func(*map(_split, expression.args))
+    return expression

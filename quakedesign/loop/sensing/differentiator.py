@@ -1,14 +1,183 @@
-"""Robust exact filtering differentiator (eq. dif of the paper)."""
+"""Robust exact filtering differentiator: coefficients, discretisations, output feedback.
+
+Discretisations: forward Euler, homogeneous (Livne and Levant 2014, Automatica 50, 2040) and implicit
+(Mojallizadeh, Brogliato and Acary 2021, Int. J. Robust Nonlinear Control 31, 7679). Coefficients: Levant
+and Livne (2020), European Journal of Control 55, 33. Last chapter: from rest and with a sufficiently
+large bound λ_d, the implicit differentiator is a filter of backward differences.
+"""
 
 import math
 import sys
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import pairwise
+from math import comb
 from typing import Any
 
+import casadi as ca
+
 from quakedesign.errors import ParameterError, require_known
-from quakedesign.fault.checks import require_positive
-from quakedesign.loop.sensing.coefficients import LONGEST, TABLES
-from quakedesign.loop.sensing.differentiator_step import explicit_step, implicit_step, lag_free
+from quakedesign.fault.model import require_positive
+from quakedesign.laws.sampled_law import LinearLaw
+from quakedesign.loop.sensing.measurement import Sensor, SlipStage
+
+# ----------------------------------------------------------------------
+# One sample of the filtering differentiator, discretised in three ways.
+#
+# With y = (w_1 … w_nf, z_0 … z_nd), N = n_d + n_f + 1 entries, and a slip x the differentiator is, in continuous
+# time,
+#
+#     y_j' = −λ̃_(N−j) λ_d^(j/N) ⌈s⌋^((N−j)/N) + y_(j+1) − [j = n_f]·x,    y_(N+1) = 0,
+#
+# where s is y_1, or z_0 − x without a filter (n_f = 0); its estimates are z_0 … z_nd.
+#
+# - ``euler``: forward Euler.
+# - ``homogeneous``: forward Euler with the further Taylor terms T²/2·z_(i+2) + … of every z_i; without them z_i
+#   settles
+#   at x^(i) + T/2·x^(i+1), 0 < i < n_d, which is off by the order of T whatever n_d. Livne and Levant (2014),
+#   Automatica
+#   50, 2040; Levant and Livne (2020), European Journal of Control 55, 33.
+# - ``implicit``: backward Euler with the latest reading. All y_j⁺ follow from s⁺, and for s⁺ they leave
+#   s⁺ + Σ_j T^j λ̃_(N−j) λ_d^(j/N) ⌈s⁺⌋^((N−j)/N) ∋ b with a known b. The left-hand side rises, so the solution is
+#   unique and has the sign of b. With |s⁺| = λ_d·(qT)^N it is the root q ≥ 0 of the polynomial
+#   q^N + Σ_j λ̃_(N−j) q^(N−j) = |b|/(λ_d·T^N) if the right-hand side exceeds λ̃_0, and s⁺ = 0 otherwise. The
+#   polynomial is
+#   convex and rises for q > 0, so that Newton's method falls monotonically from any bound above the root.
+#   Mojallizadeh,
+#   Brogliato and Acary (2021), Int. J. Robust Nonlinear Control 31, 7679.
+#
+# In the implicit sliding mode z_i = ∇^i x/T^i, which lags: the i-th derivative is (−ln(1 − ∇))^i x/T^i, and the terms
+# of
+# that up to ∇^nd x are a combination of z_i … z_nd. `lag_free` has its coefficients i!/j!·|S1(j, i)|; with them the
+# estimates have the accuracy T^(nd+1−i) of the continuous differentiator. For n_f = 0 this is the proper implicit
+# discretisation of Seeber (2024), arXiv:2404.02770.
+
+NEWTON_STEPS = 8
+
+
+def explicit_step(
+    gains: Sequence[Any], step: Any, state: Sequence[Any], slip: Any, filters: int, taylor: bool
+) -> list[Any]:
+    """y after one sample (SX); the gains are T·λ̃_(N−j)·λ_d^(j/N), j = 1 … N."""
+    size = len(state)
+    distance = state[0] if filters else state[0] - slip
+    root = _root(ca.fabs(distance), size)
+    after = []
+    for j, (value, gain) in enumerate(zip(state, gains, strict=True), start=1):
+        drift = state[j] if j < size else ca.SX(0)
+        drift = drift - slip if j == filters else drift
+        moved = value + step * drift - gain * ca.sign(distance) * _whole_power(root, size - j)
+        after.append(moved + _taylor(step, state[j + 1 :]) if taylor and j > filters else moved)
+    return after
+
+
+def implicit_step(
+    gains: Sequence[Any], scale: Any, table: Sequence[float], step: Any, state: Sequence[Any], slip: Any, filters: int
+) -> list[Any]:
+    """y after one sample (SX); the gains are λ̃_(N−j)·λ_d·T^(N−j+1), j = 1 … N, and the scale is λ_d·T^N."""
+    size = len(state)
+    ahead = state[-1]
+    for value in reversed(state[:-1]):
+        ahead = value + step * ahead
+    ahead = (ahead - _whole_power(step, filters) * slip) / scale
+    root, share = _solve(ca.fabs(ahead), table)
+    push = [_whole_power(root, size - j) for j in range(1, size)] + [share]
+    after: list[Any] = []
+    following = ca.SX(0)
+    for j in range(size, 0, -1):
+        drift = following - slip if j == filters else following
+        following = state[j - 1] + step * drift - gains[j - 1] * ca.sign(ahead) * push[j - 1]
+        after.insert(0, following)
+    return after
+
+
+def lag_free(order: int) -> tuple[tuple[Fraction, ...], ...]:
+    """Row i has the coefficients of T^(j−i)·z_j, j = i … order, in the estimate of derivative i."""
+    rows = []
+    for i in range(order + 1):
+        shares = (Fraction(math.factorial(i) * _stirling(j, i), math.factorial(j)) for j in range(i, order + 1))
+        rows.append(tuple(shares))
+    return tuple(rows)
+
+
+def _solve(target: Any, table: Sequence[float]) -> tuple[Any, Any]:
+    """q of the polynomial, and the selection of |⌈s⁺⌋⁰| from [0, 1]."""
+    size, (jump, *rest) = len(table), table
+    excess = ca.fmax(target - jump, 0)
+    rising = [*rest, 1.0]  # of q, q² … q^N
+    root = _root(excess, size)
+    for power, weight in enumerate(rest, start=1):
+        root = ca.fmin(root, _root(excess / weight, power))
+    for _ in range(NEWTON_STEPS):
+        value, slope = ca.SX(rising[-1]), ca.SX(0)
+        for weight in reversed(rising[:-1]):
+            slope = slope * root + value
+            value = value * root + weight
+        slope = slope * root + value
+        root = root - (value * root - excess) / slope
+    return root, ca.fmin(target / jump, 1)
+
+
+def _root(value: Any, degree: int) -> Any:
+    """Root of a number that is not negative; square roots are correctly rounded."""
+    return value if degree == 1 else ca.sqrt(value) if degree == 2 else value ** (1.0 / degree)
+
+
+def _whole_power(value: Any, exponent: int) -> Any:
+    product: Any = 1.0
+    for _ in range(exponent):
+        product = product * value
+    return product
+
+
+def _taylor(step: Any, later: Sequence[Any]) -> Any:
+    """T²/2·z_(i+2) + T³/6·z_(i+3) + …."""
+    total: Any = 0.0
+    for degree in range(len(later) + 1, 1, -1):
+        total = (total + later[degree - 2]) * step / degree
+    return total * step
+
+
+def _stirling(j: int, i: int) -> int:
+    """Unsigned Stirling number of the first kind."""
+    row = [1]
+    for k in range(j):
+        row = [(row[m - 1] if m else 0) + k * (row[m] if m < len(row) else 0) for m in range(len(row) + 1)]
+    return row[i] if i < len(row) else 0
+
+
+# ----------------------------------------------------------------------
+# Published coefficients of the homogeneous differentiator.
+#
+# Levant and Livne (2020), Robust exact filtering differentiators, European Journal of Control 55, 33, doi
+# 10.1016/j.ejcon.2019.08.006: λ̃_0 … λ̃_n for n = n_d + n_f = 0 … 12, rounded to about four digits. They are those of
+# the
+# recursive form with λ = 1.1, 1.5, 2, 3, 5, 7, 10, 12, 14, 17, 20, 26, 32 (there too, and up to n = 5 in Levant
+# (2003),
+# Higher-order sliding modes, differentiation and output-feedback control, Int. J. Control 76, 924), by
+# λ̃_n = λ_n and λ̃_j = λ_j·λ̃_(j+1)^(j/(j+1)).
+
+LONGEST = 12
+TABLES = (
+    (1.1,),
+    (1.1, 1.5),
+    (1.1, 2.12, 2.0),
+    (1.1, 3.06, 4.16, 3.0),
+    (1.1, 4.57, 9.30, 10.03, 5.0),
+    (1.1, 6.75, 20.26, 32.24, 23.72, 7.0),
+    (1.1, 9.91, 43.65, 101.96, 110.08, 47.69, 10.0),
+    (1.1, 14.13, 88.78, 295.74, 455.40, 281.37, 84.14, 12.0),
+    (1.1, 19.66, 171.73, 795.63, 1703.9, 1464.2, 608.99, 120.79, 14.0),
+    (1.1, 26.93, 322.31, 2045.8, 6002.3, 7066.2, 4026.3, 1094.1, 173.72, 17.0),
+    (1.1, 36.34, 586.78, 5025.4, 19895.0, 31601.0, 24296.0, 8908.0, 1908.5, 251.99, 20.0),
+    (1.1, 48.86, 1061.1, 12220.0, 65053.0, 138954.0, 143658.0, 70830.0, 20406.0, 3623.1, 386.7, 26.0),
+    (1.1, 65.22, 1890.6, 29064.0, 206531.0, 588869.0, 812652.0, 534837.0, 205679.0, 48747.0, 6944.8, 623.30, 32.0),
+)
+
+
+# ----------------------------------------------------------------------
+# Robust exact filtering differentiator (eq. dif of the paper).
 
 DISCRETISATIONS = ("euler", "homogeneous", "implicit")
 
@@ -20,7 +189,7 @@ class Differentiator:
     With a reading off by ε at most, sampled every T, the estimate of derivative i is off by a multiple of
     λ_d·δ^(n_d+1−i), δ = max(T, (ε/λ_d)^(1/(n_d+1))); ``euler`` has this for n_d = 1 only. Levant and Livne (2020),
     European Journal of Control 55, 33. The paper takes n_d = n_f = 2, for which a sliding mode has no λ_d; n_d = 1 has
-    (ERRATA 21). See `quakedesign.loop.sensing.differentiator_step` for the equations.
+    (ERRATA 21). See `quakedesign.loop.sensing.differentiator` for the equations.
 
     Attributes
     ----------
@@ -128,3 +297,142 @@ def _without_lag(derivatives: list[Any], step: Any) -> list[Any]:
             total = total * step + float(share) * value
         found.append(total)
     return found
+
+
+# ----------------------------------------------------------------------
+# A law that is told estimates: p(x̂1, x̂2).
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputFeedback(Sensor):
+    """Slip through a row of stages into a differentiator, which estimates slip and slip rate.
+
+    Nothing guarantees that a loop which is stable with exact states is stable with estimates (no separation
+    principle); `joint_condition` says when the differentiator can follow.
+
+    Attributes
+    ----------
+    differentiator : Differentiator
+    stages : tuple of SlipStage
+        In the order of the signal, hardware first.
+
+    Raises
+    ------
+    ParameterError
+        For anything but stages, or hardware behind software.
+    """
+
+    differentiator: Differentiator
+    stages: tuple[SlipStage, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stages", tuple(self.stages))
+        hardware = True
+        for stage in self.stages:
+            if not isinstance(stage, SlipStage):
+                raise ParameterError(f"stages must be Transducer, Averaging and the like. Received {stage!r}.")
+            if stage.hardware and not hardware:
+                raise ParameterError(f"hardware comes first. Received {stage!r} after software. Change their order.")
+            hardware = stage.hardware
+
+    @property
+    def step(self) -> float:
+        """See `Sensor.step`."""
+        return self.differentiator.step
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """See `Sensor.numbers`."""
+        return (*(v for stage in self.stages for v in stage.numbers(self.step)), *self.differentiator.numbers)
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """See `Sensor.start`."""
+        return (*(v for stage in self.stages for v in stage.start), *self.differentiator.start)
+
+    @property
+    def software(self) -> "OutputFeedback":
+        """See `Sensor.software`."""
+        return replace(self, stages=tuple(stage for stage in self.stages if not stage.hardware))
+
+    def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
+        """See `Sensor.measure`."""
+        own, past = iter(numbers), iter(memory)
+        slip, kept = x[0], []
+        for stage in self.stages:
+            slip, after = stage.pass_on(_next(own, len(stage.numbers(self.step))), _next(past, len(stage.start)), slip)
+            kept += after
+        estimates, after = self.differentiator.estimate(list(own), list(past), slip)
+        return ca.vertcat(estimates[0], estimates[1]), [*kept, *after]
+
+
+def _next(entries: Iterator[Any], count: int) -> list[Any]:
+    return [next(entries) for _ in range(count)]
+
+
+# ----------------------------------------------------------------------
+# What the implicit differentiator is, from rest, with a bound λ_d that is large enough: differences of readings.
+#
+# With y = (w_1 … w_nf, z_0 … z_nd) as in `quakedesign.loop.sensing.differentiator`, let before a reading x be w
+# = 0,
+# z_0 = x1 the reading before, and z_i = ∇ⁱx1/Tⁱ. Then b = y_1 + T(y_2 + … + T(z_0 − x + T·z_1 + …)) is
+# −T^nf·∇^(nd+1)x, and where |∇^(nd+1)x| ≤ λ̃_0·λ_d·T^(nd+1) the step gives s⁺ = 0. So w stays 0, z_0⁺ = x and, from
+# z_i⁺ = z_i + T·z_(i+1)⁺, z_(i+1)⁺ = ∇^(i+1)x/T^(i+1). At rest at slip 0 all of y is 0. By induction the
+# differentiator
+# is this filter for ever, whatever n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`),
+# and
+# a law that it tells is a law of the slip alone, whose guarantee counts all of its errors.
+#
+# With |x1″| ≤ A and readings within ε, |∇^(nd+1)x| ≤ c·A·T² + 2^(nd+1)·ε: x1‴, which does not exist where the
+# pressure is
+# held, need not be bounded. ∇²x1 is the integral of x1″ with a triangle over two periods, so that c is the area of
+# ∇^(nd−1) of triangles, in size: straight lines between binomials of either sign, c = 1 for n_d = 1 and 3/2 for n_d =
+# 2.
+
+ORDER = 2  # n_d as printed
+
+
+def names_before(order: int = ORDER) -> tuple[str, ...]:
+    """States that hold the readings before."""
+    return tuple(f"reading_{i}" for i in range(1, order + 1))
+
+
+def rate_shares(order: int = ORDER) -> tuple[Fraction, ...]:
+    """Shares of the reading now, of the one before, and so on in T times the slip rate that is told."""
+    return tuple(
+        sum((Fraction((-1) ** back * comb(j, back), j) for j in range(1, order + 1)), Fraction(0))
+        for back in range(order + 1)
+    )
+
+
+def told_by_differences(law: LinearLaw, step: Fraction, order: int = ORDER) -> LinearLaw:
+    """A law of slip and slip rate, the latter told by differences of slips every T_s [s]: one of the slip alone."""
+    now, *before = (share / step for share in rate_shares(order))
+    zero, names = Fraction(0), names_before(order)
+
+    def fed(seen: tuple[Fraction, ...]) -> tuple[Fraction, Fraction]:
+        return seen[0] + seen[1] * now, zero
+
+    def remembered(own: tuple[Fraction, ...], seen: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
+        return (*own, *(seen[1] * share for share in before))
+
+    kept = [
+        (*[zero] * len(law.states), *(Fraction(i == place) for i in range(order))) for place in range(-1, order - 1)
+    ]
+    return replace(
+        law,
+        states=(*law.states, *names),
+        update=(*(remembered(own, seen) for own, seen in zip(law.update, law.measured, strict=True)), *kept),
+        measured=(*map(fed, law.measured), *((Fraction(place == 0), zero) for place in range(order))),
+        output=remembered(law.output, law.feedback),
+        feedback=fed(law.feedback),
+        applied=law.applied and (*law.applied, *[zero] * order),
+    )
+
+
+def least_bound(acceleration: Fraction, noise: Fraction, step: Fraction, order: int = ORDER) -> Fraction:
+    """λ_d [m/s^(n_d+1)] from which on it is, for |x1″| [m/s²] and readings within noise [m], every T_s [s]."""
+    least = min(Fraction(str(table[0])) for table in TABLES)
+    corners = [0, *(comb(order - 1, j) for j in range(order)), 0]
+    area = sum((Fraction(p**2 + q**2, 2 * (p + q)) for p, q in pairwise(corners)), Fraction(0))
+    return Fraction((area * acceleration * step**2 + 2 ** (order + 1) * noise) / (least * step ** (order + 1)))

@@ -1,5 +1,7 @@
-"""What a controller sees of the fault."""
+"""Slip measurement: sensor base classes, LVDT transducer, noise, resolution, and averaging."""
 
+import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -7,8 +9,111 @@ import casadi as ca
 import numpy as np
 
 from quakedesign.errors import ParameterError
-from quakedesign.fault.checks import require_nonnegative
-from quakedesign.loop.sensing.base import Sensor
+from quakedesign.fault.model import require_nonnegative
+
+# ----------------------------------------------------------------------
+# What every sensor, and every element of one, offers.
+
+_SAME = 1e-12  # relative difference of two sampling periods that are meant to be one
+
+
+class Sensor(ABC):
+    """From the true slip and slip rate to those that a law is told, once per sample.
+
+    Its numbers and its memory are entries of the vector that the compiled loop carries along; `measure` works on CasADi
+    SX. Unless it says otherwise it is one that estimates both from the slip.
+
+    Attributes
+    ----------
+    of_slip_alone : bool
+        Whether it does without the slip rate.
+    """
+
+    of_slip_alone: ClassVar[bool] = True
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the law is told anything but slip and slip rate as they are."""
+        return True
+
+    @property
+    @abstractmethod
+    def step(self) -> float | None:
+        """Sampling period [s] that it was made for; None for any."""
+
+    @property
+    @abstractmethod
+    def numbers(self) -> tuple[float, ...]:
+        """Parameters in SI units, as `measure` expects them."""
+
+    @property
+    @abstractmethod
+    def start(self) -> tuple[float, ...]:
+        """Memory before the first sample, for a fault at rest at slip 0."""
+
+    @abstractmethod
+    def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
+        """Slip [m] and slip rate [m/s] that the law is told, and the memory afterwards, at the true state x."""
+
+    @property
+    @abstractmethod
+    def software(self) -> "Sensor":
+        """The part that runs on the controller, without what the hardware does to the signal."""
+
+    @property
+    def size(self) -> int:
+        """Number of entries of the memory; the state of the noise generator, seeded, is among them."""
+        return len(self.start)
+
+    def require_step(self, step: float) -> None:
+        """Refuse a sampling period [s] other than the sensor's.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if self.step is not None and abs(step - self.step) > _SAME * self.step:
+            raise ParameterError(
+                f"the sampling period must be that of the sensor, {self.step:.6g} s. Received {step:.6g} s. "
+                "Make the sensor for the period of the loop."
+            )
+
+    def function(self) -> Any:
+        """CasADi Function (memory, slip [m]) → memory, slip estimate [m], slip-rate estimate [m/s]."""
+        memory, slip = ca.SX.sym("memory", self.size), ca.SX.sym("slip")
+        seen, after = self.measure([*map(ca.SX, self.numbers)], ca.vertsplit(memory), ca.vertcat(slip, 0))
+        outputs = [ca.vertcat(*after), seen[0], seen[1]]
+        names = ["memory_after", "slip_estimate", "rate_estimate"]
+        return ca.Function("sensor", [memory, slip], outputs, ["memory", "slip"], names)
+
+
+class SlipStage(ABC):
+    """One element of a chain that a measured slip [m] passes, once per sample.
+
+    Attributes
+    ----------
+    hardware : bool
+        Whether it belongs to the instrument, not to the program of the controller.
+    """
+
+    hardware: ClassVar[bool]
+
+    @property
+    @abstractmethod
+    def start(self) -> tuple[float, ...]:
+        """Memory before the first sample."""
+
+    @abstractmethod
+    def numbers(self, step: float) -> tuple[float, ...]:
+        """Parameters for a sampling period [s], as `pass_on` expects them."""
+
+    @abstractmethod
+    def pass_on(self, numbers: list[Any], memory: list[Any], slip: Any) -> tuple[Any, list[Any]]:
+        """Slip [m] (SX) that leaves the element, and the memory afterwards."""
+
+
+# ----------------------------------------------------------------------
+# What a controller sees of the fault.
 
 # Multiplicative congruential generators of L'Ecuyer (1988), Commun. ACM 31, 742, combined as there: every product is a
 # whole number below 2^53, so that floating point carries them out exactly, in machine code as elsewhere.
@@ -103,3 +208,119 @@ def uniform(memory: list[Any]) -> tuple[list[Any], Any]:
     difference = after[0] - after[1]
     top = _MODULI[0] - 1
     return after, (difference + ca.if_else(difference < 1, top, 0)) / (top + 1)
+
+
+# ----------------------------------------------------------------------
+# Linear variable differential transformer (LVDT) and its converter: bandwidth, noise, resolution.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transducer(SlipStage):
+    """Slip behind a low-pass filter of first order, plus independent normal noise at every sample, then rounded.
+
+    The filter is followed exactly for a slip that is held over the sample, y ← y + (1 − e^(−2πf_bT_s))(x − y).
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation of the noise [m]; 0 for none.
+    bandwidth : float
+        f_b, at which the amplitude falls to 1/√2 [Hz]; infinite for a transducer that follows at once.
+    quantum : float
+        q, of which a reading is the nearest multiple, halves upward [m]; 0 for a reading as it is.
+    seed : int
+        Of the noise, not negative.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    hardware: ClassVar[bool] = True
+
+    deviation: float = 0.0
+    bandwidth: float = math.inf
+    quantum: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        require_nonnegative(deviation=self.deviation, quantum=self.quantum)
+        if not self.bandwidth > 0:
+            raise ParameterError(f"bandwidth must be positive, or infinite. Received {self.bandwidth!r} Hz.")
+        Measurement(seed=self.seed)
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Filtered slip [m], if filtered, and the generator of the noise, if there is any."""
+        return ((0.0,) if self._filtered else ()) + self._noise.start
+
+    def numbers(self, step: float) -> tuple[float, ...]:
+        """Share of the difference that the filter closes in one sample [-]; deviations and quantum [m]."""
+        share = (-math.expm1(-2 * math.pi * self.bandwidth * step),) if self._filtered else ()
+        return (*share, *self._noise.numbers, *((float(self.quantum),) if self.quantum else ()))
+
+    def pass_on(self, numbers: list[Any], memory: list[Any], slip: Any) -> tuple[Any, list[Any]]:
+        """See `SlipStage.pass_on`."""
+        numbers, memory, own = list(numbers), list(memory), []
+        quantum = numbers.pop() if self.quantum else None
+        if self._filtered:
+            before = memory.pop(0)
+            slip = before + numbers.pop(0) * (slip - before)
+            own = [slip]
+        seen, noise = self._noise.measure(numbers, memory, ca.vertcat(slip, 0))
+        reading = seen[0] if quantum is None else quantum * ca.floor(seen[0] / quantum + 0.5)
+        return reading, [*own, *noise]
+
+    @property
+    def _filtered(self) -> bool:
+        return math.isfinite(self.bandwidth)
+
+    @property
+    def _noise(self) -> Measurement:
+        return Measurement(slip_noise=self.deviation, seed=self.seed)
+
+
+# ----------------------------------------------------------------------
+# Mean of the last readings.
+
+MOST_SAMPLES = 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Averaging(SlipStage):
+    """Mean of the last N readings: noise falls by √N, and the slip lags by (N − 1)T_s/2.
+
+    Attributes
+    ----------
+    samples : int
+        N, 1 … 1000.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    hardware: ClassVar[bool] = False
+
+    samples: int
+
+    def __post_init__(self) -> None:
+        whole = isinstance(self.samples, int) and not isinstance(self.samples, bool)
+        if not (whole and 1 <= self.samples <= MOST_SAMPLES):
+            raise ParameterError(
+                f"samples of a mean must be a whole number, 1 to {MOST_SAMPLES}. Received {self.samples!r}."
+            )
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """The last N − 1 readings [m], oldest first."""
+        return (0.0,) * (self.samples - 1)
+
+    def numbers(self, step: float) -> tuple[float, ...]:
+        """None."""
+        return ()
+
+    def pass_on(self, numbers: list[Any], memory: list[Any], slip: Any) -> tuple[Any, list[Any]]:
+        """See `SlipStage.pass_on`. A running sum would be cheaper, and would gather rounding errors for hours."""
+        readings = [*memory, slip]
+        return sum(readings[1:], start=readings[0]) / self.samples, readings[1:]

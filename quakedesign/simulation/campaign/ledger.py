@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from quakedesign.errors import OutputError, SimulationError
-from quakedesign.output import write_whole
-from quakedesign.temporary import FAMILY, sweep
+from quakedesign.files import FAMILY, sweep, write_whole
 
 MANIFEST, BATCHES = "campaign.json", "batches"
 _RESULTS = ("results.json", "samples.csv", "distribution.*", "sample-*.nc")

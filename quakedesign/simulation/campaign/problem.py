@@ -1,22 +1,61 @@
-"""What a campaign is about: one closed loop, and how its samples differ."""
+"""Campaign problems: one closed loop, the variation of its samples, and its programme.
 
+Chapters: interface; rate-and-state faults in slow sliding; compiled call for many samples; noise from
+other seeds; loops with a fixed step.
+"""
+
+import ctypes
+import hashlib
+import math
+import subprocess
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, Protocol
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from fractions import Fraction
+from functools import cached_property, lru_cache
+from pathlib import Path
+from threading import Lock
+from types import MappingProxyType
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
+import casadi as ca
 import numpy as np
 
-from quakedesign.controllers import Controller
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.exact import shortly
 from quakedesign.fault import Fault
-from quakedesign.loop.schemes import Scheme
+from quakedesign.fault.model import require_nonnegative, require_positive
+from quakedesign.files import temporary_folder
+from quakedesign.laws import Controller, LinearLaw
+from quakedesign.loop import Scheme, simulation_scheme
+from quakedesign.loop.actuators.chain import DIRECT
 from quakedesign.simulation.campaign.ledger import plain
 from quakedesign.simulation.campaign.space import MOST_SAMPLES, Sample, Space, noise_seed, point
-from quakedesign.simulation.outcome import Outcome, OutcomeCriterion
-from quakedesign.simulation.run import library_versions
-from quakedesign.simulation.setting import Setting
-from quakedesign.simulation.trajectory import Trajectory
+from quakedesign.simulation.closed_loop import Load, Variation, names
+from quakedesign.simulation.compiled import (
+    LANE_FLAGS,
+    LANES,
+    STEP,
+    Backend,
+    compiler,
+    expanded,
+    ladder,
+    lanes_c,
+    processor_flags,
+    shared_library,
+)
+from quakedesign.simulation.integrators import Integrator, adaptive_integrators
+from quakedesign.simulation.natural import natural_peak
+from quakedesign.simulation.recorder import EVENTS, Metrics, Recorder, events, metrics
+from quakedesign.simulation.run import RunSetting, library_versions, loop_class, run
+from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, criterion_of, simulate_sliding
+from quakedesign.simulation.state_plant import FRICTION, PressurePath, SlidingVariation, Tide
+from quakedesign.simulation.stepping import Advancer
+from quakedesign.simulation.trajectory import Outcome, OutcomeCriterion, Trajectory
+
+# ----------------------------------------------------------------------
+# What a campaign is about: one closed loop, and how its samples differ.
 
 NOT_COMPARED = ("settled_from", "steps", "seconds")
 
@@ -42,7 +81,7 @@ class SampleResult:
         return "diverged" in self.events
 
 
-class Program(Protocol):
+class CampaignProgram(Protocol):
     """What a worker needs; it can be sent anywhere.
 
     Attributes
@@ -60,7 +99,7 @@ class Program(Protocol):
     def fingerprint(self) -> str:
         """Digest of the arithmetic."""
 
-    def compiled(self, folder: Any) -> "Program":
+    def compiled(self, folder: Any) -> "CampaignProgram":
         """The same, as fast as this machine can make it, with files in a private folder."""
 
     def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
@@ -68,7 +107,7 @@ class Program(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Problem(ABC):
+class CampaignProblem(ABC):
     """One closed loop, and how its samples differ; a vector of numbers at the start of a sample tells the end of it.
 
     Attributes
@@ -76,7 +115,7 @@ class Problem(ABC):
     fault : Fault
     controller : Controller or None
     scheme : Scheme
-    setting : Setting
+    setting : RunSetting
     plant : str
     space : Space
     seed : int
@@ -85,7 +124,7 @@ class Problem(ABC):
     fault: Fault
     controller: Controller | None
     scheme: Scheme
-    setting: Setting
+    setting: RunSetting
     plant: str
     space: Space
     seed: int
@@ -125,7 +164,7 @@ class Problem(ABC):
 
     @property
     @abstractmethod
-    def program(self) -> Program:
+    def program(self) -> CampaignProgram:
         """From the start of samples to their end."""
 
     @abstractmethod
@@ -173,3 +212,486 @@ class Problem(ABC):
             "versions": library_versions("quakedesign", "casadi", "numpy", "scipy", "sympy"),
             **self.own_inputs,
         }
+
+
+# ----------------------------------------------------------------------
+# Samples of a fault with rate-and-state friction held in slow sliding, each a run of its own.
+
+_FIGURES = tuple(part.name for part in fields(Metrics) if part.name not in (*NOT_COMPARED, "max_h_rate"))
+_FACTORS = tuple(field.name for field in fields(SlidingVariation))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingProgram:
+    """A run of `simulate_sliding` for every sample; vectors are its numbers, then its figures and times of its events.
+
+    Attributes
+    ----------
+    fault : Fault
+    law : LinearLaw
+    step : Fraction
+        T_s [s].
+    path : PressurePath
+    stress, period : float
+        Amplitude [Pa] and period [s] of the stress of a sample whose share is 1.
+    plant, method : str
+    settled_from : float
+        [s].
+    """
+
+    lanes: ClassVar[int] = 1
+    batch_steps: ClassVar[int] = 10_000
+
+    fault: Fault
+    law: LinearLaw
+    step: Fraction
+    path: PressurePath
+    stress: float
+    period: float
+    plant: str
+    method: str
+    settled_from: float
+
+    @property
+    def fingerprint(self) -> str:
+        """Of the fields that are not named elsewhere; the solver is that of the versions of the libraries."""
+        told = f"{self.path} {self.stress!r} {self.period!r} {self.method}"
+        return hashlib.sha256(told.encode()).hexdigest()
+
+    def compiled(self, folder: Path) -> Self:
+        """Itself: nothing is compiled."""
+        return self
+
+    def run(self, numbers: Sequence[float], duration: float, samples: int | None = None) -> SlidingRun:
+        """Run of a sample over a time [s]."""
+        share, phase = numbers[-2:]
+        return simulate_sliding(
+            self.fault,
+            self.law,
+            self.step,
+            lag=self.path.lag,
+            diffusion=self.path.diffusion,
+            stages=self.path.stages,
+            tide=Tide(amplitude=share * self.stress, period=self.period, phase=phase),
+            variation=SlidingVariation(**dict(zip(_FACTORS, numbers, strict=False))),
+            duration=duration,
+            settled_from=self.settled_from,
+            samples=samples,
+            inertia=PLANTS[self.plant],
+            method=self.method,
+        )
+
+    def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
+        """Figures, then times of events, one sample a row; nan for what there is not."""
+        duration = steps * float(self.step)
+        return np.array([_told(self.run([float(v) for v in row], duration, 1)) for row in np.atleast_2d(starts)])
+
+
+def _told(run: SlidingRun) -> list[float]:
+    measured = run.metrics.to_dict()
+    found = [measured[name] for name in _FIGURES] + [run.events.get(name) for name in EVENTS]
+    return [math.nan if value is None else float(value) for value in found]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SlidingProblem(CampaignProblem):
+    """Friction with a state, held in slow sliding; see `CampaignProblem`. The scheme has the stages of the pressure.
+
+    Attributes
+    ----------
+    method : str
+    stress, stress_period : float
+        Bound [Pa] and period [s] of the stress.
+    """
+
+    method: str
+    stress: float
+    stress_period: float
+
+    def __post_init__(self) -> None:
+        require_nonnegative(stress=self.stress)
+        require_positive(stress_period=self.stress_period)
+        require_known(self.method, adaptive_integrators(), "method")
+        require_known(self.plant, PLANTS, "plant of a fault with a state", UnknownNameError)
+        if self.controller is None or self.controller.of_slip is None or self.controller.sampling is None:
+            raise ParameterError(
+                "a campaign with friction that has a state needs a law of samples that is told the slip alone. "
+                f"Received {self.controller}. Give an elqr that design found."
+            )
+        if self.scheme != simulation_scheme("explicit", actuator=getattr(self.scheme, "actuator", DIRECT)):
+            raise ParameterError(
+                "slow sliding is told the slip as it is and has a solver of its own. Received another scheme, noise, a "
+                "sensor or substeps. Leave them out."
+            )
+
+    @cached_property
+    def program(self) -> SlidingProgram:
+        """See `Problem.program`."""
+        law: Any = self.controller
+        return SlidingProgram(
+            fault=self.fault,
+            law=law.of_slip,
+            step=law.sampling.step,
+            path=PressurePath.of(law.sampling, getattr(self.scheme, "actuator", DIRECT)),
+            stress=self.stress,
+            period=self.stress_period,
+            plant=self.plant,
+            method=self.method,
+            settled_from=self.setting.settled_from,
+        )
+
+    def start(self, sample: Sample) -> "np.ndarray":
+        """See `Problem.start`."""
+        return np.array([sample.numbers[name] for name in (*_FACTORS, "amplitude", "phase")])
+
+    def results(self, ends: "Sequence[np.ndarray]") -> list[SampleResult]:
+        """See `Problem.results`."""
+        return [self._result(end.tolist()) for end in ends]
+
+    def _result(self, end: list[float]) -> SampleResult:
+        known = {name: v for name, v in zip((*_FIGURES, *EVENTS), end, strict=True) if not math.isnan(v)}
+        happened = {name: known.pop(name) for name in EVENTS if name in known}
+        return SampleResult(figures=known, events=happened)
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """See `Problem.metrics`."""
+        return _FIGURES
+
+    @cached_property
+    def criterion(self) -> OutcomeCriterion:
+        """With the speed at which inertia or damping carries the nominal fault."""
+        return criterion_of(self.fault)
+
+    @property
+    def own_inputs(self) -> dict[str, Any]:
+        """See `Problem.own_inputs`."""
+        return {"method": self.method, "stress": self.stress, "stress_period": self.stress_period}
+
+    def trajectory(self, sample: Sample, samples: int) -> SlidingRun:
+        """See `Problem.trajectory`."""
+        return self.program.run(self.start(sample).tolist(), self.setting.steps * self.setting.step, samples)
+
+
+def sliding_space(fault: Fault, spread: Fraction) -> Space:
+    """Space of a, b and D_c off by a share of their values [-], of the fault's box, and of a sine of stress.
+
+    Raises
+    ------
+    ParameterError
+        For a spread that is not from 0 to below 1.
+    """
+    if not 0 <= spread < 1:
+        raise ParameterError(f"a spread must be from 0 to below 1. Received {shortly(spread)}. Change it.")
+    box = fault.box
+    widths = {**dict.fromkeys(FRICTION, spread), "normal_stress": box.authority}
+    widths |= {"stiffness": box.stiffness, "damping": box.damping}
+    ranges = {name: (float(1 - widths[name]), float(1 + widths[name])) for name in _FACTORS}
+    return Space(MappingProxyType(ranges | {"amplitude": (0.0, 1.0), "phase": (0.0, 2 * math.pi)}))
+
+
+# ----------------------------------------------------------------------
+# One step of a loop as text, and the compiled call that repeats it for many samples.
+
+Mover = Callable[["np.ndarray", int], None]
+SLICE = 200_000  # steps of all samples together in one call of compiled code, which is deaf: a fraction of a second
+
+
+@dataclass(frozen=True, kw_only=True)
+class Library:
+    """Compiled source, bound to its content: whoever loads it makes sure that it is what was built.
+
+    Attributes
+    ----------
+    path : Path
+    digest : str
+    """
+
+    path: Path
+    digest: str
+
+    @classmethod
+    def of(cls, path: Path) -> "Library":
+        """Library that has just been built in a private place."""
+        return cls(path=path, digest=_digest(path.read_bytes()))
+
+    def content(self) -> bytes:
+        """What was built.
+
+        Raises
+        ------
+        OSError
+            When it is not there any more, or something else is.
+        """
+        content = self.path.read_bytes()
+        if _digest(content) != self.digest:
+            raise OSError(f"{self.path} is not what was built")
+        return content
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompiledProgram:
+    """What a worker needs to move samples on; it can be sent anywhere.
+
+    Attributes
+    ----------
+    source : str
+        C text with ``advance_samples``, which steps several of them at once.
+    function : str
+        The step with all elementary functions written out, as CasADi writes it, for workers without a C compiler.
+    size : int
+        Length of the vector of one sample.
+    diverged : int
+        Index of the time of divergence in it.
+    library : Library or None
+        Where somebody has compiled the source already.
+    """
+
+    lanes: ClassVar[int] = LANES
+    batch_steps: ClassVar[int] = 80_000_000
+
+    source: str
+    function: str
+    size: int
+    diverged: int
+    library: Library | None = None
+
+    @classmethod
+    def of(cls, step: Any, diverged: int) -> "CompiledProgram":
+        """Program of a CasADi Function that maps the vector one step on."""
+        source, function = lanes_c(step, diverged), expanded(step).serialize()
+        return cls(source=source, function=function, size=step.size1_in(0), diverged=diverged)
+
+    @property
+    def fingerprint(self) -> str:
+        """Digest of the arithmetic of one step."""
+        return hashlib.sha256(self.function.encode()).hexdigest()
+
+    def compiled(self, folder: Path) -> "CompiledProgram":
+        """Program whose library lies in a folder, which must be private; the same program where no compiler works."""
+        try:
+            command = compiler()
+            built = shared_library(self.source, folder, command, (*LANE_FLAGS, *processor_flags(command)))
+            return replace(self, library=Library.of(built))
+        except (OSError, subprocess.SubprocessError):
+            return self
+
+    def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
+        """Vectors after a number of steps, one a row, in slices that can be interrupted; one that diverges ends there.
+
+        Parameters
+        ----------
+        starts : ndarray
+            Shape (samples, size).
+        steps : int
+        """
+        move = mover(self)
+        vectors = np.array(starts, dtype=np.float64, order="C", ndmin=2)
+        slice_ = max(1, SLICE // len(vectors))
+        for taken in range(0, steps, slice_):
+            move(vectors, min(slice_, steps - taken))
+        return vectors
+
+
+@lru_cache(maxsize=8)
+def mover(program: CompiledProgram) -> Mover:
+    """Callable (vectors, steps) that moves vectors, one a row, on in place: machine code where it can be had.
+
+    A library that is missing or is not what was built, as on another machine, is built anew.
+    """
+    with temporary_folder() as folder:
+        for given in (program, replace(program, library=None)):
+            try:
+                if library := (given if given.library else given.compiled(folder)).library:
+                    return _machine_code(library.content(), folder, program.size)
+            except (OSError, AttributeError):
+                continue
+    return _virtual_machine(program)
+
+
+def _machine_code(content: bytes, folder: Path, size: int) -> Mover:
+    library = folder / f"{_digest(content)}.so"  # of another name than one that is loaded already, and refused
+    library.write_bytes(content)
+    loaded = ctypes.CDLL(str(library))
+    if not loaded.made_for_this_processor():
+        raise OSError("the library was built for another processor")
+    advance = loaded.advance_samples
+    rows = np.ctypeslib.ndpointer(dtype=np.float64, ndim=2, flags="C_CONTIGUOUS")
+    advance.argtypes, advance.restype = [rows, ctypes.c_longlong, ctypes.c_longlong], ctypes.c_int
+
+    def move(vectors: "np.ndarray", steps: int) -> None:
+        assert vectors.shape[1] == size
+        if advance(vectors, len(vectors), steps):
+            raise ArithmeticError("the compiled step failed")
+
+    return move
+
+
+def _virtual_machine(program: CompiledProgram) -> Mover:
+    rungs = ladder(ca.Function.deserialize(program.function))
+    advancer = Advancer.of(Backend(rungs, "virtual-machine", ""), [0.0] * program.size)
+    alone = Lock()  # threads share the advancer
+
+    def move(vectors: "np.ndarray", steps: int) -> None:
+        with alone:
+            for row in vectors:
+                if not row[program.diverged] >= 0:
+                    row[:] = _moved(advancer, row, steps, program.diverged)
+
+    return move
+
+
+def _moved(advancer: Advancer, start: "np.ndarray", steps: int, diverged: int) -> "np.ndarray":
+    """Vector after a number of steps, or after the one at which divergence is noticed, as in machine code."""
+    advancer.vector[:] = start
+    advancer.advance(steps)
+    if advancer.vector[diverged] >= 0:
+        advancer.vector[:] = start
+        while not advancer.vector[diverged] >= 0:
+            advancer.advance(1)
+    return advancer.vector
+
+
+# ----------------------------------------------------------------------
+# The same noise from other seeds.
+
+Value = TypeVar("Value")
+
+
+def reseeded(value: Value, seed: int) -> Value:
+    """A frozen dataclass, or a tuple, in which every entry called ``seed`` is derived from another seed.
+
+    Entries within entries are reached too; no two get the same seed, so that two noises stay independent.
+    """
+    walked: Value = _walk(value, seed, [0])
+    return walked
+
+
+def _walk(value: Any, seed: int, count: list[int]) -> Any:
+    if isinstance(value, tuple) and type(value) is tuple:
+        walked = tuple(_walk(entry, seed, count) for entry in value)
+        return walked if any(new is not old for new, old in zip(walked, value, strict=True)) else value
+    if not is_dataclass(value) or isinstance(value, type):
+        return value
+    changed = {}
+    for field in fields(value):
+        before = getattr(value, field.name)
+        after = _derived(seed, count) if field.name == "seed" else _walk(before, seed, count)
+        if after is not before:
+            changed[field.name] = after
+    return replace(value, **changed) if changed else value
+
+
+def _derived(seed: int, count: list[int]) -> int:
+    count[0] += 1
+    return int(np.random.SeedSequence(seed, spawn_key=(count[0],)).generate_state(1)[0])
+
+
+# ----------------------------------------------------------------------
+# Samples of a loop with a fixed step, many at once in compiled code.
+
+_SLICE = 4096
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SteppedProblem(CampaignProblem):
+    """Friction of slip and slip rate, with a fixed step; see `CampaignProblem`.
+
+    Attributes
+    ----------
+    method : type of Integrator
+    load : Load
+    """
+
+    method: type[Integrator]
+    load: Load
+
+    def recorder(self, sample: Sample) -> Recorder:
+        """Loop of a sample with all that is watched."""
+        numbers = dict(sample.numbers)
+        varied = Variation(**{name: numbers.pop(name) for name in names()})
+        initial = numbers["initial_slip"], numbers["initial_slip_rate"]
+        loop: Any = loop_class(self.plant)(self.fault, self.controller, load=self.load, factors=varied.values)
+        return Recorder(loop, reseeded(self.scheme, sample.noise_seed), self.setting.step, initial)
+
+    def __post_init__(self) -> None:
+        loop_class(self.plant)
+
+    def start(self, sample: Sample) -> "np.ndarray":
+        """See `Problem.start`."""
+        return np.array(self.recorder(sample).start(self.setting.settled_from))
+
+    def starts(self, samples: Sequence[Sample]) -> "np.ndarray":
+        """See `Problem.starts`; without noise samples differ in their first state and their factors alone."""
+        if not samples or self._noisy:
+            return super().starts(samples)
+        rows = np.tile(self.start(samples[0]), (len(samples), 1))
+        for column, name in enumerate(("initial_slip", "initial_slip_rate"), start=2):
+            rows[:, column] = [sample.numbers[name] for sample in samples]
+        rows[:, -len(names()) :] = [[sample.numbers[name] for name in names()] for sample in samples]
+        return rows
+
+    @cached_property
+    def _noisy(self) -> bool:
+        """Whether the seed of a sample tells in its start; four seeds have one start where it does not."""
+        one = self.sample(0)
+        return len({self.start(replace(one, noise_seed=seed)).tobytes() for seed in range(4)}) > 1
+
+    @cached_property
+    def _watched(self) -> Recorder:
+        """Recorder of any sample: what it computes from a vector is the same for all."""
+        return self.recorder(self.sample(0))
+
+    @cached_property
+    def criterion(self) -> OutcomeCriterion:
+        """With the natural earthquake of the nominal fault."""
+        return OutcomeCriterion.of(self.fault, natural_peak(self.fault))
+
+    @cached_property
+    def program(self) -> CompiledProgram:
+        """One step for all samples."""
+        before = ca.SX.sym("z", self._watched.size)
+        step = ca.Function(STEP, [before], [self._watched.advance(before, self.method)])
+        return CompiledProgram.of(step, self._watched.index("diverged"))
+
+    @property
+    def own_inputs(self) -> dict[str, Any]:
+        """See `Problem.own_inputs`."""
+        return {"method": self.method.name, "load": plain(self.load)}
+
+    def results(self, ends: "Sequence[np.ndarray]") -> list[SampleResult]:
+        """See `Problem.results`."""
+        vector = ca.SX.sym("z", self._watched.size)
+        observe = ca.Function("observe", [vector], [self._watched.observe(vector)])
+        slices = (ends[first : first + _SLICE] for first in range(0, len(ends), _SLICE))
+        return [self._result(end) for each in slices for end in observe(np.transpose(each)).full().T]
+
+    def _result(self, end: Any) -> SampleResult:
+        watched = self._watched.watched(end)
+        return SampleResult(figures=self._figures(watched), events=events(watched))
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """See `Problem.metrics`."""
+        return tuple(self._figures(defaultdict(lambda: 1.0, diverged=-1.0)))
+
+    def _figures(self, watched: dict[str, float]) -> dict[str, Any]:
+        measured = metrics(
+            watched,
+            controlled=self.controller is not None,
+            step=self.setting.step,
+            steps=self.setting.steps,
+            settled_from=self.setting.settled_from,
+            seconds=0.0,
+            sticks=self._watched.loop.sticks,
+            further=self._watched.scheme.described,
+        ).to_dict()
+        return {name: value for name, value in measured.items() if value is not None and name not in NOT_COMPARED}
+
+    def trajectory(self, sample: Sample, samples: int) -> Trajectory:
+        """See `Problem.trajectory`."""
+        return run(self.recorder(sample), replace(self.setting, samples=samples), self.method, self.criterion)

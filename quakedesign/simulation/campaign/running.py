@@ -1,42 +1,153 @@
-"""A campaign from beginning to end, or from where it was left."""
+"""Execution of a campaign: dispatch of batches with bounded retries, and resumption."""
 
 import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from fractions import Fraction
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from quakedesign.controllers import Controller
 from quakedesign.errors import ParameterError
-from quakedesign.executors import crew_of
+from quakedesign.exact import rational
 from quakedesign.fault import Fault
-from quakedesign.fault.checks import require_seed
-from quakedesign.loop.schemes import Scheme, own_way
-from quakedesign.output import sole_writer
-from quakedesign.rationals import rational
-from quakedesign.simulation.campaign.dispatch import dispatch
+from quakedesign.fault.model import require_seed
+from quakedesign.files import sole_writer, temporary_folder
+from quakedesign.laws import Controller
+from quakedesign.loop import Scheme
+from quakedesign.loop.schemes import own_way
+from quakedesign.parallel import Crew, crew_of
+from quakedesign.simulation.campaign.campaign_result import Campaign, Failure, badness, metric_names, require_metric
 from quakedesign.simulation.campaign.ledger import Ledger
-from quakedesign.simulation.campaign.problem import Problem, Program, SampleResult
-from quakedesign.simulation.campaign.result import Campaign, Failure, badness, metric_names, require_metric
-from quakedesign.simulation.campaign.search import Worst, search
-from quakedesign.simulation.campaign.sliding import SlidingProblem, sliding_space
-from quakedesign.simulation.campaign.space import Sample, Space, require_count
-from quakedesign.simulation.campaign.stepped import SteppedProblem
-from quakedesign.simulation.integrators import integrator
-from quakedesign.simulation.integrators.dormand_prince import DormandPrince
-from quakedesign.simulation.loading import Load
-from quakedesign.simulation.run import own_path, sampled_scheme
-from quakedesign.simulation.setting import Setting
-from quakedesign.simulation.sliding_conditions import TIDE
-from quakedesign.temporary import temporary_folder
-from quakedesign.workers import Crew
+from quakedesign.simulation.campaign.problem import (
+    CampaignProblem,
+    CampaignProgram,
+    SampleResult,
+    SlidingProblem,
+    SteppedProblem,
+    sliding_space,
+)
+from quakedesign.simulation.campaign.space import Sample, Space, Worst, require_count, search
+from quakedesign.simulation.closed_loop import Load
+from quakedesign.simulation.integrators import DormandPrince, integrator
+from quakedesign.simulation.run import RunSetting, own_path, sampled_scheme
+from quakedesign.simulation.state_plant import TIDE
 
-if TYPE_CHECKING:
-    import numpy as np
+# ----------------------------------------------------------------------
+# Batches handed to workers until each has an answer or has failed a bounded number of times.
+
+ATTEMPTS = 3
+_MOST_DEATHS = 2 * ATTEMPTS  # in a row: then the workers themselves do not live
+_DEATH = (
+    "a worker died (out of memory, or killed; in a script, the call belongs under if __name__ == '__main__':), "
+    "each time that this batch was computed"
+)
+
+
+def dispatch(
+    task: Callable[..., Any],
+    batches: Mapping[int, tuple[Any, ...]],
+    crew: Crew,
+    keep: Callable[[int, Any], None],
+) -> dict[int, str]:
+    """Reasons why batches failed, by their key; none for those whose answer was kept.
+
+    A worker that dies takes the whole pool along, so that the guilty batch is not known: all that were under way are
+    suspects, and are computed again one at a time. Only a batch that was alone is charged with a death.
+
+    Parameters
+    ----------
+    task : callable
+        Computes one batch from its arguments.
+    batches : mapping of int to tuple
+        Arguments, by key.
+    crew : Crew
+    keep : callable
+        Called with key and answer, in any order.
+    """
+    return _Dispatch(task, batches, crew, keep).run()
+
+
+class _Dispatch:
+    def __init__(
+        self, task: Callable[..., Any], batches: Mapping[int, tuple[Any, ...]], crew: Crew, keep: Callable[..., None]
+    ) -> None:
+        self._task, self._batches, self._crew, self._keep = task, batches, crew, keep
+        self._waiting, self._suspects = deque(batches), deque[int]()
+        self._running: dict[Future[Any], int] = {}
+        self._charges = Counter[int]()
+        self._failed: dict[int, str] = {}
+        self._deaths = 0
+
+    def run(self) -> dict[int, str]:
+        while self._waiting or self._suspects or self._running:
+            dead = self._fill()
+            done = wait(self._running, return_when=FIRST_COMPLETED).done if self._running and not dead else ()
+            for future in done:
+                dead += self._collect(self._running.pop(future), future)
+            if dead:
+                self._bury([*dead, *self._left()])
+        return self._failed
+
+    def _fill(self) -> list[int]:
+        """Start as many batches as are worth it; those that a broken executor refused."""
+        while (self._suspects and not self._running) or (
+            self._waiting and not self._suspects and len(self._running) < self._crew.width
+        ):
+            key = (self._suspects or self._waiting).popleft()
+            try:
+                self._running[self._crew.submit(self._task, *self._batches[key])] = key
+            except BrokenExecutor:
+                return [key]
+        return []
+
+    def _collect(self, key: int, future: "Future[Any]") -> list[int]:
+        """Keep an answer, or charge the batch with its error; a batch whose worker died is returned."""
+        try:
+            answer = future.result()
+        except BrokenExecutor:
+            return [key]
+        except (Exception, CancelledError) as error:
+            self._charge(key, " ".join(f"{type(error).__name__}: {error}".split()), self._waiting)
+            return []
+        self._deaths = 0
+        self._keep(key, answer)
+        return []
+
+    def _bury(self, dead: list[int]) -> None:
+        """Renew the workers and decide who is suspected of the death."""
+        self._running.clear()
+        self._deaths += 1
+        if self._deaths > _MOST_DEATHS:
+            self._failed |= dict.fromkeys((*dead, *self._suspects, *self._waiting), _DEATH)
+            self._suspects.clear()
+            self._waiting.clear()
+            return
+        self._crew.renew()
+        if len(dead) == 1:
+            self._charge(dead[0], _DEATH, self._suspects)
+        else:
+            self._suspects.extend(dead)
+
+    def _left(self) -> list[int]:
+        """Batches under way that the broken workers leave without an answer."""
+        done, pending = wait(self._running, timeout=1.0)
+        lost = [key for future in done for key in self._collect(self._running[future], future)]
+        return lost + [self._running[future] for future in pending]
+
+    def _charge(self, key: int, reason: str, queue: "deque[int]") -> None:
+        self._charges[key] += 1
+        if self._charges[key] < ATTEMPTS:
+            queue.append(key)
+        else:
+            self._failed[key] = reason
+
+
+# ----------------------------------------------------------------------
+# A campaign from beginning to end, or from where it was left.
 
 LARGEST_BATCH = 1024
 BATCHES_PER_WORKER = 8
@@ -62,7 +173,7 @@ def campaign_problem(
     stress: float = 0.0,
     stress_period: float = TIDE,
     seed: int = 0,
-) -> Problem:
+) -> CampaignProblem:
     """Closed loop and the space of its samples.
 
     Parameters
@@ -98,7 +209,7 @@ def campaign_problem(
         "fault": fault,
         "controller": controller,
         "scheme": way,
-        "setting": Setting.of(fault, step, duration, 1, settled_from),
+        "setting": RunSetting.of(fault, step, duration, 1, settled_from),
         "plant": plant,
         "seed": seed,
     }
@@ -120,7 +231,7 @@ def campaign_problem(
 
 
 def run_campaign(
-    problem: Problem,
+    problem: CampaignProblem,
     samples: int,
     folder: str | Path,
     *,
@@ -142,7 +253,7 @@ def run_campaign(
 
     Parameters
     ----------
-    problem : Problem
+    problem : CampaignProblem
         See `campaign_problem`.
     samples : int
         Number of samples; number i depends on the seed and on i alone.
@@ -196,7 +307,7 @@ def run_campaign(
     )
 
 
-def _ends(program: Program, starts: "np.ndarray", steps: int) -> "np.ndarray":
+def _ends(program: CampaignProgram, starts: "np.ndarray", steps: int) -> "np.ndarray":
     return program.ends(starts, steps)
 
 
@@ -204,7 +315,13 @@ class _Runner:
     """Results of samples, from the ledger or from the crew."""
 
     def __init__(
-        self, problem: Problem, ledger: Ledger, program: Program, crew: Crew, batch: int | None, tell: Tell
+        self,
+        problem: CampaignProblem,
+        ledger: Ledger,
+        program: CampaignProgram,
+        crew: Crew,
+        batch: int | None,
+        tell: Tell,
     ) -> None:
         self._problem, self._ledger, self._program, self._crew = problem, ledger, program, crew
         self._sent = crew.shared(program)

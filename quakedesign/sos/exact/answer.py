@@ -7,8 +7,8 @@ from pathlib import Path
 
 from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.polynomial_files import save
+from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares, holds
-from quakedesign.sos.exact.statement import Statement
 from quakedesign.sos.exact.work import limited
 
 

@@ -1,22 +1,43 @@
-"""Regions of attraction by a Lyapunov function: what is claimed of a polynomial field, and whether its proof holds.
+"""Regions of attraction of polynomial fields by Lyapunov functions: claim, proof, files.
 
-V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite. Where a pure power of every state is
-in a basis of the squares of V, V is positive and grows without bound; where one is in a basis of σ_0 or σ_1, V̇ < 0
-where V < level, but at the origin. Then {V < level} is bounded, is never left, and every solution in it tends to zero.
+The claim holds if V and μ·(−V̇) are given as sums of squares with positive definite Gram matrices for V <
+level; see the first chapter. Further chapters: files of regions (proofs/FORMAT.md) and of fields (TOML).
 """
 
+import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
-from quakedesign.errors import PolynomialError
+from quakedesign.errors import CertificateError, PolynomialError
+from quakedesign.files import parse_toml, read_text
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination, constant, degree, evaluate, product
-from quakedesign.sos.exact.proofs import Point, SumOfSquares, holds
-from quakedesign.sos.exact.squares import Square
-from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.polynomial_files import TERMS, plain_proof, read_proof, variables
+from quakedesign.sos.exact.polynomial_statement import Statement
+from quakedesign.sos.exact.proofs import Point, Square, SumOfSquares, holds
+from quakedesign.sos.exact.strict import (
+    headed,
+    listed,
+    parse,
+    polynomial_text,
+    read_polynomial,
+    read_rational,
+    write_readable,
+)
 from quakedesign.sos.exact.work import limited
+
+# ----------------------------------------------------------------------
+# Regions of attraction by a Lyapunov function: what is claimed of a polynomial field, and whether its proof holds.
+#
+# V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite. Where a pure power of every state
+# is
+# in a basis of the squares of V, V is positive and grows without bound; where one is in a basis of σ_0 or σ_1, V̇ < 0
+# where V < level, but at the origin. Then {V < level} is bounded, is never left, and every solution in it tends to
+# zero.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -223,3 +244,118 @@ def _statement(
         degree=top + top % 2,
         multiplier=multiplier,
     )
+
+
+# ----------------------------------------------------------------------
+# The file about a region of attraction (proofs/FORMAT.md): read strictly, written whole.
+
+_CLAIM = {"variables", "field", "V", "level"}
+_PROOF = {"multiplier", "positive", "decrease"}
+
+
+def read(raw: Any) -> Attraction:
+    """Claim and proof of a parsed file; reading verifies nothing.
+
+    Raises
+    ------
+    CertificateError
+        When it breaks a rule of FORMAT.md.
+    """
+    refuted = isinstance(raw, dict) and "negative" in raw
+    headed(raw, _CLAIM | ({"negative"} if refuted else _PROOF), "attraction")
+    names = variables(raw)
+    size = len(names)
+    field = listed(raw["field"], "field", length=size)
+    level = listed(raw["level"], "level", 1)
+    try:
+        claim = Attraction(
+            variables=names,
+            field=tuple(read_polynomial(f, "field", size, TERMS) for f in field),
+            lyapunov=read_polynomial(raw["V"], "V", size, TERMS),
+            level=read_rational(level[0]) if level else None,
+            multiplier=constant(size) if refuted else read_polynomial(raw["multiplier"], "multiplier", size, TERMS),
+        )
+        return _with_proof(claim, raw, refuted)
+    except PolynomialError as error:
+        raise CertificateError(str(error)) from None
+
+
+def _with_proof(claim: Attraction, raw: dict[str, Any], refuted: bool) -> Attraction:
+    if refuted:
+        return replace(claim, proof=read_proof(raw["negative"], "negative", claim.positive))
+    found = [read_proof(raw[part], "sos", getattr(claim, part)) for part in ("positive", "decrease")]
+    return replace(claim, proof=LyapunovProof(positive=found[0], decrease=found[1]))
+
+
+def load(text: str) -> Attraction:
+    """Claim and proof of the text of a file. Raises CertificateError as `read`."""
+    return read(parse(text))
+
+
+def text(claim: Attraction) -> str:
+    """Text of the file, the same for the same proof.
+
+    Raises
+    ------
+    CertificateError
+        When there is no proof.
+    """
+    proof = claim.proof
+    if proof is None:
+        raise CertificateError("only a proof can be saved. Received an undecided answer.")
+    plain: dict[str, Any] = {
+        "format": 1,
+        "kind": "attraction",
+        "variables": list(claim.variables),
+        "field": [polynomial_text(f) for f in claim.field],
+        "V": polynomial_text(claim.lyapunov),
+        "level": [] if claim.level is None else [str(claim.level)],
+    }
+    if isinstance(proof, Point):
+        plain |= plain_proof(proof)
+    else:
+        plain["multiplier"] = polynomial_text(claim.multiplier)
+        plain |= {part: plain_proof(getattr(proof, part))["sos"] for part in ("positive", "decrease")}
+    return json.dumps(plain, ensure_ascii=True, separators=(",", ":")) + "\n"
+
+
+def save_attraction(claim: Attraction, path: str | Path) -> None:
+    """Write the file whole or not at all, and only if it can be read again.
+
+    Raises
+    ------
+    CertificateError
+        When there is no proof, or it is beyond the limits of the format.
+    OutputError
+        When the folder cannot be written.
+    """
+    write_readable(path, text(claim), load)
+
+
+# ----------------------------------------------------------------------
+# A polynomial field and a Lyapunov function from a TOML file.
+
+_LARGEST = 1 << 16  # bytes
+
+
+def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
+    """Rates of the states by name, from the table ``field``, and V where the file has one; all as text.
+
+    Raises
+    ------
+    PolynomialError
+        When the file cannot be read, or has other contents.
+    """
+    content = read_text(path, "a field's file", largest=_LARGEST, refusal=PolynomialError)
+    try:
+        raw = parse_toml(content)
+    except ValueError as error:
+        reason = str(error).partition("\n")[0]
+        raise PolynomialError(f"{path} must be TOML. Received: {reason}. Quote polynomials.") from None
+    field, function = raw.get("field"), raw.get("V")
+    texts = isinstance(field, dict) and all(isinstance(rate, str) for rate in field.values())
+    if not raw.keys() <= {"field", "V"} or not texts or not isinstance(function, str | None):
+        raise PolynomialError(
+            f'{path} must have a table [field], such as x = "-x + x^3", and at most V = "x^2" before it.'
+        )
+    return dict(field or {}), function

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import CertificateError, PolynomialError
-from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares
-from quakedesign.sos.exact.squares import Element, Square
-from quakedesign.sos.exact.statement import Statement
+from quakedesign.sos.exact.polynomial_statement import Statement
+from quakedesign.sos.exact.proofs import Element, Functional, Point, Proof, Square, SumOfSquares
 from quakedesign.sos.exact.strict import (
     common_grid,
     headed,

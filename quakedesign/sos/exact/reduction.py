@@ -14,7 +14,7 @@ from typing import Any
 
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, times
-from quakedesign.sos.exact.statement import Statement, parity, residue
+from quakedesign.sos.exact.polynomial_statement import Statement, parity, residue
 from quakedesign.sos.exact.work import spend
 
 _MONOMIALS, _PAIRS = 2_000, 8_000_000

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, NoReturn, cast
 
 from quakedesign.errors import CertificateError
-from quakedesign.output import write_whole
-from quakedesign.rationals import exact_text
+from quakedesign.exact import exact_text
+from quakedesign.files import write_whole
 
 LARGEST_FILE = 4 << 20
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")

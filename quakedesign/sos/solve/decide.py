@@ -10,16 +10,15 @@ from typing import Any
 from flint import fmpq, fmpq_mat
 
 from quakedesign.errors import PolynomialError
-from quakedesign.rationals import fraction_of, nearest
+from quakedesign.exact import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree
+from quakedesign.sos.exact.polynomial_statement import Statement, Structure
 from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds, identity_holds
 from quakedesign.sos.exact.reduction import full_bases, parity_classes, reduced_bases
-from quakedesign.sos.exact.statement import Statement, Structure
-from quakedesign.sos.solve.faces import Block, at_kernels, at_real_zeros, at_zeros, modulo
-from quakedesign.sos.solve.moment import MomentProgram, Solution
+from quakedesign.sos.solve.facial_reduction import Block, at_kernels, at_real_zeros, at_zeros, modulo
+from quakedesign.sos.solve.moment import MomentProgram, MomentSolution
 from quakedesign.sos.solve.points import local_minima, negative_point, polished_zeros, rational_zeros
-from quakedesign.sos.solve.rounding import relations, rounded
-from quakedesign.sos.solve.scaling import Scaled, decimal_units, scaled
+from quakedesign.sos.solve.rounding import Scaled, decimal_units, relations, rounded, scaled
 
 _STRICT = 1e-7
 _ROUNDS = 4
@@ -29,7 +28,7 @@ KERNELS = ((1e-6, 1e-5), (1e-6, 1e-7), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2),
 
 
 @dataclass
-class Search:
+class StatementSearch:
     """One statement under way.
 
     Attributes
@@ -87,7 +86,7 @@ class Search:
 
     def _solve(
         self, blocks: list[Block], accuracy: float = _ACCURACIES[0]
-    ) -> tuple[Solution | None, MomentProgram | None]:
+    ) -> tuple[MomentSolution | None, MomentProgram | None]:
         if not blocks:
             return None, None
         rows = [{e: float(c) for e, c in r.items()} for r in self.relations]
@@ -97,7 +96,7 @@ class Search:
         target = {e: float(c) for e, c in self.statement.target.items()}
         return program.solve(target, accuracy), program
 
-    def _hints(self, solution: Solution | None) -> list[list[float]]:
+    def _hints(self, solution: MomentSolution | None) -> list[list[float]]:
         """First moments of the functional, where it has a mass."""
         if solution is None:
             return []
@@ -126,7 +125,7 @@ class Search:
                 return self._finish(Functional(values={e: Fraction(-1 if target[e] > 0 else 1)}))
         return None
 
-    def _refute(self, program: MomentProgram, solution: Solution) -> Proof | None:
+    def _refute(self, program: MomentProgram, solution: MomentSolution) -> Proof | None:
         target = {e: float(c) for e, c in self.statement.target.items()}
         interior = program.interior(target, solution.margin / 2)
         for values in (interior, solution.functional) if interior is not None else (solution.functional,):
@@ -144,7 +143,7 @@ class Search:
             exact = _project(exact, self.relations)
         return {e: v for e, v in exact.items() if v}
 
-    def _on_faces(self, candidates: Any, solution: Solution | None) -> Proof | None:
+    def _on_faces(self, candidates: Any, solution: MomentSolution | None) -> Proof | None:
         zeros = rational_zeros(self.statement, candidates, self.units)
         blocks = at_zeros(self.blocks, zeros) if zeros else self.blocks
         for accuracy in _ACCURACIES:
@@ -170,9 +169,9 @@ class Search:
             blocks = smaller
         return None
 
-    def _nothing(self) -> Solution:
+    def _nothing(self) -> MomentSolution:
         """Answer without squares, where only multiples of the equalities are left."""
-        return Solution(margin=1.0, grams=[], moments=[], functional={}, cofactors=[0.0] * len(self.relations))
+        return MomentSolution(margin=1.0, grams=[], moments=[], functional={}, cofactors=[0.0] * len(self.relations))
 
 
 def strict_proof(asked: Statement) -> SumOfSquares | None:
@@ -180,7 +179,7 @@ def strict_proof(asked: Statement) -> SumOfSquares | None:
 
     Whether the multiplier is positive is the caller's question.
     """
-    search = Search(asked)
+    search = StatementSearch(asked)
     solution = search._solve(search.blocks)[0]
     if solution is None or not solution.margin > 0:
         return None

@@ -1,30 +1,130 @@
-"""Questions about positivity, answered with a proof or with ``undecided``."""
+"""Search for a proof of positivity: methods, multipliers, and the undecided answer.
 
+Methods: Gram matrices by conic programming with rounding, and factorisation into a square and a rest.
+Multipliers are powers of the sum of squares, or sums of squares found in floating point. Exact arithmetic
+decides every proof.
+"""
+
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from importlib.metadata import version
 from math import comb
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 from quakedesign.errors import PolynomialError, WorkError
-from quakedesign.rationals import rational
+from quakedesign.exact import nearest, rational
 from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.polynomial import (
+    Exponents,
     Polynomial,
     combination,
+    constant,
     degree,
     from_sympy,
+    monomials,
     product,
+    rescaled,
     square_factor,
 )
-from quakedesign.sos.exact.proofs import SumOfSquares, multiplier_is_positive
-from quakedesign.sos.exact.reading import read
-from quakedesign.sos.exact.statement import Statement, statement
-from quakedesign.sos.solve.decide import block_sizes
-from quakedesign.sos.solve.methods import methods
-from quakedesign.sos.solve.multipliers import searched
+from quakedesign.sos.exact.polynomial_statement import Statement, statement
+from quakedesign.sos.exact.polynomial_text import read
+from quakedesign.sos.exact.proofs import (
+    Proof,
+    SumOfSquares,
+    as_element,
+    as_polynomial,
+    in_echelon_form,
+    multiplier_is_positive,
+)
+from quakedesign.sos.exact.reduction import invariant
+from quakedesign.sos.solve.decide import StatementSearch, block_sizes, strict_proof
+from quakedesign.sos.solve.joint import Demand, joint_program
+from quakedesign.sos.solve.rounding import scaled
+
+# ----------------------------------------------------------------------
+# Multipliers of a polynomial on ℝⁿ: powers of the sum of squares, and sums of squares that are searched for it.
+#
+# A sum of squares σ of a degree with σ·P a sum of squares is a linear question. σ is found in floating point, in
+# scaled
+# variables, then rounded, and proved to be a sum of squares; whether σ·P is one is decided exactly by who asks.
+
+_TERMS = 40  # of σ, so that the programme is solved within seconds
+_GRID = 2**8  # of its coefficients
+_LEAST = 1e-5  # margin of σ, whose coefficients are at most one
+
+
+def searched(variables: tuple[str, ...], polynomial: Polynomial, top: int) -> Polynomial | None:
+    """Sum of squares σ of one degree, a form where P is one, for which σ·P may be one; None if none is found."""
+    moved = scaled(statement(variables, polynomial))
+    target = moved.statement.polynomial
+    used = [i for i in range(len(variables)) if any(e[i] for e in target)]
+    form = len({sum(e) for e in target}) == 1
+    terms = [
+        e
+        for e in monomials(len(variables), top, top if form else 0)
+        if not any(k for i, k in enumerate(e) if i not in used) and invariant(moved.statement, e)
+    ]
+    values = _centred(variables, target, terms) if 0 < len(terms) <= _TERMS else None
+    if values is None:
+        return None
+    rounded = {e: nearest(v, _GRID) for e, v in zip(terms, values, strict=True)}
+    multiplier = rescaled({e: c for e, c in rounded.items() if c}, tuple(1 / s for s in moved.scale))
+    return multiplier if strict_proof(statement(variables, multiplier)) is not None else None
+
+
+def _centred(variables: tuple[str, ...], target: Polynomial, terms: list[Exponents]) -> list[float] | None:
+    """Coefficients of σ, at most one, with the largest t for which σ − t·Σ m² is a sum of squares."""
+    squares = {e: Fraction(1) for e in terms if not any(k % 2 for k in e)}
+    own: list[Polynomial] = [{e: Fraction(1)} for e in terms]
+    multiplied = [product(len(variables), (target, p)) for p in own]
+    demands = [_demand(variables, own, squares), _demand(variables, multiplied, {})]
+    proposal = joint_program(demands).solve(demands)
+    return proposal.decision if proposal is not None and proposal.margin > _LEAST else None
+
+
+def _demand(variables: tuple[str, ...], parts: Sequence[Polynomial], margin: Polynomial) -> Demand:
+    template = statement(variables, {e: Fraction(1) for p in (*parts, margin) for e in p})
+    return Demand(template=template, parts=parts, margin=margin)
+
+
+# ----------------------------------------------------------------------
+# What every way to a proof offers.
+
+
+class Method(ABC):
+    """A search that may end in a proof; exact arithmetic decides whether it is one.
+
+    Attributes
+    ----------
+    name : str
+    order : int
+        Lower ones, which are cheaper, are tried first.
+    """
+
+    name: ClassVar[str]
+    order: ClassVar[int]
+
+    @abstractmethod
+    def propose(self, asked: Statement) -> Proof | None:
+        """Proof of exactly this statement, which is not that zero is a sum of squares; None if none is found."""
+
+
+# ----------------------------------------------------------------------
+# Ways to find a proof of one statement.
+
+
+@cache
+def methods() -> tuple[Method, ...]:
+    """Every method, in the order in which they are tried."""
+    return SquareFactor(), Conic()
+
+
+# ----------------------------------------------------------------------
+# Questions about positivity, answered with a proof or with ``undecided``.
 
 _GROWTH = (0, 2)
 _SEARCHED = (2, 4)  # degrees of searched multipliers
@@ -46,7 +146,7 @@ def prove(
     Parameters
     ----------
     polynomial : str, SymPy expression or mapping of exponents to Fraction
-        With rational coefficients; text in the grammar of `quakedesign.sos.exact.text`.
+        With rational coefficients; text in the grammar of `quakedesign.sos.exact.polynomial_text`.
     on : sequence of str or SymPy relation
         Constraints of the set such as ``"x >= 0"``, ``"x^2 + y^2 <= 1"``, ``"x*y == 1"``; ℝⁿ unless given.
     multiplier : str, SymPy expression or mapping, optional
@@ -201,3 +301,54 @@ def _squares_of_multiplier(asked: Statement) -> Any:
 
 
 __all__ = ["decide", "from_sympy", "prove"]
+
+
+# ----------------------------------------------------------------------
+# Gram matrices by conic programming, rounded.
+
+
+class Conic(Method):
+    """Solve, round, look for a point, refute, pass to a face; see `quakedesign.sos.solve.decide`."""
+
+    name: ClassVar[str] = "conic"
+    order: ClassVar[int] = 2
+
+    def propose(self, asked: Statement) -> Proof | None:
+        """See `Method.propose`."""
+        return StatementSearch(asked).run()
+
+
+# ----------------------------------------------------------------------
+# Polynomials with a square factor.
+
+
+class SquareFactor(Method):
+    """Proof for s²·r from one for r."""
+
+    name: ClassVar[str] = "square-factor"
+    order: ClassVar[int] = 1
+
+    def propose(self, asked: Statement) -> SumOfSquares | None:
+        """See `Method.propose`; None as well where r has no sum of squares.
+
+        A square in the multiplier may be what makes r one, so that the polynomial's own is tried alone as well.
+        """
+        count = len(asked.variables)
+        whole = replace(asked, polynomial=asked.target, multiplier=constant(count))
+        parts = {degree(root): (root, replace(part, polynomial=rest))
+                 for part in (asked, whole) for root, rest in [square_factor(part.polynomial, count)]}  # fmt: skip
+        proofs = (_multiplied(*parts[d], asked.degree - 2 * d) for d in sorted(parts, reverse=True) if d)
+        return next((proof for proof in proofs if proof is not None), None)
+
+
+def _multiplied(root: Polynomial, left: Statement, bound: int) -> SumOfSquares | None:
+    """Proof of what is left beside root², up to a degree, times root²."""
+    inner = decide(replace(left, degree=bound)).proof if bound >= 0 else None
+    if not isinstance(inner, SumOfSquares):
+        return None
+    count = len(left.variables)
+    squares = tuple(
+        in_echelon_form(replace(s, basis=tuple(as_element(product(count, (root, as_polynomial(b)))) for b in s.basis)))
+        for s in inner.squares
+    )
+    return SumOfSquares(squares=squares, cofactors=tuple(product(count, (root, root, q)) for q in inner.cofactors))

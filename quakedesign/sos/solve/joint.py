@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, product
-from quakedesign.sos.exact.statement import Statement, Structure
+from quakedesign.sos.exact.polynomial_statement import Statement, Structure
 from quakedesign.sos.solve.conic import Compiled, in_cones
 from quakedesign.sos.solve.decide import initial_blocks
-from quakedesign.sos.solve.faces import modulo
+from quakedesign.sos.solve.facial_reduction import modulo
 from quakedesign.sos.solve.moment import MomentProgram
 from quakedesign.sos.solve.rounding import relations
 
@@ -50,7 +50,7 @@ class Demand:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
+class DecisionBounds:
     """Bounds on the decisions x: |x_j| ≤ radius_j, row·x ≤ bound for every row, and Σ_j share_j|x_j| ≤ 1.
 
     Attributes
@@ -112,7 +112,7 @@ class JointProgram:
         self,
         demands: Sequence[Demand],
         fixed: Sequence[Polynomial] | None = None,
-        limits: Limits | None = None,
+        limits: DecisionBounds | None = None,
     ) -> Proposal | None:
         """Decision with the largest margin for demands of the same structure; None if the solver fails.
 
@@ -121,7 +121,7 @@ class JointProgram:
         demands : sequence of Demand
         fixed : sequence of Polynomial, optional
             C_o, in the monomials of the demand's template; nothing unless given.
-        limits : Limits, optional
+        limits : DecisionBounds, optional
             All |x_j| ≤ 1 unless given.
 
         Raises
@@ -129,7 +129,7 @@ class JointProgram:
         ValueError
             When a monomial occurs that the structure does not have.
         """
-        within = limits or Limits(radii=[1.0] * self._count)
+        within = limits or DecisionBounds(radii=[1.0] * self._count)
         kind = len(within.bounds), len(within.shares)
         if kind not in self._stated:
             self._stated[kind] = _Stated(self._shapes, self._count, *kind)

@@ -47,7 +47,7 @@ class Shape:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Solution:
+class MomentSolution:
     """Floating-point answer; proves nothing.
 
     Attributes
@@ -105,7 +105,7 @@ class MomentProgram:
         """Whether every monomial of a target can be produced at all."""
         return all(e in self.index for e in target)
 
-    def solve(self, target: Mapping[Exponents, float], accuracy: float = 1e-9) -> Solution | None:
+    def solve(self, target: Mapping[Exponents, float], accuracy: float = 1e-9) -> MomentSolution | None:
         """Largest margin for a target whose coefficients are about one; None if the solver fails.
 
         On a set without interior the largest margin may not be attained. Then a smaller one is asked for.
@@ -137,7 +137,7 @@ class MomentProgram:
         self.solver_seconds = perf_counter() - began  # its own solve_time holds the set-up of the first solve
         return answer if useful(answer) else None
 
-    def _solution(self, answer: Any) -> Solution:
+    def _solution(self, answer: Any) -> MomentSolution:
         x, z, s = (np.array(v) for v in (answer.x, answer.z, answer.s))
         count = 1 + self.relation_count
         margin = -z[0]
@@ -147,7 +147,7 @@ class MomentProgram:
             grams.append(_full(z[start:stop], block.size) + margin * np.eye(block.size))
             moments.append(_full(s[start:stop], block.size))
             start = stop
-        return Solution(
+        return MomentSolution(
             margin=float(margin),
             grams=grams,
             moments=moments,

@@ -1,4 +1,7 @@
-"""Positivity with decision variables: solved by cvxpy and Clarabel, rounded, and proved polynomial by polynomial."""
+"""Sum-of-squares programmes with decision variables, solved, rounded and proved.
+
+The solver is Clarabel through cvxpy. `Membership` solves many polynomials of one shape with one model.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,17 +13,21 @@ import numpy as np
 from scipy.sparse import diags_array
 
 from quakedesign.errors import PolynomialError
-from quakedesign.rationals import nearest, rational
+from quakedesign.exact import nearest, rational
 from quakedesign.sos.exact.answer import Answer, Positivity
-from quakedesign.sos.exact.definiteness import positive_definite
-from quakedesign.sos.exact.polynomial import Exponents, combination, degree
-from quakedesign.sos.exact.reading import read
-from quakedesign.sos.exact.statement import statement
+from quakedesign.sos.exact.polynomial import Exponents, combination, degree, positive_definite
+from quakedesign.sos.exact.polynomial_statement import Statement, statement
+from quakedesign.sos.exact.polynomial_text import read
 from quakedesign.sos.solve.conic import Compiled, solve
+from quakedesign.sos.solve.decide import initial_blocks
 from quakedesign.sos.solve.engine import decide
-from quakedesign.sos.solve.faces import Block, at_kernels
-from quakedesign.sos.solve.forced import Forced, Requirement
-from quakedesign.sos.solve.moment import pairs
+from quakedesign.sos.solve.facial_reduction import Block, at_kernels
+from quakedesign.sos.solve.forced_equations import Forced, Requirement
+from quakedesign.sos.solve.moment import MomentProgram, pairs
+from quakedesign.sos.solve.rounding import relations
+
+# ----------------------------------------------------------------------
+# Positivity with decision variables: solved by cvxpy and Clarabel, rounded, and proved polynomial by polynomial.
 
 _ROOM = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 _BITS = (4, 8, 12, 18, 24, 32)
@@ -405,3 +412,48 @@ def _definite(vector: Any, rows: list[list[dict[Any, Any]]], margin: Any) -> Any
         unit = tuple(int(i == k) for i in range(len(zero)))
         total = total + vector[k] * np.array([[float(entry.get(unit, 0)) for entry in row] for row in rows])
     return total - margin * np.eye(size) >> 0
+
+
+# ----------------------------------------------------------------------
+# Many polynomials of one shape: modelled once, solved with the solver's data updated in place.
+
+
+class Membership:
+    """Largest margins of polynomials whose monomials are among those of one statement.
+
+    Parameters
+    ----------
+    template : Statement
+        Fixes set, degree, multiplier and, by its polynomial, the monomials that may occur.
+    """
+
+    def __init__(self, template: Statement) -> None:
+        self.template = template
+        self.solver_seconds = 0.0
+        rows = [{e: float(c) for e, c in r.items()} for _, _, r in relations(template)]
+        self._program = MomentProgram([b.shape() for b in initial_blocks(template)], rows)
+
+    def margin(self, polynomial: Mapping[Exponents, Any]) -> float:
+        """Largest t with polynomial − t·Σ b² in the cone, in floating point: no proof; NaN when the solver fails.
+
+        Raises
+        ------
+        PolynomialError
+            When it has a monomial that the template's polynomial does not have.
+        """
+        unknown = [e for e in polynomial if e not in self.template.polynomial]
+        if unknown:
+            raise PolynomialError(f"monomials must be those of the template. Received another one: {unknown[0]}.")
+        asked = polynomial
+        if len(self.template.multiplier) != 1 or any(map(any, self.template.multiplier)):
+            asked = replace(self.template, polynomial={e: Fraction(c) for e, c in polynomial.items()}).target
+        size = max((abs(float(c)) for c in asked.values()), default=0.0)
+        if size == 0 or not self._program.covers(asked):
+            return 0.0 if size == 0 else float("-inf")
+        margin = self._program.margin({e: float(c) / size for e, c in asked.items()}, 1e-8)
+        self.solver_seconds = self._program.solver_seconds
+        return float("nan") if margin is None else margin * size
+
+    def prove(self, polynomial: Mapping[Exponents, Fraction]) -> Answer:
+        """Exact answer for one of the polynomials."""
+        return decide(replace(self.template, polynomial=dict(polynomial)))

@@ -7,21 +7,11 @@ import numpy as np
 import pytest
 from own_parts import Smoothing
 
-from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.loop.actuators import (
-    Actuator,
-    Delay,
-    Diffusion,
-    FlowStage,
-    Lag,
-    Quantisation,
-    RateLimit,
-    SampledStage,
-    Saturation,
-    stages,
-)
+from quakedesign.laws import control_law
+from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Quantisation, RateLimit, Saturation, stages
+from quakedesign.loop.actuators.base import FlowStage, SampledStage
 from quakedesign.simulation import simulate
 
 EXAMPLES = {

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.loop.actuators import Actuator, Delay, Quantisation
+from quakedesign.loop import Actuator, Delay, Quantisation
 
 COUNT = 4000
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from quakedesign.loop.actuators import Diffusion
+from quakedesign.loop import Diffusion
 
 LAYER = {"length": 30.0, "diffusivity": 0.9, "storage": 2e-6}  # τ = 1000 s
 

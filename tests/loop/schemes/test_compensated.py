@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.laws import control_law
+from quakedesign.loop import simulation_scheme
 from quakedesign.simulation import simulate
 
 REAL = load_fault("real-fault")

@@ -7,16 +7,25 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from quakedesign.controllers import control_law, published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.loop.actuators import Actuator, Delay, Diffusion, Lag, Quantisation, RateLimit, Saturation
-from quakedesign.loop.schemes import Scheme, simulation_scheme
+from quakedesign.laws import control_law, published
+from quakedesign.loop import (
+    Actuator,
+    Delay,
+    Diffusion,
+    Lag,
+    Quantisation,
+    RateLimit,
+    Saturation,
+    Scheme,
+    schemes,
+    simulation_scheme,
+)
+from quakedesign.loop.schemes.base import Sampled
 from quakedesign.loop.sensing.measurement import Measurement
-from quakedesign.loop.steps.sampled import Sampled
-from quakedesign.simulation import schemes, simulate
+from quakedesign.simulation import integrator, simulate
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import _step
 
@@ -108,7 +117,7 @@ def test_substeps_refine_the_plant_and_not_the_control(name):
 
 @pytest.mark.parametrize("name", SAMPLED)
 def test_both_backends_give_the_same_digits_through_every_stage(name, monkeypatch):
-    monkeypatch.setattr("quakedesign.simulation.backend._WORTH", 0)
+    monkeypatch.setattr("quakedesign.simulation.compiled._WORTH", 0)
     setting = {
         "scheme": name,
         "duration": 300 * REAL.sampling_time,

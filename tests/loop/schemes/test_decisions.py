@@ -7,18 +7,18 @@ import casadi as ca
 import pytest
 import sympy as sp
 
-from quakedesign.controllers import Sampling, control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.loop.schemes import own_way, schemes, simulation_scheme
+from quakedesign.laws import Sampling, control_law
+from quakedesign.loop import discrete_law, schemes, simulation_scheme
+from quakedesign.loop.discrete_law import DiscreteLaw, acceleration, authority, held, rate_error, slip, slip_error, step
+from quakedesign.loop.schemes import own_way
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.explicit import Explicit
-from quakedesign.loop.steps import discrete_law
-from quakedesign.loop.steps.discrete_law import Law, acceleration, authority, held, rate_error, slip, slip_error, step
-from quakedesign.loop.steps.inclusion import end_rate, end_slip
+from quakedesign.loop.schemes.implicit import end_rate, end_slip
 
 ONE, TWO = sp.symbols("xi_1 xi_2", real=True)
-LAW = Law(-2 * slip_error - 3 * rate_error - 5 * ONE, (slip_error + 4 * ONE,), (ONE,))
+LAW = DiscreteLaw(-2 * slip_error - 3 * rate_error - 5 * ONE, (slip_error + 4 * ONE,), (ONE,))
 KNOWN = {slip_error: 1.0, rate_error: 3.0, ONE: 0.5, step: 0.5, authority: 4.0, held: 7.0, acceleration: 6.0, slip: 9.0}
 
 
@@ -48,7 +48,7 @@ def test_the_explicit_scheme_takes_the_law_at_the_measured_state_and_one_forward
     ],
 )
 def test_the_compensated_scheme_derives_the_pull_with_integral_states_at_zero(pressure, integrals, share, slope):
-    pull, ahead, found = Compensated.derive(Law(pressure, (slip_error,) * len(integrals), integrals))
+    pull, ahead, found = Compensated.derive(DiscreteLaw(pressure, (slip_error,) * len(integrals), integrals))
     assert (ahead, found) == (0, slope)
     assert sp.expand(pull - step * authority * (-(2 + share * step) * end_slip - 3 * end_rate)) == 0
 
@@ -91,7 +91,7 @@ def test_the_compensated_scheme_follows_the_disturbance_and_answers_it():
     ],
 )
 def test_at_rest_the_pressure_has_a_limit(asked, limit, applied, highest):
-    law = Law.of(None, float(asked))
+    law = DiscreteLaw.of(None, float(asked))
     decision = Compensated.decide(Compensated.derive(law), law, known(), [ca.SX(v) for v in (*OWN, *limit)])
     assert numbers([decision.pressure, *decision.own[11:]]) == [applied, highest, 9]
 
@@ -104,7 +104,7 @@ def test_a_feed_forward_is_added_and_known_not_to_be_a_disturbance():
 
 
 def test_a_constant_pressure_is_no_law_to_compensate():
-    assert decided(Law.of(None, 5.0)) == ([5], [], [1, 3, 5, 0, 0.3])
+    assert decided(DiscreteLaw.of(None, 5.0)) == ([5], [], [1, 3, 5, 0, 0.3])
 
 
 def test_the_compensated_scheme_starts_without_a_sample_and_in_the_middle_of_the_box():

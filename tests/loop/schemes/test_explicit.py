@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from quakedesign.controllers import control_law
 from quakedesign.fault import load_fault
+from quakedesign.laws import control_law
 from quakedesign.simulation import simulate
 
 REAL = load_fault("real-fault")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from quakedesign.loop.sensing.coefficients import LONGEST, TABLES
+from quakedesign.loop.sensing.differentiator import LONGEST, TABLES
 
 RECURSIVE = (1.1, 1.5, 2, 3, 5, 7, 10, 12, 14, 17, 20, 26, 32)  # Levant and Livne 2020
 

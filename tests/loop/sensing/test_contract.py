@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from own_parts import Backward, Offset
 
-from quakedesign.controllers import control_law
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.laws import control_law
 from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Sensor, Transducer
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import simulate

@@ -6,10 +6,15 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from quakedesign.loop import LinearLaw
-from quakedesign.loop.sensing.differences import least_bound, names_before, rate_shares, told_by_differences
-from quakedesign.loop.sensing.differentiator import Differentiator
-from quakedesign.loop.sensing.differentiator_step import lag_free
+from quakedesign.laws import LinearLaw
+from quakedesign.loop.sensing.differentiator import (
+    Differentiator,
+    lag_free,
+    least_bound,
+    names_before,
+    rate_shares,
+    told_by_differences,
+)
 
 ACCELERATION, NOISE, STEP = F("2e-3"), F("2e-6"), F("0.184")
 

@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.sensing import Differentiator
-from quakedesign.loop.sensing.accuracy import constants, error_scale, worst_errors
+from quakedesign.loop.sensing.choice import constants, error_scale, worst_errors
 from quakedesign.loop.sensing.differentiator import DISCRETISATIONS
 
 PAIRS = [(1, 0), (2, 0), (1, 1), (2, 2)]

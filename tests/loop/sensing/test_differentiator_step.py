@@ -9,8 +9,7 @@ import pytest
 import sympy as sp
 
 from quakedesign.loop.sensing import Differentiator
-from quakedesign.loop.sensing.coefficients import TABLES
-from quakedesign.loop.sensing.differentiator_step import lag_free
+from quakedesign.loop.sensing.differentiator import TABLES, lag_free
 
 ORDERS = [(1, 0), (2, 0), (1, 2), (2, 2), (3, 1), (5, 2), (8, 4), (12, 0), (1, 11)]
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from quakedesign.controllers import control_law, published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.laws import control_law, published
+from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing import Differentiator, OutputFeedback, joint_condition, smallest_bound
-from quakedesign.loop.sensing.joint_choice import pressure_swing
+from quakedesign.loop.sensing.choice import pressure_swing
 from quakedesign.simulation import simulate
 
 LAB = load_fault("lab-fault")

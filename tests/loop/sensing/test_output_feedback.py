@@ -6,10 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.laws import published
+from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Transducer
 from quakedesign.simulation import simulate
 

@@ -4,9 +4,8 @@ from concurrent.futures import BrokenExecutor, CancelledError, Future
 
 import pytest
 
-from quakedesign.executors import Given, SerialExecutor
-from quakedesign.simulation.campaign.dispatch import ATTEMPTS, dispatch
-from quakedesign.workers import Crew
+from quakedesign.parallel import Crew, Given, SerialExecutor
+from quakedesign.simulation.campaign.running import ATTEMPTS, dispatch
 
 
 class Frail(Crew):

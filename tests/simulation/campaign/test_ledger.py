@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import OutputError, SimulationError
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.files import FAMILY, PREFIX
+from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing import Transducer
 from quakedesign.simulation.campaign.ledger import Ledger, differences, plain
-from quakedesign.temporary import FAMILY, PREFIX
 
 INPUTS = {"seed": 1, "controller": {"gains": {"k1": "7"}}}
 

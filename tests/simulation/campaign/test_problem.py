@@ -8,10 +8,10 @@ import pytest
 import sympy as sp
 from scipy.linalg import expm
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.laws import published
+from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Load, Variation, simulate
 from quakedesign.simulation.campaign import campaign_problem

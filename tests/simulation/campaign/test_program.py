@@ -6,15 +6,15 @@ import os
 import numpy as np
 import pytest
 
-from quakedesign.controllers import published
 from quakedesign.fault import load_fault
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.laws import published
+from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Variation, simulate
-from quakedesign.simulation.backend import compiler, shared_library
 from quakedesign.simulation.campaign import campaign_problem
-from quakedesign.simulation.campaign import program as program_module
-from quakedesign.simulation.campaign.program import mover
+from quakedesign.simulation.campaign import problem as program_module
+from quakedesign.simulation.campaign.problem import mover
+from quakedesign.simulation.compiled import compiler, shared_library
 
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]  # sampled at 1 ms it is on the verge of instability (ERRATA 22)
@@ -103,7 +103,8 @@ def test_a_library_that_is_gone_is_built_anew(ends, tmp_path):
 
 def test_nothing_compiled_in_its_folder_changes_a_campaign(ends, plant, tmp_path):
     """Whatever a folder of results holds comes from whoever may write there."""
-    from quakedesign.simulation.campaign import SerialExecutor, run_campaign
+    from quakedesign.parallel import SerialExecutor
+    from quakedesign.simulation.campaign import run_campaign
 
     folder = tmp_path / "campaign"
     run_campaign(PROBLEM, 2, folder, executor=SerialExecutor())
@@ -117,7 +118,7 @@ def test_nothing_compiled_in_its_folder_changes_a_campaign(ends, plant, tmp_path
 
 def test_a_sample_is_what_simulate_gives():
     """Without an initial state, simulate() takes the same arguments."""
-    from quakedesign.simulation.campaign.reseeding import reseeded
+    from quakedesign.simulation.campaign.problem import reseeded
 
     problem = campaign_problem(LAB, LAW, scheme=SCHEME, duration=0.1)
     sample = problem.sample(3)

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing import Transducer
 from quakedesign.loop.sensing.measurement import Measurement
-from quakedesign.simulation.campaign.reseeding import reseeded
+from quakedesign.simulation.campaign.problem import reseeded
 
 
 @dataclass(frozen=True)

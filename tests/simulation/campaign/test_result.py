@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
+from quakedesign.laws import published
 from quakedesign.simulation.campaign import Campaign, SampleResult, campaign_problem
-from quakedesign.simulation.campaign.result import LEVELS, Failure
+from quakedesign.simulation.campaign.campaign_result import LEVELS, Failure
 
 PROBLEM = campaign_problem(load_fault("lab-fault"), published("lab-fault")["elqr"], duration=0.1)
 RANDOM = np.random.default_rng(0)

@@ -13,12 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quakedesign.controllers import published
 from quakedesign.errors import OutputError, ParameterError, SimulationError
 from quakedesign.fault import load_fault
-from quakedesign.loop.schemes import simulation_scheme
+from quakedesign.laws import published
+from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
-from quakedesign.simulation.campaign import SerialExecutor, campaign_problem, run_campaign
+from quakedesign.parallel import SerialExecutor
+from quakedesign.simulation.campaign import campaign_problem, run_campaign
 
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]
@@ -135,7 +136,7 @@ def test_an_interruption_leaves_what_is_done(serial, tmp_path):
 KILLED = """
 import json, os, random, signal, sys, time
 from dataclasses import replace
-from quakedesign.controllers import published
+from quakedesign.laws import published
 from quakedesign.fault import load_fault
 from quakedesign.simulation.campaign import SerialExecutor, campaign_problem, run_campaign
 from quakedesign.loop.sensing.measurement import Measurement

@@ -6,8 +6,7 @@ from types import MappingProxyType
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.simulation.campaign.search import corners, neighbours, search
-from quakedesign.simulation.campaign.space import Space
+from quakedesign.simulation.campaign.space import Space, corners, neighbours, search
 
 PAPER = Space.of(load_fault("lab-fault"))
 MIDDLE = [0.5] * len(PAPER.ranges)

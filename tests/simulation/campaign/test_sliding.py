@@ -10,19 +10,19 @@ import pytest
 from matplotlib.figure import Figure
 
 from quakedesign import simulate, synthesis
-from quakedesign.certificates.guarantee import Held
 from quakedesign.cli import main
-from quakedesign.controllers import published
 from quakedesign.errors import ParameterError, UnknownNameError
-from quakedesign.executors import Given
 from quakedesign.fault import load_fault
-from quakedesign.loop import LinearLaw
-from quakedesign.simulation import Actuator, Lag, Load, Measurement, Tide, simulation_scheme
-from quakedesign.simulation.campaign import Campaign, SerialExecutor, campaign_problem, run_campaign, running
+from quakedesign.guarantees import Held
+from quakedesign.guarantees.search.lqg import sliding_law, sliding_model
+from quakedesign.laws import LinearLaw, published
+from quakedesign.loop import Actuator, Lag, simulation_scheme
+from quakedesign.loop.sensing import Measurement
+from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.simulation import Load, Tide
+from quakedesign.simulation.campaign import Campaign, campaign_problem, run_campaign, running
 from quakedesign.simulation.campaign.ledger import Ledger
-from quakedesign.simulation.sliding_conditions import SlidingVariation
-from quakedesign.synthesis.linear.plant.sliding_model import sliding_model
-from quakedesign.synthesis.linear.sampled.slow_sliding import sliding_law
+from quakedesign.simulation.state_plant import SlidingVariation
 
 PATCH, STEP, PATH = load_fault("crustal-patch"), Fraction(300), Fraction(800)
 LAW = sliding_law(sliding_model(PATCH), STEP, diffusion=PATH)

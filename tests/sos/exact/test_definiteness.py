@@ -7,7 +7,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quakedesign.sos.exact.definiteness import full_matrix, over_common_denominator, positive_definite
+from quakedesign.sos.exact.polynomial import full_matrix, over_common_denominator, positive_definite
 
 entries = st.fractions(-3, 3, max_denominator=5)
 

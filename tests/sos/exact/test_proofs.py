@@ -5,10 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quakedesign.sos.exact.definiteness import full_matrix, nonnegative_definite, positive_definite
-from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares, holds, identity_holds
-from quakedesign.sos.exact.squares import Square, as_element, in_echelon_form
-from quakedesign.sos.exact.statement import statement
+from quakedesign.sos.exact.polynomial import full_matrix, nonnegative_definite, positive_definite
+from quakedesign.sos.exact.polynomial_statement import statement
+from quakedesign.sos.exact.proofs import (
+    Functional,
+    Point,
+    Square,
+    SumOfSquares,
+    as_element,
+    holds,
+    identity_holds,
+    in_echelon_form,
+)
 
 ONE = Fraction(1)
 X2_2XY_2Y2 = {(2, 0): ONE, (1, 1): Fraction(-2), (0, 2): Fraction(2)}

@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 from quakedesign.errors import ParameterError, PolynomialError
-from quakedesign.sos.exact.reading import read
+from quakedesign.sos.exact.polynomial_text import read
 
 x, y, z = sp.symbols("x y z")
 

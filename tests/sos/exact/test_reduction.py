@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from quakedesign.errors import PolynomialError
-from quakedesign.sos.exact import text
+from quakedesign.sos.exact import polynomial_text as text
+from quakedesign.sos.exact.polynomial_statement import statement
 from quakedesign.sos.exact.reduction import full_bases, invariant, parity_classes, reduced_bases
-from quakedesign.sos.exact.statement import statement
 
 
 def asked(polynomial, *, on=(), **options):
-    names = text.names(polynomial, *on)
+    names = text.names_in_text(polynomial, *on)
     g = tuple(text.parse_constraint(c, names)[2] for c in on)
     return statement(names, text.parse(polynomial, names)[1], inequalities=g, **options)
 

@@ -6,7 +6,7 @@ from itertools import product
 import pytest
 
 from quakedesign.errors import PolynomialError
-from quakedesign.sos.exact.statement import Statement, parity, residue, statement
+from quakedesign.sos.exact.polynomial_statement import Statement, parity, residue, statement
 
 X, Y = {(1, 0): F(1)}, {(0, 1): F(1)}
 DISC = {(0, 0): F(1), (2, 0): F(-1), (0, 2): F(-1)}

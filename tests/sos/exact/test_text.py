@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quakedesign.errors import PolynomialError, QuakedesignError
-from quakedesign.sos.exact import expansion
-from quakedesign.sos.exact.text import DEPTH, LENGTH, VARIABLES, names, parse, parse_constraint
+from quakedesign.sos.exact import polynomial_text as expansion
+from quakedesign.sos.exact.polynomial_text import DEPTH, LENGTH, VARIABLES, names_in_text, parse, parse_constraint
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ NUMBERS = ["nan", "NaN", "NAN", "inf", "Inf", "INF", "infinity", "Infinity", "oo
 
 @pytest.mark.parametrize("name", NUMBERS)
 def test_the_name_of_a_number_is_a_variable_only_where_it_is_declared(name):
-    for read in (parse, names, lambda text: parse_constraint(f"{text} >= 0")):
+    for read in (parse, names_in_text, lambda text: parse_constraint(f"{text} >= 0")):
         with pytest.raises(PolynomialError, match=rf"at character 7\..*x\^2 \+ ⟦{name}⟧ .*Write numbers in digits"):
             read(f"x^2 + {name}")
     assert parse(f"x^2 + {name}", ["x", name]) == (("x", name), {(2, 0): 1, (0, 1): 1})
@@ -67,7 +67,7 @@ SIXTEEN = [f"v{i}" for i in range(16)]
 
 
 def test_as_many_and_as_long_names_as_allowed_are_read():
-    assert names(*SIXTEEN) == names("+".join(SIXTEEN)) == parse("1", SIXTEEN)[0] == tuple(SIXTEEN)
+    assert names_in_text(*SIXTEEN) == names_in_text("+".join(SIXTEEN)) == parse("1", SIXTEEN)[0] == tuple(SIXTEEN)
     assert parse("+".join(SIXTEEN))[0] == tuple(SIXTEEN)
     assert parse("x" * 32)[0] == parse("1", "x" * 32)[0] == ("x" * 32,)
     with pytest.raises(PolynomialError, match="a name of at most 32"):
@@ -98,9 +98,9 @@ def test_constraints_are_read_as_differences(text, kind, polynomial):
 
 
 def test_variables_of_several_texts_are_collected_in_order():
-    assert names("y*x + 1", "z >= x", "w == 0") == ("y", "x", "z", "w")
+    assert names_in_text("y*x + 1", "z >= x", "w == 0") == ("y", "x", "z", "w")
     with pytest.raises(PolynomialError, match="at most 16"):
-        names(*(f"v{i}" for i in range(17)))
+        names_in_text(*(f"v{i}" for i in range(17)))
 
 
 @pytest.mark.parametrize(
@@ -219,7 +219,7 @@ def test_hostile_text_is_refused_in_bounded_memory():
     program = """
 import json, resource, sys
 from quakedesign.errors import PolynomialError
-from quakedesign.sos.exact.text import parse
+from quakedesign.sos.exact.polynomial_text import parse
 resource.setrlimit(resource.RLIMIT_AS, (500 * 2**20,) * 2)
 refused = 0
 for text in json.load(sys.stdin):

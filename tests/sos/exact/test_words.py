@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quakedesign.sos.exact import text
+from quakedesign.sos.exact import polynomial_text as text
 from quakedesign.sos.exact.answer import Answer
+from quakedesign.sos.exact.polynomial_statement import statement
 from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares
-from quakedesign.sos.exact.statement import statement
 from quakedesign.sos.exact.words import polynomial_words, sentences
 
 WRITTEN = {

@@ -9,24 +9,33 @@ from pathlib import Path
 
 import pytest
 
-from quakedesign.certificates import load_certificate
-from quakedesign.certificates.command import check_files
+from quakedesign.checking import check_files
 from quakedesign.errors import WorkError
+from quakedesign.lyapunov import load_certificate
 from quakedesign.sos import Answer, Positivity
 from quakedesign.sos.exact import work
-from quakedesign.sos.exact.definiteness import (
+from quakedesign.sos.exact.polynomial import (
     _eliminates,
+    evaluate,
     nonnegative_definite,
     positive_definite,
     positive_definite_integers,
+    product,
 )
-from quakedesign.sos.exact.polynomial import evaluate, product
 from quakedesign.sos.exact.polynomial_files import read as read_polynomial_file
-from quakedesign.sos.exact.proofs import Functional, _functional_holds, _sum, localizing_matrix
+from quakedesign.sos.exact.polynomial_statement import Statement
+from quakedesign.sos.exact.polynomial_statement import statement as usual
+from quakedesign.sos.exact.proofs import (
+    Functional,
+    IntegerGram,
+    Square,
+    _functional_holds,
+    _sum,
+    form,
+    integer_gram,
+    localizing_matrix,
+)
 from quakedesign.sos.exact.reduction import _contributions, reach
-from quakedesign.sos.exact.squares import IntegerGram, Square, form, integer_gram
-from quakedesign.sos.exact.statement import Statement
-from quakedesign.sos.exact.statement import statement as usual
 from quakedesign.sos.exact.work import STEPS, TERMS, expanded, length, limited, longest, spend
 from quakedesign.sos.solve.engine import prove
 

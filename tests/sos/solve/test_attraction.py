@@ -18,11 +18,10 @@ from scipy.integrate import solve_ivp
 from quakedesign import sos
 from quakedesign.cli import main
 from quakedesign.errors import PolynomialError
-from quakedesign.sos.exact.attraction_files import load, text
-from quakedesign.sos.exact.field_files import read_field
+from quakedesign.sos.exact.attraction import load, read_field, text
 from quakedesign.sos.exact.polynomial_files import load as load_polynomial
 from quakedesign.sos.exact.proofs import Point
-from quakedesign.sos.solve import attraction
+from quakedesign.sos.solve import attraction_search as attraction
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "howto" / "region_of_attraction.md").read_text(encoding="utf-8")

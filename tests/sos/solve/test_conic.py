@@ -4,8 +4,8 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from quakedesign.sos.exact import text
-from quakedesign.sos.exact.statement import statement
+from quakedesign.sos.exact import polynomial_text as text
+from quakedesign.sos.exact.polynomial_statement import statement
 from quakedesign.sos.solve.conic import Compiled, in_cones, stated_problems
 from quakedesign.sos.solve.conic import solve as solved
 from quakedesign.sos.solve.joint import shape_of

@@ -11,8 +11,7 @@ from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.proofs import Square, SumOfSquares
 from quakedesign.sos.exact.words import sentences
 from quakedesign.sos.solve import engine
-from quakedesign.sos.solve.methods import methods
-from quakedesign.sos.solve.methods.base import Method
+from quakedesign.sos.solve.engine import Method, methods
 
 ALL = {method.name: method for method in (*methods(), Monomials())}
 POSITIVE = ("3*x^4*y^2", "x^2 + 1", "x^4 - 2*x^2 + 1", "(x - y)^2*(x^2 + 1)", "x^2*y^2 + x^2 + y^2")

@@ -5,11 +5,11 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from quakedesign.sos.exact import text
-from quakedesign.sos.exact.statement import statement
+from quakedesign.sos.exact import polynomial_text as text
+from quakedesign.sos.exact.polynomial_statement import statement
 from quakedesign.sos.solve.decide import initial_blocks
-from quakedesign.sos.solve.membership import Membership
 from quakedesign.sos.solve.moment import MomentProgram
+from quakedesign.sos.solve.program import Membership
 
 
 def program_of(polynomial):

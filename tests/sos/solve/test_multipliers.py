@@ -6,9 +6,9 @@ import pytest
 
 from quakedesign import sos
 from quakedesign.sos.exact.polynomial_files import load, text
-from quakedesign.sos.exact.text import parse
-from quakedesign.sos.solve import multipliers
-from quakedesign.sos.solve.multipliers import searched
+from quakedesign.sos.exact.polynomial_text import parse
+from quakedesign.sos.solve import engine as multipliers
+from quakedesign.sos.solve.engine import searched
 
 MOTZKIN = "{x}^4*{y}^2 + {x}^2*{y}^4 + {z}^6 - 3*{x}^2*{y}^2*{z}^2"
 STRETCHED = MOTZKIN.format(x="x", y="(1000*y)", z="(z/100)")

@@ -6,9 +6,9 @@ import pytest
 
 from quakedesign import sos
 from quakedesign.sos.exact.polynomial import evaluate
-from quakedesign.sos.exact.reading import read
-from quakedesign.sos.exact.statement import statement
-from quakedesign.sos.solve.decide import Search
+from quakedesign.sos.exact.polynomial_statement import statement
+from quakedesign.sos.exact.polynomial_text import read
+from quakedesign.sos.solve.decide import StatementSearch
 from quakedesign.sos.solve.points import local_minima, negative_point
 
 DIRECTIONS = ((F(1), F(0)), (F(0), F(1)), (F(3, 5), F(4, 5)), (F(5, 13), F(-12, 13)), (F(-8, 17), F(15, 17)))
@@ -20,7 +20,7 @@ def negative(polynomial, on):
     """Point that the search finds, without any programme, checked here by hand; None if it finds none."""
     names, p, inequalities, equalities, _ = read(polynomial, on, None, None)
     asked = statement(names, p, inequalities=inequalities, equalities=equalities)
-    search = Search(asked)
+    search = StatementSearch(asked)
     found = negative_point(search.statement, list(local_minima(search.statement)), search.units)
     if found is None:
         return None

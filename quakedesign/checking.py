@@ -1,0 +1,152 @@
+"""Re-checking files for people: a verdict and what exactly was verified."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from quakedesign import fault as faults
+from quakedesign import guarantees, lyapunov
+from quakedesign.errors import CertificateError, WorkError
+from quakedesign.lyapunov.exact.certificate import Certificate
+from quakedesign.lyapunov.exact.certificate_files import (
+    ATTRACTION,
+    GUARANTEE,
+    LOOP,
+    SLOW_SLIDING,
+    entry_lines,
+    evidence_of,
+    kind_of,
+    read_json,
+)
+from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.sos.exact.answer import Answer, Positivity
+from quakedesign.sos.exact.attraction import read as read_attraction
+from quakedesign.sos.exact.polynomial_files import read as read_polynomial_file
+from quakedesign.sos.exact.words import claim_words, sentences, statement_words
+from quakedesign.symbolic.terms import written
+
+if TYPE_CHECKING:
+    from quakedesign.fault import Fault
+    from quakedesign.guarantees import SlidingTask, Task
+    from quakedesign.guarantees.exact.guarantee_files import Claim
+
+
+def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tuple[str, list[str]]]:
+    """Verdict (``proved``, ``refuted`` or ``invalid: reason``) and statement for every file.
+
+    Raises
+    ------
+    CertificateError
+        For a file that cannot be read.
+    QuakedesignError
+        For a fault that cannot be read.
+    """
+    plant = faults.load_fault(fault) if fault else None
+    return {str(path): _checked(path, plant) for path in paths}
+
+
+def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
+    try:
+        known = path.is_file()
+    except (OSError, ValueError):
+        known = False
+    if not known:
+        raise CertificateError(f"certificate must be a file. Received {path}, which is none. Check the path.")
+    try:
+        raw = read_json(path)
+        kind = kind_of(raw)
+        if kind in (GUARANTEE, SLOW_SLIDING):
+            return _running(raw, fault)
+        if kind != LOOP:
+            verdict_of, said = _attraction(raw) if kind == ATTRACTION else _polynomial(raw)
+            return verdict_of, said if fault is None else [
+                *said,
+                f'names no fault: nothing is said about "{fault.name}"',
+            ]
+        certificate = Certificate.of(evidence_of(raw))
+        verdict = certificate.check()
+        more = lyapunov.covers(certificate, fault) if fault is not None and verdict is Verdict.PROVED else []
+    except WorkError as error:
+        return f"undecided: {error}", []
+    except CertificateError as error:
+        return f"invalid: {' '.join(str(error).split())}", []
+    return str(verdict), [*statement(certificate), *more]
+
+
+def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
+    """Verdict on a file about a loop that runs, and whether its data are those of a fault."""
+    claim = guarantees.read_guarantee(raw)
+    if claim.check() is not Verdict.PROVED:
+        raise CertificateError("the claims do not follow from the loop and the fault's data")
+    about = entry_lines(guarantees.guarantee_document(claim))
+    lines = [f'fault "{claim.task.name}", by the data in the file', claim.sentence(), *about]
+    if fault is not None:
+        if claim.task != replace(_task(claim, fault), name=claim.task.name):
+            raise CertificateError(f'the data are not those of "{fault.name}"')
+        lines.append(f'the data are those of "{fault.name}"{_other_step(claim, fault)}')
+    return str(Verdict.PROVED), lines
+
+
+def _task(claim: "Claim", fault: "Fault") -> "Task | SlidingTask":
+    """What a claim of the kind would be about on a fault."""
+    if not isinstance(claim, guarantees.SlidingGuarantee):
+        return guarantees.task_of(fault, rate_limited=claim.task.change is not None)
+    low, high = claim.task.ranges["direct_effect"]
+    return guarantees.sliding_task(fault, claim.task.stress, (high - low) / (high + low))
+
+
+def _other_step(claim: "Claim", fault: "Fault") -> str:
+    """The box, and that a loop is not sampled as the fault is, where it is so."""
+    if isinstance(claim, guarantees.SlidingGuarantee):
+        return ""
+    said = f", box {fault.box.name}"
+    if isinstance(claim, guarantees.ContinuousPeaks) or float(claim.held.step) == fault.sampling_time:
+        return said
+    return f"{said}; NOT at its T_s = {fault.sampling_time:g} s, but at {float(claim.held.step):.4g} s"
+
+
+def _polynomial(raw: Any) -> tuple[str, list[str]]:
+    """Verdict on a file about a plain polynomial."""
+    statement, proof = read_polynomial_file(raw)
+    answer = Answer(statement=statement, proof=proof)
+    if not answer.check():
+        raise CertificateError("the proof does not decide the statement")
+    kind = "proved" if answer.verdict is Positivity.SOS else "refuted"
+    lines = [line for line in sentences(answer) if not line.endswith("exact arithmetic")]
+    return kind, [*lines, *statement_words(answer)]
+
+
+def _attraction(raw: Any) -> tuple[str, list[str]]:
+    """Verdict on a file about a region of attraction."""
+    claim = read_attraction(raw)
+    if not claim.check():
+        raise CertificateError("the proof does not decide the claim")
+    return claim.verdict, claim_words(claim)
+
+
+def statement(certificate: Certificate) -> list[str]:
+    """What a certificate says, in lines."""
+    loop = certificate.loop
+    lines = [f"law {loop.law}, field equal to the law's own"]
+    lines.append(", ".join(f"{name} = {v}" for name, v in loop.parameters.items()))
+    weights = ", ".join(f"{name} = {weight}" for name, weight in loop.states.items())
+    lines.append(f"domain: {loop.domain}; states with weights: {weights}")
+    lines.append(", ".join(f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()))
+    lines += [
+        f"{name} in [{low}, {high}] is the positive square root of {of}"
+        for name, (of, (low, high)) in loop.roots.items()
+    ]
+    lines += [f"argument of a nested power: {lift} = {written(terms)}" for lift, terms in loop.lifts.items()]
+    lines += [f"{state}' = {written(terms)}" for state, terms in loop.field.items()]
+    if certificate.refutation is not None:
+        found = certificate.refutation
+        point = ", ".join(f"{name}: {v}" for name, v in found.point.items())
+        lines.append(f"Filippov equilibrium away from the origin, in cell coordinates {point}")
+        for of, values in (("parameters", found.parameters), ("weights of the cells", found.weights)):
+            lines += [f"{of}: {', '.join(f'{name} = {v}' for name, v in values.items())}"] if values else []
+        return lines
+    lines.append("V = " + " + ".join(f"({written([term])})" for term in certificate.lyapunov))
+    lines.append("SignedPower(x, a) is |x|^a with the sign of x, AbsolutePower(x, a) is |x|^a")
+    lines.append("claims: " + ", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
+    return lines

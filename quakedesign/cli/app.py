@@ -1,0 +1,176 @@
+"""What all commands share: the application, output and progress."""
+
+import json
+import logging
+import os
+import shlex
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from itertools import combinations
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+from cyclopts import App
+from rich.console import Console
+from rich.text import Text
+
+from quakedesign.discovery import allow_code
+from quakedesign.errors import OutputError, ParameterError
+from quakedesign.files import require_room
+from quakedesign.text import in_lines, visible
+
+_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+_log = logging.getLogger("quakedesign")
+_typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
+
+
+def typed(arguments: Sequence[str]) -> None:
+    """Keep what was typed, for `command_line`; speak until `hush` is called, and run no code that files name."""
+    _typed.set(tuple(arguments))
+    allow_code(False)
+    hush(quiet=False, level="warning")
+
+
+def hush(*, quiet: bool, level: str) -> None:
+    """Say nothing for people from here on, or say what is being done on stderr, from a level of logging on."""
+    _quiet.set(quiet)
+    for handler in _log.handlers[:]:
+        _log.removeHandler(handler)
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    _log.addHandler(handler)
+    _log.propagate = False
+    _log.setLevel(level.upper())
+
+
+def command_line() -> str:
+    """Command that runs, as it was typed; empty outside one."""
+    return shlex.join(("quakedesign", *_typed.get())) if _typed.get() else ""
+
+
+app = App(
+    name="quakedesign",
+    help="Design controllers that let a fault slip slowly instead of in an earthquake, and prove that they do.",
+    version_flags=["--version"],
+    suppress_keyboard_interrupt=False,
+)
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("quakedesign")
+
+
+app.version = _version
+
+
+def given(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options that were given."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def refuse(options: Mapping[str, Any], what: str) -> None:
+    """Refuse options that belong to something else, if any is given.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if names := list(given(options)):
+        raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Leave it out.")
+
+
+def print_json(value: dict[str, Any]) -> None:
+    """Print an answer as JSON on stdout."""
+    print(json.dumps(value, indent=1, allow_nan=False))
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print an answer in words on stdout."""
+    screen = console()
+    for line in lines:
+        screen.print(line)
+
+
+class _Screen(Console):
+    """Console on which a string is text: no markup, no emoji, nothing that a terminal would obey, no endless line."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Lines that are wider than a terminal go on below their beginning; files and pipes get them whole."""
+        if self.is_terminal:
+            objects = tuple(self._wrapped(told) if isinstance(told, str) else told for told in objects)
+        super().print(*objects, **options)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(f"\n{_hanging(text)}".join(in_lines(visible(text))), **options)
+
+    def _wrapped(self, text: str) -> Text:
+        below = _hanging(text)
+        lines = wrap(visible(text), self.width, subsequent_indent=below, break_long_words=False, break_on_hyphens=False)
+        return Text("\n".join(lines))
+
+
+def _hanging(text: str) -> str:
+    """Margin of what goes on below a line."""
+    return " " * (len(text) - len(text.lstrip(" ")) + 2)
+
+
+def console(**options: Any) -> Console:
+    """Console for people, on stdout unless told; every string is one line of text, a long one several."""
+    return _Screen(quiet=_quiet.get(), markup=False, emoji=False, highlight=False, soft_wrap=True, **options)
+
+
+def new_file(path: Path | None, what: str, *, force: bool) -> None:
+    """Refuse an existing file before the work begins.
+
+    Raises
+    ------
+    OutputError
+        When it exists and force is not given, or cannot be written.
+    """
+    if path is None:
+        return
+    if os.path.exists(path) and not force:
+        raise OutputError(f"{what} must be new. Received {path}, which exists. Give --force to replace it.")
+    if os.path.isdir(path):
+        raise OutputError(f"{what} must be a file. Received {path}, which is a folder. Choose another --out.")
+    require_room(path)
+
+
+def require_different(places: Mapping[str, Path | None]) -> None:
+    """Refuse two names for one place, so that what is read is not replaced.
+
+    Raises
+    ------
+    OutputError
+    """
+    named = {name: os.path.realpath(path) for name, path in places.items() if path is not None}
+    for one, other in combinations(named, 2):
+        if named[one] == named[other]:
+            raise OutputError(
+                f"{one} and {other} must be different files. Received {places[one]} for both. Choose another."
+            )
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, float], None]]:
+    """Progress bar on stderr, which leaves stdout to the answer."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    columns = TextColumn("{task.description:44}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
+    console = Console(stderr=True)
+    shown = console.is_terminal and not _quiet.get()
+    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
+        task, last = bar.add_task("starting", total=1.0), ""
+
+        def tell(what: str, done: float) -> None:
+            nonlocal last
+            bar.update(task, description=what, completed=done)
+            _log.log(logging.DEBUG if what == last else logging.INFO, "%s (%.0f %%)", visible(what), 100 * done)
+            last = what
+
+        yield tell

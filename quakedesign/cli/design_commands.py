@@ -1,0 +1,344 @@
+"""Commands `design`, `compare` and `figures`.
+
+They design, prove, simulate and compare the controllers of one fault and write the report.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from quakedesign.cli.app import app, command_line, console, print_json, print_lines, progress
+from quakedesign.cli.options import (
+    PLAIN,
+    Box,
+    DisturbanceClass,
+    ExactMetres,
+    ExactMetresPerSecond,
+    ExactPascals,
+    ExactSeconds,
+    ExactSquareMetresPerSecond,
+    FaultName,
+    Force,
+    Formats,
+    Output,
+    Shaking,
+    rock,
+)
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.files import hold
+
+if TYPE_CHECKING:
+    from quakedesign.fault import Fault
+
+
+# ----------------------------------------------------------------------
+# The main job.
+
+_SHARED = (
+    *("objective", "continuous", "measured", "slip_noise", "rate_noise"),
+    *("delay", "lag", "stress", "spread", "disturbance_class"),
+)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class DesignOptions:
+    """Which controllers are designed for a fault, and how.
+
+    Parameters
+    ----------
+    controller
+        Law to design: cta, dia, elqr or all.
+    objective
+        tracking, or peak for the smallest guaranteed slip-rate error.
+    continuous
+        Design in continuous time, as in the paper, in place of the loop that samples and holds with a guarantee.
+    measured
+        What the e-LQR that samples is told: slip-and-rate, or slip, from which it estimates the slip rate; with slip
+        sliding modes are told both as they are.
+    slip_noise
+        Bound of the error of the slip that designed laws are told, such as '1 um', in guarantees and runs.
+        --slip-noise-deviation of simulate is a standard deviation.
+    rate_noise
+        The same of the slip rate.
+    disturbance_class
+        Of the guarantee: amplitude, any disturbance as large as the fault's; rate, one that starts at 0 and is no
+        faster either, such as a tide.
+    scheme
+        Of the runs of gains designed with --continuous: continuous (unless given), as in the paper, or sampled and
+        held: explicit, implicit, semi-implicit, compensated. Others run as they were designed.
+    delay
+        From the measurement to the pressure at the valve, for which an e-LQR is designed and behind which it runs.
+    lag
+        The same of the time constant of pump and pipe.
+    diffusion
+        The same of L²/D of the rock between well and fault. With rate-and-state friction D_c/(10 V) unless given.
+    well
+        Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
+    diffusivity
+        Of the rock between well and fault, such as '0.5 m^2/s'.
+    stress
+        Of such a fault: bound of the shear stress disturbance, such as '25 kPa'; the largest that the design stands
+        unless given.
+    spread
+        Of such a fault: by how much of their values a, b and D_c may be off, such as 0.1.
+    published_scheme
+        Of the runs of published gains, see --scheme.
+    whole_task
+        Of such a fault: run all of a slow task, not 500 D_c/V of it; the proof is about all of it either way.
+    """
+
+    controller: str = "all"
+    box: Box = None
+    disturbance: Shaking = None
+    objective: Literal["tracking", "peak"] = "tracking"
+    continuous: Annotated[bool, Parameter(negative="")] = False
+    measured: Literal["slip-and-rate", "slip"] = "slip-and-rate"
+    slip_noise: ExactMetres = "0"
+    rate_noise: ExactMetresPerSecond = "0"
+    disturbance_class: DisturbanceClass = "amplitude"
+    scheme: str | None = None
+    delay: ExactSeconds = "0"
+    lag: ExactSeconds = "0"
+    diffusion: ExactSeconds | None = None
+    well: ExactMetres | None = None
+    diffusivity: ExactSquareMetresPerSecond | None = None
+    stress: ExactPascals | None = None
+    spread: str = "0"
+    published_scheme: str = "continuous"
+    whole_task: Annotated[bool, Parameter(negative="")] = False
+
+    def asked(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
+        """Fault of a name, and what `designed_comparison` is asked about it; refused before anything heavy is loaded.
+
+        Raises
+        ------
+        UnknownNameError, ParameterError
+        """
+        from quakedesign.fault import load_fault
+
+        controllers(self.controller)
+        loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
+        laws = "elqr" if self._behind(loaded) and self.controller == "all" else self._laws
+        names = controllers(laws, loaded)
+        shown = {"published_scheme": self.published_scheme, "whole_task": self.whole_task}
+        return loaded, {"names": names, **shown, **self.told()}
+
+    def _behind(self, fault: "Fault") -> bool:
+        """Whether the e-LQR alone is designed: friction without a state, behind a delay, a lag or rock."""
+        return not fault.friction.state_names and any(
+            time not in (None, "0") for time in (self.delay, self.lag, self._rock)
+        )
+
+    def told(self) -> dict[str, Any]:
+        """Options of `designed_comparison`.
+
+        Raises
+        ------
+        ParameterError
+            For a scheme of designs that have their own.
+        """
+        if self.scheme is not None and not self.continuous:
+            raise ParameterError(
+                f"--scheme is for gains designed with --continuous, others run as guaranteed. Received {self.scheme}. "
+                "Give both, or none."
+            )
+        options = {name: getattr(self, name) for name in _SHARED} | {"diffusion": self._rock}
+        return {"options": options, "scheme": self.scheme}
+
+    @property
+    def _rock(self) -> str | None:
+        """L²/D [s], however it was told."""
+        return rock(self.diffusion, self.well, self.diffusivity)
+
+    @property
+    def _laws(self) -> str:
+        """Laws that are asked for: of the slip alone the only one that there is.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if self.measured != "slip" or self.controller == "elqr":
+            return self.controller
+        if self.controller != "all":
+            raise ParameterError(
+                f"--measured slip is for the e-LQR. Received --controller {self.controller}. Leave it out."
+            )
+        return "elqr"
+
+
+_AS_USUAL = DesignOptions()
+
+
+@app.command
+def design(
+    fault: FaultName,
+    /,
+    *,
+    options: DesignOptions = _AS_USUAL,
+    out: Path | None = None,
+    format: Formats = ("svg",),
+    force: Force = False,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
+    output: Output = PLAIN,
+) -> int:
+    """Derive, synthesise, prove, simulate, compare with the published gains, and write a report.
+
+    Every designed controller runs as it is guaranteed: sampled, held over T_s. Exit code 0 if every one is proved, for
+    the fault's T_s, and its run is neither an earthquake nor diverges nor opens the fault; with --continuous, if its
+    premise along the reference holds as well; 1 otherwise.
+
+    Parameters
+    ----------
+    out
+        Folder to write; ./quakedesign-FAULT unless given.
+    verbose
+        Print every premise, certified domain and feed-forward too, as they stand in the report.
+    """
+    from quakedesign.report.folder import prepare
+
+    loaded, asked = options.asked(fault)
+    folder = out or Path(f"quakedesign-{loaded.name}")
+    prepare(folder, force=force)
+    hold(folder)
+    from quakedesign.report.comparison_table import designed_comparison
+    from quakedesign.report.folder import write_folder
+
+    with progress() as tell:
+        comparison = designed_comparison(loaded, tell=tell, **asked)
+        results = write_folder(comparison, folder, force=force, formats=format, command=command_line(), tell=tell)
+
+    def said() -> None:
+        from quakedesign.report.terminal import print_comparison
+
+        print_comparison(comparison, console(), whole=verbose)
+        print_lines(["", f"written: {folder}/ (results.json, report.html, certificates, figures)"])
+        if not verbose:
+            print_lines([f"premises, margins and equations: {folder}/report.html, or --verbose"])
+
+    output.show(results, said)
+    return 0 if positive(comparison) else 1
+
+
+def controllers(name: str, fault: "Fault | None" = None) -> list[str]:
+    """Laws to design: the one named, or all that apply to a fault.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    from quakedesign.laws import control_law
+    from quakedesign.synthesis import designable
+
+    names = designable()
+    if ":" in name:
+        control_law(name)
+    else:
+        require_known(name, (*names, "all"), "controller", UnknownNameError)
+    return list(designable(fault)) if name == "all" else [name]
+
+
+def positive(comparison: Any) -> bool:
+    """Whether every design is proved and its premises hold but for those on run and start, and its run is harmless.
+
+    A design that was to run with a guarantee and found none is not.
+    """
+    from quakedesign.guarantees import NoGuarantee
+
+    needed = {"along_reference", "control_coefficient", "friction_slope", "sampling_time"}
+    return all(
+        str(entry.design.verdict) == "proved"
+        and not isinstance(entry.design.runs, NoGuarantee)
+        and all(p.holds for p in entry.design.conditions if p.name in needed)
+        and (entry.run is None or entry.run.outcome.harmless)
+        for entry in comparison.of("designed")
+    )
+
+
+# ----------------------------------------------------------------------
+# Commands that show all controllers of a fault side by side: in a table, and in the figures of the paper.
+
+_FIGURES_AS_USUAL = DesignOptions()
+
+
+@app.command
+def compare(
+    fault: FaultName,
+    /,
+    *,
+    options: DesignOptions = _FIGURES_AS_USUAL,
+    output: Output = PLAIN,
+) -> int:
+    """Design, prove, simulate and compare with the published gains as `design` does, and write nothing.
+
+    Exit code as `design`.
+    """
+    from quakedesign.report.comparison_table import designed_comparison
+    from quakedesign.report.folder import results
+    from quakedesign.report.terminal import printed_lines
+    from quakedesign.studies.paper import printed, table
+
+    loaded, asked = options.asked(fault)
+    with progress() as tell:
+        comparison = designed_comparison(loaded, tell=tell, **asked)
+    if output.json:
+        beside = {"numbers": table(comparison), "printed": printed(comparison)}
+        print_json({**results(comparison, stored=False), **beside})
+    else:
+        from quakedesign.report.terminal import print_comparison
+
+        print_comparison(comparison, console())
+        print_lines(printed_lines(printed(comparison)))
+    return 0 if positive(comparison) else 1
+
+
+@app.command
+def figures(
+    fault: FaultName,
+    /,
+    *,
+    options: DesignOptions = _FIGURES_AS_USUAL,
+    out: Path | None = None,
+    format: Formats = ("svg",),
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Draw the figures of the paper that show simulations, for any fault, published gains beside designed ones.
+
+    Writes a folder as `design` does, with these figures in addition, and their numbers in numbers.csv and results.json.
+
+    Parameters
+    ----------
+    out
+        Folder to write; ./quakedesign-FAULT-figures unless given.
+    """
+    from quakedesign.report.folder import prepare, write_folder
+
+    loaded, asked = options.asked(fault)
+    folder = out or Path(f"quakedesign-{loaded.name}-figures")
+    prepare(folder, force=force)
+    hold(folder)
+    from quakedesign.report.comparison_table import designed_comparison
+    from quakedesign.report.paper_figures import paper_study
+    from quakedesign.report.sentences import run_sentences
+    from quakedesign.report.terminal import printed_lines
+
+    with progress() as tell:
+        comparison = designed_comparison(loaded, tell=tell, **asked)
+        study = paper_study(comparison, progress=tell)
+        results = write_folder(
+            comparison, folder, force=force, study=study, formats=format, command=command_line(), tell=tell
+        )
+    if output.json:
+        print_json(results)
+        return 0
+    runs = ((e.label, "; ".join(run_sentences(e.run, loaded))) for e in comparison.entries if e.run)
+    print_lines(f"{label}: {said}" for label, said in runs)
+    files = [(drawn["file"], drawn["paper"]) for drawn in results["figures"].values()]
+    print_lines(f"{folder}/{file}" + (f": {paper} of the paper" if paper else "") for file, paper in files)
+    print_lines(printed_lines(results["printed"]))
+    print_lines(["", f"written: {folder}/ (also results.json, numbers.csv, report.html, certificates)"])
+    return 0

@@ -1,0 +1,279 @@
+"""Commands about a fault, its records and the shell.
+
+`fault`, `derive`, `scale`, `errata`, `init`, `identify` and `completion`.
+"""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from quakedesign.cli.app import app, console, new_file, print_json, progress, require_different
+from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Gains, Output, Pascals, Whole, in_unit
+
+# ----------------------------------------------------------------------
+# Commands about the fault itself: what it is, its equations, its scaling, the paper's errata.
+
+
+@app.command
+def fault(fault: FaultName, /, *, box: Box = None, output: Output = PLAIN) -> int:
+    """Show derived quantities of a fault and why it is unstable."""
+    from quakedesign.fault import load_fault
+    from quakedesign.studies.facts import fault_dict, fault_sentences
+
+    loaded = load_fault(fault, box=box)
+    if output.json:
+        print_json(fault_dict(loaded))
+        return 0
+    screen = console()
+    screen.print(loaded.name, style="bold", end=" ")
+    screen.print(f"({loaded.source})")
+    for line in fault_sentences(loaded):
+        screen.print(f"  {line}")
+    return 0
+
+
+@app.command
+def derive(
+    fault: FaultName, /, *, latex: Annotated[bool, Parameter(negative="")] = False, output: Output = PLAIN
+) -> int:
+    """Derive the equations of a fault from its force balance.
+
+    Parameters
+    ----------
+    latex
+        Print LaTeX instead of plain text.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.symbolic import derive as derive_model
+    from quakedesign.symbolic.plant import latex as in_latex
+    from quakedesign.symbolic.plant import plain
+
+    model = derive_model(load_fault(fault))
+    write = in_latex if latex else plain
+    equations: dict[str, Any] = {
+        "error_dynamics": {"beta": write(model.error_dynamics.beta), "h": write(model.error_dynamics.h)},
+        "jacobian": write(model.jacobian),
+        "instability": write(model.instability),
+        "unstable": model.unstable,
+    }
+    beta, h = equations["error_dynamics"].values()
+    lines = [
+        r"\dot e_1 = e_2, \quad \dot e_2 = \beta (\nu + h)" if latex else "e_1' = e_2, e_2' = beta*(nu + h)",
+        rf"\beta = {beta}" if latex else f"beta = {beta}",
+        f"h = {h}",
+        rf"J(0, 0) = {equations['jacobian']}" if latex else f"jacobian = {equations['jacobian']}",
+        rf"\text{{unstable}} \iff {equations['instability']}" if latex else f"unstable if {equations['instability']}",
+    ]
+    output.show(
+        equations, [*lines, f"{'% ' if latex else ''}this fault is {'unstable' if model.unstable else 'stable'}"]
+    )
+    return 0
+
+
+@app.command
+def scale(
+    source: str,
+    target: str,
+    /,
+    *,
+    controller: str = "cta",
+    gains: Gains = ("published",),
+    clock: Literal["operation-time", "natural-period"] | None = None,
+    output: Output = PLAIN,
+) -> int:
+    """Carry gains from one fault to a similar one, and say which dimensionless groups differ.
+
+    Parameters
+    ----------
+    source
+        Fault that the gains are for: preset or path of a .toml file.
+    target
+        Fault to carry them to.
+    controller
+        cta, dia or elqr.
+    gains
+        published, or the gains of the law (λ = 1, divisor μ_res·N̂_min of the source).
+    clock
+        What fixes the scale of time: operation-time or natural-period; chosen by their agreement unless given.
+    """
+    from quakedesign.report.plain import scale_lines
+    from quakedesign.studies.scaling import scale_answer
+
+    clocks = {None: None, "operation-time": "reference.operation_time", "natural-period": "shear_modulus"}
+    answer = scale_answer(source, target, controller, gains, clock=clocks[clock])
+    output.show(answer, scale_lines(answer))
+    return 0
+
+
+@app.command
+def errata(*rows: int, output: Output = PLAIN) -> int:
+    """Show where the paper cannot be taken literally, each row checked again now.
+
+    Parameters
+    ----------
+    rows
+        Numbers of rows; all unless given.
+    """
+    from quakedesign.studies.errata import errata_rows, run_rows
+
+    numbers = list(rows) or [row.number for row in errata_rows()]
+    checked = []
+    with progress() as tell:
+        for i, number in enumerate(numbers):
+            tell(f"row {number}", i / len(numbers))
+            checked += run_rows([number])
+    output.show({"errata": checked}, (line for row in checked for line in _row_lines(row)))
+    return 0
+
+
+def _row_lines(row: dict[str, Any]) -> list[str]:
+    held = "holds" if row["holds"] else "DOES NOT HOLD"
+    told = f"{row['row']}. {held} ({row['kind']}): {row['evidence']}"
+    return [told, f"    printed: {row['printed']}", f"    correct: {row['correct']}"]
+
+
+# ----------------------------------------------------------------------
+# The command with which a fault of one's own begins.
+
+
+@app.command
+def init(
+    file: Path = Path("my-fault.toml"),
+    /,
+    *,
+    law: str = "exponential-slip-weakening",
+    schema: Annotated[bool, Parameter(negative="")] = False,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Write a commented fault file to start from: every key with its unit, and what happens if it is left out.
+
+    Parameters
+    ----------
+    file
+        Path of the .toml file.
+    law
+        Friction law.
+    schema
+        Write a JSON Schema beside it too, with which editors complete and check TOML.
+    """
+    import json
+
+    from quakedesign.errors import OutputError
+    from quakedesign.fault.fault_toml import SCHEMA_NAME, fault_schema, template
+    from quakedesign.files import write_whole
+
+    if file.suffix != ".toml":
+        raise OutputError(f"the file of a fault must end in .toml. Received {file}. Write {file.stem or 'fault'}.toml.")
+    beside = file.parent / SCHEMA_NAME if schema else None
+    text = template(law, schema=schema)
+    for path in (file, beside):
+        new_file(path, "fault file" if path == file else "schema", force=force)
+    write_whole(file, text)
+    if beside is not None:
+        write_whole(beside, json.dumps(fault_schema(), indent=1, ensure_ascii=False) + "\n")
+    written = [str(path) for path in (file, beside) if path is not None]
+    facts = {"file": str(file), "schema": str(beside) if beside else None}
+    output.show(facts, [f"written: {', '.join(written)}", f"next: edit it, then quakedesign fault {file}"])
+    return 0
+
+
+# ----------------------------------------------------------------------
+# The command from a laboratory record to friction parameters.
+
+
+@app.command
+def identify(
+    data: Path,
+    /,
+    *,
+    law: str | None = None,
+    stiffness: str | None = None,
+    normal_stress: Pascals | None = None,
+    seed: Whole = 0,
+    fault: FaultName = "lab-fault",
+    out: Path | None = None,
+    figure: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Identify friction parameters, with confidence regions, from a laboratory record.
+
+    Velocity steps and slide-hold-slide give the laws with state, slip or a stiffly drawn block those that weaken with
+    slip. Exit code 1 where the record cannot tell every parameter.
+
+    Parameters
+    ----------
+    data
+        CSV file with units in its first line, such as 'time [s], load_point_displacement [um], shear_stress [MPa],
+        normal_stress [MPa]'; load_point_rate, shear_force, normal_force, friction and slip are known, too.
+    law
+        Friction law: rate-and-state-aging and rate-and-state-slip are both fitted, and the better one taken, unless
+        told; regularised-rate-and-state, exponential-slip-weakening or linear-slip-weakening, say, are others.
+    stiffness
+        Of the machine, such as '5 GPa/m' ('2 kN/um' for forces, '1e-3 1/um' for friction); fitted unless given.
+    normal_stress
+        Constant, such as '5 MPa', where there is no such column.
+    seed
+        Of the draw of the starts.
+    fault
+        Preset or .toml file that gives all but the friction to the file that is written.
+    out
+        Fault file to write, with a friction that covers every law of the box where a fault file can hold it.
+    figure
+        Figure of the residuals to write: .svg, .png or .pdf.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.identification.fault_file import law_remarks, next_command, other_parts, save_fault, task_remarks
+    from quakedesign.identification.identify import identify as fitted
+    from quakedesign.identification.record import read_record
+    from quakedesign.report.identification_page import identification_lines, require_format, save_figure
+
+    for path, what in ((out, "fault file"), (figure, "figure")):
+        new_file(path, what, force=force)
+    if figure is not None:
+        require_format(figure)
+    require_different({"--out": out, "--figure": figure, "the record": data, "--fault": Path(fault)})
+    around = load_fault(fault)
+    record = read_record(data, normal_stress=normal_stress)
+    spring = None if stiffness is None else in_unit(stiffness, record.stiffness_unit, "stiffness")
+    identification = fitted(record, law, stiffness=spring, seed=seed)
+    written = [path for path in (figure, out if identification.identified else None) if path is not None]
+    if figure is not None:
+        save_figure(identification, figure)
+    if out is not None and identification.identified:
+        save_fault(identification, around, out)
+    told = law_remarks(identification, around)
+    told += [f"written: {', '.join(map(str, written))}"] if written else []
+    if out in written:
+        told.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
+        ahead = "next:" if identification.explained else "next, if nothing above explains the record better:"
+        told += [*task_remarks(identification, around), f"{ahead} {next_command(identification, out)}"]
+    if out is not None and not identification.identified:
+        told.append(f"not written: {out}, which needs every parameter")
+    places = {"figure": figure, "file": out if identification.identified else None}
+    facts = identification.to_dict() | {name: None if path is None else str(path) for name, path in places.items()}
+    output.show(facts, [*identification_lines(identification), *told])
+    return 0 if identification.identified else 1
+
+
+# ----------------------------------------------------------------------
+# Names of commands and options for the shell.
+
+
+@app.command
+def completion(shell: Literal["bash", "zsh", "fish"], /, *, output: Output = PLAIN) -> int:
+    """Print a script that completes commands and options in a shell.
+
+    For example: quakedesign completion bash > ~/.local/share/bash-completion/completions/quakedesign
+
+    Parameters
+    ----------
+    shell
+        bash, zsh or fish.
+    """
+    script = app.generate_completion(shell=shell)
+    output.show({"shell": shell, "script": script}, lambda: sys.stdout.write(f"{script}\n"))
+    return 0

@@ -1,0 +1,269 @@
+"""Commands `synthesise` and `map`, about gains with a proof."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from quakedesign.cli.app import app, console, given, new_file, progress, refuse
+from quakedesign.cli.options import PLAIN, Force, Formats, Gains, Output, Scheduler, Seconds, Whole
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.files import hold
+
+if TYPE_CHECKING:
+    from quakedesign.lyapunov.gains.synthesise import Synthesis
+
+
+# ----------------------------------------------------------------------
+# The command that finds gains with a proof.
+
+
+@app.command
+def synthesise(
+    law: str,
+    fault: str | None = None,
+    /,
+    *,
+    objective: str = "norm",
+    lipschitz: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    gain_range: tuple[str, str] | None = None,
+    bound: float | None = None,
+    degree: tuple[Whole, ...] = (),
+    starts: Whole | None = None,
+    seed: Whole | None = None,
+    workers: Whole | None = None,
+    scheduler: Scheduler = None,
+    step: Seconds | None = None,
+    scheme: str | None = None,
+    metric: str | None = None,
+    out: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Find gains with a proof that are best in one respect, and compare them with those from the literature.
+
+    Exit code 0 only if gains were proved. No gains are printed without a proof.
+
+    Parameters
+    ----------
+    law
+        cta, dia, super-twisting or cta3.
+    fault
+        For sampled: preset or path of a .toml file.
+    objective
+        norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: fastest certified decay, as one over
+        the settling time from where no error exceeds the bound on |h'|. beta: widest certified range of the control
+        coefficient. sampled: smallest error of a sampled run on a fault, measured, of gains that are proved.
+    lipschitz
+        Bound on |h'|, in the unit of ν per second; 1 unless given, for sampled a tenth above what the fault needs.
+    gain_range
+        b_m and b_M, the range of the control coefficient β; 1 1 unless given, for sampled that of the fault. For beta
+        its middle counts, and it is covered at least.
+    bound
+        For decay and beta: largest norm of the gains; the smallest of the sets from the literature unless given.
+    degree
+        Degree of V; repeat for more. The two lowest unless given; higher ones find better gains and take longer.
+    starts
+        Number of starts, 4 unless given; sampled has its own.
+    seed
+        Of the random starts, 0 unless given.
+    workers
+        Number of processes, 2 unless given; no digit depends on it.
+    step
+        For sampled: sampling time T_s, in s or with a unit; the fault's unless given.
+    scheme
+        For sampled: explicit (the default), implicit, semi-implicit or compensated.
+    metric
+        For sampled: max_slip_rate_error (the default) or another metric that is better when smaller.
+    out
+        File for the certificate, which is written whole or not at all.
+    """
+    from quakedesign.lyapunov.gains.synthesise import OBJECTIVES
+
+    require_known(objective, (*OBJECTIVES, "sampled"), "objective", UnknownNameError)
+    new_file(out, "certificate file", force=force)
+    began = perf_counter()
+    of_search = {"starts": starts, "seed": seed, "workers": workers, "scheduler": scheduler}
+    of_trial, what = {"step": step, "scheme": scheme, "metric": metric}, f"the objective {objective}"
+    if objective == "sampled":
+        refuse({"--bound": bound, **{f"--{name}": value for name, value in of_search.items()}}, what)
+        synthesis, more = _sampled(law, fault, lipschitz, gain_range, degree, given(of_trial))
+    else:
+        refuse({"FAULT": fault, **{f"--{name}": value for name, value in of_trial.items()}}, what)
+        from quakedesign.lyapunov.gains.synthesise import synthesise as search
+
+        ranges = {"lipschitz": lipschitz or "1", "gain_range": gain_range or ("1", "1")}
+        options = {"workers": 2, **given(of_search), "degrees": degree or None, "bound": bound, **ranges}
+        synthesis, more = search(law, objective, **options), {}
+    if synthesis is not None and out is not None:
+        synthesis.certificate.save(out)
+    answer = _facts(synthesis) | more | {
+        "certificate": str(out) if synthesis is not None and out is not None else None,
+        "seconds": perf_counter() - began,
+    }  # fmt: skip
+    output.show(answer, lambda: _print(law, synthesis, more))
+    return 0 if synthesis is not None else 1
+
+
+def _sampled(
+    law: str, fault: str | None, lipschitz: str | None, gain_range: tuple[str, str] | None, degree: tuple[int, ...],
+    options: Mapping[str, Any],
+) -> tuple["Synthesis | None", dict[str, Any]]:  # fmt: skip
+    """Gains whose sampled run errs least, and how they were tried."""
+    from quakedesign.fault import load_fault
+    from quakedesign.synthesis.simulated_error import sampling, synthesise_sampled
+
+    if fault is None:
+        raise ParameterError(
+            f"the objective sampled needs a fault. Received none. Give a preset or a file after {law}."
+        )
+    trial = sampling(load_fault(fault), law, lipschitz=lipschitz, gain_range=gain_range, **options)
+    tried = {"scale": str(trial.scale), "step": trial.step, "duration": trial.duration, "scheme": trial.scheme}
+    return synthesise_sampled(trial, degrees=degree or None), {"fault": fault, **tried}
+
+
+def _facts(synthesis: "Synthesis | None") -> dict[str, Any]:
+    """Answer as JSON: gains and ranges as texts, measured values as numbers."""
+    if synthesis is None:
+        return {"verdict": "undecided", "gains": None, "value": None, "compared": []}
+    ranges = synthesis.certificate.loop.uncertain
+    return {
+        "verdict": "proved",
+        "objective": synthesis.objective,
+        "gains": {name: str(k) for name, k in synthesis.gains.items()},
+        "lipschitz": str(ranges["d"][1]),
+        "gain_range": [str(v) for v in ranges["beta"]] if "beta" in ranges else None,
+        "value": synthesis.value,
+        "unit": synthesis.unit,
+        "norm": synthesis.norm,
+        "compared": [
+            {"gains": {n: str(k) for n, k in c.gains.items()}, "value": c.value, "norm": c.norm, "ratio": c.ratio}
+            for c in synthesis.compared
+        ],
+    }
+
+
+def _print(law: str, synthesis: "Synthesis | None", more: Mapping[str, Any]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    out = console()
+    if synthesis is None:
+        out.print(f"undecided: no gains of {law} were proved")
+        return
+    gains = ", ".join(f"{name} = {k}" for name, k in synthesis.gains.items())
+    ranges = synthesis.certificate.loop.uncertain
+    beta = f", β in [{ranges['beta'][0]}, {ranges['beta'][1]}]" if "beta" in ranges else ""
+    out.print(f"proved: {law} with {gains} for |h'| <= {ranges['d'][1]}{beta}")
+    if more:
+        of_run = "{scheme} run on {fault} with scale {scale}, T_s = {step:.4g} s, over {duration:.4g} s"
+        out.print(f"measured, not proved: {synthesis.objective} of one {of_run.format(**more)}")
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    unit = "" if synthesis.unit == "-" else f" [{synthesis.unit}]"
+    for column in ("gains", f"{synthesis.objective}{unit}", "norm", "better by"):
+        table.add_column(Text(column))
+    rows: list[tuple[str, float | None, float, float | None]] = [("these", synthesis.value, synthesis.norm, None)]
+    rows += [
+        (" ".join(f"{float(k):.4g}" for k in c.gains.values()), c.value, c.norm, c.ratio) for c in synthesis.compared
+    ]
+    for name, value, norm, ratio in rows:
+        shown = "not proved" if value is None else f"{value:.4g}"
+        table.add_row(name, shown, f"{norm:.4g}", "" if ratio is None else f"{ratio:.3g}")
+    out.print(table)
+
+
+# ----------------------------------------------------------------------
+# The command that maps certified gains.
+
+Numbers = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
+
+
+@app.command(name="map")
+def gain_map(
+    law: str,
+    /,
+    *,
+    over: tuple[str, str],
+    gains: Gains | None = None,
+    range: Numbers | None = None,
+    lipschitz: Numbers | None = None,
+    gain_range: tuple[str, str] = ("1", "1"),
+    points: Whole = 40,
+    degree: Whole | None = None,
+    interior: Whole = 200,
+    seed: Whole = 0,
+    workers: Whole = 2,
+    scheduler: Scheduler = None,
+    out: Path | None = None,
+    format: Formats = ("png",),
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Map where two gains are certified, at one or more levels of |h'|; certificates, a figure and a table.
+
+    Every point of the grid is screened in floating point. All points at the edges and a random sample inside are then
+    proved exactly, with certificates; figure and table keep the two apart. Exit code 0 if something is certified and
+    every edge point is proved.
+
+    Parameters
+    ----------
+    law
+        cta, dia or another sliding mode.
+    over
+        Names of the two gains that vary, such as k1 k2.
+    gains
+        All gains of the law; those that do not vary keep these values. Those of the literature unless given, if known.
+    range
+        Four numbers: both ends of the first gain, then of the second; a quarter to four times its value unless given.
+    lipschitz
+        One or more bounds on |h'|; five shares of the necessary limit unless given.
+    gain_range
+        b_m and b_M, the range of the control coefficient β.
+    points
+        Along each axis.
+    degree
+        Of the Lyapunov functions; the lowest that proves the given gains unless given.
+    interior
+        Number of random points inside that are proved.
+    seed
+        Of their choice.
+    workers
+        Number of processes.
+    out
+        Folder; ./quakedesign-map-LAW unless given.
+    """
+    from quakedesign.laws import family
+    from quakedesign.lyapunov.maps.gain_map import gain_map as mapped
+    from quakedesign.report.drawing import file_names
+    from quakedesign.report.folder import prepare
+    from quakedesign.report.gain_map_figure import gain_map_lines, write_gain_map
+
+    folder = out or Path(f"quakedesign-map-{law}")
+    prepare(folder, force=force)
+    hold(folder)
+    if range is not None and len(range) != 4:
+        raise ParameterError(f"range needs four numbers, two for each gain. Received {len(range)}.")
+    base = gains or tuple(str(v) for v in family(law)[0].law.gains.values())
+    with progress() as tell:
+        drawn = mapped(
+            law,
+            base,
+            over,
+            ranges=None if range is None else [(range[0], range[1]), (range[2], range[3])],
+            points=points,
+            levels=lipschitz,
+            gain_range=gain_range,
+            degree=degree,
+            interior=interior,
+            seed=seed,
+            workers=workers,
+            scheduler=scheduler,
+            tell=tell,
+        )
+    facts = write_gain_map(drawn, folder, format)
+    written = f"written: {folder}/ ({file_names('map', format)}, map.csv, results.json, certificates)"
+    output.show(facts, [*gain_map_lines(drawn), written])
+    proved = all(level["edge_proved"] == level["edge"] for level in facts["levels"])
+    return 0 if proved and any(level["screened"] for level in facts["levels"]) else 1

@@ -1,0 +1,326 @@
+"""Commands `certify`, `check`, `sos` and `attraction`: proof, refutation and re-check."""
+
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from quakedesign.cli.app import app, new_file, refuse
+from quakedesign.cli.options import PLAIN, Box, ExactSeconds, Force, Gains, Output
+from quakedesign.errors import ParameterError, PolynomialError
+
+# ----------------------------------------------------------------------
+# Commands that prove, refute and re-check.
+
+
+@app.command
+def certify(
+    law: str,
+    fault: str | None = None,
+    /,
+    *,
+    gains: Gains,
+    lipschitz: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    maximize: str | None = None,
+    gain_range: tuple[str, str] | None = None,
+    box: Box = None,
+    feedback: str | None = None,
+    step: ExactSeconds | None = None,
+    peaks: str | None = None,
+    out: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Prove or refute given gains: of a sliding mode for a bound on |h'|, of the e-LQR on a fault.
+
+    Exit code 0 only if proved, and if the peaks that were asked for are certified.
+
+    Parameters
+    ----------
+    law
+        cta or another sliding mode; or elqr.
+    fault
+        For the e-LQR: preset or path of a .toml file.
+    gains
+        Exact numbers: decimals, exponents or p/q; four for cta and elqr (SI).
+    lipschitz
+        For a sliding mode: bound on |h'|, in the unit of ν per second.
+    maximize
+        For a sliding mode: lipschitz (the largest bound on |h'|; with --lipschitz also the smallest scale for that),
+        beta (the upper end of its range), beta-factor (f in [b/f, b·f]) or decay (with a bound on the settling time).
+    gain_range
+        For a sliding mode: b_m and b_M, the range of the control coefficient β; 1 1 unless given. One value b twice to
+        maximise the range.
+    box
+        For the e-LQR: uncertainty box, paper or ten-percent.
+    feedback
+        For the e-LQR: error (k1 and k2 act on x1 - r and x2 - r', the default) or state (on x1 and x2, as printed).
+    step
+        For the e-LQR: sampling period for which p is held, such as '140 ms' or 7/50 (s); the fault's unless given.
+    peaks
+        For the e-LQR: certify how fast the fault can slip at most, for every disturbance of a class, amplitude or rate,
+        if the pressure acts at once (see the command guarantee for the loop that runs).
+    out
+        File for the certificate. Other proofs of an e-LQR go beside it, with their names added.
+    """
+    from quakedesign.laws import law as law_of
+
+    new_file(out, "certificate file", force=force)
+    about_fault = {"FAULT": fault, "--box": box, "--feedback": feedback, "--step": step, "--peaks": peaks}
+    about_rate = {"--lipschitz": lipschitz, "--maximize": maximize, "--gain-range": gain_range}
+    if law_of(law).loop_field().domain == "reals":
+        refuse(about_rate, f"{law}, which needs a FAULT instead")
+        if fault is None:
+            raise ParameterError(f"certify {law} needs a fault. Received none. Give a preset or a file after {law}.")
+        return _certify_on_fault(fault, gains, box, feedback or "error", step, peaks, out, force, output)
+    refuse(about_fault, f"{law}, which needs --lipschitz instead")
+    return _certify_for_rate(law, gains, lipschitz, maximize, gain_range or ("1", "1"), out, output)
+
+
+def _certify_for_rate(
+    law: str, gains: tuple[str, ...], lipschitz: str | None, maximize: str | None, gain_range: tuple[str, str],
+    out: Path | None, output: Output,
+) -> int:  # fmt: skip
+    """Verdict on a sliding mode, or how far its gains reach."""
+    from quakedesign.studies.certified import certified
+
+    answer = certified(law, gains, lipschitz=lipschitz, maximize=maximize, gain_range=gain_range)
+    if answer.certificate is not None and out is not None:
+        answer.certificate.save(out)
+    output.show(
+        {**answer.facts, "certificate": str(out) if answer.certificate is not None and out else None}, answer.lines
+    )
+    return 0 if str(answer.verdict) == "proved" else 1
+
+
+def _certify_on_fault(
+    fault: str, gains: tuple[str, ...], box: str | None, feedback: str, step: str | None, peaks: str | None,
+    out: Path | None, force: bool, output: Output,
+) -> int:  # fmt: skip
+    """Verdict on an e-LQR."""
+    from quakedesign.fault import load_fault
+    from quakedesign.laws.elqr import ExtendedLQR
+    from quakedesign.linear.verdict import judge
+    from quakedesign.report.sentences import verdict_lines
+
+    began = perf_counter()
+    controller = ExtendedLQR.from_values(gains, feedback=feedback)
+    judged = judge(load_fault(fault, box=box), controller, step=step, peaks=peaks)
+    files = judged.save(out, force=force) if out is not None else {}
+    facts = {
+        **judged.to_dict(),
+        "certificate": files.get("stability"),
+        "certificates": files,
+        "seconds": perf_counter() - began,
+    }
+    output.show(facts, verdict_lines(judged))
+    return 0 if facts["verdict"] == "proved" and (peaks is None or facts["peaks"] is not None) else 1
+
+
+@app.command
+def check(
+    *files: Path,
+    fault: str | None = None,
+    rocq: Annotated[bool, Parameter(negative="")] = False,
+    out: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Re-check certificate files in exact arithmetic. Exit code 0 only if all are proved.
+
+    Parameters
+    ----------
+    files
+        Certificate files (proofs/FORMAT.md).
+    fault
+        Preset or .toml file whose constants and ranges the certificates must cover as well.
+    rocq
+        Write a file that Rocq's compiler, coqc, verifies, for every certificate that is not invalid. Exit code 1 if a
+        kind of certificate has none.
+    out
+        With --rocq: folder for its files; ./quakedesign-rocq unless given.
+    """
+    from quakedesign.checking import check_files
+
+    if not files:
+        raise ParameterError("check needs at least one certificate file. Received none. Give a path.")
+    if out is not None and not rocq:
+        raise ParameterError("--out is the folder of --rocq. Received it alone. Add --rocq or leave it out.")
+    verdicts = check_files(files, fault)
+    kept = [path for path in dict.fromkeys(files) if verdicts[str(path)][0] in ("proved", "refuted")]
+    written = _write_rocq(kept, out or Path("quakedesign-rocq"), force) if rocq else {}
+    said = (
+        line
+        for path, (verdict, statement) in verdicts.items()
+        for line in (f"{path}: {verdict}", *(f"    {line}" for line in (*statement, *written.get(path, ())[1:])))
+    )
+    facts: dict[str, Any] = {"files": {path: verdict for path, (verdict, _) in verdicts.items()}}
+    if rocq:
+        facts["rocq"] = {path: written[path][0] if path in written else None for path in verdicts}
+    output.show(facts, said)
+    complete = not rocq or None not in facts["rocq"].values()
+    return 0 if complete and all(verdict == "proved" for verdict, _ in verdicts.values()) else 1
+
+
+def _write_rocq(files: list[Path], folder: Path, force: bool) -> dict[str, tuple[str | None, str]]:
+    """Path of the file for coqc, or None, and what is said of it, by certificate."""
+    from quakedesign.rocq.rocq_export import write_rocq
+
+    return {
+        str(path): (None, f"no file for coqc: {made}") if isinstance(made, str) else (str(made), f"for coqc: {made}")
+        for path, made in write_rocq(files, folder, force=force).items()
+    }
+
+
+# ----------------------------------------------------------------------
+# The command about plain polynomials.
+
+Text = Annotated[str, Parameter(allow_leading_hyphen=True)]
+
+
+@app.command
+def sos(
+    polynomial: Text | None = None,
+    /,
+    *,
+    on: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative="")] = (),
+    multiplier: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    margin: str = "0",
+    degree: int | None = None,
+    products: bool | None = None,
+    gram: Path | None = None,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
+    out: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Decide whether a polynomial is a sum of squares, with proof either way. Exit code 0 only if it is.
+
+    Parameters
+    ----------
+    polynomial
+        Such as "x^4*y^2 + x^2*y^4 + 1 - 3*x^2*y^2": numbers, names, + - * ^ ** and parentheses.
+    on
+        A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat for more. All of ℝⁿ unless given.
+    multiplier
+        Positive polynomial to multiply with, or auto to search one, and to try powers of 1 + x² + y² + … (x² + y² + …
+        for forms).
+    margin
+        Decide polynomial − margin·(1 + Σ x_i^degree) instead (without the 1 for forms).
+    degree
+        Largest degree of a summand; the smallest that fits unless given, and the next even one under constraints.
+    products
+        Use all products of constraints, or none; unless given, products of variables only.
+    gram
+        Instead of a polynomial: a file, JSON or .mat, with a polynomial and a Gram matrix from another programme.
+    verbose
+        Show the sizes of the Gram matrices before and after the exact reduction.
+    out
+        File for the proof (proofs/FORMAT.md).
+    """
+    from quakedesign.sos import prove, read_gram
+    from quakedesign.sos.exact.polynomial_files import plain_proof
+    from quakedesign.sos.exact.words import sentences
+
+    new_file(out, "proof file", force=force)
+    asked = (polynomial, on, multiplier, margin, degree, products)
+    if gram is not None and asked != (None, (), None, "0", None, None):
+        raise PolynomialError("--gram is a file that says what is asked. Received more. Leave the rest out.")
+    if gram is not None:
+        answer = read_gram(gram).verify()
+    elif polynomial is None:
+        raise PolynomialError("sos needs a polynomial, or --gram FILE. Received neither. Give for example 'x^2 + 1'.")
+    else:
+        answer = prove(polynomial, on=on, multiplier=multiplier, margin=margin, degree_bound=degree, products=products)
+    if out is not None and answer.proof is not None:
+        answer.save(out)
+    facts: dict[str, Any] = {
+        "verdict": str(answer.verdict),
+        "variables": list(answer.statement.variables),
+        "degree": answer.statement.degree,
+        "blocks": dict(answer.blocks),
+        "witness": plain_proof(answer.proof) if answer.proof is not None else None,
+        "file": str(out) if out is not None and answer.proof is not None else None,
+        "remark": answer.remark or None,
+        "empty_set": answer.set_is_empty,
+        "seconds": answer.seconds,
+        "versions": dict(answer.versions),
+    }
+    output.show(facts, sentences(answer, verbose=verbose))
+    return 0 if facts["verdict"] == "sos" else 1
+
+
+# ----------------------------------------------------------------------
+# The command about polynomial fields: stability, and regions of attraction.
+
+
+@app.command
+def attraction(
+    field: Path,
+    /,
+    *,
+    everywhere: Annotated[bool, Parameter(negative="")] = False,
+    relative: float = 1e-4,
+    degree: int | None = None,
+    shape: Text | None = None,
+    out: Path | None = None,
+    above: Path | None = None,
+    inclusion: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Prove the largest level of a Lyapunov function below which all solutions tend to the origin.
+
+    Exit code 0 if one is proved.
+
+    Parameters
+    ----------
+    field
+        TOML file: in [field] the rate of every state, such as x = "-y" and y = "x + (x^2 - 1)*y", polynomials that
+        vanish at the origin; before it V = "..." if V is given. Unless it is, V = x'Px with A'P + PA = -1 for the
+        linearised field, or one of degree 2 or 4 that is searched (--everywhere).
+    everywhere
+        Prove that the solutions from everywhere do, or refute V (without one, all V) by a point.
+    relative
+        Width of the last step of the bisection, from 1e-6 to below 1.
+    degree
+        Search other V of at most this even degree, for a larger part of the shape in the region.
+    shape
+        Polynomial that is positive but at the origin, such as "x^2 + 2*y^2": the largest b is proved for which the part
+        where it is at most b lies in the region. With --degree the sum of squares of the states unless given.
+    out
+        File for the proof (proofs/FORMAT.md); for the refutation where nothing is proved, unless --above is given.
+    above
+        File for the point that refutes all levels above that of V there.
+    inclusion
+        File for the proof that the part of the shape lies in the region.
+    """
+    from quakedesign.sos import Answer, Attraction, Region, region_of_attraction, save_attraction, stability
+    from quakedesign.sos.exact.attraction import read_field
+    from quakedesign.sos.exact.words import region_facts, region_words
+
+    began = perf_counter()
+    for path, what in ((out, "proof file"), (above, "refutation file"), (inclusion, "proof file")):
+        new_file(path, what, force=force)
+    rates, function = read_field(field)
+    if everywhere and (degree, shape) != (None, None):
+        raise PolynomialError("--degree and --shape are of a region. Received --everywhere as well. Leave one out.")
+    if everywhere:
+        region = Region.of(stability(rates, function))
+    else:
+        region = region_of_attraction(rates, function, relative=relative, degree=degree, shape=shape)
+    files: dict[str, tuple[Path | None, Attraction | Answer | None]] = {
+        "file": (out, region.proved or (None if above else region.refuted)),
+        "file_above": (above, region.refuted),
+        "file_inclusion": (inclusion, region.inclusion),
+    }
+    written: dict[str, str | None] = dict.fromkeys(files)
+    for key, (path, proof) in files.items():
+        if path is not None and proof is not None:
+            written[key] = str(path)
+            proof.save(path) if isinstance(proof, Answer) else save_attraction(proof, path)
+    seconds = perf_counter() - began
+    lines = [*region_words(region), f"{seconds:.2f} s; checked in exact arithmetic"]
+    output.show({**region_facts(region), **written, "seconds": seconds}, lines)
+    return 0 if region.proved is not None else 1

@@ -1,0 +1,438 @@
+"""Commands `simulate`, `sampling`, `export` and `campaign`, about one closed loop."""
+
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.cli.app import app, console, given, new_file, print_lines, progress
+from quakedesign.cli.options import (
+    NO_STATE,
+    PLAIN,
+    ActuatorOptions,
+    Box,
+    EstimateOptions,
+    FaultName,
+    Force,
+    Formats,
+    Gains,
+    LawOptions,
+    Metres,
+    MetresPerSecond,
+    NoLawOptions,
+    Output,
+    RunOptions,
+    Scheduler,
+    Seconds,
+    SensorOptions,
+    SpreadOptions,
+    StartOptions,
+    StateOptions,
+    Texts,
+    Whole,
+    changed_options,
+    require_no_state_options,
+    show_state_run,
+    surroundings,
+)
+from quakedesign.errors import ParameterError
+from quakedesign.files import hold
+from quakedesign.parallel import remedy
+
+if TYPE_CHECKING:
+    from quakedesign.simulation.campaign import Campaign, CampaignProblem
+
+
+# ----------------------------------------------------------------------
+# Commands about one closed loop: simulate it, see what sampling does to it, export its controller.
+
+_DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
+_BESIDE = ("scheme", "plant", "drift", "perturbation", "initial_slip", "initial_slip_rate", "weight", "authority")
+_NONE, _LAW, _USUAL, _REST = NoLawOptions(), LawOptions(), RunOptions(), StartOptions()
+
+
+@app.command
+def simulate(
+    fault: FaultName,
+    /,
+    *,
+    law: NoLawOptions = _NONE,
+    run: RunOptions = _USUAL,
+    start: StartOptions = _REST,
+    weight: float | None = None,
+    authority: float | None = None,
+    actuator: ActuatorOptions = _DIRECT,
+    sensors: SensorOptions = _EXACT,
+    state: StateOptions = NO_STATE,
+    seed: Whole = 0,
+    out: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Run one closed loop over the whole task, or the natural earthquake without a controller.
+
+    Quantities have a unit, as '20 MPa', or are bare numbers in SI units.
+
+    Parameters
+    ----------
+    weight
+        Of the estimate of the disturbance in the scheme compensated, above 0, at most 1.
+    authority
+        B0 of a sampled scheme in m^2/kg; guarantee says weight and authority of the sliding modes that it proves.
+    seed
+        Of noise and jitter.
+    out
+        NetCDF file to write.
+    """
+    options = dict(locals())
+    from quakedesign.fault import load_fault
+    from quakedesign.report.sentences import proved_line
+    from quakedesign.simulation import Load
+    from quakedesign.studies.runs import run_single
+
+    new_file(out, "output file", force=force)
+    loaded = load_fault(fault)
+    if loaded.friction.state_names:
+        return show_state_run(loaded, simulate, options)
+    require_no_state_options(state, loaded)
+    loaded = start.task(loaded)
+    chosen, load = law.choose(loaded, run.step, actuator.path()), run.load()
+    way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
+    period = loaded.sampling_time if step is None else step
+    substeps, chain, told = surroundings(chosen, period, run, actuator, sensors, seed)
+    with progress() as tell:
+        tell("compiling", 0.0)
+        trajectory, premises = run_single(
+            loaded,
+            chosen,
+            tell=lambda done: tell("simulation", done),
+            duration=run.duration,
+            load=load if load != Load() else None,
+            step=step,
+            scheme=way,
+            method=run.method,
+            plant=run.plant,
+            substeps=substeps,
+            actuator=chain,
+            noise=told,
+            initial=start.state(),
+            tuning=given({"weight": weight, "authority": authority}),
+        )
+    if out is not None:
+        trajectory.save(out)
+    proved, outside = None, list[str]()
+    if chosen and chosen.claim:
+        proved, outside = chosen.claim.sentence(), _outside(changed_options(simulate, options), chosen.claim.held)
+    answer = _answer(trajectory, loaded, premises) | {
+        "guarantee": {"sentence": proved} if proved else None,
+        "outside": outside,
+    }
+    output.show(answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside)))
+    return 0
+
+
+def _outside(changed: dict[str, Any], held: Any) -> list[str]:
+    """Options of a run of a law that what is proved of it does not know."""
+    known = {name: float(time) for name, time in held.path.items()}
+    starts = zip(("initial_slip", "initial_slip_rate"), map(float, held.start), strict=True)
+    within = {name for name, most in starts if abs(changed.get(name, 0.0)) <= most}
+    within |= {name for name, time in known.items() if changed.get(name) == time}
+    kinds: tuple[Any, ...] = (ActuatorOptions, SensorOptions)
+    groups = (option.name for kind in kinds for option in fields(kind))
+    return [name for name in (*_BESIDE, *groups) if name in changed and name not in within]
+
+
+def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
+    from quakedesign.simulation.natural import waiting
+    from quakedesign.studies.comparison import shortfall
+
+    metrics, energy = trajectory.metrics.to_dict(), trajectory.energy
+    begins = waiting(trajectory, fault)
+    return {
+        "outcome": trajectory.outcome.to_dict(),
+        "waiting": begins.to_dict() if begins else None,
+        "shortfall": shortfall(trajectory, fault),
+        "metrics": metrics,
+        "units": {name: trajectory.metrics.unit(name) for name in metrics},
+        "premises": [p.to_dict() for p in premises],
+        "events": dict(trajectory.events),
+        "energy": energy.to_dict() | {"relative_residual": energy.relative_residual} if energy else None,
+        "steps": metrics["steps"],
+        "seconds": metrics["seconds"],
+        "run": dict(trajectory.provenance),
+    }
+
+
+def _print_run(trajectory: Any, fault: Any, premises: Any, proved: str) -> None:
+    from quakedesign.report.terminal import print_run
+
+    print_run(trajectory, fault, premises, console())
+    if trajectory.energy:
+        lost = f"{trajectory.energy.relative_residual:.2g} of the largest share"
+        print_lines([f"  energy that the integration loses: {lost}"])
+    print_lines([f"  {proved}"] if proved else [])
+
+
+@app.command
+def sampling(
+    fault: FaultName,
+    /,
+    *,
+    controller: str = "cta",
+    gains: Gains = ("designed",),
+    scale: Texts = (),
+    schemes: Texts = ("explicit", "implicit", "semi-implicit", "compensated"),
+    duration: Seconds | None = None,
+    out: Path | None = None,
+    format: Formats = ("png",),
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Show what sampling does: every scheme beside the published controllers, orders of accuracy, sensitivities.
+
+    Writes results.json and figures. Errors count after a quarter of each run; those with noise last a sixteenth of
+    the task.
+
+    Parameters
+    ----------
+    controller
+        cta, dia or elqr.
+    gains
+        designed (in continuous time), published, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+    scale
+        Further values of λ for a sliding mode, decimal or p/q.
+    schemes
+        To run the law with.
+    duration
+        Of the runs; the operation time unless given.
+    out
+        Folder to write; ./quakedesign-FAULT-sampling unless given.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.report.folder import prepare
+    from quakedesign.report.sampling_table import print_sampling, write_sampling
+    from quakedesign.studies.runs import CONTINUOUS, DESIGNED, chosen_controller
+    from quakedesign.studies.sampling import sampling_report
+    from quakedesign.synthesis import design
+
+    loaded = load_fault(fault)
+    loaded.require_memoryless("a study of sampling")
+    folder = out or Path(f"quakedesign-{loaded.name}-sampling")
+    prepare(folder, force=force)
+    hold(folder)
+    with progress() as tell:
+        tell("gains", 0.0)
+        law = (
+            design(loaded, controller, continuous=True)
+            if gains in (DESIGNED, CONTINUOUS)
+            else chosen_controller(loaded, controller, gains)
+        )
+        report = sampling_report(loaded, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
+        results = write_sampling(report, folder, format)
+
+    def told() -> None:
+        print_sampling(report, console())
+        print_lines(["", f"written: {folder}/ (results.json, figures)"])
+
+    output.show(results, told)
+    return 0
+
+
+@app.command
+def export(
+    fault: FaultName,
+    /,
+    *,
+    law: LawOptions = _LAW,
+    step: Seconds | None = None,
+    scheme: str | None = None,
+    sensors: EstimateOptions = _TOLD,
+    fmu: bool = False,
+    out: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Write a controller as C for the computer of a laboratory: one function, called once per sample.
+
+    Parameters
+    ----------
+    step
+        Sampling period, for which designed gains are designed; the fault's unless given.
+    scheme
+        explicit (unless given), implicit, semi-implicit or compensated.
+    fmu
+        Write controller.fmu as well: the same step for co-simulation (FMI 2.0).
+    out
+        Folder to write; ./quakedesign-FAULT-CONTROLLER unless given.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.report.plain import export_lines
+    from quakedesign.studies.exporting import export_answer
+
+    loaded = load_fault(fault)
+    chosen = law.choose(loaded, step)
+    if chosen is None:
+        raise ParameterError("export needs a controller. Received none. Give --controller.")
+    folder = out or Path(f"quakedesign-{loaded.name}-{chosen.controller.name}")
+    answer = export_answer(
+        loaded,
+        chosen.controller,
+        folder,
+        step=step,
+        scheme=scheme,
+        **sensors.told(),
+        remarks=(f"proved: {chosen.claim.sentence()}",) if chosen.claim else (),
+        fmu=fmu,
+        force=force,
+    )
+    output.show(answer, export_lines(answer))
+    return 0
+
+
+# ----------------------------------------------------------------------
+# The command that runs many samples of one closed loop.
+
+_CAMPAIGN_DIRECT, _CAMPAIGN_EXACT, _CAMPAIGN_LAW, _CAMPAIGN_USUAL = (
+    ActuatorOptions(),
+    SensorOptions(),
+    LawOptions(),
+    RunOptions(),
+)
+_SAME = SpreadOptions()
+
+
+@app.command
+def campaign(
+    fault: FaultName,
+    /,
+    *,
+    samples: Whole,
+    law: LawOptions = _CAMPAIGN_LAW,
+    run: RunOptions = _CAMPAIGN_USUAL,
+    box: Box = None,
+    actuator: ActuatorOptions = _CAMPAIGN_DIRECT,
+    sensors: SensorOptions = _CAMPAIGN_EXACT,
+    initial_slip: Metres = 0.0,
+    initial_rate: MetresPerSecond = 0.0,
+    state: SpreadOptions = _SAME,
+    seed: Whole = 0,
+    search: str | None = None,
+    rerun: str | None = None,
+    workers: Whole | None = None,
+    scheduler: Scheduler = None,
+    out: Path | None = None,
+    format: Formats = ("png",),
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Run many samples over the uncertainty box, disturbances, noise and initial states, and report how bad they get.
+
+    Every batch that is done is kept in the folder: interrupted or killed, the same command goes on and gives the same
+    answer. Exit code 0 if all samples have a result (one that diverges has), 1 if a batch failed. Quantities have a
+    unit, as '20 MPa', or are bare numbers in SI units.
+
+    Parameters
+    ----------
+    samples
+        Number of samples.
+    initial_slip
+        Largest slip at the start.
+    initial_rate
+        Largest slip rate at the start.
+    seed
+        Of samples and noise.
+    search
+        Metric whose worst value is searched for, such as max_slip_rate_error.
+    rerun
+        Index of a sample to run again and store as NetCDF in the folder.
+    workers
+        Number of processes; one per core unless given.
+    out
+        Folder; ./quakedesign-FAULT-campaign unless given.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.report.drawing import figure_bytes
+    from quakedesign.simulation.campaign import campaign_problem, run_campaign
+    from quakedesign.simulation.run import sampled_scheme
+
+    if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
+        raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
+    loaded = load_fault(fault, box=box)
+    chosen, told = state.choose(loaded, law, run.step, actuator.path())
+    controller = chosen.controller if chosen else None
+    way, step, own = run.way(controller)
+    period = loaded.sampling_time if step is None else step
+    around = surroundings(None if loaded.friction.state_names else chosen, period, run, actuator, sensors, 0)
+    problem = campaign_problem(
+        loaded,
+        controller,
+        scheme=sampled_scheme(way, *around, **own),
+        step=step,
+        method=run.method,
+        duration=run.duration,
+        plant=run.plant,
+        load=run.load(),
+        initial_slip=initial_slip,
+        initial_slip_rate=initial_rate,
+        seed=seed,
+        **told,
+    )
+    folder = out or Path(f"quakedesign-{loaded.name}-campaign")
+    hold(folder, make=True)
+    options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
+    remedy(f"the same command goes on from {folder}")
+    with progress() as tell:
+        done = run_campaign(problem, samples, folder, tell=tell, **options)
+        drawn = done.plot()
+        done.save(folder, {f"distribution.{kind}": figure_bytes(drawn, kind, "distribution") for kind in format})
+        answer = done.to_dict() | _again(done, rerun, folder)
+    output.show(answer, lambda: _print(problem, done, answer, f"{folder}/ ({_written(answer, format)})"))
+    return 1 if done.failures else 0
+
+
+def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
+    """Run one sample again and store it."""
+    if index is None:
+        return {}
+    run = done.trajectory(int(index) if index.isdecimal() else index)
+    path = run.save(folder / f"sample-{index}.nc")
+    told = {"outcome": run.outcome.to_dict(), "metrics": run.metrics.to_dict(), "events": dict(run.events)}
+    return {"rerun": {"index": index, "file": str(path), **told}}
+
+
+def _print(problem: "CampaignProblem", done: "Campaign", answer: dict[str, Any], written: str) -> None:
+    from rich.table import Table
+
+    from quakedesign.simulation.recorder import StickMetrics
+
+    out = console()
+    happened = ", ".join(f"{len(indices)} {name.replace('_', ' ')}" for name, indices in done.events.items() if indices)
+    law = problem.controller.title if problem.controller else "no control"
+    out.print(f"{problem.fault.name}, {law}: {answer['samples']} samples, {answer['resumed']} of them from files")
+    came_to = ", ".join(f"{len(indices)} {kind}" for kind, indices in done.kinds.items() if indices)
+    out.print(f"outcomes (samples): {came_to or 'none'}")
+    out.print(f"events (samples): {happened or 'none'}")
+    levels = ("0.05", "0.5", "0.95", "1")
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    for column in ("metric", "unit", "5 %", "50 %", "95 %", "worst", "samples"):
+        table.add_column(column, no_wrap=column != "samples")
+    for name, quantiles in answer["quantiles"].items():
+        values = ("diverges" if quantiles[level] is None else f"{quantiles[level]:.2g}" for level in levels)
+        worst = ", ".join(str(entry["index"]) for entry in answer["worst"][name][:3])
+        table.add_row(name, StickMetrics.unit(name) or "-", *values, worst)
+    out.print(table, soft_wrap=False)
+    for told in (answer["search"],) if answer["search"] else ():
+        value = "diverges" if told["value"] is None else f"{told['value']:.6g} {StickMetrics.unit(told['metric'])}"
+        out.print(f"search: {told['metric']} = {value} in {told['index']} of {told['looked_at']} samples")
+    for failure in answer["failures"]:
+        span = f"{failure['samples'][0]} … {failure['samples'][-1]}"
+        out.print(f"failed: samples {span}: {failure['reason']}")
+    out.print(f"written: {written}")
+
+
+def _written(answer: dict[str, Any], formats: Sequence[str]) -> str:
+    """Names of the files in the folder."""
+    from quakedesign.report.drawing import file_names
+
+    again = [Path(answer["rerun"]["file"]).name] if "rerun" in answer else []
+    return ", ".join(["results.json", "samples.csv", file_names("distribution", formats), *again])

@@ -1,0 +1,329 @@
+"""Exact rational numbers from decimal text and floats, and certified bounds.
+
+Every other module receives numbers as `fractions.Fraction` from here. The second chapter holds one-sided
+bounds and enclosures; they are printed rounded outwards (an upper bound up, a lower bound down).
+"""
+
+import math
+import re
+import sys
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from fractions import Fraction
+from numbers import Rational, Real
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from quakedesign.errors import ParameterError
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+
+# ----------------------------------------------------------------------
+# The one place where numbers become exact: decimal text and floats in, `fractions.Fraction` out.
+
+_DIGITS = 308  # so that float() of the number neither overflows nor vanishes
+_NUMBER = re.compile(r"[+-]?(\d+(/\d+)?|(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)", re.ASCII)
+
+
+def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
+    """Exact value of a decimal, an exponent form, a fraction p/q, or a float read as its shortest decimal.
+
+    Parameters
+    ----------
+    value : float, int, str or Fraction
+        Number, also one of NumPy or SymPy; a float means the decimal that Python prints for it, so 0.1 is 1/10.
+    name : str
+        What the number is, for the message.
+
+    Returns
+    -------
+    Fraction
+
+    Raises
+    ------
+    ParameterError
+        When the value is not a finite number of at most 300 characters and 308 digits, or has more digits than a float
+        without being a rational.
+    """
+    if isinstance(value, Fraction):
+        return value if type(value) is Fraction else Fraction(value)
+    exact = _read(value, name)
+    if max(abs(exact.numerator), exact.denominator) >= 10**_DIGITS:
+        raise ParameterError(f"{name} must have at most {_DIGITS} digits. Received more. Round it, or check its unit.")
+    return exact
+
+
+def _read(value: object, name: str) -> Fraction:
+    if isinstance(value, Rational) and not isinstance(value, bool):
+        return Fraction(int(value.numerator), int(value.denominator))
+    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else value
+    if isinstance(number, float) and number != value and not math.isnan(number):
+        raise ParameterError(
+            f"{name} must be a float, a rational or text. Received {value!r:.60}, which is no float. Give it as text."
+        )
+    written = number.strip() if isinstance(number, str) else repr(number)
+    if len(written) > 300 or not _NUMBER.fullmatch(written) or re.search(r"/0+$", written):
+        raise ParameterError(
+            f"{name} must be a finite number: a decimal, an exponent form or p/q, in at most 300 characters. "
+            f"Received {written[:60]!r}. Write for example {_instead(written)}."
+        )
+    return Fraction(written)
+
+
+def _instead(written: str) -> str:
+    """A number that may be meant."""
+    share = written.removesuffix("%").strip()
+    if share != written and len(share) <= 20 and _NUMBER.fullmatch(share) and "/" not in share:
+        return f"{float(share) / 100:g}"
+    return "2.3, 4.51e-4 or 23/10"
+
+
+def nearest(value: float, denominator: int) -> Fraction:
+    """Multiple of 1/denominator that is nearest to a float.
+
+    Raises
+    ------
+    ParameterError
+        When the float is not finite.
+    """
+    if not math.isfinite(value):
+        raise ParameterError(f"a finite number is needed for rounding. Received {value!r}.")
+    return Fraction(round(Fraction(value) * denominator), denominator)
+
+
+def fraction_of(value: Any) -> Fraction:
+    """Fraction of a rational of python-flint or SymPy, both of which have p and q."""
+    return Fraction(int(value.p), int(value.q))
+
+
+def end_of(ball: Any) -> Fraction:
+    """Fraction of an exact ball of python-flint, such as an end of another."""
+    return fraction_of(ball.fmpq())
+
+
+def fraction_of_float(value: "sp.Float") -> Fraction:
+    """Fraction of a float of SymPy: as `rational` reads it where it is one of Python's, else its exact value."""
+    import sympy as sp
+
+    near = float(value)
+    return rational(near) if sp.Float(near) == value else fraction_of(sp.Rational(value))
+
+
+def to_sympy(value: Fraction) -> "sp.Rational":
+    """Rational of SymPy."""
+    import sympy as sp
+
+    return sp.Rational(value.numerator, value.denominator)
+
+
+def exact_text(value: Any) -> str:
+    """A rational as p/q, or p, whatever its length: ``str`` refuses more than 4300 digits, `Decimal` none.
+
+    What is no rational of Python is written by ``str``.
+    """
+    if not isinstance(value, Rational):
+        return str(value)
+    numerator, denominator = (str(Decimal(int(part))) for part in (value.numerator, value.denominator))
+    return numerator if denominator == "1" else f"{numerator}/{denominator}"
+
+
+def float_above(value: Fraction) -> float:
+    """Float at or just above a rational, infinite above the largest."""
+    try:
+        number = float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -sys.float_info.max
+    return number if Fraction(number) >= value else math.nextafter(number, math.inf)
+
+
+def float_below(value: Fraction) -> float:
+    """Float at or just below a rational."""
+    return -float_above(-value)
+
+
+def shortly(value: Fraction | float) -> str:
+    """A number as floats are written, or six digits of one that no float holds."""
+    try:
+        return f"{float(value):.6g}"
+    except OverflowError:
+        return six_digits(Fraction(value))
+
+
+def six_digits(value: Fraction) -> str:
+    """Six digits, to nearest, for people; Decimal has no largest number as floats have."""
+    return f"{Decimal(value.numerator) / Decimal(value.denominator):.6g}"
+
+
+# ----------------------------------------------------------------------
+# Certified numbers, which are printed on their outer side only: an upper bound is rounded up, a lower one down.
+#
+# A bound is a `fractions.Fraction`, so that it is compared and computed with exactly. What is computed from it is a
+# plain
+# fraction: whether that is a bound again, and of which side, says the code that computed it.
+
+_SPEC = re.compile(
+    r"(?P<align>.?[<>^])?(?P<sign>[-+ ]?)(?P<width>([1-9]\d*)?)(\.(?P<digits>\d+))?(?P<kind>[eEfFgG%]?)", re.ASCII
+)
+_PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate("a f p n µ m  k M G T P E".split(" "))}
+
+
+class Bound(Fraction):
+    """Exact bound of a certified quantity; `UpperBound` and `LowerBound` are its two sides.
+
+    ``str`` and ``repr`` show six digits, ``format`` as many as it is told, ``float`` the nearest float, all on the
+    outer side. `exact` is the only text that is the number itself.
+    """
+
+    __slots__ = ()
+    _side: ClassVar[str]
+
+    @property
+    def exact(self) -> str:
+        """The number itself, p/q."""
+        return exact_text(Fraction(self))
+
+    def quantity(self, unit: str, digits: int = 3) -> str:
+        """Text with a unit and its engineering prefix, such as ``20.1 MPa``.
+
+        Parameters
+        ----------
+        unit : str
+            One that takes prefixes, such as Pa, m or m/s.
+        digits : int
+            Significant ones, at least those before the point.
+        """
+        _, exponent = self._significant(digits)
+        power = min(max(3 * (exponent // 3), -18), 18)
+        shown = format(type(self)(self / Fraction(10) ** power), f".{max(digits - 1 - exponent + power, 0)}f")
+        return f"{_bare(shown)} {_PREFIXES[power]}{unit}"
+
+    def __str__(self) -> str:
+        return format(self, "")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}('{self}')"
+
+    def __format__(self, spec: str) -> str:
+        """Decimal on the outer side, within a unit of its last digit.
+
+        Parameters
+        ----------
+        spec : str
+            Alignment, sign, width, precision, and one of ``e``, ``f``, ``g``, ``%``, as for a float.
+
+        Raises
+        ------
+        ValueError
+            For any other.
+        """
+        match = _SPEC.fullmatch(spec)
+        if match is None:
+            raise ValueError(f"a format of a bound must be one of e, f, g or %, as '.3g'. Received {spec!r}.")
+        digits = int(match["digits"]) if match["digits"] else 6
+        kind = match["kind"].lower() or "g"
+        text = {"e": self._scientific, "f": self._fixed, "g": self._general, "%": self._percent}[kind](digits)
+        sign = "-" if text.startswith("-") else match["sign"].replace("-", "")
+        text = sign + text.removeprefix("-")
+        text = text.upper() if match["kind"].isupper() else text
+        return format(text, f"{match['align'] or '>'}{match['width']}")
+
+    def _significant(self, digits: int) -> tuple[Decimal, int]:
+        """Outer decimal of so many digits, and the power of ten of its first."""
+        context = Context(prec=max(digits, 1), rounding=self._side)
+        found = context.divide(Decimal(self.numerator), Decimal(self.denominator))
+        return found, found.adjusted()
+
+    def _whole(self, factor: int) -> int:
+        """Outer whole multiple of 1/factor."""
+        return (math.ceil if self._side == ROUND_CEILING else math.floor)(self * factor)
+
+    def _scientific(self, digits: int) -> str:
+        number, exponent = self._significant(digits + 1)
+        return f"{_mantissa(number, exponent, digits)}e{exponent:+03d}"
+
+    def _fixed(self, digits: int) -> str:
+        return _fixed(self._whole(10**digits), digits)
+
+    def _percent(self, digits: int) -> str:
+        return _fixed(self._whole(10 ** (digits + 2)), digits) + "%"
+
+    def _general(self, digits: int) -> str:
+        number, exponent = self._significant(digits)
+        if -4 <= exponent < max(digits, 1):
+            return _bare(format(number, "f"))
+        return f"{_bare(_mantissa(number, exponent, digits))}e{exponent:+03d}"
+
+
+class UpperBound(Bound):
+    """Not exceeded: a peak, a settling time, what a premise requires. Rounded up."""
+
+    __slots__ = ()
+    _side = ROUND_CEILING
+
+    def __float__(self) -> float:
+        return float_above(Fraction(self))
+
+
+class LowerBound(Bound):
+    """Reached at least: a longest step, a margin, a decay rate, what a certificate covers. Rounded down."""
+
+    __slots__ = ()
+    _side = ROUND_FLOOR
+
+    def __float__(self) -> float:
+        return float_below(Fraction(self))
+
+
+@dataclass(frozen=True, slots=True)
+class Enclosure:
+    """Interval that contains a quantity: printed, it contains it still.
+
+    Attributes
+    ----------
+    low : LowerBound
+    high : UpperBound
+
+    Raises
+    ------
+    ParameterError
+        For ends in the wrong order.
+    """
+
+    low: LowerBound
+    high: UpperBound
+
+    def __post_init__(self) -> None:
+        if self.low > self.high:
+            raise ParameterError(f"an enclosure must run from low to high. Received {self}. Swap its ends.")
+
+    @classmethod
+    def of(cls, low: Fraction, high: Fraction) -> "Enclosure":
+        """Enclosure by its two exact ends."""
+        return cls(LowerBound(low), UpperBound(high))
+
+    def __format__(self, spec: str) -> str:
+        return f"{self.low:{spec}} to {self.high:{spec}}"
+
+    def __str__(self) -> str:
+        return format(self, "")
+
+
+def _mantissa(number: Decimal, exponent: int, digits: int) -> str:
+    """Number over its power of ten, with so many places; exact, since it has no more digits."""
+    sign, figures, _ = number.as_tuple()
+    written = "".join(map(str, figures)).ljust(digits + 1, "0")
+    whole = f"{written[0]}.{written[1:]}" if digits else written[0]
+    return f"-{whole}" if sign else whole
+
+
+def _fixed(count: int, places: int) -> str:
+    """Decimal text of count·10^(−places)."""
+    written = str(abs(count)).rjust(places + 1, "0")
+    whole = f"{written[:-places]}.{written[-places:]}" if places else written
+    return f"-{whole}" if count < 0 else whole
+
+
+def _bare(text: str) -> str:
+    """Decimal text without the zeros that say nothing."""
+    return text.rstrip("0").rstrip(".") if "." in text else text

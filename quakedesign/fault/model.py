@@ -1,0 +1,774 @@
+"""Spring-slider model of one fault: parameters, reference, disturbance, uncertainty box.
+
+All values are in SI units. Chapters: uncertainty box, slip at rest after an uncontrolled event, checks of
+physical values, reference slip (eq. ref of the paper), disturbance, and the class `Fault` (eq.
+springmodel).
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from fractions import Fraction
+from functools import cached_property
+from math import inf, nan, nextafter
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.errors import (
+    ParameterError,
+    QuakedesignError,
+    ScenarioError,
+    UnitError,
+    UnknownNameError,
+    require_known,
+)
+from quakedesign.exact import rational
+from quakedesign.fault.friction.base import FrictionLaw
+from quakedesign.fault.units import si_value
+from quakedesign.text import shown
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+
+# ----------------------------------------------------------------------
+# How far the real fault may be from the nominal one.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UncertaintyBox:
+    """Relative half-widths of the plant's parameters; friction is uncertain in every box.
+
+    In every box μ_res ≤ μ ≤ μ_max, the chord slope of μ in slip is at most that of the law, and slip ≥ 0.
+
+    Attributes
+    ----------
+    name : str
+    stiffness, damping, authority : Fraction
+        Half-widths of k̂, η̂ and N̂ relative to their nominal values [-], in [0, 1).
+    """
+
+    name: str
+    stiffness: Fraction = Fraction(0)
+    damping: Fraction = Fraction(0)
+    authority: Fraction = Fraction(0)
+
+    def __post_init__(self) -> None:
+        for part in ("stiffness", "damping", "authority"):
+            if not 0 <= getattr(self, part) < 1:
+                raise ParameterError(
+                    f"{part} of the uncertainty box must be in [0, 1). Received {getattr(self, part)}. "
+                    "Ten percent is 0.1."
+                )
+
+
+BOXES = {
+    box.name: box
+    for box in (
+        UncertaintyBox(name="paper"),
+        UncertaintyBox(
+            name="ten-percent", stiffness=Fraction(1, 10), damping=Fraction(1, 10), authority=Fraction(1, 10)
+        ),
+    )
+}
+
+
+def uncertainty_box(name: str) -> UncertaintyBox:
+    """Named box: ``paper`` (only friction is uncertain) or ``ten-percent`` (also ±10 % on k, η and N̂).
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    require_known(name, BOXES, "uncertainty box", UnknownNameError)
+    return BOXES[name]
+
+
+# ----------------------------------------------------------------------
+# Where a fault that starts to slip comes to rest.
+
+_SCAN = 4096
+_DIGITS = 40  # the slip of a fault that is only just unstable is a small difference
+
+
+def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
+    """Smallest positive slip [m] where the excess of load over strength turns from driving to resisting.
+
+    The excess is (μ(0) − μ(x))σ'_n A − kx at zero pressure (statics of eq. shift), for a load σ'_n A [N] and a
+    stiffness k [N/m]. All roots lie below
+    (μ_max − μ_min)σ'_n A/k. A fault whose origin is stable stays where it is; friction with a state has no strength
+    of its own at rest, and nan is returned.
+    """
+    if friction.state_names:
+        return nan
+    import mpmath
+    import sympy as sp
+
+    x = sp.Symbol("x", nonnegative=True)
+    law = friction.exact().coefficient
+    excess = law(sp.Integer(0), 0) - law(x, 0) - stiffness / load * x
+    drive, drive_in_floats = (sp.lambdify(x, excess, module) for module in ("mpmath", "math"))
+    low, high = friction.bounds
+    furthest = (high - low) * load / stiffness * 1.0001
+    if furthest == 0:
+        return 0.0
+    try:
+        ends = _turn(drive_in_floats, furthest)
+    except (NameError, ArithmeticError, ValueError):  # a function that floats do not have, or beyond their range
+        ends = _turn(drive, furthest)
+    if ends is None:
+        return 0.0
+    with mpmath.workdps(_DIGITS):
+        return float(mpmath.findroot(drive, ends, solver="anderson", tol=1e-60, maxsteps=100, verify=False))
+
+
+def _turn(drive: Callable[[float], Any], furthest: float) -> tuple[float, float] | None:
+    """Slips [m] between which an excess turns from driving to resisting; None where it does not drive at the start."""
+    grid = [furthest * i / _SCAN for i in range(_SCAN + 1)]
+    if drive(grid[1] / _SCAN) <= 0:
+        return None
+    after = next(i for i, slip in enumerate(grid) if i and drive(slip) <= 0)
+    return grid[after - 1] if after > 1 else grid[1] / _SCAN, grid[after]
+
+
+# ----------------------------------------------------------------------
+# Checks of physical values, shared by the types of this room.
+
+MOST_WORKERS = 256
+"""Processes that one command may start."""
+
+_LARGEST = 1e40
+_NAME = re.compile(r"\w[\w .-]{0,59}")
+_MOST_BYTES = 120  # files and folders are named after it, and a system gives them 255
+
+
+class Problems:
+    """What is wrong with one input, collected so that all of it is said at once."""
+
+    def __init__(self) -> None:
+        self.found: list[QuakedesignError] = []
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Keep the refusal that the block ends with, and go on."""
+        try:
+            yield
+        except QuakedesignError as error:
+            self.found += error.parts or (error,)
+
+    def refuse(self, where: str = "") -> None:
+        """Raise what was collected, if anything: as it is, or as one error that counts and names them all.
+
+        Raises
+        ------
+        QuakedesignError
+        """
+        if not self.found:
+            return
+        kinds = {type(error) for error in self.found}
+        kind = kinds.pop() if len(kinds) == 1 else ScenarioError
+        told = [str(error) for error in self.found]
+        if len(told) > 1:
+            told = [f"{len(told)} errors.", *(f"({i}) {text}" for i, text in enumerate(told, start=1))]
+        error = kind(f"{where}: {' '.join(told)}" if where else " ".join(told))
+        error.parts = tuple(self.found) if len(told) > 1 else ()
+        raise error from None
+
+
+def require_all(*checks: Callable[[], None]) -> None:
+    """Make every check, and refuse all that is wrong at once.
+
+    Raises
+    ------
+    QuakedesignError
+    """
+    problems = Problems()
+    for check in checks:
+        with problems.collected():
+            check()
+    problems.refuse()
+
+
+def require_seed(seed: int) -> None:
+    """Refuse what is no seed.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise ParameterError(f"seed must be a whole number of at least 0. Received {seed!r}.")
+
+
+def require_positive(remedy: str = "", **values: float | Fraction) -> None:
+    """Refuse values that are not positive finite numbers, all at once; the keyword is the name.
+
+    Raises
+    ------
+    ParameterError
+    """
+    _require(values, lambda v: v > 0, "positive and finite", remedy)
+
+
+def require_nonnegative(remedy: str = "", **values: float) -> None:
+    """Refuse values that are negative or no finite numbers.
+
+    Raises
+    ------
+    ParameterError
+    """
+    _require(values, lambda v: v >= 0, "zero or positive, and finite", remedy)
+
+
+def require_finite(remedy: str = "", **values: float) -> None:
+    """Refuse values that are no finite numbers.
+
+    Raises
+    ------
+    ParameterError
+    """
+    _require(values, lambda v: True, "finite", remedy)
+
+
+def is_ordinary(size: float | Fraction, least: float = 1 / _LARGEST) -> bool:
+    """Whether a positive number can be the size of something in SI units."""
+    return least <= size <= _LARGEST
+
+
+def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) -> None:
+    """Refuse values that are no sizes of anything, so that no product of them leaves the floats; zero is one.
+
+    Raises
+    ------
+    ParameterError
+    """
+    problems = Problems()
+    for name, value in values.items():
+        with problems.collected():
+            if value and not is_ordinary(max(value, -value), least):
+                raise ParameterError(
+                    f"{name} must be of a size between {least:g} and {_LARGEST:g} in SI units. "
+                    f"Received {shown(value)}. Check its unit."
+                )
+    problems.refuse()
+
+
+def require_count(most: int, **values: int) -> None:
+    """Refuse values that are no whole numbers from 1 to `most`.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for name, value in values.items():
+        if not isinstance(value, Integral) or isinstance(value, bool) or not 1 <= value <= most:
+            raise ParameterError(f"{name} must be a whole number from 1 to {most}. Received {shown(value)}.")
+
+
+def _require(values: dict[str, Any], fine: Callable[[Any], bool], what: str, remedy: str) -> None:
+    problems = Problems()
+    for name, value in values.items():
+        with problems.collected():
+            if not isinstance(value, Real) or isinstance(value, bool):
+                raise ParameterError(f"{name} must be a number in SI units, {what}. Received {shown(value)}.")
+            if not (is_finite(value) and fine(value)):
+                raise ParameterError(f"{name} must be {what}. Received {shown(value)} (SI units). {remedy}".strip())
+    problems.refuse()
+
+
+def is_finite(value: Real | float) -> bool:
+    """Whether a number is one that a float holds."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def require_name(name: str) -> None:
+    """Refuse a name after which no file can be named everywhere.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not isinstance(name, str) or not _NAME.fullmatch(name) or len(name.encode()) > _MOST_BYTES:
+        raise ParameterError(
+            "name must be a text of at most 60 letters, digits, spaces and _ . - (120 bytes in UTF-8), beginning "
+            f"with a letter or digit. Received {shown(name)}."
+        )
+
+
+# ----------------------------------------------------------------------
+# The slip that the controller shall follow.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reference:
+    """Smooth slip r(t) from rest to rest, eq. ref, held at its end for t > operation_time (ERRATA 26).
+
+    Attributes
+    ----------
+    target_slip : float
+        d_max [m], positive.
+    operation_time : float
+        t_op [s], positive.
+    ramp : float, optional
+        Of friction with a state, which slides all the time: share of the slip that follows the smooth ramp, above 0 and
+        below 1; the rest comes at a constant rate. None: all of it at a constant rate.
+    """
+
+    target_slip: float = field(metadata={"unit": "m", "symbol": "d_{max}"})
+    operation_time: float = field(metadata={"unit": "s", "symbol": "t_{op}"})
+    ramp: float | None = field(
+        default=None, metadata={"unit": "", "directed_unit": "slip_m/slip_m", "symbol": r"\lambda_r"}
+    )
+
+    def __post_init__(self) -> None:
+        require_positive(target_slip=self.target_slip, operation_time=self.operation_time)
+        if self.ramp is not None and not 0 < self.ramp < 1:
+            raise ParameterError(
+                f"ramp must be above 0 and below 1. Received {self.ramp!r}. Leave it out for a constant rate."
+            )
+        require_ordinary(0, target_slip=self.target_slip)
+        require_ordinary(operation_time=self.operation_time)
+
+    def shape(self, stage: Any) -> Any:
+        """Share of the target slip [-] at the stage s = t/t_op in [0, 1] (eq. ref): number, array or expression.
+
+        Raises
+        ------
+        ParameterError
+            For anything that has no powers, or too large ones.
+        """
+        if isinstance(stage, type) or not hasattr(stage, "__pow__"):
+            raise ParameterError(
+                f"stage must be a number, an array or an expression. Received {shown(stage)}. Give t/t_op."
+            )
+        try:
+            return stage**3 * (10 - 15 * stage + 6 * stage**2)
+        except (OverflowError, TypeError):
+            raise ParameterError(f"stage must be from 0 to 1. Received {shown(stage)}. Give t/t_op.") from None
+
+    def slip(self, time: "sp.Expr") -> "sp.Expr":
+        """Reference slip [m] at a time [s] of [0, operation_time], with exact numbers."""
+        import sympy as sp
+
+        d_max, t_op = (sp.Rational(str(rational(v))) for v in (self.target_slip, self.operation_time))
+        return d_max * self.shape(time / t_op)
+
+    @property
+    def largest_rate(self) -> float:
+        """Largest r' [m/s]: 15/8 of the mean, at half of the operation time."""
+        return 15 / 8 * self.target_slip / self.operation_time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingReference:
+    """Slip r(t) = d_max((1 − λ)t/t_op + λ·shape(t/t_op)) of a fault that slides at r′(0) at first and at the end.
+
+    Attributes
+    ----------
+    task : Reference
+        With d_max, t_op and λ, its ramp; 0 without one.
+    """
+
+    task: Reference
+
+    @property
+    def _shares(self) -> tuple[Fraction, Fraction]:
+        """1 − λ and λ."""
+        share = rational(self.task.ramp or 0)
+        return 1 - share, share
+
+    @property
+    def first_rate(self) -> Fraction:
+        """V = r′(0) [m/s], the smallest r′."""
+        return rational(self.task.target_slip) / rational(self.task.operation_time) * self._shares[0]
+
+    @property
+    def swing(self) -> Fraction:
+        """w [-]: r′ lies between V and V(1 + w)."""
+        steady, share = self._shares
+        return Fraction(15, 8) * share / steady
+
+    def slip(self, time: Any) -> Any:
+        """r [m] at times [s] from 0 on, number or array; V goes on behind t_op."""
+        steady, share = map(float, self._shares)
+        stage = time / self.task.operation_time
+        ended = (stage < 1) * stage + (stage >= 1)
+        return self.task.target_slip * (steady * stage + share * self.task.shape(ended))
+
+    def rate(self, time: Any) -> Any:
+        """r′ [m/s] at times [s], as `slip`."""
+        steady, share = map(float, self._shares)
+        stage = time / self.task.operation_time
+        ramping = 30 * stage**2 * (1 - stage) ** 2 * (stage < 1)
+        return self.task.target_slip / self.task.operation_time * (steady + share * ramping)
+
+
+# ----------------------------------------------------------------------
+# What acts on the fault besides the spring, the dashpot, friction and the injected fluid.
+
+STRESSES = ("constant", "amplitude")
+
+
+def acceleration(quantity: Any, authority: Fraction, name: str) -> tuple[float, bool]:
+    """Value [m/s²] of a text such as ``"1e-4 m/s^2"``, or of a shear stress such as ``"35 kPa"``; whether it was that.
+
+    A stress τ accelerates a fault by τA/m: rounded up in size, so that what is proved of the float is so of the stress.
+
+    Parameters
+    ----------
+    quantity : str
+    authority : Fraction
+        A/m [m²/kg] of the fault, the nominal one.
+    name : str
+        What the quantity is, for the message.
+
+    Raises
+    ------
+    UnitError
+        For another unit.
+    ParameterError
+        For a stress that is no size of anything on this fault.
+    """
+    try:
+        return si_value(quantity, "m/s^2", name), False
+    except UnitError as error:
+        try:
+            stress = rational(si_value(quantity, "Pa", name), name)
+        except UnitError as other:
+            if "Did you mean" in str(other):
+                raise
+            raise UnitError(f"{error} A shear stress in Pa will do as well.") from None
+    require_ordinary(**{name: float(stress)})
+    exact = abs(stress) * authority
+    size = float(exact)
+    while rational(size) < exact:  # the decimal that proofs read
+        size = nextafter(size, inf)
+    return (size if stress >= 0 else -size), True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disturbance:
+    """Acceleration φ̂_e(x1, x2, t) = constant + amplitude·sin(frequency·t) + slip_growth·x1 + rate_growth·x2.
+
+    Attributes
+    ----------
+    constant : float
+        [m/s²], in a file also as a shear stress on the fault, such as "35 kPa".
+    amplitude : float
+        [m/s²], not negative, in a file also as a shear stress on the fault, such as "35 kPa".
+    frequency : float
+        Angular frequency [rad/s], not negative.
+    slip_growth : float
+        [1/s²].
+    rate_growth : float
+        [1/s].
+    stresses : tuple of str
+        Which of ``constant`` and ``amplitude`` were given as a shear stress: proofs cover it for every area per mass of
+        the fault's box, while the number itself is for the nominal one.
+    """
+
+    constant: float = field(default=0.0, metadata={"unit": "m/s^2"})
+    amplitude: float = field(default=0.0, metadata={"unit": "m/s^2"})
+    frequency: float = field(default=0.0, metadata={"unit": "rad/s"})
+    slip_growth: float = field(default=0.0, metadata={"unit": "1/s^2"})
+    rate_growth: float = field(default=0.0, metadata={"unit": "1/s"})
+    stresses: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_finite(constant=self.constant, slip_growth=self.slip_growth, rate_growth=self.rate_growth)
+        require_nonnegative(amplitude=self.amplitude, frequency=self.frequency)
+        require_ordinary(**{each.name: getattr(self, each.name) for each in fields(self) if "unit" in each.metadata})
+
+    def acceleration(self, slip: "sp.Expr", rate: "sp.Expr", time: "sp.Expr") -> "sp.Expr":
+        """φ̂_e [m/s²] at a slip [m], slip rate [m/s] and time [s]."""
+        import sympy as sp
+
+        return self.explicit(time) + sp.Float(self.slip_growth) * slip + sp.Float(self.rate_growth) * rate
+
+    def explicit(self, time: "sp.Expr") -> "sp.Expr":
+        """Part of φ̂_e [m/s²] that depends on time [s] alone."""
+        import sympy as sp
+
+        return self.constant + self.amplitude * sp.sin(sp.Float(self.frequency) * time)
+
+    @property
+    def largest_explicit(self) -> float:
+        """Bound on the part of φ̂_e that depends on time alone [m/s²]."""
+        return abs(self.constant) + self.amplitude
+
+    @property
+    def largest_rate(self) -> float:
+        """Bound on the time derivative of that part [m/s³]."""
+        return self.amplitude * self.frequency
+
+    def exact_bounds(self, width: Fraction = Fraction(0)) -> tuple[Fraction, Fraction]:
+        """Both bounds [m/s²] and [m/s³] of the decimals given, for proofs: of floats they may be rounded inward.
+
+        A stress accelerates by up to 1 + `width` times as much, the half-width of the area per mass [-].
+        """
+        constant, amplitude = (
+            abs(rational(getattr(self, name))) * (1 + width * (name in self.stresses)) for name in STRESSES
+        )
+        return constant + amplitude, amplitude * rational(self.frequency)
+
+
+# ----------------------------------------------------------------------
+# One fault as a spring-slider, in SI units.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """Spring-slider analogue of one fault, eq. springmodel.
+
+    Attributes
+    ----------
+    name : str
+    source : str
+        Where the numbers come from.
+    density : float
+        ρ of the host rock [kg/m³].
+    shear_modulus : float
+        G of the host rock [Pa].
+    length : float
+        L_ac, length of the activated fault [m].
+    width : float, optional
+        The side of the patch beside its length [m]; None for a square one, the paper's.
+    damping : float
+        η [kg/s], not negative.
+    effective_normal_stress : float
+        σ'_n [Pa], positive in compression.
+    friction : FrictionLaw
+    reference : Reference
+        Slip to follow.
+    sampling_time : float
+        T_s [s].
+    disturbance : Disturbance
+    box : UncertaintyBox
+    assumed : tuple of str
+        What a file left to physics or to the paper's example, each in a sentence.
+
+    Notes
+    -----
+    A patch of two sides is a row of squares of its shorter side h that slip as one. Stress that slip changes reaches
+    about h into the rock, so each has the paper's mass ρh³ and stiffness Gh, and the damping is shared among them: the
+    natural frequency √(G/ρ)/h is that of one square, and moment, mass and stiffness are those of all.
+
+    Raises
+    ------
+    ParameterError
+        When a value is unphysical or not finite.
+    """
+
+    name: str
+    source: str
+    density: float = field(metadata={"unit": "kg/m^3", "directed_unit": "kg/fault_m^3", "symbol": r"\rho"})
+    shear_modulus: float = field(metadata={"unit": "Pa", "directed_unit": "shear_Pa/(slip_m/fault_m)", "symbol": "G"})
+    length: float = field(metadata={"unit": "m", "directed_unit": "fault_m", "symbol": "L"})
+    width: float | None = field(default=None, metadata={"unit": "m", "directed_unit": "fault_m"})
+    damping: float = field(metadata={"unit": "kg/s", "symbol": r"\eta"})
+    effective_normal_stress: float = field(metadata={"unit": "Pa", "symbol": r"\sigma'_n"})
+    friction: FrictionLaw
+    reference: Reference
+    sampling_time: float = field(metadata={"unit": "s", "symbol": "T_s"})
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    box: UncertaintyBox = field(default_factory=lambda: uncertainty_box("paper"))
+    assumed: tuple[str, ...] = field(default=(), compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        problems = Problems()
+        with problems.collected():
+            require_name(self.name)
+        with problems.collected():
+            require_plant(**{name: getattr(self, name) for name in _PLANT}, **self._other_side)
+        with problems.collected():
+            require_ordinary(**{name: getattr(self.friction, name) for name in self.friction.quantities()})
+        problems.refuse()
+        if self.reference.ramp is not None and not self.friction.state_names:
+            raise ParameterError(
+                f"a ramp beside a constant rate needs friction with a state. Received {self.reference.ramp!r} with "
+                f"{self.friction.name}, whose reference is a smooth ramp from rest to rest. Leave it out."
+            )
+        if self.reference.operation_time < 1000 * self.sampling_time:
+            raise ParameterError(
+                f"sampling_time must be at most a thousandth of the operation time "
+                f"({self.reference.operation_time!r} s). Received {self.sampling_time!r} s."
+            )
+
+    def require_memoryless(self, purpose: str) -> None:
+        """Refuse friction with a state variable where only slip and slip rate are covered.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if self.friction.state_names:
+            raise ParameterError(
+                f"{purpose} needs a friction law of slip and slip rate alone. Received {self.friction.name}, with the "
+                f"state {', '.join(self.friction.state_names)}. "
+                "Use fault, derive, simulate, guarantee or design for it."
+            )
+
+    def with_box(self, name: str) -> "Fault":
+        """Return the same fault with a named uncertainty box."""
+        return replace(self, box=uncertainty_box(name))
+
+    @property
+    def disturbance_bounds(self) -> tuple[Fraction, Fraction]:
+        """Bounds of the disturbance [m/s²] and of its rate [m/s³]; of a stress for every area per mass of the box."""
+        return self.disturbance.exact_bounds(self.box.authority)
+
+    def with_disturbance(self, disturbance: Disturbance) -> "Fault":
+        """Return the same fault under another disturbance."""
+        return replace(self, disturbance=disturbance)
+
+    @property
+    def _other_side(self) -> dict[str, float]:
+        return {} if self.width is None else {"width": self.width}
+
+    @property
+    def side(self) -> float:
+        """h [m], the shorter side of the patch; L of a square one."""
+        return min((self.length, *self._other_side.values()))
+
+    @cached_property
+    def squares(self) -> Fraction:
+        """n, exact: the longer over the shorter side [-]; 1 of a square one."""
+        sides = [rational(self.length), rational(self.length if self.width is None else self.width)]
+        return max(sides) / min(sides)
+
+    @property
+    def mass(self) -> float:
+        """m = nρh³ [kg]."""
+        return float(self.squares) * self.density * self.side**3
+
+    @property
+    def area(self) -> float:
+        """A = nh² [m²]."""
+        return float(self.squares) * self.side**2
+
+    @property
+    def stiffness(self) -> float:
+        """k = nGh [N/m] (the paper prints G/L: ERRATA 3)."""
+        return float(self.squares) * self.shear_modulus * self.side
+
+    @property
+    def authority(self) -> float:
+        """N̂ = A/m [m²/kg]."""
+        return self.area / self.mass
+
+    @property
+    def exact_authority(self) -> Fraction:
+        """A/m = 1/(ρh) [m²/kg] of the decimals given."""
+        return 1 / (rational(self.density) * rational(self.side))
+
+    @property
+    def authority_range(self) -> tuple[float, float]:
+        """Smallest and largest input gain μN̂ [m²/kg] over the uncertainty box."""
+        low, high = self.friction.bounds
+        width = float(self.box.authority)
+        return low * self.authority * (1 - width), high * self.authority * (1 + width)
+
+    @property
+    def specific_stiffness(self) -> float:
+        """k̂ = k/m [1/s²]."""
+        return self.stiffness / self.mass
+
+    @property
+    def specific_damping(self) -> float:
+        """η̂ = η/m [1/s]."""
+        return self.damping / self.mass
+
+    @property
+    def natural_frequency(self) -> float:
+        """ω_n = √(k/m) [rad/s]."""
+        return math.sqrt(self.specific_stiffness)
+
+    @property
+    def damping_ratio(self) -> float:
+        """ζ = η/(2mω_n) [-]."""
+        return self.specific_damping / (2 * self.natural_frequency)
+
+    @property
+    def stress_drop(self) -> float:
+        """Δτ = (μ_max − μ_res)σ'_n [Pa]; nan for friction with a state, whose drop is that of an event."""
+        if self.friction.state_names:
+            return math.nan
+        low, high = self.friction.bounds
+        return (high - low) * self.effective_normal_stress
+
+    @property
+    def seismic_moment(self) -> float:
+        """M0 = GAD [N·m] of the rest slip D; 0 for a stable fault, nan for friction with a state: see `moment_of`.
+
+        The paper's nh³Δτ is that of a fault on which friction loses all that it can.
+        """
+        return self.moment_of(self.rest_slip)
+
+    @property
+    def magnitude(self) -> float:
+        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity for a stable fault, nan as `seismic_moment`."""
+        return magnitude(self.seismic_moment)
+
+    def moment_of(self, slip: float) -> float:
+        """M0 = GAD [N·m] of an event that slips by D [m]: L³Δτ with the stress that the spring loses."""
+        return self.shear_modulus * self.area * slip
+
+    @cached_property
+    def rest_slip(self) -> float:
+        """Slip [m] at which the fault comes to rest next: the stable root of the statics; 0 for a stable fault.
+
+        nan for friction with a state, which has no strength of its own at rest.
+        """
+        return rest_slip(self.friction, self.effective_normal_stress * self.area, self.stiffness)
+
+
+_PLANT = {
+    "density": "kg/m^3",
+    "shear_modulus": "Pa",
+    "length": "m",
+    "damping": "kg/s",
+    "effective_normal_stress": "Pa",
+    "sampling_time": "s",
+}
+
+
+def require_plant(**numbers: float) -> None:
+    """Refuse numbers of a fault that are unphysical, all of them at once.
+
+    Raises
+    ------
+    ParameterError
+    """
+    problems = Problems()
+    compression = "Compression is positive here; check the sign."
+    for name, value in numbers.items():
+        with problems.collected():
+            if name == "damping":
+                require_nonnegative(damping=value)
+            else:
+                usual = f"It is in {_PLANT[name]} here; check sign and unit." if name in _PLANT else ""
+                require_positive(compression if name == "effective_normal_stress" else usual, **{name: value})
+            require_ordinary(**{name: value})
+    problems.refuse()
+
+
+def magnitude(seismic_moment: float) -> float:
+    """M_w = ⅔log10(M0) − 6.07 [-] of a seismic moment [N·m], eq. magnitude; minus infinity of none."""
+    return -math.inf if seismic_moment <= 0 else 2 / 3 * math.log10(seismic_moment) - 6.07
+
+
+def require_fault(fault: Fault) -> Fault:
+    """The fault, if it is one.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not isinstance(fault, Fault):
+        raise ParameterError(f"fault must be a Fault. Received {fault!r:.60}. Write load_fault('real-fault'), say.")
+    return fault

@@ -1,0 +1,610 @@
+"""Similarity of faults: π-groups, exact scale factors, and scaled faults.
+
+The dimensional matrix is derived from units alone; two faults are similar if all π-groups agree
+(Buckingham 1914, Phys. Rev. 4, 345). Slip, fault length and the normal direction have separate units of
+length (directed lengths, Huntley 1967, Dimensional Analysis), as Table I of the paper requires. A scale
+factor is a signed root of a rational.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from decimal import Context, Decimal, localcontext
+from fractions import Fraction
+from functools import cache, cached_property, reduce
+from math import lcm, prod
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
+
+from quakedesign.errors import ParameterError, UnitError, UnknownNameError, require_known
+from quakedesign.exact import exact_text, fraction_of, rational
+from quakedesign.fault.friction.base import FrictionLaw
+from quakedesign.fault.model import Disturbance, Fault, Reference
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+
+# ----------------------------------------------------------------------
+# The dimensions of the spring-slider: what may be rescaled independently.
+#
+# The equation of motion never compares a slip with the length of the fault, nor a tangential with a normal direction:
+# a stiffness k = GL is a force per slip, a friction coefficient a tangential force per normal force. The metres of
+# the
+# three are therefore three units (directed lengths, as in Huntley 1967, Dimensional Analysis), with mass and time
+# five
+# in all; this is why slip, fault length and friction scale by different factors in Table I of the paper.
+
+BASES = ("mass", "fault_length", "slip", "normal_length", "time")
+"""Independent dimensions, in the order of the rows of the dimensional matrix."""
+
+_UNITS = (
+    "kilogram = [mass] = kg",
+    "second = [time] = s",
+    "radian = [] = rad",
+    "fault_meter = [fault_length] = fault_m",
+    "slip_meter = [slip] = slip_m = m = meter",
+    "normal_meter = [normal_length] = normal_m",
+    "shear_newton = kg * slip_m / s^2 = shear_N",
+    "shear_pascal = shear_N / fault_m^2 = shear_Pa",
+    "normal_newton = kg * normal_m / s^2 = normal_N",
+    "normal_pascal = normal_N / fault_m^2 = normal_Pa = Pa = pascal",
+)
+
+PLANT_UNITS: Mapping[str, str] = {
+    f"{part}{each.name}": each.metadata.get("directed_unit", each.metadata["unit"])
+    for part, kind in (("", Fault), ("reference.", Reference), ("disturbance.", Disturbance))
+    for each in fields(kind)
+    if "unit" in each.metadata
+}
+"""Units of the numbers of a `Fault`, by dotted name; with all three metres equal they are its SI units."""
+
+_FRICTION = "slip_m/normal_m"
+_UNIT_FRICTION = "unit friction"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """One parameter of a fault.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name inside the `Fault`.
+    unit : str
+        With directed lengths.
+    value : Fraction
+        In that unit.
+    """
+
+    name: str
+    unit: str
+    value: Fraction
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    registry: Any = pint.UnitRegistry(None)
+    for line in _UNITS:
+        registry.define(line)
+    return registry
+
+
+@cache
+def dimension(unit: str) -> tuple[Fraction, ...]:
+    """Exponents of `BASES` in a unit; a plain ``m`` is one of slip and ``Pa`` one of normal stress or fluid pressure.
+
+    Raises
+    ------
+    UnitError
+        For a unit that cannot be read.
+    """
+    try:
+        exponents = dict(_registry().parse_units(unit).dimensionality)
+    except Exception:
+        raise UnitError(
+            f"a unit in kg, s, slip_m (or m), fault_m, normal_m, Pa is needed. Received {unit!r}. Check its spelling."
+        ) from None
+    return tuple(Fraction(exponents.get(f"[{base}]", 0)).limit_denominator(1000) for base in BASES)
+
+
+def dimensional_matrix(units: Sequence[str]) -> "sp.Matrix":
+    """Exponents of the base dimensions (rows, as `BASES`) in units (columns), exact."""
+    import sympy as sp
+
+    columns = [[sp.Rational(e.numerator, e.denominator) for e in dimension(unit)] for unit in units]
+    return sp.Matrix(len(BASES), len(units), lambda row, column: columns[column][row])
+
+
+def quantities(fault: Fault) -> dict[str, Quantity]:
+    """Every parameter of a fault by dotted name, those of its friction law included.
+
+    Where a friction law cannot be stretched as a whole by its dimensionless parameters, friction has no scale of its
+    own; the constant friction coefficient 1 is then one more parameter, the same for every fault.
+    """
+    law = fault.friction
+    named = {name: (unit, number) for name, unit in PLANT_UNITS.items() if (number := _number(fault, name)) is not None}
+    named |= {
+        f"friction.{name}": (_friction_unit(field.metadata), getattr(law, name))
+        for name, field in law.quantities().items()
+    }
+    quantities = {n: Quantity(name=n, unit=u, value=rational(v, n)) for n, (u, v) in named.items()}
+    if not stretches(law):
+        quantities[_UNIT_FRICTION] = Quantity(name=_UNIT_FRICTION, unit=_FRICTION, value=Fraction(1))
+    return quantities
+
+
+def _number(fault: Fault, dotted: str) -> float | None:
+    value: Any = fault
+    for part in dotted.split("."):
+        value = getattr(value, part)
+    number: float | None = value
+    return number
+
+
+def _friction_unit(metadata: Mapping[str, Any]) -> str:
+    """Unit with directed lengths: a law may state it as ``directed_unit``; a number is a friction coefficient."""
+    return str(metadata.get("directed_unit", metadata["unit"] or _FRICTION))
+
+
+def stretches(law: FrictionLaw) -> bool:
+    """True where μ grows by any factor as all friction coefficients among the parameters do (degree 1 of Euler)."""
+    import sympy as sp
+
+    factor = sp.Symbol("c", positive=True)
+    slip, rate = sp.Symbol("x", positive=True), sp.Symbol("v", positive=True)
+    state = sp.symbols(f"theta:{len(law.state_names)}", positive=True)
+    plain = sp.sympify(law.symbolic().coefficient(slip, rate, *state))
+    symbols = law.symbols()
+    numbers = [symbols[n] for n, f in law.quantities().items() if _friction_unit(f.metadata) == _FRICTION]
+    grown = plain.subs({symbol: factor * symbol for symbol in numbers}, simultaneous=True)
+    return bool(sp.expand(grown - factor * plain) == 0)
+
+
+# ----------------------------------------------------------------------
+# Signed roots of rationals: the exact numbers that appear when a rational is raised to a rational power.
+
+_WORKING_DIGITS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Radical:
+    """sign · radicand^(1/degree), held in its one canonical form, so that equal numbers compare equal.
+
+    Products, quotients and rational powers of such numbers are such numbers, hence every scale factor and every
+    carried gain is exact. Build them with `radical`.
+
+    Attributes
+    ----------
+    sign : int
+        −1, 0 or 1.
+    radicand : Fraction
+        Positive; 1 for the number zero.
+    degree : int
+        Smallest possible, so 1 for a rational number.
+    """
+
+    sign: int
+    radicand: Fraction
+    degree: int
+
+    @property
+    def is_rational(self) -> bool:
+        """True where the number is a rational."""
+        return self.degree == 1
+
+    @property
+    def fraction(self) -> Fraction:
+        """The number itself, where it is rational.
+
+        Raises
+        ------
+        ParameterError
+            When it is irrational.
+        """
+        if not self.is_rational:
+            raise ParameterError(
+                f"a rational number is needed. Received {self.text()}…, a root of degree {self.degree}."
+            )
+        return self.sign * self.radicand
+
+    def __mul__(self, other: "Radical | Fraction | int") -> "Radical":
+        right = radical(other)
+        degree = lcm(self.degree, right.degree)
+        radicand = self.radicand ** (degree // self.degree) * right.radicand ** (degree // right.degree)
+        return _canonical(self.sign * right.sign, radicand, degree)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: "Radical | Fraction | int") -> "Radical":
+        return self * radical(other) ** -1
+
+    def __pow__(self, exponent: Fraction | int) -> "Radical":
+        power = Fraction(exponent)
+        if (self.sign == 0 and power <= 0) or (self.sign < 0 and power.denominator != 1):
+            raise ParameterError(f"{self.text()} has no real power {power}.")
+        if self.sign == 0:
+            return self
+        sign = -1 if self.sign < 0 and power.numerator % 2 else 1
+        return _canonical(sign, self.radicand**power.numerator, self.degree * power.denominator)
+
+    def decimal(self, digits: int = 12) -> Decimal:
+        """Nearest decimal number with so many significant digits."""
+        with localcontext(Context(prec=max(_WORKING_DIGITS, 2 * digits))):
+            ratio = Decimal(self.radicand.numerator) / Decimal(self.radicand.denominator)
+            root = self.sign * ratio ** (Decimal(1) / self.degree)
+        return Context(prec=digits).plus(root)
+
+    def nearest(self, digits: int = 12) -> Fraction:
+        """The number itself where it is rational, else the nearest decimal with so many significant digits."""
+        return self.fraction if self.is_rational else rational(str(self.decimal(digits)))
+
+    def text(self, digits: int = 12) -> str:
+        """Exact decimal or p/q where the number is rational, else a decimal with so many significant digits."""
+        if not self.is_rational:
+            return f"{self.decimal(digits):.{digits}g}"
+        rounded = self.decimal(17).normalize()
+        if Fraction(rounded) != self.fraction:
+            return exact_text(self.fraction)
+        return f"{rounded:f}" if -7 <= rounded.adjusted() <= 17 else str(rounded)
+
+    def __float__(self) -> float:
+        return float(self.decimal(40))
+
+    def __str__(self) -> str:
+        return self.text()
+
+
+def radical(value: "Radical | Fraction | int") -> Radical:
+    """Exact number from a rational; a `Radical` is returned as it is."""
+    if isinstance(value, Radical):
+        return value
+    exact = Fraction(value)
+    return _canonical((exact > 0) - (exact < 0), abs(exact) or Fraction(1), 1)
+
+
+def _canonical(sign: int, radicand: Fraction, degree: int) -> Radical:
+    if sign == 0:
+        return Radical(0, Fraction(1), 1)
+    return Radical(sign, *reduce(_without_prime, _primes(degree), (radicand, degree)))
+
+
+def _without_prime(held: tuple[Fraction, int], prime: int) -> tuple[Fraction, int]:
+    radicand, degree = held
+    while degree % prime == 0 and (root := _root(radicand, prime)) is not None:
+        radicand, degree = root, degree // prime
+    return radicand, degree
+
+
+def _root(value: Fraction, degree: int) -> Fraction | None:
+    """Rational root of a positive rational, None where there is none."""
+    from sympy import integer_nthroot
+
+    (top, exact_top), (bottom, exact_bottom) = (
+        integer_nthroot(n, degree) for n in (value.numerator, value.denominator)
+    )
+    return Fraction(int(top), int(bottom)) if exact_top and exact_bottom else None
+
+
+def _primes(number: int) -> list[int]:
+    if number == 1:
+        return []
+    from sympy import primefactors
+
+    return [int(prime) for prime in primefactors(number)]
+
+
+# ----------------------------------------------------------------------
+# Scale factors between faults, and how any quantity grows with them.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scales:
+    """Scale factors λ of the five independent dimensions, target over source.
+
+    Attributes
+    ----------
+    factors : mapping of str to Radical
+        Positive, by name in `quakedesign.fault.similarity.BASES`.
+
+    Raises
+    ------
+    ParameterError
+        For a factor that is missing, unknown or not positive.
+    """
+
+    factors: Mapping[str, Radical]
+
+    def __post_init__(self) -> None:
+        if set(self.factors) != set(BASES) or any(f.sign <= 0 for f in self.factors.values()):
+            raise ParameterError(
+                f"scale factors must be positive, one for each of {', '.join(BASES)}. "
+                f"Received {', '.join(f'{n} = {f}' for n, f in self.factors.items()) or 'none'}."
+            )
+        object.__setattr__(self, "factors", MappingProxyType(dict(self.factors)))
+
+    @classmethod
+    def from_ratios(cls, ratios: Mapping[str, Radical | Fraction | int]) -> Self:
+        """Scale factors from the ratios of five independent quantities.
+
+        Parameters
+        ----------
+        ratios : mapping of unit to number
+            Target over source, such as ``{"slip_m": …, "s": …, "normal_Pa": …, "fault_m": …, "kg/fault_m^3": …}``.
+
+        Raises
+        ------
+        ParameterError
+            When the units are not five independent ones, or a ratio is not positive.
+        """
+        matrix = dimensional_matrix(list(ratios))
+        if matrix.shape != (5, 5) or matrix.det() == 0:
+            raise ParameterError(
+                f"scale factors need the ratios of five quantities with independent dimensions. "
+                f"Received {', '.join(ratios) or 'none'}."
+            )
+        if any(radical(ratio).sign <= 0 for ratio in ratios.values()):
+            raise ParameterError(f"ratios must be positive. Received {', '.join(str(r) for r in ratios.values())}.")
+        inverse = matrix.inv()
+        return cls(
+            factors={
+                base: power_product(
+                    ratios, {unit: fraction_of(inverse[row, column]) for row, unit in enumerate(ratios)}
+                )
+                for column, base in enumerate(BASES)
+            }
+        )
+
+    def of(self, unit: str) -> Radical:
+        """Scale factor of any quantity from its unit; ``m`` is a slip, ``Pa`` a normal stress or fluid pressure."""
+        return power_product(self.factors, dict(zip(BASES, dimension(unit), strict=True)))
+
+    def inverse(self) -> Self:
+        """The way back."""
+        return replace(self, factors={base: factor**-1 for base, factor in self.factors.items()})
+
+
+def power_product(bases: Mapping[str, Radical | Fraction | int], exponents: Mapping[str, Fraction]) -> Radical:
+    """Π base^exponent, exact; bases may be zero only where they are not used."""
+    return prod((radical(bases[n]) ** e for n, e in exponents.items() if e), start=radical(1))
+
+
+# ----------------------------------------------------------------------
+# Similarity of faults: π-groups as the null space of the dimensional matrix, scale factors, and scaled faults.
+#
+# The dimensional matrix comes from units alone (`quakedesign.fault.similarity`). Two faults are similar if every
+# π-group has the same value in both (Buckingham 1914, Phys. Rev. 4, 345); then every solution of one is a solution of
+# the other after slip, time and pressure are multiplied by their scale factors.
+
+TOLERANCE = Fraction(1, 100)
+"""Relative difference of a π-group up to which faults known to three digits count as similar."""
+
+CLOCKS = ("reference.operation_time", "shear_modulus")
+"""What may fix the scale of time: the task, as in Table I of the paper, or the natural period 1/ω_n ∝ √(ρL²/G)."""
+
+_SUPERSCRIPTS = str.maketrans("-/0123456789", "⁻ᐟ⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PiGroup:
+    """One dimensionless product of parameters, Π parameter^exponent.
+
+    Attributes
+    ----------
+    name : str
+        The parameter that this group makes dimensionless; its exponent is 1.
+    exponents : mapping of str to Fraction
+        By dotted name of the parameter, without zeros.
+    """
+
+    name: str
+    exponents: Mapping[str, Fraction]
+
+    @property
+    def formula(self) -> str:
+        """The product as text, such as ``shear_modulus·density⁻¹·…``."""
+        return "·".join(n + (str(e).translate(_SUPERSCRIPTS) if e != 1 else "") for n, e in self.exponents.items())
+
+    def _repr_latex_(self) -> str:
+        words = (rf"\text{{{n.replace('_', ' ')}}}^{{{e}}}" for n, e in self.exponents.items())
+        return rf"$\displaystyle {' '.join(words)}$"
+
+    def value(self, parameters: Mapping[str, Quantity]) -> Radical:
+        """Exact value [-] for given parameters."""
+        if any(parameters[name].value == 0 for name in self.exponents):
+            return radical(0)
+        return power_product({name: parameters[name].value for name in self.exponents}, self.exponents)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroupComparison:
+    """One π-group in two faults.
+
+    Attributes
+    ----------
+    group : PiGroup
+    source, target : Radical
+        Values [-].
+    """
+
+    group: PiGroup
+    source: Radical
+    target: Radical
+
+    @property
+    def ratio(self) -> Radical | None:
+        """target/source [-]; None where it is zero in the source only."""
+        if self.source == self.target:
+            return radical(1)
+        return self.target / self.source if self.source.sign else None
+
+    def within(self, tolerance: Fraction) -> bool:
+        """True where the ratio is in [1 − tolerance, 1 + tolerance], decided in exact arithmetic."""
+        if self.ratio is None:
+            return False
+        bound = self.ratio.degree
+        size = self.ratio.sign * self.ratio.radicand
+        return (1 - tolerance) ** bound <= size <= (1 + tolerance) ** bound
+
+
+@dataclass(frozen=True, kw_only=True)
+class Similarity:
+    """How one fault maps onto another, and what stands in the way.
+
+    Attributes
+    ----------
+    scales : Scales
+    repeating : tuple of str
+        Parameters from whose ratios the scales follow; they fix slip, time, pressure, length and mass.
+    comparisons : tuple of GroupComparison
+        Every π-group of the parameters that both faults have.
+    unmatched : tuple of str
+        ``friction.law`` where the laws are different functions, and parameters that only one of them has.
+    """
+
+    scales: Scales
+    repeating: tuple[str, ...]
+    comparisons: tuple[GroupComparison, ...]
+    unmatched: tuple[str, ...] = ()
+
+    @cached_property
+    def differing(self) -> tuple[GroupComparison, ...]:
+        """Groups that are not exactly equal."""
+        return tuple(c for c in self.comparisons if c.source != c.target)
+
+    def violations(self, tolerance: Fraction = TOLERANCE) -> tuple[GroupComparison, ...]:
+        """Groups that differ by more than a relative tolerance."""
+        return tuple(c for c in self.comparisons if not c.within(tolerance))
+
+    def similar(self, tolerance: Fraction = TOLERANCE) -> bool:
+        """True where no group differs by more than the tolerance and both faults have the same parameters."""
+        return not self.unmatched and not self.violations(tolerance)
+
+
+def pi_groups(parameters: Sequence[Quantity]) -> tuple[PiGroup, ...]:
+    """Basis of the rational null space of the dimensional matrix, one group for every parameter that is not repeated.
+
+    Parameters
+    ----------
+    parameters : sequence of Quantity
+        The first ones with independent dimensions are the repeated ones, so the order decides on the basis.
+    """
+    names = [q.name for q in parameters]
+    groups = []
+    for vector in dimensional_matrix([q.unit for q in parameters]).nullspace():
+        powers = {name: fraction_of(power) for name, power in zip(names, vector, strict=True) if power}
+        made = list(powers)[-1]
+        groups.append(PiGroup(name=made, exponents={made: Fraction(1)} | powers))
+    return tuple(groups)
+
+
+def ordered(fault: Fault, clock: str = CLOCKS[0]) -> tuple[Quantity, ...]:
+    """Parameters of a fault, those that fix the scales first.
+
+    Parameters
+    ----------
+    fault : Fault
+    clock : str
+        One of `CLOCKS`.
+
+    Raises
+    ------
+    UnknownNameError
+        For another clock.
+    """
+    require_known(clock, CLOCKS, "clock", UnknownNameError)
+    first = ("unit friction", "density", "length", clock, *_slip_parameters(fault), "effective_normal_stress")
+    found = quantities(fault)
+    return tuple(sorted(found.values(), key=lambda q: (q.value == 0, first.index(q.name) if q.name in first else 99)))
+
+
+def _slip_parameters(fault: Fault) -> tuple[str, ...]:
+    """Friction parameters with a slip length, pure lengths first, then the target slip."""
+    slip = BASES.index("slip")
+    found = [q for q in quantities(fault).values() if q.name.startswith("friction.")]
+    held = [q for q in found if dimension(q.unit)[slip] and not dimension(q.unit)[BASES.index("normal_length")]]
+    return (*(q.name for q in sorted(held, key=lambda q: dimension(q.unit)[-1] != 0)), "reference.target_slip")
+
+
+def similarity(source: Fault, target: Fault, *, clock: str | None = None) -> Similarity:
+    """Scale factors from one fault to another, and every π-group in both.
+
+    Parameters
+    ----------
+    source, target : Fault
+    clock : str, optional
+        What fixes the scale of time, one of `CLOCKS`. Unless given the task, as in Table I of the paper; but the
+        natural period where the operation times are not in the ratio of the natural periods (within `TOLERANCE`).
+    """
+    if clock is not None:
+        return _compared(source, target, clock)
+    by_task = _compared(source, target, CLOCKS[0])
+    agrees = all(c.within(TOLERANCE) for c in by_task.comparisons if c.group.name == CLOCKS[1])
+    return by_task if agrees else _compared(source, target, CLOCKS[1])
+
+
+def _compared(source: Fault, target: Fault, clock: str) -> Similarity:
+    there, here = quantities(target), quantities(source)
+    common = [q for q in ordered(source, clock) if q.name in there and there[q.name].unit == q.unit]
+    common.sort(key=lambda q: q.value == 0 or there[q.name].value == 0)
+    pivots = dimensional_matrix([q.unit for q in common]).rref()[1]
+    repeating = [common[i] for i in pivots]
+    comparisons = tuple(
+        GroupComparison(group=g, source=g.value(here), target=g.value(there)) for g in pi_groups(common)
+    )
+    matched = {q.name for q in common}
+    law = () if _law(source) == _law(target) else ("friction.law",)
+    return Similarity(
+        scales=Scales.from_ratios({q.unit: there[q.name].value / q.value for q in repeating}),
+        repeating=tuple(q.name for q in repeating),
+        comparisons=comparisons,
+        unmatched=(*law, *(n for n in (here | there) if n not in matched)),
+    )
+
+
+def _law(fault: Fault) -> tuple[Any, ...]:
+    """Friction as a function, in symbols: equal for equal laws, whatever their parameters' values."""
+    import sympy as sp
+
+    slip, rate = sp.Symbol("x", positive=True), sp.Symbol("v", positive=True)
+    state = sp.symbols(f"theta:{len(fault.friction.state_names)}", positive=True)
+    law = fault.friction.symbolic()
+    return law.coefficient(slip, rate, *state), *law.state_rates(slip, rate, *state)
+
+
+def scaled_parameters(parameters: Mapping[str, Quantity], scales: Scales) -> dict[str, Radical]:
+    """Exact parameters of the similar fault, by dotted name."""
+    return {name: scales.of(q.unit) * q.value for name, q in parameters.items()}
+
+
+def scaled_fault(source: Fault, scales: Scales, name: str | None = None) -> Fault:
+    """Fault that is similar to another one; only the last step, to the floats of a `Fault`, rounds.
+
+    Parameters
+    ----------
+    source : Fault
+    scales : Scales
+    name : str, optional
+        Name of the new fault; that of the source with ``-scaled`` unless given.
+
+    Raises
+    ------
+    ParameterError
+        When a scaled value is out of range, or friction shall be scaled though its law admits no factor.
+    """
+    exact = scaled_parameters(quantities(source), scales)
+    if exact.pop("unit friction", radical(1)) != radical(1):
+        raise ParameterError(
+            f"{source.friction.name} cannot be multiplied by a factor, so the scales must leave friction as it is. "
+            f"Received the factor {scales.of('slip_m/normal_m')} for slip_m/normal_m."
+        )
+    held = {dotted: float(value) for dotted, value in exact.items()}
+    changes: dict[str, Any] = {key: held[key] for key in PLANT_UNITS if "." not in key and key in held}
+    for part in ("friction", "reference", "disturbance"):
+        changes[part] = replace(getattr(source, part), **_inside(held, f"{part}."))
+    return replace(source, name=name or f"{source.name}-scaled", source=f"similar to: {source.source}", **changes)
+
+
+def _inside(values: Mapping[str, float], prefix: str) -> dict[str, float]:
+    return {name.removeprefix(prefix): value for name, value in values.items() if name.startswith(prefix)}

@@ -1,0 +1,136 @@
+"""The data of a fault with rate-and-state friction that a guarantee of slow sliding uses."""
+
+from fractions import Fraction
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.exact import fraction_of, rational
+from quakedesign.fault import Fault, SlidingReference
+from quakedesign.guarantees.exact.sliding_task import AXES, SlidingTask
+from quakedesign.guarantees.exact.task import Friction, Task
+from quakedesign.loop import StateLaw
+from quakedesign.lyapunov.exact.fault_bounds import static_friction
+from quakedesign.symbolic.friction_bounds import friction_bounds
+
+_LAWS: dict[str, tuple[StateLaw, bool]] = {
+    "rate-and-state-aging": ("ageing", False),
+    "rate-and-state-slip": ("slip", False),
+    "regularised-rate-and-state": ("ageing", True),
+}
+"""Law of the state, unless the friction tells one itself, and whether friction is regularised."""
+_DIGITS = 12
+_LARGEST_RAMP = Fraction(8, 23)
+
+
+def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingTask:
+    """The task of a fault that slides at V, the first rate of its reference, under a stress of at most `stress` [Pa].
+
+    The ranges of a, b and D are their values and `spread` of them to both sides [-]; that of μ* follows from a − b.
+
+    Raises
+    ------
+    UnsupportedError
+        For friction without a state, or whose state feels the normal stress, and for a ramp from 8/23 on.
+    """
+    if fault.friction.name not in _LAWS or fault.friction.stress_sensitivity:  # type: ignore[attr-defined]
+        sensitivity = getattr(fault.friction, "stress_sensitivity", 0)
+        raise UnsupportedError(
+            f"a guarantee of slow sliding needs friction of a law {', '.join(_LAWS)}, its state deaf to the normal "
+            f"stress. Received {fault.friction.name}{f', stress_sensitivity {sensitivity:g}' * bool(sensitivity)}. "
+            "Simulate it."
+        )
+    state_law, regularised = _LAWS[fault.friction.name]
+    if getattr(fault.friction, "evolution", "") == "slip":
+        state_law = "slip"
+    law = fault.friction.exact()
+    reference = SlidingReference(task=fault.reference)
+    if reference.swing >= 1:
+        raise UnsupportedError(
+            f"a guarantee of slow sliding needs a ramp below {_LARGEST_RAMP}, with which the rate of the reference "
+            f"doubles. Received {fault.reference.ramp:g}. Make it smaller, or simulate it."
+        )
+    rate = reference.first_rate
+    named = {axis: rational(getattr(fault.friction, axis)) for axis in AXES[:3]}
+    steady = law.steady_coefficient(sp.Rational(rate.numerator, rate.denominator))
+    middle = _near(steady)
+    per_effect = abs(_near(sp.log(sp.Rational(rate.numerator, rate.denominator) / law.reference_rate)))  # type: ignore[attr-defined]
+    off = spread * per_effect * (named["direct_effect"] + named["evolution_effect"])
+    off += Fraction(1, 10**_DIGITS) * middle if off or not steady.is_Rational else 0
+    ends = {name: (value * (1 - spread), value * (1 + spread)) for name, value in named.items()}
+    normal = rational(fault.effective_normal_stress)
+    stiffness = rational(fault.shear_modulus) / rational(fault.side)
+    return SlidingTask(
+        name=fault.name,
+        density=rational(fault.density),
+        shear_modulus=rational(fault.shear_modulus),
+        length=rational(fault.side),
+        damping=rational(fault.damping) / fault.squares,
+        ranges={**ends, "coefficient": (middle - off, middle + off), "normal_stress": (normal, normal)},
+        rate=rate,
+        distance=rational(fault.reference.target_slip),
+        ramp=stiffness * rate / middle,
+        stress=stress,
+        swing=reference.swing,
+        state_law=state_law,
+        regularised=regularised,
+    )
+
+
+def _near(expression: sp.Expr) -> Fraction:
+    """A rational within 10^-14 of a number; itself if it is rational."""
+    value = sp.nsimplify(expression, rational=True) if expression.is_Rational else sp.N(expression, 40)
+    return fraction_of(value) if value.is_Rational else Fraction(str(value)).limit_denominator(10**18)
+
+
+# ----------------------------------------------------------------------
+# The data of a fault that a guarantee uses.
+
+
+def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
+    """What a guarantee uses of a fault, exactly.
+
+    Parameters
+    ----------
+    fault : Fault
+    rate_limited : bool
+        Whether the disturbance is bounded in its rate of change as well (class ``rate``).
+
+    Raises
+    ------
+    ParameterError
+        For friction with a state, or a disturbance of the class ``rate`` that does not start at 0.
+    """
+    fault.require_memoryless("a guarantee of tracking")
+    law, given, box = friction_bounds(fault.friction), fault.disturbance, fault.box
+    amplitude, change = fault.disturbance_bounds
+    if rate_limited and given.constant:
+        raise ParameterError(
+            "the class rate needs a disturbance that starts at 0. Received a constant one of "
+            f"{given.constant!r} m/s^2. Use the class amplitude."
+        )
+    stage = sp.Symbol("s")
+    shape = sp.Poly(fault.reference.shape(stage), stage).all_coeffs()[::-1]
+    return Task(
+        name=fault.name,
+        density=rational(fault.density),
+        shear_modulus=rational(fault.shear_modulus),
+        length=rational(fault.side),
+        damping=rational(fault.damping) / fault.squares,
+        normal_stress=rational(fault.effective_normal_stress),
+        spreads=(box.stiffness, box.damping, box.authority),
+        friction=Friction(
+            static=static_friction(fault),
+            least=law.least,
+            largest=law.most,
+            weakening=law.slip_slope,
+            strengthening=Fraction(0) if law.weakens else law.slip_slope,
+            rate_slope=law.rate_slope,
+        ),
+        shape=tuple(fraction_of(sp.Rational(c)) for c in shape),
+        target_slip=rational(fault.reference.target_slip),
+        operation_time=rational(fault.reference.operation_time),
+        amplitude=amplitude,
+        change=change if rate_limited else None,
+        growths=(rational(given.slip_growth), rational(given.rate_growth)),
+    )

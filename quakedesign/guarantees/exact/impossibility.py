@@ -1,0 +1,483 @@
+"""Performance limits of every controller: two theorems evaluated in ball arithmetic.
+
+Theorem 1 bounds the smallest peak error at a given sampling period. Theorem 2 gives the longest reaction
+and diffusion times, and the smallest withdrawal, with which a controller may hold the fault. The first
+chapter treats the linearised rate-and-state fault in slow sliding, the second a fault with slip or
+slip-rate dependent friction.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from math import ceil, sqrt
+from typing import Any, TypedDict
+
+from flint import arb, arb_mat, ctx
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import LowerBound, UpperBound, end_of
+from quakedesign.guarantees.exact.norms import ball, upper
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.loop import SlidingModel
+
+# ----------------------------------------------------------------------
+# What no controller can do with a fault in slow sliding, of its linearisation: two theorems, in ball arithmetic.
+#
+# The plant is the nominal one about sliding at V, linearised at the pressure 0, without inertia (`SlidingModel` with
+# c = c_z = 1): slip error x, y = ln(v/V), z = ln(θ/θ_ss), pressure error q = p − p*, any measurable shear stress |d|
+# ≤ D;
+# x(0) = z(0) = 0 and
+#
+#     x′ = Vy,   z′ = −ρ(y + z),   Sy = −Kx − Wz + μq + d.
+#
+# Controllers are any: linear or not, with memory, knowing plant, errors and stress exactly up to the sample.
+#
+# **Theorem 1 (surprise).** If pressures are decided at samples T apart, no controller keeps |y| below D·h(t) for any
+# 0 ≤ t < T, h the response of y to a unit step of d with q = 0: h(0) = 1/S.
+# *Proof.* Take d = D for ever, and the course on which it turns to −D just after a sample. All that is decided at
+# this
+# sample or before is the same, so q is, until the next one. The two courses of y then differ by 2D·h(t) at t after
+# the
+# turn, and one of them is at least D·h(t) in size. ∎  By continuity t = T may be taken as well.
+#
+# **Theorem 2 (push).** Let λ > 0 be an eigenvalue without control, G the transfer function of the path from well to
+# fault, whose impulse response is not negative, and q the path's answer to the well's u, |u| ≤ P. If a stress d = D
+# begins while x = z = u = 0 and u stays 0 until T later, no controller keeps x and z bounded if D·e^{λT} > μP·G(λ).
+# *Proof.* The plant is controllable from y, so that a left eigenvector w can be scaled to give ζ = w·(x, z) with
+# ζ′ = λζ + μq + d. With what u up to now will still do, η: η′ = λη + μG(λ)u + D, η(0) = 0. Until T η grows to
+# D(e^{λT} − 1)/λ, and then η′ ≥ λη + D − μG(λ)P > 0 for ever: η grows exponentially. What differs from ζ is bounded.
+# ∎
+
+_BITS = 128
+_ZERO, _ONE = Fraction(0), Fraction(1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingPush:
+    """A linearised fault in slow sliding and the stress that may push it.
+
+    Attributes
+    ----------
+    model : SlidingModel
+        With c = c_z = 1.
+    amplitude : Fraction
+        D [Pa], positive.
+    """
+
+    model: SlidingModel
+    amplitude: Fraction
+
+    @property
+    def authority(self) -> Fraction:
+        """μ [-], what a pressure is worth beside a stress."""
+        return self.model.coefficient
+
+    @property
+    def _ratios(self) -> tuple[Fraction, Fraction]:
+        """κ = KV/(ρS) and β = W/S."""
+        model = self.model
+        return model.stiffness * model.rate / (model.state_rate * model.strength), model.weakening / model.strength
+
+    @property
+    def grows(self) -> bool:
+        """Whether there is a real λ > 0: both eigenvalues are ρ times the roots of s² + (1 + κ − β)s + κ."""
+        kappa, beta = self._ratios
+        return beta > 1 + kappa and (beta - 1 - kappa) ** 2 >= 4 * kappa
+
+    @property
+    def pole(self) -> Any:
+        """The largest λ [1/s]."""
+        kappa, beta = self._ratios
+        trace = beta - 1 - kappa
+        return ball(self.model.state_rate) * (ball(trace) + ball(trace**2 - 4 * kappa).sqrt()) / 2
+
+    def smallest_rate_error(self, step: Fraction) -> LowerBound:
+        """V·D·h [m/s] of theorem 1 for samples a step [s] apart, the larger of both ends of a period."""
+        kappa, beta = self._ratios
+        flow = ((-kappa, -beta, _ONE), (kappa, beta - 1, -_ONE), (_ZERO, _ZERO, _ZERO))
+        with ctx.workprec(_BITS):
+            time = ball(step * self.model.state_rate)
+            moved = (arb_mat([[ball(v) * time for v in row] for row in flow])).exp()
+            late = 1 - ball(kappa) * moved[0, 2] - ball(beta) * moved[1, 2]
+            share = max(_ONE, end_of(late.lower()))
+        return LowerBound(self.model.rate * self.amplitude / self.model.strength * share)
+
+
+# ----------------------------------------------------------------------
+# What no controller whatever can do with a fault: two theorems, evaluated in ball arithmetic.
+#
+# A claim about all frictions and parameters of the box fails if it fails for one of them, so each theorem picks the
+# plant
+# that hurts most among a few. κ = k̂ − φ1 and w = η̂ − φ2 stand for the plant, φ is any measurable function of time
+# with
+# |φ| ≤ H, the pressure p is whatever a controller likes: linear or not, with memory, knowing plant, slip, slip rate
+# and
+# disturbance exactly up to the sample; or, with noise in theorem 1, knowing the plant and being told, at all times up
+# to
+# the sample, slip and slip rate within n and n′ of the true ones, either of which may be missing (n = ∞). X and P
+# below
+# are the largest slip-rate error and the largest withdrawal.
+#
+# **Theorem 1 (surprise).** Let the pressure be decided at samples T apart, act θ later and stay for T. On the plant
+# continued to negative slip rates no controller keeps the slip error within E and the slip-rate error below X for
+# ever if
+#
+#     X ≤ 2H·h(T + θ + τ),   h: impulse response of h″ = σh − wh′ from acceleration to slip,
+#
+# where noise hides for τ that a push has turned: H·h₊(t) ≤ n′ and H·∫₀ᵗ h₊ ≤ n for 0 ≤ t ≤ τ, h₊ as h with σ₊; τ = 0
+# without noise. Once the reference r rests, friction that is affine there, μ(r + e1) = μr − m·e1 for |e1| ≤ E, gives
+# with
+# q = p − p*
+#
+#     e1′ = e2,   e2′ = s·e1 − w·e2 + N̂(μr − m·e1)q + φ,   s = N̂m(σ′ − p*) − κ,
+#     σ = s − m(2X/T + sE + |w|X)/(μr − mE),   σ₊ = s + m(2X/T + sE + |w|X + H)/(μr − mE),
+#
+# and σ must not be negative. Friction that does not change, m = 0, leaves σ = σ₊ = s = −κ, and E may be any bound.
+# *Proof.* Suppose |e1| ≤ E, |e2| ≤ X′ < X for every φ and every noise. Take φ = H from the rest of r on. While p is
+# held, y = e2 obeys y″ = σ_k·y − w·y′ with σ_k = s − N̂mq_k. Integrated over the T that q_k lasts, e2′ bounds q_k:
+# −(2X′/T
+# + sE + |w|X′ + H) ≤ N̂q_k(μr − mE) ≤ 2X′/T + sE + |w|X′, so σ ≤ σ_k ≤ σ₊. If y ≥ δ > 0 at all changes of p from some
+# on,
+# then y is in between above the solution for σ₊ with δ at both ends (maximum principle, or for σ < 0 since κT² ≤ 1 <
+# π²),
+# each T adds at least a fixed part of δ to e1, and e1 leaves E. So for every δ some change of p, at t + θ + T with t
+# a
+# sample, has e2 < δ, as late as one likes. Turn φ to −H at t − τ. As long as p is the same in both, the difference d
+# of
+# both courses has d2′ = σ(t)d1 − w·d2 + 2H with σ ≤ σ(t) ≤ σ₊, so that d1 and d2 are at least 0 and at most what σ₊
+# makes
+# of them: up to t at most 2n and 2n′. So let what is told be n and n′ too low in the first course, always, and higher
+# by
+# d in the turned one: it is within n and n′ there too, and up to t what is told is the same, which decides what p
+# does
+# until t + θ + T. By then d2 ≥ 2H·h(τ + θ + T) ≥ X, and the turned course has e2 < δ − X, for every δ > 0. ∎
+# A controller that holds for T also holds for T/n, and one that acts θ late could act earlier, so T and θ may be
+# shortened, and τ as well.
+#
+# **Theorem 2 (withdrawal).** Let a fault rest at p = 0 when a push φ = H begins, and the pressure at the well be 0
+# until
+# T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse response is not
+# negative: delay, diffusion 1/cosh √(sL²/D). Friction that falls from μ* by m per slip gives s = N̂mσ′ − κ and, for s
+# > 0,
+# the unstable pole λ, λ² + wλ = s. If
+#
+#     H·e^{λT} > N̂μ*·P·G(λ),
+#
+# then slip passes E = (μ* − μ_res)/m, where friction has lost all that it can, whatever the controller does, even if
+# it
+# knows φ and the plant from the onset on; also where friction sticks instead of reversing.
+# *Proof.* For 0 ≤ x1 ≤ E: x2′ ≥ s·x1 − w·x2 + N̂(μ* − m·x1)p_f + H, an equality unless the fault sticks, and the
+# third
+# term is at least c·min(p_f, 0), c = N̂μ*, and min(p_f, 0) at least the path's answer to u = min(p, 0). With z = (λ +
+# w)x1
+# + x2, z′ = λz + … so that z ≥ ζ, ζ = z0 + what u up to now will still do; ζ′ = λζ + cG(λ)u + H, ζ(0) = 0. Until T ζ
+# grows to H(e^{λT} − 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 for ever: ζ grows exponentially. x1′ = z − (λ + w)x1
+# with
+# z ≥ ζ > 0 keeps x1 positive, so the premise x1 ≥ 0 lasts, and takes x1 beyond E. ∎
+
+_SHARE = Fraction(1, 20)  # E of theorem 1: of the slip over which friction falls, and of the target
+_BISECTIONS = 14
+_SHARES = [Fraction(3, 4) ** n for n in range(16)]  # of τ, tried until they forbid less
+_GROWN, _TURNED = 32, 1  # longest T·√|s| that theorem 1 is used with, for s above and below 0
+_IMPOSSIBILITY_ZERO = Fraction(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SmallestPeak:
+    """No controller keeps both errors below these.
+
+    Attributes
+    ----------
+    slip_rate_error : LowerBound
+        X [m/s].
+    slip_error : UpperBound or None
+        E [m]; None where any bounded slip error is meant.
+    """
+
+    slip_rate_error: LowerBound
+    slip_error: UpperBound | None
+
+
+class Noise(TypedDict):
+    """Bounds n [m] and n′ [m/s] of theorem 1; None for a slip rate that is not measured."""
+
+    slip_noise: Fraction
+    rate_noise: Fraction | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Surprised:
+    """A plant of theorem 1: s [1/s²], w [1/s], m [1/m], the least friction near r [-], E [m]."""
+
+    slip: Fraction
+    rate: Fraction
+    weakening: Fraction
+    friction: Fraction
+    reach: Fraction | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What a controller is told: bounds n [m] and n′ [m/s] of the noise; None for a slip rate that is not measured."""
+
+    slip_noise: Fraction
+    rate_noise: Fraction | None
+
+    @property
+    def noisy(self) -> bool:
+        """Whether anything is hidden."""
+        return bool(self.slip_noise) and self.rate_noise != 0
+
+    def hides(self, slip: Fraction, rate: Fraction, push: Fraction, step: Fraction) -> Fraction:
+        """τ [s], within a small part of T: for how long a turned push [m/s²] is hidden with σ₊ = `slip`, w = `rate`.
+
+        A larger σ₊ hides it for less. Answers with σ₊ of at least 0 only grow: it is enough to look at their ends.
+        """
+        if not push or not self.noisy:
+            return _IMPOSSIBILITY_ZERO
+
+        def hidden(time: Fraction) -> bool:
+            told = zip(
+                _moved(max(slip, _IMPOSSIBILITY_ZERO), rate, time), (self.slip_noise, self.rate_noise), strict=True
+            )
+            return all(noise is None or bool(ball(push) * answer <= ball(noise)) for answer, noise in told)
+
+        low, high = _IMPOSSIBILITY_ZERO, step
+        while hidden(high):
+            low, high = high, 2 * high
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if hidden(middle) else (low, middle)
+        return low
+
+
+@dataclass(frozen=True, slots=True)
+class _Pushed:
+    """A plant of theorem 2: s [1/s²], w [1/s], N̂μ* [m²/kg]."""
+
+    slip: Fraction
+    rate: Fraction
+    authority: Fraction
+
+    @property
+    def pole(self) -> Any:
+        """λ [1/s]."""
+        w = ball(self.rate)
+        return ((w * w + 4 * ball(self.slip)).sqrt() - w) / 2
+
+
+def smallest_peak(
+    task: Task,
+    step: Fraction,
+    delay: Fraction = _IMPOSSIBILITY_ZERO,
+    *,
+    slip_noise: Fraction = _IMPOSSIBILITY_ZERO,
+    rate_noise: Fraction | None = _IMPOSSIBILITY_ZERO,
+) -> SmallestPeak | None:
+    """Theorem 1; None without a disturbance.
+
+    Parameters
+    ----------
+    task : Task
+    step, delay : Fraction
+        T, positive, and θ [s].
+    slip_noise, rate_noise : Fraction
+        n [m] and n′ [m/s]; None for a slip rate that is not measured.
+
+    Raises
+    ------
+    ParameterError
+        For times or noise that are negative, or a step of 0.
+    """
+    _require(step > 0 and delay >= 0, "a step above 0 and a delay of at least 0", step, delay)
+    noise = (slip_noise, *([] if rate_noise is None else [rate_noise]))
+    _require(min(noise) >= 0, "bounds of noise of at least 0", *noise)
+    told = _Told(slip_noise, rate_noise)
+    with ctx.workprec(_BITS):
+        peaks = [
+            SmallestPeak(
+                slip_rate_error=LowerBound(_surprise(plant, step, delay, told, task.amplitude)),
+                slip_error=None if plant.reach is None else UpperBound(plant.reach),
+            )
+            for plant in _surprised(task)
+        ]
+    best = max(peaks, key=lambda one: one.slip_rate_error)
+    return best if best.slip_rate_error > 0 else None
+
+
+def longest_reaction(task: Task | SlidingPush, withdrawal: Fraction) -> UpperBound | None:
+    """T + θ [s] beyond which no controller holds the fault, without a diffusive path; None where none is proved."""
+    _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
+
+    def longest(plant: _Pushed | SlidingPush) -> Any:
+        ratio = ball(plant.authority * withdrawal / task.amplitude)
+        return _at_least_one(ratio).log() / plant.pole
+
+    return _least(task, longest)
+
+
+def longest_diffusion(task: Task | SlidingPush, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
+    """L²/D [s] beyond which no controller holds the fault with samples T apart; None where none is proved."""
+    _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
+
+    def longest(plant: _Pushed | SlidingPush) -> Any:
+        pole = plant.pole
+        ratio = ball(plant.authority * withdrawal / task.amplitude) * (-pole * ball(step)).exp()
+        return _at_least_one(ratio).acosh() ** 2 / pole
+
+    return _least(task, longest)
+
+
+def farthest_well(diffusion_time: UpperBound, diffusivity: Fraction) -> UpperBound:
+    """L [m] of a diffusion time L²/D [s] at a diffusivity D [m²/s]."""
+    _require(diffusivity > 0, "a diffusivity above 0", diffusivity)
+    with ctx.workprec(_BITS):
+        return UpperBound(upper(ball(diffusion_time * diffusivity).sqrt()))
+
+
+def nearest_proved_well(diffusion_time: LowerBound, diffusivity: Fraction) -> LowerBound:
+    """L [m] of a diffusion time L²/D [s] up to which something is proved, at a diffusivity D [m²/s]."""
+    _require(diffusivity > 0, "a diffusivity above 0", diffusivity)
+    with ctx.workprec(_BITS):
+        return LowerBound(end_of(ball(diffusion_time * diffusivity).sqrt().lower()))
+
+
+def smallest_withdrawal(task: Task | SlidingPush, step: Fraction) -> LowerBound | None:
+    """P [Pa] below which no controller holds the fault with samples T apart; None where none is proved."""
+    _require(step >= 0, "a step of at least 0", step)
+    with ctx.workprec(_BITS):
+        needed = (ball(task.amplitude / plant.authority) * (plant.pole * ball(step)).exp() for plant in _pushed(task))
+        withdrawals = [end_of(one.lower()) for one in needed]
+    return LowerBound(max(withdrawals)) if withdrawals else None
+
+
+def too_slow(task: Task, withdrawal: Fraction, step: Fraction, delay: Fraction) -> str:
+    """Why no controller with such a withdrawal [Pa] holds the fault with T_s and a delay [s]; empty where none is."""
+    late = longest_reaction(task, withdrawal) if task.change is None else None
+    if late is None or step + delay <= late:
+        return ""
+    most = LowerBound(withdrawal).quantity("Pa")
+    how = f"with T_s and delay above {late.quantity('s')} in all"
+    return f"no controller whatever that withdraws at most {most} holds it {how}"
+
+
+def hopeless(task: Task, withdrawal: Fraction, delay: Fraction, diffusion: Fraction) -> str:
+    """Why no controller with such a withdrawal [Pa] holds the fault, whatever its T_s; empty where that is not proved.
+
+    Parameters
+    ----------
+    task : Task
+    withdrawal : Fraction
+        [Pa].
+    delay, diffusion : Fraction
+        θ and L²/D [s].
+    """
+    late, far = longest_reaction(task, withdrawal), longest_diffusion(task, withdrawal, _IMPOSSIBILITY_ZERO)
+    if task.change is None and late is not None and delay > late:
+        way = f"with a delay above {late.quantity('s')}"
+    elif task.change is None and far is not None and diffusion > far:
+        way = f"through rock of L^2/D above {far.quantity('s')}"
+    else:
+        return ""
+    most = LowerBound(withdrawal).quantity("Pa")
+    return f"no controller whatever that withdraws at most {most} holds it {way}, whatever T_s"
+
+
+def _least(task: Task | SlidingPush, value: Callable[[_Pushed | SlidingPush], Any]) -> UpperBound | None:
+    with ctx.workprec(_BITS):
+        bounds = [upper(value(plant)) for plant in _pushed(task)]
+    return UpperBound(min(bounds)) if bounds else None
+
+
+def _corners(task: Task) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
+    """κ, w and N̂ at the ends of their ranges."""
+    ranges = (dict.fromkeys(ends) for ends in (task.stiffness, task.specific_damping, task.area_per_mass))
+    for k, eta, area in product(*ranges):
+        yield k - task.growths[0], eta - task.growths[1], area
+
+
+def _pushed(task: Task | SlidingPush) -> Sequence[_Pushed | SlidingPush]:
+    """Plants of theorem 2, which is that of `SlidingPush` too."""
+    if isinstance(task, SlidingPush):
+        return [task] if task.grows else []
+    law = task.friction
+    plants = [
+        _Pushed(area * law.weakening * task.normal_stress - kappa, w, area * law.static)
+        for kappa, w, area in _corners(task)
+    ]
+    return [plant for plant in plants if plant.slip > 0 and law.static > law.least and task.amplitude]
+
+
+def _surprised(task: Task) -> Iterator[_Surprised]:
+    """Friction that does not change near the target, and friction that falls as fast as it may."""
+    law, target = task.friction, task.target_slip
+    for kappa, w, area in _corners(task):
+        yield _Surprised(-kappa, w, _IMPOSSIBILITY_ZERO, law.static, None)
+        if law.static > law.least and law.weakening:
+            reach = _SHARE * min((law.static - law.least) / law.weakening, target)
+            middle = max(law.least + law.weakening * reach, law.static - law.weakening * target)
+            stress = (law.static * task.normal_stress - kappa / area * target) / middle
+            slip = area * law.weakening * stress - kappa
+            yield _Surprised(slip, w, law.weakening, middle - law.weakening * reach, reach)
+
+
+def _surprise(plant: _Surprised, step: Fraction, delay: Fraction, told: _Told, amplitude: Fraction) -> Fraction:
+    """X, or 0 where the theorem says nothing."""
+    pace = sqrt(abs(plant.slip))
+    most = _GROWN if plant.slip > 0 else _TURNED
+    held = step / max(1, ceil(float(step) * pace / most))
+
+    def shortened(time: Fraction) -> Fraction:
+        return time if float(time) * pace <= most else Fraction(most / pace)
+
+    def hidden(slip: Fraction) -> Fraction:
+        return shortened(told.hides(slip, plant.rate, amplitude, step))
+
+    def bound(slip: Fraction, unseen: Fraction) -> Any:
+        return 2 * ball(amplitude) * _moved(slip, plant.rate, held + shortened(delay) + unseen)[1]
+
+    reach = plant.reach or _IMPOSSIBILITY_ZERO
+
+    def gained(peak: Fraction, more: Fraction = _IMPOSSIBILITY_ZERO) -> Fraction:
+        """What friction's slope makes of the pressure's force."""
+        force = 2 * peak / held + plant.slip * reach + abs(plant.rate) * peak + more
+        return plant.weakening * force / plant.friction
+
+    def largest(share: Fraction) -> Fraction:
+        unseen = share * hidden(plant.slip)
+        if not plant.weakening:
+            return end_of(bound(plant.slip, unseen).lower())
+        low, high = _IMPOSSIBILITY_ZERO, upper(bound(plant.slip, unseen))
+        unseen = min(unseen, hidden(plant.slip + gained(high, amplitude)))
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            slip = plant.slip - gained(middle)
+            holds = slip >= 0 and bool(bound(slip, unseen) >= ball(middle))
+            low, high = (middle, high) if holds else (low, middle)
+        return low
+
+    best = _IMPOSSIBILITY_ZERO
+    for share in _SHARES if told.noisy else _SHARES[:1]:
+        if (found := largest(share)) <= best:
+            break
+        best = found
+    return best
+
+
+def _moved(slip: Fraction, rate: Fraction, time: Fraction) -> tuple[Any, Any]:
+    """Slip and slip rate after a unit push for some time, from rest."""
+    flow = arb_mat([[arb(0), arb(1), arb(0)], [ball(slip), -ball(rate), arb(1)], [arb(0), arb(0), arb(0)]])
+    moved = (flow * ball(time)).exp()
+    return moved[0, 2], moved[1, 2]
+
+
+def _require(holds: bool, what: str, *values: Fraction) -> None:
+    if not holds:
+        received = ", ".join(f"{float(v):.4g}" for v in values)
+        raise ParameterError(f"a limit needs {what}. Received {received}. Correct it.")
+
+
+def _at_least_one(value: Any) -> Any:
+    """Upper end of a ball, or one."""
+    return value.upper().max(arb(1))

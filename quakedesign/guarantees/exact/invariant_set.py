@@ -1,0 +1,268 @@
+"""A loop whose samples follow no clock: a set that its state at the samples never leaves, verified in ball arithmetic.
+
+**Loop.** The next sample comes any time T after the last, T_s ≤ T ≤ T_m, each time anew; all else is as it is with a
+clock, and the law is not told T. Let the map of a sample be J = CB, B its reduced row echelon form without rows of
+zeros and C its columns at B's pivots: ξ = By, y the state just before a sample, is all that a sample keeps, and θ after
+it x(θ) = e^{Aθ}(Cξ + Σ j·n) + ∫₀^θ e^{Aσ}Σ b_i·w_i dσ, n the sampled inputs.
+
+**Theorem.** Let X = {ξ: |h_l·ξ| ≤ 1 for all l}, 0 ∈ X, and let every input be at most W_i. Suppose |h_l·Bx(T)| ≤ 1 for
+all l and T_s ≤ T ≤ T_m, and |c_y·x(θ)| ≤ Y_y for 0 ≤ θ ≤ T_m, whatever ξ ∈ X and the inputs are. If W_i ≥ F_i + Σ_y
+c_iy·Y_y for every input (`inputs`), then from rest every output stays below Y_y for ever.
+
+**Proof.** By induction ξ stays in X while the inputs obey their bounds. Along a trajectory of the loop s, w, β and φ
+are some functions of time, with which the inputs are linear in the state. Cut what they make off at ±W_i: a solution of
+that obeys all bounds of the inputs for ever, hence |y| ≤ Y_y for ever, so that nothing was cut off and it solves the
+loop as well; that solution is unique. ∎
+
+**What is verified.** With r facets l ∈ L that are independent, |gξ| ≤ |gH_L⁻¹|·1 on X: a file says which r facets to
+take for every row g at every end of a piece. For c = h_l·B on [T_s, T_m], and for an output c on [0, T_m], let f(θ) =
+|ce^{Aθ}(Cξ + Σ j·n)| + Σ W_i∫₀^θ|ce^{Aσ}b_i|dσ. On a piece [α, β] the first term is that of a vector within (β −
+α)²/8·max|cA²e^{Aσ}||x(0)| of its chord, and the second is within (β − α)²/8·Σ W_i·max|cAe^{Aσ}b_i| of its own: f is at
+most the larger of its ends and that. Integrals are trapezoidal sums, as in `norms`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+from flint import arb, arb_mat, ctx, fmpq, fmpq_mat
+
+from quakedesign.errors import ParameterError
+from quakedesign.guarantees.exact.loop import Channel, Held, channels_of
+from quakedesign.guarantees.exact.norms import absolute, ball, column, majorant, matrix, upper
+from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, unshifted
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.loop import PeriodicLoop
+
+_BITS, _ZERO = 128, Fraction(0)
+SOONEST = 4  # pieces of the shortest interval, for integrals
+MOST_FACETS = 400
+MOST_PIECES = 32
+MOST_SIZE, MOST_BASES, LARGEST = 6, 4000, 10**20  # entries of a facet, bases in all, numbers of an entry
+Basis = tuple[int, ...]
+Row = tuple[Fraction, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InvariantPolytope:
+    """The set, what is said of the inputs, and which facets bound which row.
+
+    Attributes
+    ----------
+    inputs : tuple of Fraction
+        W_i, in the units and the order of `channels_of`.
+    facets : tuple of rows
+        h_l, of r entries each.
+    at_samples : tuple of tuple of Basis
+        Of every facet, r facets each, by their numbers from 0, at the ends of equal pieces of [T_s, T_m].
+    between : tuple of tuple of Basis
+        Of every output, the same on [0, T_m].
+
+    Raises
+    ------
+    ParameterError
+        When the sizes do not fit.
+    """
+
+    inputs: Row
+    facets: tuple[Row, ...]
+    at_samples: tuple[tuple[Basis, ...], ...]
+    between: tuple[tuple[Basis, ...], ...]
+
+    def __post_init__(self) -> None:
+        size, count = len(self.facets[0]) if self.facets else 0, len(self.facets)
+        bases = [basis for lines in (self.at_samples, self.between) for line in lines for basis in line]
+        fits = (
+            0 < size <= count <= MOST_FACETS
+            and size <= MOST_SIZE
+            and len(bases) <= MOST_BASES
+            and all(max(abs(v.numerator), v.denominator) < LARGEST for row in self.facets for v in row)
+            and {len(row) for row in self.facets} == {size}
+            and len(self.at_samples) == count
+            and all(_even(lines) for lines in (self.at_samples, self.between))
+            and all(len(basis) == size and all(0 <= i < count for i in basis) for basis in bases)
+            and min(self.inputs, default=-1) >= 0
+        )
+        if not fits:
+            raise ParameterError(
+                f"a reach needs at most {MOST_FACETS} facets of one size, at most {MOST_SIZE}, in numbers below 1e20, "
+                f"so many of them at the ends of 1 to {MOST_PIECES} pieces for every facet and output, at most "
+                f"{MOST_BASES} times in all, and inputs of 0 or more. Received others. Complete it."
+            )
+
+
+def _even(lines: tuple[tuple[Basis, ...], ...]) -> bool:
+    """Whether all rows have the same pieces."""
+    return len({len(line) for line in lines}) == 1 and 2 <= len(lines[0]) <= MOST_PIECES + 1
+
+
+def reached_bounds(task: Task, held: Held, reach: InvariantPolytope) -> Bounds | NoGuarantee:
+    """Bounds of the theorem, or what of it does not hold."""
+    loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
+    with ctx.workprec(_BITS):
+        try:
+            outputs = _SampleMap.of(loop, channels, reach).outputs(held.step, held.longest_step, reach)
+        except ParameterError as error:
+            return NoGuarantee(reason=str(error), small_gain=None)
+    largest = dict(zip(loop.outputs, outputs, strict=True))
+    shares = [sum((c * largest[y] for y, c in channel.shares.items()), _ZERO) for channel in channels]
+    for channel, share, bound in zip(channels, shares, reach.inputs, strict=True):
+        if channel.own + share > bound:
+            return NoGuarantee(reason=f"the {channel.name} may be larger than the set is for", small_gain=None)
+    gains = (share / bound for share, bound in zip(shares, reach.inputs, strict=True) if bound)
+    return Bounds(
+        slip_error=largest["slip_error"],
+        slip_rate_error=largest["slip_rate_error"],
+        push=largest["push"] + unshifted(task),
+        small_gain=max(gains, default=_ZERO),
+    )
+
+
+@dataclass(frozen=True)
+class _SampleMap:
+    """From one sample to the next: A, B, C, H, output rows, what flows and what a sample adds, with their bounds."""
+
+    flow: Any
+    seen: Any
+    kept: Any
+    facets: fmpq_mat
+    rows: Any
+    inputs: list[tuple[Any, Any]]
+    sampled: list[tuple[Any, Any]]
+
+    @classmethod
+    def of(cls, loop: PeriodicLoop, channels: Sequence[Channel], reach: InvariantPolytope) -> "_SampleMap":
+        """Of a loop with one jump, and a set that fits it."""
+        seen, kept = reduced(loop.segments[0].jump)
+        bounds = {channel.name: ball(bound) for channel, bound in zip(channels, reach.inputs, strict=True)}
+        return cls(
+            flow=matrix(loop.flow),
+            seen=arb_mat(seen),
+            kept=arb_mat(kept),
+            facets=_exact(reach.facets),
+            rows=matrix(tuple(loop.outputs.values())),
+            inputs=[(column(entry), bounds[name]) for name, entry in loop.inputs.items()],
+            sampled=[(column(entry), bounds[name]) for name, entry in loop.sampled.items()],
+        )
+
+    def outputs(self, soonest: Fraction, latest: Fraction, reach: InvariantPolytope) -> list[Fraction]:
+        """Y of every output.
+
+        Raises
+        ------
+        ParameterError
+            When the state may leave the set, or facets are not independent.
+        """
+        ends = [soonest * i / SOONEST for i in range(SOONEST)]
+        ends += _cut(soonest, latest, len(reach.at_samples[0]) - 1)
+        for number, (facet, bases) in enumerate(zip(arb_mat(self.facets).tolist(), reach.at_samples, strict=True)):
+            if not self._largest(arb_mat([facet]) * self.seen, ends, bases) <= 1:
+                raise ParameterError(f"the state at a sample may leave the set through facet {number}")
+        ends = _cut(_ZERO, latest, len(reach.between[0]) - 1)
+        rows = zip(self.rows.tolist(), reach.between, strict=True)
+        return [upper(self._largest(arb_mat([row]), ends, bases)) for row, bases in rows]
+
+    def _largest(self, row: Any, ends: list[Fraction], bases: tuple[Basis, ...]) -> Any:
+        """Bound of |c·x(θ)| at every θ from the end on for which there is the first of the bases."""
+        first, area, found, heights = len(ends) - len(bases), arb(0), arb(0), list[Any]()
+        for i, piece in enumerate(b - a for a, b in pairwise(ends)):
+            step, within = self._step(piece)
+            h, following, bent = ball(piece), row * step, absolute(row * self.flow * self.flow) * within
+            if i >= first:
+                heights.append(self._height(row, bases[i - first]) + area)
+            area += self._area(row, following, bent, h)
+            if i >= first:
+                last = self._height(following, bases[i + 1 - first]) + area
+                found = found.max(heights[-1].max(last) + self._bend(row, within, bent) * h**2 / 8)
+            row = following
+        return found.abs_upper()
+
+    def _height(self, row: Any, basis: Basis) -> Any:
+        """Bound of |c·x| right after a sample."""
+        size = _sum(absolute(row * self.kept * arb_mat(self._inverse(basis))))
+        return sum((abs((row * entry)[0, 0]) * bound for entry, bound in self.sampled), size)
+
+    def _area(self, row: Any, following: Any, bent: Any, h: Any) -> Any:
+        """Bound of what the inputs of one piece bring."""
+        total = arb(0)
+        for entry, bound in self.inputs:
+            ends = abs((row * entry)[0, 0]) + abs((following * entry)[0, 0])
+            total += (ends * h / 2 + (bent * absolute(entry))[0, 0] * h**3 / 12) * bound
+        return total
+
+    def _bend(self, row: Any, within: Any, bent: Any) -> Any:
+        """Bound of the second derivative of the state's part, and of the slope of the integrand of the inputs."""
+        slope = absolute(row * self.flow) * within
+        total = (bent * self._largest_state)[0, 0]
+        return sum(((slope * absolute(entry))[0, 0] * bound for entry, bound in self.inputs), total)
+
+    @cached_property
+    def _largest_state(self) -> Any:
+        """Right after a sample, entry by entry."""
+        frame = absolute(arb_mat(self._inverse(tuple(range(self.facets.ncols())))))
+        total = absolute(self.kept) * arb_mat([[_sum(arb_mat([row]))] for row in frame.tolist()])
+        for entry, bound in self.sampled:
+            total += absolute(entry) * bound
+        return total
+
+    @cached_property
+    def _steps(self) -> dict[Fraction, tuple[Any, Any]]:
+        return {}
+
+    def _step(self, piece: Fraction) -> tuple[Any, Any]:
+        """e^{Ah} and an upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h."""
+        if piece not in self._steps:
+            h = ball(piece)
+            self._steps[piece] = (self.flow * h).exp(), absolute((majorant(self.flow) * h).exp())
+        return self._steps[piece]
+
+    def _inverse(self, basis: Basis) -> fmpq_mat:
+        try:
+            return _rows(self.facets, basis).inv()
+        except ZeroDivisionError:
+            raise ParameterError("facets that bound a row must be independent. Received others.") from None
+
+
+def require_fit(loop: PeriodicLoop, reach: InvariantPolytope) -> None:
+    """Refuse a set of other sizes than those of a loop.
+
+    Raises
+    ------
+    ParameterError
+    """
+    sizes = reduced(loop.segments[0].jump)[0].nrows(), len(loop.outputs), len(loop.inputs) + len(loop.sampled)
+    given = len(reach.facets[0]), len(reach.between), len(reach.inputs)
+    if sizes != given:
+        raise ParameterError(
+            f"a reach of this loop has facets of {sizes[0]} entries, {sizes[1]} outputs and {sizes[2]} inputs. "
+            f"Received {given[0]}, {given[1]} and {given[2]}. Look for it anew."
+        )
+
+
+def reduced(jump: Sequence[Row]) -> tuple[fmpq_mat, fmpq_mat]:
+    """B and C with J = CB: the rows of the reduced row echelon form that are not zero, and J at their pivots."""
+    whole = _exact(jump)
+    form, rank = whole.rref()
+    rows = form.tolist()[:rank]
+    pivots = [next(i for i, v in enumerate(row) if v != 0) for row in rows]
+    return fmpq_mat(rows), fmpq_mat([[row[i] for i in pivots] for row in whole.tolist()])
+
+
+def _exact(rows: Sequence[Row]) -> fmpq_mat:
+    return fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows])
+
+
+def _rows(whole: fmpq_mat, places: Basis) -> fmpq_mat:
+    lines = whole.tolist()
+    return fmpq_mat([lines[i] for i in places])
+
+
+def _cut(start: Fraction, end: Fraction, pieces: int) -> list[Fraction]:
+    return [start + (end - start) * i / pieces for i in range(pieces + 1)]
+
+
+def _sum(row: Any) -> Any:
+    return sum(row.entries(), arb(0))

@@ -1,0 +1,435 @@
+"""Sampled loop of a guarantee: law, loop setup, pump limits, and inputs with their bounds.
+
+The inputs are acceleration, drift, implicit step, noise, initial condition and truncation error of the
+diffusion modes. The derivation of their bounds is in `quakedesign.guarantees.exact.small_gain`.
+"""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypedDict, cast
+
+from quakedesign import laws
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.exact import LowerBound, UpperBound, shortly
+from quakedesign.guarantees.exact.norms import START
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, NominalModel
+from quakedesign.loop import Instants, Layer, PeriodicLoop, held_loop, starts, with_known_area
+
+if TYPE_CHECKING:
+    from quakedesign.laws import SampledController
+
+
+# ----------------------------------------------------------------------
+# What the pump at the valve can do; a loop that is proved never asks for more.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pump:
+    """Limits of the pressure at the valve; None where there are none.
+
+    Attributes
+    ----------
+    least, largest : Fraction, optional
+        [Pa]; 0, the pressure at the start, lies between them. Both or none.
+    rate : Fraction, optional
+        How fast it goes to a pressure that is asked for, at least, and the fastest that it has to [Pa/s].
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    least: Fraction | None = None
+    largest: Fraction | None = None
+    rate: Fraction | None = None
+
+    def __post_init__(self) -> None:
+        low, high = self.least or Fraction(0), self.largest or Fraction(0)
+        alone = (self.least is None) != (self.largest is None)
+        if alone or not low <= 0 <= high or (self.least is not None and low == high):
+            raise ParameterError(
+                "a pump's least and largest pressure must have 0 between them. Received "
+                f"{shortly(low)} Pa and {shortly(high)} Pa. Check their signs."
+            )
+        if self.rate is not None and self.rate <= 0:
+            raise ParameterError(
+                f"the rate of a pump must be positive. Received {shortly(self.rate)} Pa/s. Leave it out for any."
+            )
+
+    @property
+    def limits(self) -> tuple[Fraction, Fraction] | None:
+        """Least and largest pressure [Pa]."""
+        return None if self.least is None or self.largest is None else (self.least, self.largest)
+
+    def exceeded(self, low: LowerBound, high: UpperBound) -> str:
+        """Why pressures between two claims are more than it can hold; empty where they are not."""
+        if self.limits is None or (self.limits[0] <= low and high <= self.limits[1]):
+            return ""
+        return (
+            f"pressures from {low.quantity('Pa')} to {high.quantity('Pa')} may be asked for, which a pump of "
+            f"{self._range()} cannot all hold"
+        )
+
+    def too_slow(self, step: UpperBound | None, time: Fraction) -> str:
+        """Why it may take longer than a time [s] to change by what is claimed; empty where it does not."""
+        if self.rate is None or (step is not None and step <= self.rate * time):
+            return ""
+        most = "of any size" if step is None else f"of {step.quantity('Pa')}"
+        return (
+            f"changes {most} from one sample to the next may be asked for, which a pump of "
+            f"{LowerBound(self.rate).quantity('Pa/s')} does not make in {LowerBound(time).quantity('s')}"
+        )
+
+    def to_dict(self) -> dict[str, str]:
+        """Exact numbers as texts."""
+        given = {part.name: getattr(self, part.name) for part in fields(self)}
+        return {name: str(value) for name, value in given.items() if value is not None}
+
+    def words(self) -> str:
+        """For people."""
+        of = [] if self.limits is None else [self._range()]
+        of += [] if self.rate is None else [LowerBound(self.rate).quantity("Pa/s")]
+        return f"with a pump of {', '.join(of)}, whose limits are never reached"
+
+    def _range(self) -> str:
+        """On the inner side."""
+        assert self.limits is not None
+        low, high = self.limits
+        return f"{UpperBound(low).quantity('Pa')} to {LowerBound(high).quantity('Pa')}"
+
+
+# ----------------------------------------------------------------------
+# A law as it runs around a fault: what a guarantee is about besides the fault.
+
+
+class Around(TypedDict, total=False):
+    """What `Held` has besides the law and T_s; what is left out is 0, a pump without limits None."""
+
+    delay: Fraction
+    lag: Fraction
+    diffusion: Fraction
+    slip_noise: Fraction
+    rate_noise: Fraction
+    initial_slip: Fraction
+    initial_slip_rate: Fraction
+    jitter: Fraction
+    delay_jitter: Fraction
+    averaging: Fraction
+    pump: Pump | None
+    longest_step: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Held:
+    """A law as it runs: once every T_s, its pressure held, late, through a lag and rock, from what it measures.
+
+    Attributes
+    ----------
+    law : LinearLaw
+    step, delay, lag : Fraction
+        [s].
+    diffusion : Fraction
+        L²/D of the layer between well and fault [s]; 0 for none.
+    slip_noise, rate_noise : Fraction
+        Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
+    initial_slip, initial_slip_rate : Fraction
+        Bounds of both at the start, where the reference has none, of either sign [m], [m/s].
+    jitter, delay_jitter : Fraction
+        By how much a measurement is early or late at most, its pressure with it [s], and the pressure besides.
+    averaging : Fraction
+        Each measurement but the first is a mean over a time around its own, at most half of this away [s].
+    pump : Pump, optional
+        Limits at the valve, which the loop must never reach.
+    ramp : Fraction
+        Time in which the pump goes from one pressure to the next, at most [s].
+    longest_step : Fraction
+        Where samples follow no clock: each comes `step` to this after the last [s]; 0 where they do.
+
+    Raises
+    ------
+    ParameterError
+        For a negative bound, noise of a slip rate that the law does not measure, or samples that follow no clock with
+        anything but noise around the law.
+    """
+
+    law: LinearLaw
+    step: Fraction
+    delay: Fraction = Fraction(0)
+    lag: Fraction = Fraction(0)
+    diffusion: Fraction = Fraction(0)
+    slip_noise: Fraction = Fraction(0)
+    rate_noise: Fraction = Fraction(0)
+    initial_slip: Fraction = Fraction(0)
+    initial_slip_rate: Fraction = Fraction(0)
+    jitter: Fraction = Fraction(0)
+    delay_jitter: Fraction = Fraction(0)
+    averaging: Fraction = Fraction(0)
+    pump: Pump | None = None
+    ramp: Fraction = Fraction(0)
+    longest_step: Fraction = Fraction(0)
+
+    def __post_init__(self) -> None:
+        if min(self.start) < 0:
+            raise ParameterError(
+                "initial slip and slip rate are bounds of both signs, 0 or more. Received "
+                f"{shortly(self.initial_slip)} m and {shortly(self.initial_slip_rate)} m/s. Leave out the sign."
+            )
+        if min(self.slip_noise, self.rate_noise) < 0:
+            raise ParameterError(
+                "a bound of noise must be 0 or more. Received "
+                f"{shortly(self.slip_noise)} m and {shortly(self.rate_noise)} m/s. Check their signs."
+            )
+        if min(self.jitter, self.delay_jitter, self.averaging, self.ramp) < 0:
+            raise ParameterError(
+                f"jitter must be 0 or more, and averaging too. Received {shortly(self.jitter)} s, of the delay "
+                f"{shortly(self.delay_jitter)} s, and {shortly(self.averaging)} s. Leave out the sign."
+            )
+        if self.rate_noise and self.law.of_slip_alone:
+            raise ParameterError(
+                "noise of the slip rate needs a law that measures it. Received "
+                f"{shortly(self.rate_noise)} m/s and a law of the slip alone. Leave it out."
+            )
+        if self.longest_step:
+            self._require_no_clock()
+
+    def _require_no_clock(self) -> None:
+        """Refuse intervals that are no range, and what asks for a schedule or a start at rest."""
+        if self.longest_step <= self.step:
+            raise ParameterError(
+                "the longest step must be longer than the step, the shortest one. Received "
+                f"{shortly(self.longest_step)} s and {shortly(self.step)} s. Exchange them, or leave it out."
+            )
+        first = (v for row in self.law.first for v in row)
+        times = (self.ramp, self.jitter, self.delay_jitter, self.averaging)
+        if (
+            any((*self.path.values(), *self.start, *times, *first))
+            or self.law.root is not None
+            or (self.pump and self.pump.rate)
+        ):
+            raise ParameterError(
+                "samples that follow no clock are known from rest, of a linear law whose pressure acts at once. "
+                "Received a longest step beside a delay, a lag, rock, a start, jitter, means, the rate of a pump or an "
+                "implicit step. Leave one of them out."
+            )
+
+    @property
+    def around(self) -> Around:
+        """All but law and T_s."""
+        return cast(Around, {name: getattr(self, name) for name in Around.__annotations__})
+
+    @property
+    def path(self) -> dict[str, Any]:
+        """Delay, lag and L²/D [s] between law and fault."""
+        return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
+
+    @property
+    def start(self) -> tuple[Fraction, Fraction]:
+        """Bounds of the errors at the start [m], [m/s]; 0 and 0 at rest."""
+        return self.initial_slip, self.initial_slip_rate
+
+    @property
+    def noise(self) -> dict[str, Fraction]:
+        """Bounds of the noise that there is, by its input of the loop; with jitter all that is measured has some."""
+        measured = (NOISES[0], *NOISES[1:] * (not self.law.of_slip_alone)) if self.off else ()
+        return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
+
+    @property
+    def off(self) -> Fraction:
+        """How far from its instant a measurement may tell of, at most [s]."""
+        return self.jitter + self.averaging / 2
+
+    @property
+    def instants(self) -> Instants | None:
+        """How far those of the loop may be off; None where they are not, and a pressure may change at once."""
+        if not (self.off or self.delay_jitter or (self.pump and self.pump.rate)):
+            return None
+        return Instants(measured=self.off, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
+
+    @property
+    def slack(self) -> Fraction:
+        """By how much an interval from sample to sample may be longer than the shortest [s]; 0 with a clock."""
+        return max(self.longest_step - self.step, Fraction(0))
+
+    @property
+    def longest_ramp(self) -> Fraction:
+        """Time after a pressure is due and before the next sample is [s]."""
+        off, part = self.jitter + self.delay_jitter, self.delay % self.step
+        return min(self.step - part - off, self.step - 2 * off)
+
+    def told(self, task: Task, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
+        """Bounds of the errors as the law is told them, from those of the true ones at any time [m], [m/s].
+
+        A measurement that is early or late may be compared with the reference at its instant.
+        """
+        off = zip(errors, (self.slip_noise, self.rate_noise), task.reference_rates, strict=True)
+        slip, rate = (error + noise + self.off * moves for error, noise, moves in off)
+        return slip, rate
+
+    @property
+    def controller(self) -> "SampledController":
+        """The law for `simulate`, with the scheme ``explicit``, the step T_s, and the delay, lag and rock around it.
+
+        Raises
+        ------
+        UnsupportedError
+            For a law with an implicit root, which is a controller of its own with a scheme.
+        """
+        if self.law.root is not None:
+            raise UnsupportedError(
+                "what is proved of a sliding mode tells its implicit root, not its gains. Received one. Take the "
+                "controller of its design, or its gains, scale, weight and authority in the scheme compensated."
+            )
+        return laws.SampledController(law=self.law, step=self.step, **self.path, longest=self.longest_step)
+
+    def loop(self, task: Task, model: NominalModel | None = None) -> PeriodicLoop:
+        """Nominal error loop on a task, of its model or another one."""
+        loop = held_loop(
+            self.law,
+            model or task.model,
+            task.authority,
+            self.step,
+            **self.path,
+            noisy=self.noise,
+            instants=self.instants,
+        )
+        if self.diffusion:
+            gain = (model or task.model).gain / task.authority
+            loop = with_known_area(loop, gain, Layer(time=self.diffusion))
+        box = starts(self.law, len(loop.states), self.start, (self.slip_noise, self.rate_noise))
+        return replace(loop, start=box)
+
+
+# ----------------------------------------------------------------------
+# The inputs of a nominal loop, and what bounds each: acceleration, drift, root, noise, start, a layer's rest.
+#
+# Why each is bounded so stands in `quakedesign.guarantees.exact.small_gain`.
+
+Gains = Mapping[tuple[str, str], tuple[Any, ...]]
+NOISELESS: Mapping[str, Fraction] = MappingProxyType({})
+LATE = "late"
+_ZERO = Fraction(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """An input of the nominal loop and what bounds it: F + Σ c_y·|y|.
+
+    Attributes
+    ----------
+    name : str
+    own : Fraction
+        F, in the unit of the input.
+    shares : mapping of str to Fraction
+        c_y by the output.
+    """
+
+    name: str
+    own: Fraction
+    shares: Mapping[str, Fraction]
+
+    def rounded(self) -> "Channel":
+        """The same in floats, which are multiplied twenty times as fast: for estimates."""
+        shares: Mapping[str, Any] = {output: float(share) for output, share in self.shares.items()}
+        own: Any = float(self.own)
+        return Channel(name=self.name, own=own, shares=shares)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainSpread:
+    """How far the input gain may be off that of a nominal loop [-].
+
+    Attributes
+    ----------
+    half : Fraction
+        By itself.
+    aged : Fraction
+        Of that of a time σ ago, over e^{ασ}.
+    """
+
+    half: Fraction
+    aged: Fraction
+
+
+def channels_of(
+    task: Task,
+    root: ImplicitRoot | None,
+    step: Fraction,
+    noise: Mapping[str, Fraction] = NOISELESS,
+    spread: GainSpread | None = None,
+    jitter: Fraction = _ZERO,
+) -> tuple[Channel, ...]:
+    """Inputs of the loop of a task, of a law with an implicit root or without, with noise or without.
+
+    `noise` has the bounds of those inputs of the loop that are noise, `jitter` [s] is that of the measurements.
+    """
+    force, drift, coupling = _task_inputs(task)
+    half, implicit, aged = task.half_ranges, [], []
+    if spread is not None:
+        half = {**half, "push": spread.half}
+        aged.append(Channel(name="aged", own=_ZERO, shares={"push": spread.aged}))
+    if root is not None:
+        share = root.half_range / step
+        own = root.remainder + share * (noise.get("slip_noise", _ZERO) + jitter * task.reference_rates[0])
+        implicit.append(Channel(name="root", own=own, shares={"slip_error": share}))
+    return (
+        Channel(name="acceleration", own=force, shares=half),
+        Channel(name="drift", own=drift, shares={"slip_rate_error": coupling}),
+        *implicit,
+        *aged,
+        *_told(task, noise, jitter),
+    )
+
+
+def _told(task: Task, noise: Mapping[str, Fraction], jitter: Fraction) -> Iterator[Channel]:
+    """What the measured errors are more than the true ones at their instants: noise, and what moves until then."""
+    forces = _task_inputs(task)[0]
+    slopes = [max(map(abs, ends)) for ends in (task.slip_chord, task.rate_chord, task.beta)]
+    moves = {
+        "slip_noise": (_ZERO, {"slip_rate_error": Fraction(1)}),
+        "rate_noise": (forces, dict(zip(task.half_ranges, slopes, strict=True))),
+    }
+    for name, rate in zip(NOISES, task.reference_rates, strict=True):
+        if name in noise:
+            force, shares = moves[name]
+            off = {output: jitter * share for output, share in shares.items()} if jitter else {}
+            yield Channel(name=name, own=noise[name] + jitter * (rate + force), shares=off)
+
+
+def beside(task: Task, names: Collection[str]) -> Iterator[Channel]:
+    """Inputs of a law in continuous time that uses the reference itself (`continuous_loop`), a start, what is late."""
+    if "reference_acceleration" in names:
+        yield Channel(name="reference_acceleration", own=task.reference_rates[1], shares={})
+    if "reference_jerk" in names:
+        yield Channel(name="reference_jerk", own=task.reference_jerk, shares={})
+    if START in names:
+        yield Channel(name=START, own=Fraction(1), shares={})
+    if LATE in names:
+        yield Channel(name=LATE, own=_ZERO, shares={"stepped": Fraction(1)})
+
+
+def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
+    """Inputs of a loop through a layer: what its modes leave out acts as v does, by itself where it fades."""
+    fades = ("left_out", "left_out") in gains
+    for channel in channels:
+        share = {"left_out": channel.shares["push"]} if "push" in channel.shares else {}
+        if fades and channel.name == "acceleration":
+            yield from (channel, Channel(name="left_out", own=_ZERO, shares=share))
+        else:
+            yield replace(channel, shares={**channel.shares, **share})
+    for name in ("awaited", "awaited_told"):
+        yield Channel(name=name, own=_ZERO, shares={"left_out": Fraction(1)})
+
+
+def _task_inputs(task: Task) -> tuple[Fraction, Fraction, Fraction]:
+    """F of a [m/s²] and of d [m/s³], and κ [1/s²]."""
+    if task.change is None:
+        return task.reference_force + task.amplitude, task.drift, _ZERO
+    law = task.friction
+    if law.rate_slope:
+        middle, half = (task.beta[0] + task.beta[1]) / 2, task.half_ranges["push"]
+        return task.reference_force + half / middle * task.amplitude, task.drift + task.change / middle, _ZERO
+    coupling = task.amplitude * max(law.weakening, law.strengthening) * task.area_per_mass[1] / task.authority
+    return task.reference_force, task.drift + task.change + coupling * task.reference_rates[0], coupling

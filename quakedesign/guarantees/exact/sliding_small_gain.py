@@ -1,0 +1,413 @@
+"""The robust small-gain theorem around slow sliding with rate-and-state friction: the slip rate stays below Ve^Y.
+
+**Plant.** Per unit of area, with v = Ve^y, θ = (D/V)e^z, the slip error x, the pressure error q = p − p* and N = σ′ −
+p,
+
+    mVe^y·y′ = s − ŝ,    ŝ = N(ay + bz) + HV(e^y − 1) + Kx − μ*q,    x′ = V(f − ω),    z′ = −ρ(f + g),
+
+f = e^y − 1, g = 1 − e^{−z}, ρ = V/D: the balance of forces, of which the steady one, with Nμ* + HV + Kr, is taken off,
+and the ageing law. The slip law has z′ = −ρe^y(y + z) in its place. Everything is 0 at first; a, b, D, μ* and σ′ are
+constants. The slip error is that from a reference r with r′ = V(1 + ω), |ω| ≤ W < 1 of any course, r = Vt without a
+swing W, and p* = Kr/μ*, so that |p*′| ≤ KV(1 + W)/μ*; 0 ≤ r, which rises to the distance. Rate and state are those
+beside V and D/V all the same: V does not follow r′.
+
+**Regularised friction** is larger than a·ln(2s), 2s = 2sinh(μ*/a)·e^{y + bz/a}, by at most a/(4s²), as arsinh s =
+ln(2s) + ln((1 + √(1 + 1/s²))/2). With m = μ* − aY − bZ, 2m/a ≥ 1, this is below 4a·e^{−2m/a} =: ε, for (1 −
+e^{−2μ*/a})^{−2} < 4. So it is the logarithmic one under a shear stress that is larger by N_max·ε, far below 1 Pa.
+
+**Inertia.** Let |y| ≤ Y, |z| ≤ Z, |q| ≤ Q so far. Then ŝ′ = λ(s − ŝ) + r with λ = (Na + HVe^y)/(mVe^y) ≥ λ₀ =
+N_min·a/(mVe^Y) and r = N′(ay + bz) + Nbz′ + Kx′ − μ*q′. Where |ŝ| > S + sup|r|/λ₀ it falls, so |ŝ| ≤ S + sup|r|/λ₀: the
+fault with its mass is one without it (ŝ in place of s) under a stress that is larger by sup|r|/λ₀, some Pa. Its r has
+|N′| ≤ KV(1 + W)/μ* + |q′|, |z′| ≤ ζ, ζ the larger of ρ(e^Y − e^{−Z}) and ρ(e^Z − e^{−Y}), of the slip law ρe^Y(Y + Z),
+and |x′| ≤ V(e^Y − 1 + W). The pressure in the fault is that of the well, u beside the plan, through filters 1/(1 +
+s/λ_n), of which one has the rate λ: so q′ = λ(h − w) − δ′, w what comes out, h what goes into it, δ = p* − plan, |δ′| ≤
+d. Filters are means over the past, E late in all, so with |u − δ| ≤ U also |h − δ| ≤ U + dE, and |w − δ| = |q| ≤ Q:
+|q′| ≤ λ(U + dE + Q) + d. For rock λ = π²/(4τ) < 5/(2τ) and E = τ/2, with the lag ℓ before it E = τ/2 + ℓ; for a lag
+alone λ = 1/ℓ, E = ℓ.
+
+**Sectors.** On |y| ≤ Y f/y lies between (1 − e^{−Y})/Y and (e^Y − 1)/Y, c its middle and δ half the range, and on |z|
+≤ Z g/z between the same of Z, c_z and δ_z. With middles N₀, a₀, b₀, μ₀, ρ₀ of the ranges of a cell the loop of
+`sliding_loop` has the inputs
+
+    e = ŝ − (N − N₀)(ay + bz) − N₀((a − a₀)y + (b − b₀)z) − HV(f − cy) + (μ* − μ₀)q,    φ = f − cy,
+    h = (ρ/ρ₀ − 1)(cy + c_z·z + φ) + (ρ/ρ₀)(g − c_z·z),
+
+so |e| ≤ sup|ŝ| + δN|a₀y + b₀z| + N_max(δa|y| + δb|z|) + HVδ|y| + δμ|q|, |φ| ≤ δ|y| and, with r = sup|ρ/ρ₀ − 1|, |h| ≤
+r|cy + c_z·z| + rδ|y| + (1 + r)δ_z|z|. Of the slip law (ρ/ρ₀)e^y lies between (1 − r)e^{−Y} and (1 + r)e^Y, c_z its
+middle and δ_z half the range, and with z′ = −ρ₀c_z(y + z) − ρ₀h, into which φ does not come, |h| ≤ δ_z|y + z|. ω is an
+input of its own. Noise of the measured slip, the drift of p* from the plan and what the modes of a layer leave out, R,
+are inputs as in `guarantee.theorem`: q has R more than the loop's, and y and what is made of it what e and μ₀R add to
+them at the same instant, R no more than its weight at the beginning of a part of the period.
+
+**After a step.** R is largest at once, where the fault has not felt the step yet. With the middle N₀a₀ + HVc = B, By
+= X + e and |X′| ≤ KV(e^Y − 1 + W) + N₀b₀ζ + μ₀q̇, |z′| ≤ ζ, |q′| ≤ q̇ as above. So as long as θ after a step αy + βz is
+at most what it was before, with what e adds now, and θ(α|X′|/B + βζ): in the parts of the period that begin before R
+has faded to a sixteenth y, ay + bz and cy + c_z·z have the gains of the part that ends with the step, and that
+constant of the first instant of the others more.
+
+**Conclusion.** Let the bounds that follow for |y|, |z|, |q| and |u − δ| lie below Y, Z, Q and U. y, z and q are
+continuous and 0 at first, and u is decided by samples before it acts, so none of them ever reaches its bound: it
+would have had to obey the smaller one until then. So the slip rate never exceeds Ve^Y, on every cell. ∎
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from itertools import accumulate
+from typing import Any
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import UpperBound, shortly
+from quakedesign.guarantees.exact.loop import Channel, Gains, Held
+from quakedesign.guarantees.exact.norms import norms
+from quakedesign.guarantees.exact.sliding_task import Range, SlidingTask
+from quakedesign.guarantees.exact.small_gain import NoGuarantee, channel_bounds
+from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop
+
+_TERMS = 24  # of Taylor's series
+_LARGEST = 3  # logarithm of a ratio: beyond that nothing is slow sliding
+_FADED = Fraction(1, 16)
+_AT_ONCE = ("log_rate", "ageing", "strength")
+_ZERO, _ONE = Fraction(0), Fraction(1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingClaims:
+    """What is never exceeded, absolute values.
+
+    Attributes
+    ----------
+    log_rate, log_state : UpperBound
+        Y and Z: logarithms of v/V and of θ over D/V [-].
+    slip_error : UpperBound
+        [m].
+    push : UpperBound
+        Q: the pressure in the fault less that which it needs at V [Pa].
+    asked : UpperBound
+        U: the same of the pressure at the valve [Pa].
+
+    Raises
+    ------
+    ParameterError
+        For bounds that are not positive, or logarithms above 3.
+    """
+
+    log_rate: UpperBound
+    log_state: UpperBound
+    slip_error: UpperBound
+    push: UpperBound
+    asked: UpperBound
+
+    def __post_init__(self) -> None:
+        every = (self.log_rate, self.log_state, self.slip_error, self.push, self.asked)
+        if min(every) <= 0 or max(self.log_rate, self.log_state) > _LARGEST:
+            raise ParameterError(
+                f"claims must be positive, logarithms at most {_LARGEST}. Received "
+                f"{', '.join(f'{shortly(v)}' for v in every)}. Bound them so."
+            )
+
+
+def cell_bounds(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | NoGuarantee:
+    """What follows from the claims for a box of constants as one cell, by the names of the claims; ``small_gain`` too.
+
+    Raises
+    ------
+    ParameterError
+        For a law that does not rest, or a pressure that reaches the fault without lag or rock.
+    """
+    model = model_of(task, claims)
+    if model is None:
+        return NoGuarantee(reason=_left(task, claims), small_gain=None)
+    loop = loop_of(held, model, task)
+    try:
+        gains = norms(loop)
+    except ParameterError:
+        return NoGuarantee(reason="even the nominal loop is not stable, or too slow to be seen so", small_gain=None)
+    return bounds_from(task, held, claims, loop, gains, after_a_step(loop))
+
+
+def bounds_from(
+    task: SlidingTask,
+    held: Held,
+    claims: SlidingClaims,
+    loop: PeriodicLoop,
+    gains: Gains,
+    phases: Sequence[Fraction],
+) -> dict[str, Any] | NoGuarantee:
+    """The same from the gains of the loop; of floats, what floats make of them.
+
+    `phases` are times [s] since a step reached the well, at the beginning of every part that has a gain.
+    """
+    model = model_of(task, claims)
+    if model is None:
+        return NoGuarantee(reason=_left(task, claims), small_gain=None)
+    late = settled(loop)
+    more = _moved(task, held, claims, model, late)
+    gains = _once_settled(_with_what_adds_at_once(loop, model, gains, phases), phases, late)
+    channels = [
+        replace(one, own=one.own + sum((c * more.get(y, _ZERO) for y, c in one.shares.items()), _ZERO))
+        for one in channels_of(task, held, claims, loop)
+    ]
+    small_gain, bounds = channel_bounds(channels, gains)
+    if bounds is None:
+        whole = UpperBound(Fraction(small_gain))
+        return NoGuarantee(reason=f"small gain {whole:.3g}", small_gain=whole)
+    return {
+        "log_rate": bounds["log_rate"] + more["log_rate"],
+        "log_state": bounds["log_state"],
+        "slip_error": bounds["slip_error"],
+        "push": bounds["push"] + bounds.get("left_out", _ZERO),
+        "asked": bounds["asked"],
+        "small_gain": small_gain,
+    }
+
+
+def follows(bounds: Mapping[str, Any], claims: SlidingClaims) -> bool:
+    """Whether every bound lies below its claim."""
+    return all(bounds[name] < getattr(claims, name) for name in SlidingClaims.__dataclass_fields__)
+
+
+def loop_of(held: Held, model: SlidingModel, task: SlidingTask) -> PeriodicLoop:
+    """The nominal loop; without the drift where the plan is exact, and without a reference where its rate is V.
+
+    Raises
+    ------
+    ParameterError
+        For a law that uses the slip rate, a pressure that jumps in the fault, jitter or the rate of a pump.
+    """
+    if held.instants is not None:
+        raise ParameterError(
+            "jitter and the rate of a pump are not known of slow sliding. Received some. Leave it out."
+        )
+    if not held.law.of_slip_alone or not (held.lag or held.diffusion):
+        raise ParameterError(
+            "slow sliding is guaranteed of a law of the slip alone whose pressure reaches the fault through rock or a "
+            f"lag. Received L^2/D = {shortly(held.diffusion)} s and a lag of {shortly(held.lag)} s. Give one of them."
+        )
+    times = {"delay": held.delay, "lag": held.lag, "diffusion": held.diffusion}
+    loop = sliding_loop(held.law, model, held.step, **times, noisy=held.noise)
+    for name, size in _moving(task).items():
+        if not size:
+            del loop.inputs[name]
+    return loop
+
+
+def _moving(task: SlidingTask) -> dict[str, Fraction]:
+    """Bounds of what comes of the reference, by its inputs of the loop."""
+    return {"drift": task.drift, "reference": task.swing}
+
+
+def model_of(task: SlidingTask, claims: SlidingClaims) -> SlidingModel | None:
+    """Middle of all that may be; None where the normal stress, or regularised friction, may come near 0."""
+    low, high = task.normal_stress(claims.push)
+    if low <= 0 or (task.regularised and _least_exponent(task, claims) < 1):
+        return None
+    a, b, mu = (_middle(task.ranges[name]) for name in ("direct_effect", "evolution_effect", "coefficient"))
+    slope, state_slope = _middle(chords(claims.log_rate)), _middle(_state_slopes(task, claims))
+    return SlidingModel(
+        rate=task.rate,
+        state_rate=_middle(_ageing(task)),
+        slope=slope,
+        state_slope=state_slope,
+        strength=_middle((low, high)) * a + task.radiation * task.rate * slope,
+        weakening=_middle((low, high)) * b,
+        direct=a,
+        evolution=b,
+        stiffness=task.stiffness,
+        coefficient=mu,
+        state_law=task.state_law,
+    )
+
+
+def _left(task: SlidingTask, claims: SlidingClaims) -> str:
+    """Why there is no model."""
+    if task.normal_stress(claims.push)[0] <= 0:
+        return "the pressure may open the fault"
+    return "regularised friction may come near 0"
+
+
+def channels_of(task: SlidingTask, held: Held, claims: SlidingClaims, loop: PeriodicLoop) -> tuple[Channel, ...]:
+    """Inputs of the loop and what bounds them."""
+    low, high = task.normal_stress(claims.push)
+    rates, states = chords(claims.log_rate), _state_slopes(task, claims)
+    off, bent = _off(task), _half(rates)
+    stress = {
+        "strength": _half((low, high)),
+        "log_rate": high * _half(task.ranges["direct_effect"]) + task.radiation * task.rate * bent,
+        "log_state": high * _half(task.ranges["evolution_effect"]),
+        "push": _half(task.ranges["coefficient"]),
+    }
+    left_out = {"left_out": stress["push"]} if "left_out" in loop.outputs else {}
+    if left_out and not loop.fading:
+        left_out["left_out"] += _middle(task.ranges["coefficient"])
+    state = {"ageing": off, "log_rate": off * bent, "log_state": (1 + off) * _half(states)}
+    if task.state_law == "slip":
+        state = {"ageing": _half(states) / _middle(states)}
+    own = task.stress + inertia(task, held, claims) + regularisation(task, claims)
+    channels = [
+        Channel(name="stress", own=own, shares={**stress, **left_out}),
+        Channel(name="rate", own=_ZERO, shares={"log_rate": bent}),
+        Channel(name="state", own=_ZERO, shares=state),
+    ]
+    beside = {name: size for name, size in _moving(task).items() if size} | held.noise
+    channels += [Channel(name=name, own=size, shares={}) for name, size in beside.items()]
+    if loop.fading:
+        channels.append(Channel(name="left_out", own=_ZERO, shares={"left_out": _ONE}))
+    return tuple(channels)
+
+
+def inertia(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fraction:
+    """By how much the mass makes the stress larger, sup|r|/λ₀ [Pa]."""
+    low, high = task.normal_stress(claims.push)
+    (a_low, a), (_, b), (_, mu) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
+    grown, moved = exponential(claims.log_rate), _fastest_push(task, held, claims)
+    rest = (task.pressure_per_slip * task.fastest + moved) * (a * claims.log_rate + b * claims.log_state)
+    rest += high * b * _fastest_state(task, claims) + _fastest_pull(task, claims) + mu * moved
+    return rest * task.inertia * task.rate * grown / (low * a_low)
+
+
+def regularisation(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+    """By how much regularised friction makes the stress larger, N_max·ε [Pa]."""
+    if not task.regularised:
+        return _ZERO
+    a = task.ranges["direct_effect"][1]
+    return task.normal_stress(claims.push)[1] * 4 * a / _partial(_least_exponent(task, claims))
+
+
+def _least_exponent(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+    """2m/a of the least friction coefficient m that may be, without regularisation."""
+    (_, a), (_, b), (mu, _) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
+    return 2 * (mu - a * claims.log_rate - b * claims.log_state) / a
+
+
+def _fastest_push(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fraction:
+    """Bound of |q′| [Pa/s]."""
+    late = held.diffusion / 2 + held.lag
+    speed = Fraction(5, 2) / held.diffusion if held.diffusion else 1 / held.lag
+    return speed * (claims.asked + task.drift * late + claims.push) + task.drift
+
+
+def _fastest_pull(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+    """Bound of K|x′| [Pa/s]."""
+    return task.stiffness * task.rate * (exponential(claims.log_rate) - 1 + task.swing)
+
+
+def _fastest_state(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+    """Bound ζ of |z′| [1/s]."""
+    grown, aged = exponential(claims.log_rate), exponential(claims.log_state)
+    if task.state_law == "slip":
+        return _ageing(task)[1] * grown * (claims.log_rate + claims.log_state)
+    return _ageing(task)[1] * max(grown - 1 / aged, aged - 1 / grown)
+
+
+def _moved(
+    task: SlidingTask, held: Held, claims: SlidingClaims, model: SlidingModel, time: Fraction
+) -> dict[str, Fraction]:
+    """How far y and what is made of it can move within a time [s], but for what the stress adds at once."""
+    of_state = _fastest_state(task, claims)
+    change = (
+        _fastest_pull(task, claims) + model.weakening * of_state + model.coefficient * _fastest_push(task, held, claims)
+    )
+    y, z = change / model.strength * time, of_state * time
+    return {
+        "log_rate": y,
+        "ageing": model.evolution_slope * y + model.state_slope * z,
+        "strength": model.direct * y + model.evolution * z,
+    }
+
+
+def chords(size: Fraction) -> Range:
+    """(1 − e^{−Y})/Y from below and (e^Y − 1)/Y from above."""
+    grown = exponential(size)
+    return (1 - 1 / _partial(size)) / size, (grown - 1) / size
+
+
+def _state_slopes(task: SlidingTask, claims: SlidingClaims) -> Range:
+    """What c_z stands in place of: of ageing (1 − e^{−z})/z, of the slip law (ρ/ρ₀)e^y."""
+    if task.state_law == "ageing":
+        return chords(claims.log_state)
+    grown, off = exponential(claims.log_rate), _off(task)
+    return (1 - off) / grown, (1 + off) * grown
+
+
+@lru_cache(maxsize=64, typed=True)
+def exponential(size: Fraction) -> Fraction:
+    """e^Y from above, for 0 ≤ Y ≤ 3: what Taylor's sum leaves out is below its next term over 1 − Y/(n + 1)."""
+    term = _ONE
+    for k in range(1, _TERMS + 1):
+        term *= size / k
+    return _partial(size) + term / (1 - size / (_TERMS + 1))
+
+
+@lru_cache(maxsize=64, typed=True)
+def _partial(size: Fraction) -> Fraction:
+    """e^Y from below."""
+    total = term = _ONE
+    for k in range(1, _TERMS):
+        term *= size / k
+        total += term
+    return total
+
+
+def _ageing(task: SlidingTask) -> Range:
+    """ρ = V/D [1/s]."""
+    low, high = task.ranges["critical_slip"]
+    return task.rate / high, task.rate / low
+
+
+def _off(task: SlidingTask) -> Fraction:
+    """r, how far ρ may be from the middle of its range, over that."""
+    slow, fast = _ageing(task)
+    return (fast - slow) / (fast + slow)
+
+
+def _middle(ends: Range) -> Fraction:
+    return (ends[0] + ends[1]) / 2
+
+
+def _half(ends: Range) -> Fraction:
+    return (ends[1] - ends[0]) / 2
+
+
+def after_a_step(loop: PeriodicLoop) -> tuple[Fraction, ...]:
+    """Times [s] since a step reached the well, at the beginning of every part of the period; all 0 where none does."""
+    first = {fading.first for fading in loop.fading.values()}
+    starts = list(accumulate((part.duration for part in loop.segments), initial=_ZERO))
+    origin = starts[max(first)] if first else None
+    return tuple(
+        _ZERO if origin is None else (start + share * part.duration - origin) % loop.period
+        for start, part in zip(starts, loop.segments, strict=False)
+        for share in part.ends[:-1]
+    )
+
+
+def settled(loop: PeriodicLoop) -> Fraction:
+    """The first of these times at which what is left out has faded to a sixteenth [s]; 0 where it does not."""
+    times = sorted(after_a_step(loop))
+    return next((t for t in times for fading in loop.fading.values() if fading.weight(t) <= _FADED), _ZERO)
+
+
+def _with_what_adds_at_once(
+    loop: PeriodicLoop, model: SlidingModel, gains: Gains, phases: Sequence[Fraction]
+) -> dict[tuple[str, str], tuple[Any, ...]]:
+    """Gains with what stress and left out pressure make of y at once, in every part of the period."""
+    total = dict(gains)
+    for (output, name), size in at_once(model).items():
+        if name in loop.inputs:
+            total[output, name] = tuple(v + size for v in gains[output, name])
+        elif name in loop.fading:
+            weights = (loop.fading[name].weight(time) for time in phases)
+            total[output, name] = tuple(v + size * w for v, w in zip(gains[output, name], weights, strict=True))
+    return total
+
+
+def _once_settled(
+    gains: Mapping[tuple[str, str], tuple[Any, ...]], phases: Sequence[Fraction], late: Fraction
+) -> dict[tuple[str, str], tuple[Any, ...]]:
+    """Gains of y and what is made of it, with those of the part that ends with a step in all parts soon after one."""
+    last = max(range(len(phases)), key=lambda j: phases[j])
+    return {
+        (output, name): tuple(v[last] if output in _AT_ONCE and phases[j] < late else v[j] for j in range(len(v)))
+        for (output, name), v in gains.items()
+    }

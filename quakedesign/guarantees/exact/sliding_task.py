@@ -1,0 +1,209 @@
+"""Slow-sliding task of a rate-and-state fault in rationals, and cells of its parameter box.
+
+Quantities are per unit of area. Bisection of the box of constants gives cells that cover it, whatever the
+cuts.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import get_args
+
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.exact import six_digits
+from quakedesign.loop import StateLaw
+
+# ----------------------------------------------------------------------
+# What a guarantee of slow sliding uses of a fault with rate-and-state friction, in rationals.
+#
+# Per unit of area: mass m = ρL, stiffness K = G/L, damping H = η/L². The friction coefficient is that of sliding at
+# V,
+# μ*, plus a·ln(v/V) + b·ln(θV/D), or its regularised form, a·arsinh(sinh(μ*/a)·exp((a·ln(v/V) + b·ln(θV/D))/a)); the
+# state follows the ageing law, θ′ = 1 − vθ/D, or the slip law, θ′ = −(vθ/D)·ln(vθ/D). The fault slides at V at first,
+# without pressure, its far end at rest. Along a reference r from 0, whose rate stays within V(1 ± ``swing``), it then
+# needs p* = Kr/μ*, of which the plan brings ``ramp``·r/V. Without a swing r = Vt.
+
+Range = tuple[Fraction, Fraction]
+AXES = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")
+"""Constants that are only known to lie in ranges: a, b, D [m], μ* and σ′ [Pa]."""
+
+_SAME = {
+    "density": "kg/m^3",
+    "shear_modulus": "Pa",
+    "length": "m",
+    "damping": "kg/s",
+    "rate": "m/s",
+    "ramp": "Pa/s",
+    "state_law": "-",
+    "regularised": "-",
+}
+_WITHIN = {"distance": "m", "swing": "-", "stress": "Pa"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingTask:
+    """A fault, its box of constants, the reference and the stress disturbance.
+
+    Attributes
+    ----------
+    name : str
+    density, shear_modulus, length, damping : Fraction
+        ρ [kg/m³], G [Pa], L [m], η [kg/s].
+    ranges : mapping of str to (Fraction, Fraction)
+        By the names of `AXES`.
+    rate, distance, ramp : Fraction
+        V [m/s], how far the reference goes [m], and how fast the planned pressure rises along Vt [Pa/s].
+    swing : Fraction
+        How far the rate of the reference may be from V, over V [-], below 1; 0 for a constant rate.
+    stress : Fraction
+        Bound of the shear stress disturbance [Pa].
+    state_law : str
+        ``"ageing"`` or ``"slip"``.
+    regularised : bool
+        Whether friction is of the form that stays finite at rest.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    name: str
+    density: Fraction
+    shear_modulus: Fraction
+    length: Fraction
+    damping: Fraction
+    ranges: Mapping[str, Range]
+    rate: Fraction
+    distance: Fraction
+    ramp: Fraction
+    stress: Fraction
+    swing: Fraction = Fraction(0)
+    state_law: StateLaw = "ageing"
+    regularised: bool = False
+
+    def __post_init__(self) -> None:
+        ends = [self.ranges[axis] for axis in AXES] if set(self.ranges) == set(AXES) else []
+        positive = (self.density, self.shear_modulus, self.length, self.rate, *(low for low, _ in ends))
+        ordered = len(ends) == len(AXES) and all(low <= high for low, high in ends) and 0 <= self.swing < 1
+        if not ordered or min(positive) <= 0 or min(self.damping, self.distance, self.ramp, self.stress) < 0:
+            raise ParameterError(
+                f"slow sliding needs ordered ranges of {', '.join(AXES)} above 0, density, modulus, length and rate "
+                "above 0, damping, distance, ramp and stress not below, a swing from 0 to below 1. Received others for "
+                f"{self.name}."
+            )
+        require_known(self.state_law, get_args(StateLaw), "state_law")
+
+    def differences(self, asked: "SlidingTask") -> list[str]:
+        """What of another task a proof for this one does not cover, each with both values, SI; empty if everything is.
+
+        Constants of the fault, V, the plan and the law of friction must be the same; constants of friction, distance,
+        swing and stress lie within those of the proof. The name is none of it.
+        """
+        found = [
+            f"{name} [{unit}] {_as_told(getattr(self, name))} there, {_as_told(getattr(asked, name))} here"
+            for name, unit in _SAME.items()
+            if getattr(self, name) != getattr(asked, name)
+        ]
+        found += [
+            f"{name} [{unit}] up to {_as_told(getattr(self, name))} there, {_as_told(getattr(asked, name))} here"
+            for name, unit in _WITHIN.items()
+            if getattr(self, name) < getattr(asked, name)
+        ]
+        return found + [
+            f"{axis} from {' to '.join(map(_as_told, self.ranges[axis]))} there, "
+            f"{' to '.join(map(_as_told, asked.ranges[axis]))} here"
+            for axis in AXES
+            if asked.ranges[axis][0] < self.ranges[axis][0] or asked.ranges[axis][1] > self.ranges[axis][1]
+        ]
+
+    @property
+    def stiffness(self) -> Fraction:
+        """K [Pa/m]."""
+        return self.shear_modulus / self.length
+
+    @property
+    def inertia(self) -> Fraction:
+        """M [kg/m²]."""
+        return self.density * self.length
+
+    @property
+    def radiation(self) -> Fraction:
+        """H [Pa·s/m]."""
+        return self.damping / self.length**2
+
+    @property
+    def fastest(self) -> Fraction:
+        """Largest rate of the reference [m/s]."""
+        return self.rate * (1 + self.swing)
+
+    @property
+    def pressure_per_slip(self) -> Fraction:
+        """Largest dp*/dr [Pa/m]."""
+        return self.stiffness / self.ranges["coefficient"][0]
+
+    @property
+    def drift(self) -> Fraction:
+        """How fast p* may leave the plan [Pa/s]."""
+        along = max(abs(self.stiffness * self.rate / mu - self.ramp) for mu in self.ranges["coefficient"])
+        return along * (1 + self.swing)
+
+    def normal_stress(self, push: Fraction) -> Range:
+        """N = σ′ − p [Pa] along the reference, with |p − p*| up to `push` [Pa]."""
+        low, high = self.ranges["normal_stress"]
+        return low - self.pressure_per_slip * self.distance - push, high + push
+
+
+def _as_told(value: Fraction | str | bool) -> str:
+    """With six digits, or as it is."""
+    return six_digits(value) if isinstance(value, Fraction) else str(value)
+
+
+# ----------------------------------------------------------------------
+# A box of constants, cut in two again and again: whatever the cuts, the cells cover it.
+
+MOST_CELLS = 64
+Cuts = tuple[tuple[str, Fraction] | None, ...]
+"""For a box, then for its part below the cut with all of its parts, then for that above: axis and place, or no cut."""
+WHOLE: Cuts = (None,)
+
+
+def cells(task: SlidingTask, cuts: Cuts) -> tuple[SlidingTask, ...]:
+    """The same task on every cell.
+
+    Raises
+    ------
+    ParameterError
+        For a cut outside its box, too few or too many cuts, or more than 64 cells.
+    """
+    boxes, leaves = [task], []
+    for cut in cuts[: 2 * MOST_CELLS]:
+        if not boxes:
+            break
+        box = boxes.pop()
+        if cut is None:
+            leaves.append(box)
+        else:
+            boxes += reversed(parts(box, *cut))
+    if boxes or len(cuts) != 2 * len(leaves) - 1 or len(leaves) > MOST_CELLS:
+        raise ParameterError(
+            f"a box must be cut into 1 to {MOST_CELLS} cells, with one cut less. Received {len(cuts)} entries and "
+            f"{len(leaves)} cells. Complete them."
+        )
+    return tuple(leaves)
+
+
+def parts(task: SlidingTask, axis: str, at: Fraction) -> tuple[SlidingTask, SlidingTask]:
+    """Both parts of a box, below and above a cut.
+
+    Raises
+    ------
+    ParameterError
+        For a cut that is not inside.
+    """
+    low, high = task.ranges.get(axis, (at, at))
+    if not low < at < high:
+        raise ParameterError(
+            f"a cut must be across one of {', '.join(AXES)}, inside its box. Received {axis} at {at}. Check it."
+        )
+    below, above = ({**task.ranges, axis: ends} for ends in ((low, at), (at, high)))
+    return replace(task, ranges=below), replace(task, ranges=above)

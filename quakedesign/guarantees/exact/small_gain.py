@@ -1,0 +1,502 @@
+"""Robust small-gain theorem for sampled loops: bounds for all t ≥ 0 in exact arithmetic.
+
+Chapters: the theorem with the bounds of all inputs; slowly varying input gain, where friction depends on
+slip alone; sector bounds of the implicit step.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from itertools import chain
+from typing import Any
+
+from flint import arb, ctx
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import LowerBound, UpperBound, shortly
+from quakedesign.guarantees.exact.loop import NOISELESS, Channel, Gains, GainSpread, beside, channels_of, through_layer
+from quakedesign.guarantees.exact.norms import ball, flow_norms, norms
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.laws import ImplicitRoot, NominalModel, Power
+from quakedesign.loop import PeriodicLoop
+from quakedesign.lyapunov.exact.claim import Verdict
+
+# ----------------------------------------------------------------------
+# The robust small-gain theorem for a loop that runs: bounds for ever, in exact arithmetic.
+#
+# **Theorem.** Let a loop be linear with inputs w_1 … w_n, first at 0, and g_yi,j gains as those of `norms`: |y(τ)| ≤
+# Σ_i
+# g_yi,j·W_i(t) for τ ≤ t in part j of the period, W_i(t) the essential supremum of |w_i| on [0, t] (for a sampled
+# input,
+# over the samples up to t). Let every input in turn be bounded by the outputs, |w_i| ≤ F_i + Σ_y c_iy·|y| at every
+# time,
+# c ≥ 0, and M_ik = max_j Σ_y c_iy·g_yk,j. If the spectral radius of M is below 1, then W(t) ≤ (1 − M)⁻¹F for every t,
+# and the outputs stay below max_j Σ_i g_yi,j·W_i for ever. For W(t) ≤ F + M·W(t), W(t) is finite, because the
+# solution
+# of such a loop is bounded on [0, t], and (1 − M)⁻¹ = 1 + M + M² … has no negative entry. Nothing is assumed about
+# stability. ∎
+#
+# **Inputs.** Let v stand for b·(p − p*) [m/s²] and let the middle of the ranges of s, w and β be the model of the
+# nominal loop. Then e2′ = s0·e1 − w0·e2 + β0·v + a with the ``acceleration``
+#
+#     a = φ − w·r′ − r″ + (s − s0)e1 − (w − w0)e2 + (β − β0)v,
+#
+# so its F is a bound of |φ − w·r′ − r″| and its c are half the ranges; p* drifts by d = b·dp*/dt, the ``drift``.
+#
+# **Class rate.** For |φ| ≤ H and |φ′| ≤ Ḣ with φ(0) = 0, and friction of the slip alone, shift p* by φ/(β·b), with
+# the β
+# of the plant: φ leaves a, v becomes b(p − p*) + φ/β, and d gains (φ/β)′. N̂ being constant, |β′| ≤ μ′·N̂|x2|/b with
+# the
+# largest slope μ′, so |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b, because β ≥ 1. Where friction depends on the slip
+# rate
+# as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0. A disturbance of this
+# class is one of the class amplitude too, so the smaller of both bounds holds for every output.
+#
+# **Start.** Where the loop starts at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of rest, |y(τ)| ≤ h_y,j + Σ_i g_yi,j·W_i(t)
+# by
+# superposition, with h_y,j ≥ |y| of the free response in part j, from every such start (`free_response`). So a start
+# is
+# one input more, ``start``, with F = 1, no c and the gains h, whose row of M is zero: the spectral radius stays. The
+# s_i
+# are bounds of e1(0) and e2(0), of both signs, and what the law makes at first of what it is told then; nothing else
+# moves before the first sample: p is 0, and so is p* at r = 0, as r(0) = r′(0) = 0. In the class rate φ(0) = 0, so
+# the
+# shift of p* is 0 too. Below, the loop of every β_i starts alike; since t = 0 counts, what bounds e1 and e2 for ever
+# is
+# at least their bound at first, so that E and R exceed that as well.
+#
+# **Noise.** A law that is told e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples has two sampled inputs
+# more, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c; nothing else is said of their courses.
+# Readings in
+# steps of q are off by at most q/2.
+#
+# **Implicit root.** A law that uses the end w of an implicit step is linear but for the sampled input ``root``, w_k +
+# γe1/T_s at the samples, γ the middle of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤ R
+# (`sector`). E and R are the claims themselves. Let the claims follow from these bounds of the inputs. If e was
+# within
+# them at the samples before kT_s, then the inputs up to kT_s, which these samples alone decide, obey the bounds, so e
+# is
+# within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do.
+# With
+# noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places of E and R, and ε gains δγN1/T_s. ∎
+#
+# **Jitter.** Let sample k be measured within J of kT_s, the first at 0, and let the valve's pressure leave p_{k−1}
+# within
+# A of when p_k is due and go to p_k without turning back, over a time of at most Θ, with |p_k − p_{k−1}|/Θ at least
+# until
+# it is there. Keep the nominal loop on schedule. What it is told is then e(kT_s) and what e moves until it is
+# measured:
+# |n1| ≤ J(|e2| + r′), r′ where it is compared with the reference at kT_s, and |n2| ≤ J(|e2′| + |r″|), |e2′| ≤
+# max|s||e1|
+# + max|w||e2| + max β|v| + |φ − w·r′ − r″|: both are c and F of the inputs of noise. The valve's pressure is j more
+# than
+# on schedule, b·|j| ≤ |u_k|, u_k = b(p_k − p_{k−1}), the output ``stepped``, and only from A before to A + Θ after
+# p_k is
+# due: p_k where it is early, p_{k−1} where it is late. The input ``late`` is b·j, which acts as the valve's pressure
+# does, F = 0 and c = 1 for u_k. Let f be the share of the step that is made when p_k is due. The areas of b|j| before
+# and
+# after that are E and L times |u_k|: where it begins late, E = 0 and L ≤ A + Θ/2; where it begins early, E ≤ f·A and
+# L ≤
+# (1 − f)²·Θ/2. So E/A + L/(A + Θ/2) ≤ 1 always, and ``late`` is a `Pulse`. v = b(p − p*) is what the nominal loop has
+# of
+# it at the same time or, of the pressure before or after, A + Θ away at most, when p* was d times that time another:
+# the
+# output ``push`` (behind a lag ``asked``) has that more.
+#
+# Some of these bounds are by outputs a little later, up to t + T_s for an input at t. But beyond t let the nominal
+# loop
+# go on with no inputs but those that bring what has been measured or has come before t to its instant: they obey the
+# same
+# bounds, and beyond t + T_s there is none. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is not more. A root is one of
+# what
+# was measured: of e at a time up to which the bounds hold, so that E and R have no more on top than noise, J·r′ and
+# J·|r″|, and ε gains δγ(N1 + J·r′)/T_s. What is told may as well be a mean of e, with any weights, over times within
+# J of
+# kT_s: it is as near e(kT_s), and within the bounds if e is. ∎
+#
+# **Slow input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤ κ(2E +
+# r′σ),
+# σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Cut the range of β into parts with middles β_i and half widths δ. Fix t, let
+# β(t) be in part i, and take β_i in place of β0 in the nominal loop up to t: |β(τ) − β_i| ≤ δ + 2κE + κr′σ, and σ ≤
+# e^{ασ}/(eα) for every α > 0. So (β − β_i)v is at most (δ + 2κE)|v|, as before with a smaller c, and ``aged``, an
+# input
+# that enters as a does with c = κr′/(eα) for v, its gains those of the loop with A + α in place of A, whose responses
+# are
+# e^{ασ} times as large. All gains are the largest over the parts. E is the claim on the slip error, which has to
+# exceed
+# the bound that follows: e1 is continuous and below E at first, so it never reaches E. ∎
+#
+# **Layer between well and fault.** Its pressure is that of its modes, v, and what they leave out, R, |R| ≤ sup|y|
+# with
+# the output y = ``left_out`` (`quakedesign.loop.layer`). Of β(v + R) the loop has β0·v and what is known of β0·R,
+# with
+# x2 = e2 − β0Y in place of e2 (`quakedesign.loop.layer`). So (β − β0)R comes into x2′ beside a, with the c of v
+# for
+# y: where the well's pressure moves, within a; where it steps, R fades after every step and is an input of its own.
+# What
+# is past of a slow gain takes R as it takes v, with the same c. Two inputs more, F = 0 and c = 1 for y, are
+# ``awaited``,
+# β0Y in e1′ and x2′, and ``awaited_told``, what the law is told of it, as of noise, at the samples: e2 is measured,
+# not
+# x2. A bound of e2 is one of x2 and one of β0Y: the gain of ``awaited`` and what that adds at once. ∎
+
+_ZERO = Fraction(0)
+OUTPUTS = ("slip_error", "slip_rate_error", "push")
+_WORDS = {
+    ("acceleration", "slip_error"): "range of friction's slope in slip",
+    ("acceleration", "slip_rate_error"): "range of the slope in slip rate",
+    ("acceleration", "push"): "input gain's range",
+    ("aged", "push"): "change of the input gain",
+    ("drift", "slip_rate_error"): "drift that the input gain makes of the disturbance",
+    ("root", "slip_error"): "range of the implicit step's slope",
+    ("late", "stepped"): "jitter or rise of the pressure",
+    **{("rate_noise", output): "jitter of the measurement" for output in OUTPUTS},
+    ("slip_noise", "slip_rate_error"): "jitter of the measurement",
+}
+_LEFT_OUT = "what the modes of the layer leave out"
+_HALVINGS = 96
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What no course of the uncertain quantities exceeds, from its start, for ever.
+
+    Attributes
+    ----------
+    slip_error : Fraction
+        |e1| [m].
+    slip_rate_error : Fraction
+        |e2| [m/s].
+    push : Fraction
+        b·|p − p*| [m/s²].
+    asked : Fraction, optional
+        The same at the valve [m/s²]; None where that is the fault's.
+    stepped : Fraction, optional
+        b times the change of the pressure that is asked for from sample to sample [m/s²]; None where it does not count.
+    small_gain : Fraction
+        Spectral radius of M [-] from above, below 1.
+    """
+
+    slip_error: Fraction
+    slip_rate_error: Fraction
+    push: Fraction
+    small_gain: Fraction
+    asked: Fraction | None = None
+    stepped: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoGuarantee:
+    """Why a loop has none.
+
+    Attributes
+    ----------
+    reason : str
+        With the quantity that fails.
+    small_gain : UpperBound or None
+        At least 1; None where something else fails, such as the stability of the nominal loop.
+    needs : Fraction, optional
+        Change of the pressure from sample to sample that a pump would have to make [Pa].
+    """
+
+    reason: str
+    small_gain: UpperBound | None
+    needs: Fraction | None = None
+
+    def check(self) -> Verdict:
+        """UNDECIDED."""
+        return Verdict.UNDECIDED
+
+    def sentence(self) -> str:
+        """For people."""
+        return f"none: {self.reason}"
+
+
+def certified_bounds(
+    task: Task,
+    loop: PeriodicLoop,
+    root: ImplicitRoot | None = None,
+    noise: Mapping[str, Fraction] = NOISELESS,
+    jitter: Fraction = _ZERO,
+) -> Bounds | NoGuarantee:
+    """Bounds of the theorem for the loop of `held_loop` or `continuous_loop` with the task's model.
+
+    `noise` has the bounds of those inputs of the loop that are noise, in SI units, `jitter` that of measurements [s].
+
+    Raises
+    ------
+    ParameterError
+        When the nominal loop is not found to be stable.
+    """
+    gains = norms(loop) if loop.segments else flow_norms(loop)
+    return best_bounds(task, gains, root, loop.period, noise, jitter=jitter)
+
+
+def best_bounds(
+    task: Task,
+    gains: Gains,
+    root: ImplicitRoot | None,
+    step: Fraction,
+    noise: Mapping[str, Fraction] = NOISELESS,
+    spread: GainSpread | None = None,
+    jitter: Fraction = _ZERO,
+) -> Bounds | NoGuarantee:
+    """Bounds of the theorem from the gains; of a disturbance of bounded rate, the better of both classes."""
+    classes = [task] if task.change is None else [task, replace(task, change=None)]
+    answers = [bounds_from(one, gains, root, step, noise, spread, jitter) for one in classes]
+    proved = [bounds for bounds in answers if isinstance(bounds, Bounds)]
+    if not proved:
+        return answers[0]
+    every = {part.name: [getattr(bounds, part.name) for bounds in proved] for part in fields(Bounds)}
+    best: dict[str, Any] = {name: None if None in values else min(values) for name, values in every.items()}
+    return Bounds(**best)
+
+
+def bounds_from(
+    task: Task,
+    gains: Gains,
+    root: ImplicitRoot | None,
+    step: Fraction,
+    noise: Mapping[str, Fraction] = NOISELESS,
+    spread: GainSpread | None = None,
+    jitter: Fraction = _ZERO,
+) -> Bounds | NoGuarantee:
+    """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
+    channels = (*channels_of(task, root, step, noise, spread, jitter), *beside(task, {name for _, name in gains}))
+    if ("push", "awaited") in gains:
+        channels = tuple(through_layer(channels, gains))
+    if all(isinstance(values[0], float) for values in gains.values()):
+        channels = tuple(channel.rounded() for channel in channels)
+    small_gain, peaks = channel_bounds(channels, gains)
+    if peaks is None:
+        return _none(small_gain, channels, gains)
+    return Bounds(
+        slip_error=Fraction(peaks["slip_error"]),
+        slip_rate_error=Fraction(peaks["slip_rate_error"]),
+        push=Fraction(peaks["push"] + peaks.get("left_out", _ZERO) + unshifted(task)),
+        small_gain=Fraction(small_gain),
+        asked=Fraction(peaks["asked"] + unshifted(task)) if "asked" in peaks else None,
+        stepped=Fraction(peaks["stepped"]) if "stepped" in peaks else None,
+    )
+
+
+def channel_bounds(channels: Sequence[Channel], gains: Gains) -> tuple[Any, dict[str, Any] | None]:
+    """Spectral radius of M from above and, where it is below 1, the bound of every output."""
+    loops = [
+        [
+            max(sum((c * gains[y, k.name][j] for y, c in i.shares.items()), _ZERO) for j in _parts(gains))
+            for k in channels
+        ]
+        for i in channels
+    ]
+    small_gain = spectral_radius(loops)
+    if small_gain >= 1:
+        return small_gain, None
+    inputs = _solved(loops, [channel.own for channel in channels])
+    return small_gain, {
+        y: max(
+            sum((gains[y, k.name][j] * v for k, v in zip(channels, inputs, strict=True)), _ZERO) for j in _parts(gains)
+        )
+        for y in dict.fromkeys(y for y, _ in gains)
+    }
+
+
+def spectral_radius(matrix: Sequence[Sequence[Any]]) -> Any:
+    """Upper bound of the spectral radius of a non-negative matrix by halving, within a millionth if it is not zero.
+
+    It is below v if, and only if, elimination of v − M has positive pivots (Hawkins and Simon 1949).
+    """
+    low, high = _ZERO, max(sum(row, _ZERO) for row in matrix)
+    for _ in range(_HALVINGS):
+        if high - low <= high / 2**20:
+            break
+        middle = (low + high) / 2
+        low, high = (low, middle) if _dominates(middle, matrix) else (middle, high)
+    return high
+
+
+def _dominates(value: Any, matrix: Sequence[Sequence[Any]]) -> bool:
+    rows = [[(i == j) * value - v for j, v in enumerate(row)] for i, row in enumerate(matrix)]
+    while rows:
+        first, *rest = rows
+        if first[0] <= 0:
+            return False
+        rows = [[v - row[0] / first[0] * p for v, p in zip(row[1:], first[1:], strict=True)] for row in rest]
+    return True
+
+
+def _parts(gains: Gains) -> range:
+    return range(len(next(iter(gains.values()))))
+
+
+def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
+    """(1 − M)⁻¹F; the pivots are positive, since the spectral radius of M ≥ 0 is below 1."""
+    size = len(own)
+    rows = [[(i == j) - v for j, v in enumerate(row)] + [own[i]] for i, row in enumerate(matrix)]
+    for i in range(size):
+        rows[i] = [v / rows[i][i] for v in rows[i]]
+        for k in range(size):
+            if k != i:
+                rows[k] = [v - rows[k][i] * p for v, p in zip(rows[k], rows[i], strict=True)]
+    return [row[size] for row in rows]
+
+
+def unshifted(task: Task) -> Fraction:
+    """What b·(p − p*) is more than the push of the loop, p* being shifted in the class ``rate`` [m/s²]."""
+    if task.change is None:
+        return _ZERO
+    return task.amplitude / ((task.beta[0] + task.beta[1]) / 2 if task.friction.rate_slope else 1)
+
+
+def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoGuarantee:
+    alone = {(i.name, y): c * max(gains[y, i.name]) for i in channels for y, c in i.shares.items()}
+    (name, share), whole = max(alone.items(), key=lambda item: item[1]), UpperBound(small_gain)
+    what = _WORDS.get(name, _LEFT_OUT)
+    return NoGuarantee(
+        reason=f"small gain {whole:.3g}, which must be below 1: the {what} alone makes {LowerBound(share):.3g}",
+        small_gain=whole,
+    )
+
+
+# ----------------------------------------------------------------------
+# The input gain of friction that depends on the slip alone: slow, so that a loop meets one value of it at a time.
+
+MOST_PARTS = 16
+_ONE_OVER_E = Fraction(3679, 10000)  # from above
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowGain:
+    """How a proof uses that the input gain is slow: see `theorem`.
+
+    Attributes
+    ----------
+    parts : int
+        Into how many equal parts the range of the gain is cut, each with a nominal loop of its own, at most 16.
+    growth : Fraction
+        α [1/s]: what is past counts e^{ασ} times, σ ago.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    parts: int
+    growth: Fraction
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.parts <= MOST_PARTS or self.growth <= 0:
+            raise ParameterError(
+                f"a slow gain needs 1 to {MOST_PARTS} parts and a positive growth. Received {self.parts} and "
+                f"{shortly(self.growth)} 1/s. Change them."
+            )
+
+    def models(self, task: Task) -> tuple[NominalModel, ...]:
+        """Nominal model of every part.
+
+        Raises
+        ------
+        ParameterError
+            For friction that depends on the slip rate, whose coefficient may jump.
+        """
+        if task.friction.rate_slope:
+            raise ParameterError(
+                "a slow gain needs friction of the slip alone. Received one of the slip rate. Leave it out."
+            )
+        half = self._half(task)
+        middles = (task.beta[0] + (2 * number + 1) * half for number in range(self.parts))
+        return tuple(replace(task.model, gain=middle * task.authority) for middle in middles)
+
+    def spread(self, task: Task, slip_error: Fraction) -> GainSpread:
+        """How far the gain is off while the slip error stays below a bound [m]."""
+        law = task.friction
+        slope = max(law.weakening, law.strengthening) * task.area_per_mass[1] / task.authority
+        return GainSpread(
+            half=self._half(task) + 2 * slope * slip_error,
+            aged=slope * task.reference_rates[0] * _ONE_OVER_E / self.growth,
+        )
+
+    def _half(self, task: Task) -> Fraction:
+        return (task.beta[1] - task.beta[0]) / (2 * self.parts)
+
+
+def slow_gains(loops: Iterable[PeriodicLoop], growth: Fraction) -> Gains:
+    """Gains of the nominal loops of all parts, those of one after those of the other, with those of ``aged``.
+
+    Raises
+    ------
+    ParameterError
+        When one of the loops, or of those that grow, is not found to be stable.
+    """
+    of_parts = [norms(loop) | norms(grown(loop, growth)) for loop in loops]
+    return {key: tuple(chain.from_iterable(gains[key] for gains in of_parts)) for key in of_parts[0]}
+
+
+def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:
+    """The loop whose responses to the acceleration are e^{ασ} as large."""
+    flow = tuple(tuple(v + growth * (i == j) for j, v in enumerate(row)) for i, row in enumerate(loop.flow))
+    entry = {"aged": loop.inputs["acceleration"]}
+    return replace(loop, flow=flow, inputs=entry, sampled={}, fading={}, pulses={}, at_once={}, start=())
+
+
+# ----------------------------------------------------------------------
+# Whether the root of an implicit step lies between two lines for all errors of a size, in ball arithmetic.
+#
+# **Statement.** w solves 0 ∈ w − e2 + q(e1 + T_s·w, w). For |e1| ≤ E and |e2| ≤ R: −γ1·u − ε ≤ w ≤ −γ0·u + ε where u
+# =
+# e1/T_s ≥ 0, and the same mirrored where e1 ≤ 0.
+#
+# **Proof.** F(w) = w − e2 + q is strongly monotone, so w is at most ω wherever F(ω) holds a number that is not
+# negative.
+# For e2 ≤ R and 0 ≤ u ≤ E/T_s take ω = ε − γ0·u, where e1 + T_s·ω = T_s(ε + (1 − γ0)u). As q is odd, the lower line
+# is
+# the upper one of −e1: ω = ε + γ1·u, e1 + T_s·ω = T_s(ε − (1 − γ1)u). On a part of the range of u both arguments of q
+# are at least the smaller of their ends, and q never falls, with ⌈0⌋⁰ taken as 1; parts are halved until that shows ω
+# − R
+# + q ≥ 0 on each, or too small. ∎
+
+Range = tuple[Fraction, Fraction]
+
+_BITS = 128
+_SECTOR_HALVINGS = 10
+
+
+def holds(root: ImplicitRoot, step: Fraction, slip: Fraction, rate: Fraction) -> bool:
+    """Whether the lines are shown to enclose the root for |e1| ≤ slip [m] and |e2| ≤ rate [m/s]; False: not shown."""
+    last = slip / step
+    low, high = root.slopes
+    with ctx.workprec(_BITS):
+        return all(
+            _above(root, step, rate, (away, along), (Fraction(0), last), _SECTOR_HALVINGS)
+            for away, along in ((1 - low, -low), (high - 1, high))
+        )
+
+
+def _above(root: ImplicitRoot, step: Fraction, rate: Fraction, slopes: Range, part: Range, halvings: int) -> bool:
+    """Whether a line stays above the root on a part of the range of u."""
+    ahead, end = (root.remainder + min(slope * u for u in part) for slope in slopes)
+    if _least(root.pull, _below(step * ahead), _below(end)) + ball(end - rate) >= 0:
+        return True
+    middle = (part[0] + part[1]) / 2
+    return halvings > 0 and all(
+        _above(root, step, rate, slopes, half, halvings - 1) for half in ((part[0], middle), (middle, part[1]))
+    )
+
+
+def _least(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
+    """Lower bound of q at given arguments, or larger ones; the bound and the arguments are exact balls."""
+    total = arb(0)
+    for term in terms:
+        inner = {"slip": slip, "rate": rate}
+        value = inner[term.argument] if isinstance(term.argument, str) else _least(term.argument, slip, rate)
+        size = abs(value).root(term.exponent.denominator) if value != 0 else value
+        total += (
+            ball(term.factor[0]) * size**term.exponent.numerator
+            if value >= 0
+            else -(ball(term.factor[1]) * size**term.exponent.numerator)
+        )
+    return total.lower()
+
+
+def _below(value: Fraction) -> Any:
+    return ball(value).lower()

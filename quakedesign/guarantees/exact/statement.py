@@ -1,0 +1,765 @@
+"""Guarantees as statements that check themselves: fault, loop, and bounds on its outputs.
+
+Chapters: claims and their check; guarantee of a sampled loop; peaks of the idealised loop in continuous
+time; test whether a guarantee covers a task; guarantee of slow sliding over the cells of a parameter box.
+"""
+
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from functools import cached_property
+from math import ceil, floor, log10
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import LowerBound, UpperBound, six_digits
+from quakedesign.guarantees.exact import small_gain
+from quakedesign.guarantees.exact.invariant_set import InvariantPolytope, reached_bounds
+from quakedesign.guarantees.exact.loop import Gains, Held
+from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, cell_bounds, exponential, follows
+from quakedesign.guarantees.exact.sliding_task import Cuts, SlidingTask, cells
+from quakedesign.guarantees.exact.small_gain import (
+    Bounds,
+    NoGuarantee,
+    SlowGain,
+    best_bounds,
+    certified_bounds,
+    slow_gains,
+)
+from quakedesign.guarantees.exact.task import Friction, Task
+from quakedesign.laws import RestLimit
+from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop
+from quakedesign.lyapunov.exact.claim import Verdict
+
+if TYPE_CHECKING:
+    from quakedesign.laws import SampledController
+
+
+# ----------------------------------------------------------------------
+# What is claimed of a loop, and whether it follows from bounds.
+
+_DIGITS = 4
+_ENDS = ("least_pressure", "largest_pressure", "least_asked", "largest_asked")
+MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claims:
+    """What is never exceeded.
+
+    Attributes
+    ----------
+    slip_error : UpperBound
+        Slip less reference, absolute value [m].
+    slip_rate_error : UpperBound
+        [m/s].
+    peak_slip_rate : UpperBound
+        Slip rate, absolute value [m/s].
+    least_pressure : LowerBound
+        [Pa].
+    largest_pressure : UpperBound
+        [Pa].
+    least_asked, largest_asked : LowerBound and UpperBound, optional
+        The same of the pressure at the valve [Pa]; None where that is the fault's.
+    largest_step : UpperBound, optional
+        Change of the pressure that is asked for from sample to sample [Pa]; None where it does not count.
+    """
+
+    slip_error: UpperBound
+    slip_rate_error: UpperBound
+    peak_slip_rate: UpperBound
+    least_pressure: LowerBound
+    largest_pressure: UpperBound
+    least_asked: LowerBound | None = None
+    largest_asked: UpperBound | None = None
+    largest_step: UpperBound | None = None
+
+    @classmethod
+    def of(cls, task: Task, bounds: Bounds) -> "Claims":
+        """Tightest claims that bounds support."""
+        low, high = task.rest_pressure
+        push = bounds.push / task.authority
+        asked = None if bounds.asked is None else bounds.asked / task.authority
+        return cls(
+            slip_error=UpperBound(bounds.slip_error),
+            slip_rate_error=UpperBound(bounds.slip_rate_error),
+            peak_slip_rate=UpperBound(bounds.slip_rate_error + task.reference_rates[0]),
+            least_pressure=LowerBound(low - push),
+            largest_pressure=UpperBound(high + push),
+            least_asked=None if asked is None else LowerBound(low - asked),
+            largest_asked=None if asked is None else UpperBound(high + asked),
+            largest_step=None if bounds.stepped is None else UpperBound(bounds.stepped / task.authority),
+        )
+
+    @property
+    def pressures(self) -> tuple[tuple[LowerBound, UpperBound], ...]:
+        """In the fault, and at the valve where that is another one [Pa]."""
+        fault = self.least_pressure, self.largest_pressure
+        if self.least_asked is None or self.largest_asked is None:
+            return (fault,)
+        return fault, (self.least_asked, self.largest_asked)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts, SI."""
+        return {
+            "slip_error": self.slip_error.exact,
+            "slip_rate_error": self.slip_rate_error.exact,
+            "peak_slip_rate": self.peak_slip_rate.exact,
+            **{
+                name: [low.exact, high.exact]
+                for name, (low, high) in zip(("pressure", "asked_pressure"), self.pressures, strict=False)
+            },
+            **({} if self.largest_step is None else {"largest_step": self.largest_step.exact}),
+        }
+
+    def rounded(self) -> "Claims":
+        """The same, a little weaker and with few digits."""
+        step = self.largest_step
+        ends: list[Any] = [end for low, high in self.pressures for end in _wider(low, high)]
+        return Claims(
+            slip_error=UpperBound(above(self.slip_error * MARGIN)),
+            slip_rate_error=UpperBound(above(self.slip_rate_error * MARGIN)),
+            peak_slip_rate=UpperBound(above(self.peak_slip_rate * MARGIN)),
+            largest_step=None if step is None else UpperBound(above(step * MARGIN)),
+            **dict(zip(_ENDS, ends, strict=False)),
+        )
+
+    def verdict(self, task: Task, bounds: Bounds) -> Verdict:
+        """PROVED if the claims follow from bounds under which the fault stays closed, else UNDECIDED."""
+        tightest = Claims.of(task, bounds)
+        return Verdict.PROVED if self.covers(tightest) and not tightest.opens(task) else Verdict.UNDECIDED
+
+    def opens(self, task: Task) -> str:
+        """Why the fault may open, where the plant is another one; empty where the pressure stays below σ′."""
+        if self.largest_pressure < task.normal_stress:
+            return ""
+        return (
+            f"the pressure may rise to {self.largest_pressure.quantity('Pa')}, and the effective normal stress is "
+            f"{LowerBound(task.normal_stress).quantity('Pa')}: the fault may open"
+        )
+
+    def covers(self, other: "Claims") -> bool:
+        """Whether these claims follow from others."""
+        return (
+            self.slip_error >= other.slip_error
+            and self.slip_rate_error >= other.slip_rate_error
+            and self.peak_slip_rate >= other.peak_slip_rate
+            and len(self.pressures) <= len(other.pressures)
+            and _covers(self.largest_step, other.largest_step)
+            and all(
+                low <= least and high >= largest
+                for (low, high), (least, largest) in zip(self.pressures, other.pressures, strict=False)
+            )
+        )
+
+
+def _covers(step: UpperBound | None, other: UpperBound | None) -> bool:
+    """Whether a largest step follows from another."""
+    return step is None or (other is not None and step >= other)
+
+
+def _wider(low: LowerBound, high: UpperBound) -> tuple[LowerBound, UpperBound]:
+    room = (high - low) * (MARGIN - 1)
+    return LowerBound(-above(room - low)), UpperBound(above(high + room))
+
+
+def above(value: Fraction) -> Fraction:
+    """At least a rational, with four digits."""
+    if not value:
+        return value
+    scale = Fraction(10) ** (floor(log10(abs(value))) - _DIGITS + 1)
+    return ceil(value / scale) * scale
+
+
+# ----------------------------------------------------------------------
+# A guarantee: a fault, the loop that runs, and what its outputs never exceed.
+
+_NOISE_WORDS = {
+    "slip_noise": "with any noise of at most {:.6g} m in the measured slip",
+    "rate_noise": "with any noise of at most {:.6g} m/s in the measured slip rate",
+}
+_RESTS = Fraction(1, 100)  # of the largest rate of the reference: below that a fault counts as at rest
+_TURNS, _LEAPS = 32, 16  # of claims that follow from themselves: by small steps first, then by leaps
+_LEAP = Fraction(6, 5)
+_RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # times of a pump that are tried, and what each has more than the last needed
+_FIRST = Fraction(1, 64)  # of a step, the first of them
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guarantee:
+    """Claims about one loop on one task; `check` decides them.
+
+    Attributes
+    ----------
+    task : Task
+    held : Held
+    claims : Claims
+    slow_gain : SlowGain, optional
+        How the proof uses that the input gain is slow; None for one that lets it jump.
+    reach : InvariantPolytope, optional
+        Of samples that follow no clock, the set that the loop never leaves; None for others.
+    covers, lasts : str
+        For what it holds, and for how long, in short.
+    """
+
+    task: Task
+    held: Held
+    claims: Claims
+    slow_gain: SlowGain | None = None
+    reach: InvariantPolytope | None = None
+    covers: ClassVar[str] = (
+        "every friction law of the box and every disturbance up to the stated size, for a plant continued to negative "
+        "slip rates"
+    )
+    lasts: ClassVar[str] = "for ever"
+
+    def __repr__(self) -> str:
+        held, claims = self.held, self.claims
+        errors = f"|e1| <= {claims.slip_error:.4g} m, |e2| <= {claims.slip_rate_error:.4g} m/s"
+        most = f" to {six_digits(held.longest_step)}" if held.longest_step else ""
+        return f"Guarantee({self.task.name} held over {six_digits(held.step)}{most} s: {errors})"
+
+    @property
+    def peak_slip_rate(self) -> UpperBound:
+        """What the slip rate never exceeds [m/s]."""
+        return self.claims.peak_slip_rate
+
+    @property
+    def loop(self) -> PeriodicLoop:
+        """Nominal error loop."""
+        return self.held.loop(self.task)
+
+    @property
+    def rest_limit(self) -> RestLimit | None:
+        """A limit that the valve's pressure never reaches; None where nothing is claimed of it, or the law not told.
+
+        What the law asks for acts a delay later, while the reference moves on. A fault that moves by less than its
+        measurement tells, or by a hundredth of the reference's largest rate, rests. Pressures that are
+        claimed never to be passed are not, either, unless the fault slips faster than is claimed.
+        """
+        held, (low, high), (*fault, (least, largest)) = self.held, self.task.rest_pressure, self.claims.pressures
+        if not held.law.applied or (not fault and (held.lag or held.diffusion)):
+            return None
+        away = max(largest - high, low - least)
+        per_slip = max(map(abs, self.task.slip_chord)) / self.task.authority
+        late = per_slip * (held.delay + held.jitter + held.delay_jitter + held.ramp) * self.task.reference_rates[0]
+        width = above(2 * away + late)
+        resolution = above(2 * held.slip_noise + _RESTS * self.task.reference_rates[0] * held.step)
+        most = max(held.step, held.longest_step) + 2 * held.off
+        return RestLimit(
+            width=width,
+            per_slip=above(per_slip),
+            resolution=resolution,
+            least=Fraction(least),
+            largest=Fraction(largest),
+            fastest=above(2 * held.slip_noise + self.claims.peak_slip_rate * most),
+        )
+
+    @property
+    def slip_acceleration(self) -> UpperBound:
+        """What |e1″| never exceeds [m/s²], from |p − p*| as the claims of the pressure follow from it."""
+        task, claims, (low, high) = self.task, self.claims, self.task.rest_pressure
+        away = max(claims.largest_pressure - high, low - claims.least_pressure)
+        slip, rate = (max(map(abs, chord)) for chord in (task.slip_chord, task.rate_chord))
+        moved = slip * claims.slip_error + rate * claims.slip_rate_error + task.beta[1] * task.authority * away
+        return UpperBound(moved + task.amplitude + task.reference_force)
+
+    @property
+    def controller(self) -> "SampledController":
+        """The law for `simulate`, as that of `Held`, with its limit against windup."""
+        return replace(self.held.controller, rest_limit=self.rest_limit)
+
+    def bounds(self) -> Bounds | NoGuarantee:
+        """What the theorem gives, computed anew."""
+        if self.slow_gain is None:
+            return _bounds(self.task, self.held, self.loop, self.reach)
+        gains = _slow_gains(self.task, self.held, self.slow_gain)
+        if isinstance(gains, NoGuarantee):
+            return gains
+        return _slow_bounds(self.task, self.held, self.slow_gain, gains, self.claims.slip_error)
+
+    def check(self) -> Verdict:
+        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
+        bounds = self.bounds()
+        if isinstance(bounds, NoGuarantee) or not _root_within(self.task, self.held, self.claims):
+            return Verdict.UNDECIDED
+        if _beyond_the_pump(self.held, self.claims):
+            return Verdict.UNDECIDED
+        if self.slow_gain is not None and not bounds.slip_error < self.claims.slip_error:
+            return Verdict.UNDECIDED
+        return self.claims.verdict(self.task, bounds)
+
+    def sentence(self) -> str:
+        """What is guaranteed, for people."""
+        held = self.held
+        when = f"held over {_seconds(held.step)}"
+        if held.longest_step:
+            shortest, longest = UpperBound(held.step), LowerBound(held.longest_step)
+            when = f"held over anything from {shortest:.6g} s to {longest:.6g} s, by no clock"
+        when += f", {_seconds(held.delay)} late" if held.delay else ""
+        when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
+        when += f", through rock of L^2/D = {_seconds(held.diffusion)} from well to fault" if held.diffusion else ""
+        when += ", with the slip alone measured" if held.law.of_slip_alone else ""
+        for name, bound in ((name, bound) for name, bound in held.noise.items() if bound):
+            when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
+        mean = LowerBound(held.averaging)
+        when += f", each measurement a mean over {mean:.6g} s around its time" if mean else ""
+        when += _off_schedule(held.jitter, held.jitter + held.delay_jitter)
+        when += f", {held.pump.words()}" if held.pump else ""
+        return sentence_of(self.task, self.claims, when, _start(*held.start))
+
+
+def sentence_of(task: Task, claims: Claims, when: str, start: str = "from rest") -> str:
+    """What is claimed of a task, for people; `when` says how the pressure follows the law.
+
+    Bounds of what is claimed are rounded up, those of the disturbances and starts for which it is claimed down.
+    """
+    stress = LowerBound(task.amplitude / task.area_per_mass[1])
+    kind = f"for every disturbance of at most {LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
+    if task.change is not None:
+        kind += f" that starts at 0 and changes by at most {LowerBound(task.change):.3g} m/s^3 (class rate)"
+    if not task.amplitude:
+        kind = "without disturbance"
+    pressures = [f"between {low.quantity('Pa')} and {high.quantity('Pa')}" for low, high in claims.pressures]
+    largest = claims.largest_step
+    step = "" if largest is None else f", that asked for changes by at most {largest.quantity('Pa')} a sample"
+    return (
+        f"{start}, {when}, {kind}, for all friction and constant parameters of the box: "
+        f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
+        f"{claims.slip_error:.3g} m of the reference, the pressure {', at the valve '.join(pressures)}{step} "
+        "(for a plant continued to negative slip rates)"
+    )
+
+
+def guarantee(
+    task: Task, held: Held, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
+) -> Guarantee | NoGuarantee:
+    """Tightest rounded claims about a loop, or why there are none; of a pump of some rate, with a ramp that will do.
+
+    Samples that follow no clock need a reach, and have no slow gain.
+
+    Raises
+    ------
+    ParameterError
+        For a loop without a steady state, or a slow gain and friction of the slip rate.
+    """
+    if reach is not None:
+        bounds = _bounds(task, held, held.loop(task), reach)
+        return (
+            bounds if isinstance(bounds, NoGuarantee) else _of_claims(task, held, _rounded(task, bounds), reach=reach)
+        )
+    if held.pump is None or held.pump.rate is None or held.ramp:
+        return _proved(task, held, slow_gain)
+    ramp, longest = _FIRST * held.step, held.longest_ramp
+    found = _proved(task, replace(held, ramp=ramp), slow_gain)
+    for _ in range(_RAMPS):
+        if isinstance(found, Guarantee) or found.needs is None or ramp == longest:
+            break
+        if slow := held.pump.too_slow(UpperBound(found.needs), longest):
+            return replace(found, reason=slow)
+        ramp = min(above(found.needs / held.pump.rate * _RAMP_ROOM), longest)
+        found = _proved(task, replace(held, ramp=ramp), slow_gain)
+    return found
+
+
+def _proved(task: Task, held: Held, slow_gain: SlowGain | None) -> Guarantee | NoGuarantee:
+    claims = _claims(task, held) if slow_gain is None else _slow_claims(task, held, slow_gain)
+    return claims if isinstance(claims, NoGuarantee) else _of_claims(task, held, claims, slow_gain)
+
+
+def _of_claims(
+    task: Task, held: Held, claims: Claims, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
+) -> Guarantee | NoGuarantee:
+    """What is claimed, or what speaks against it."""
+    if not _root_within(task, held, claims):
+        errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
+        return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
+    if reason := claims.opens(task) or _beyond_the_pump(held, claims):
+        slow = held.pump is not None and bool(held.pump.too_slow(claims.largest_step, held.ramp))
+        return NoGuarantee(reason=reason, small_gain=None, needs=claims.largest_step if slow else None)
+    return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
+
+
+def _claims(task: Task, held: Held) -> Claims | NoGuarantee:
+    bounds = _bounds(task, held, held.loop(task))
+    return bounds if isinstance(bounds, NoGuarantee) else _rounded(task, bounds)
+
+
+def _rounded(task: Task, bounds: Bounds) -> Claims:
+    return Claims.of(task, bounds).rounded()
+
+
+def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
+    """Claims on whose slip error the gain's spread rests that they follow from."""
+    gains, slip_error = _slow_gains(task, held, slow_gain), Fraction(0)
+    if isinstance(gains, NoGuarantee):
+        return gains
+    for turn in range(_TURNS + _LEAPS):
+        bounds = _slow_bounds(task, held, slow_gain, gains, slip_error)
+        if isinstance(bounds, NoGuarantee):
+            return bounds
+        claims = _rounded(task, bounds)
+        if claims.slip_error <= slip_error:
+            return claims
+        slip_error = above(max(claims.slip_error * MARGIN, _LEAP * slip_error * (turn >= _TURNS)))
+    reason = f"the slip error that moves the input gain, beyond {UpperBound(slip_error):.2g} m, moves it further"
+    return NoGuarantee(reason=reason, small_gain=None)
+
+
+def _slow_gains(task: Task, held: Held, slow_gain: SlowGain) -> Gains | NoGuarantee:
+    if held.longest_step:
+        return NoGuarantee(reason="samples that follow no clock have no slow gain", small_gain=None)
+    loops = tuple(held.loop(task, model) for model in slow_gain.models(task))
+    try:
+        return slow_gains(loops, slow_gain.growth)
+    except ParameterError:
+        return _unstable(held)
+
+
+def _slow_bounds(
+    task: Task, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
+) -> Bounds | NoGuarantee:
+    spread = slow_gain.spread(task, slip_error)
+    return best_bounds(task, gains, held.law.root, held.step, held.noise, spread, held.off)
+
+
+def _root_within(task: Task, held: Held, claims: Claims) -> bool:
+    """Whether an implicit root, if there is one, is as said wherever the claims hold."""
+    root = held.law.root
+    errors = held.told(task, (claims.slip_error, claims.slip_rate_error))
+    return root is None or small_gain.holds(root, held.step, *errors)
+
+
+def _beyond_the_pump(held: Held, claims: Claims) -> str:
+    """Why the pump cannot do what is claimed; empty where it can."""
+    if held.pump is None:
+        return ""
+    return held.pump.exceeded(*claims.pressures[-1]) or held.pump.too_slow(claims.largest_step, held.ramp)
+
+
+def _bounds(task: Task, held: Held, loop: PeriodicLoop, reach: InvariantPolytope | None = None) -> Bounds | NoGuarantee:
+    if reach is not None and not held.longest_step:
+        return NoGuarantee(reason="samples that follow a clock need no set", small_gain=None)
+    if reach is not None:
+        return reached_bounds(task, held, reach)
+    if held.longest_step:
+        return NoGuarantee(reason="samples that follow no clock need a set that the loop never leaves", small_gain=None)
+    try:
+        return certified_bounds(task, loop, held.law.root, held.noise, held.off)
+    except ParameterError:
+        return _unstable(held)
+
+
+def _unstable(held: Held) -> NoGuarantee:
+    reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
+    return NoGuarantee(reason=reason, small_gain=None)
+
+
+def _off_schedule(measured: Fraction, arrived: Fraction) -> str:
+    """Said of jitter; nothing where there is none."""
+    each = f", each measurement within {LowerBound(measured):.6g} s of its instant" if measured else ""
+    return each + (f", each pressure within {LowerBound(arrived):.6g} s of when it is due" if arrived else "")
+
+
+def _start(slip: Fraction, rate: Fraction) -> str:
+    if not (slip or rate):
+        return "from rest"
+    return f"from every start within {LowerBound(slip):.6g} m and {LowerBound(rate):.6g} m/s of rest"
+
+
+def _seconds(value: Fraction) -> str:
+    return f"{UpperBound(value):.6g} s"
+
+
+# ----------------------------------------------------------------------
+# Peaks of the idealised loop whose pressure acts at once: the theorem of the loop that runs, in continuous time.
+
+WHEN = "for a pressure that acts at once (continuous time)"
+PREMISES = (
+    "start at rest: x = 0, integrals 0; for the class rate a disturbance that starts at 0",
+    "friction: any function of slip and slip rate within the bounds and chord slopes of the box",
+    "k, eta, N anywhere in the box but constant",
+    "pressure acts at once; limits of the law, if any, lie outside the certified range of p",
+    "friction opposes forward motion: the printed plant is continued to negative slip rates (ERRATA 14)",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContinuousPeaks:
+    """Claims about a law in continuous time, which no computer runs; `check` decides them.
+
+    Attributes
+    ----------
+    task : Task
+    law : ContinuousLaw
+    claims : Claims
+    """
+
+    task: Task
+    law: ContinuousLaw
+    claims: Claims
+
+    @property
+    def loop(self) -> PeriodicLoop:
+        """Nominal error loop."""
+        return _loop(self.task, self.law)
+
+    def bounds(self) -> Bounds | NoGuarantee:
+        """What the theorem gives, computed anew."""
+        return _continuous_bounds(self.task, self.law)
+
+    def check(self) -> Verdict:
+        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
+        bounds = self.bounds()
+        return self.claims.verdict(self.task, bounds) if isinstance(bounds, Bounds) else Verdict.UNDECIDED
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact claims as texts, SI, and what they rest on."""
+        kind = "amplitude" if self.task.change is None else "rate"
+        return {"disturbance_class": kind, **self.claims.to_dict(), "premises": list(PREMISES)}
+
+    def sentence(self) -> str:
+        """What is proved, for people."""
+        return sentence_of(self.task, self.claims, WHEN)
+
+
+def continuous_peaks(task: Task, law: ContinuousLaw) -> ContinuousPeaks | NoGuarantee:
+    """Tightest rounded claims about a law in continuous time, or why there are none.
+
+    Raises
+    ------
+    ParameterError
+        For a law that leaves an error under a constant pressure at rest.
+    """
+    bounds = _continuous_bounds(task, law)
+    if isinstance(bounds, NoGuarantee):
+        return bounds
+    claims = Claims.of(task, bounds).rounded()
+    if reason := claims.opens(task):
+        return NoGuarantee(reason=reason, small_gain=None)
+    return ContinuousPeaks(task=task, law=law, claims=claims)
+
+
+def _loop(task: Task, law: ContinuousLaw) -> PeriodicLoop:
+    """Nominal error loop, of a law that fits the reference."""
+    loop = continuous_loop(law, task.model, task.authority)
+    if any(law.of_reference):
+        task.require_smooth_reference()
+    return loop
+
+
+def _continuous_bounds(task: Task, law: ContinuousLaw) -> Bounds | NoGuarantee:
+    loop = _loop(task, law)
+    try:
+        return certified_bounds(task, loop)
+    except ParameterError:
+        reason = f"{WHEN} even the nominal loop is not stable, or too slow to be seen so"
+        return NoGuarantee(reason=reason, small_gain=None)
+
+
+# ----------------------------------------------------------------------
+# Whether a guarantee is about a task: what it is proved for covers what is asked.
+
+_SAME = {
+    "density": "kg/m^3",
+    "shear_modulus": "Pa",
+    "length": "m",
+    "damping": "kg/s",
+    "normal_stress": "Pa",
+    "target_slip": "m",
+    "operation_time": "s",
+}
+_SPREADS = ("stiffness", "damping", "authority")
+
+
+def differences(proved: Task, asked: Task) -> list[str]:
+    """What of a task is not covered by the task of a proof, each with both values, SI; empty if everything is.
+
+    Constants of the fault and its reference must be the same; friction, ranges and disturbance lie within those of the
+    proof. The name is none of it.
+    """
+    return [*_other(proved, asked), *_wider_than_needed(proved, asked), *_rougher(proved.friction, asked.friction)]
+
+
+def _other(proved: Task, asked: Task) -> list[str]:
+    """Constants that are not the same."""
+    pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(asked, name)) for name, unit in _SAME.items()}
+    pairs["static friction [-]"] = proved.friction.static, asked.friction.static
+    for name, unit, *both in zip(("slip", "rate"), ("1/s^2", "1/s"), proved.growths, asked.growths, strict=True):
+        pairs[f"disturbance per {name} [{unit}]"] = both[0], both[1]
+    found = [
+        f"{name} {six_digits(one)} there, {six_digits(other)} here"
+        for name, (one, other) in pairs.items()
+        if one != other
+    ]
+    return found + ([] if proved.shape == asked.shape else ["the shape of the reference"])
+
+
+def _wider_than_needed(proved: Task, asked: Task) -> list[str]:
+    """Ranges and disturbances beyond those of the proof."""
+    pairs = {f"spread of {name} [-]": both for name, *both in zip(_SPREADS, proved.spreads, asked.spreads, strict=True)}
+    pairs["disturbance [m/s^2]"] = [proved.amplitude, asked.amplitude]
+    if proved.change is not None and asked.change is not None:
+        pairs["change of the disturbance [m/s^3]"] = [proved.change, asked.change]
+    found = [
+        f"{name} up to {six_digits(one)} there, {six_digits(other)} here"
+        for name, (one, other) in pairs.items()
+        if other > one
+    ]
+    jumps = proved.change is not None and asked.change is None
+    return found + (["a disturbance of the class rate there, one that may jump here"] if jumps else [])
+
+
+def _rougher(proved: Friction, asked: Friction) -> list[str]:
+    """Bounds of friction that reach beyond those of the proof."""
+    beyond = {part.name: getattr(asked, part.name) > getattr(proved, part.name) for part in fields(Friction)}
+    beyond |= {"static": False, "least": asked.least < proved.least}
+    names = [name for name, wider in beyond.items() if wider]
+    return [
+        f"friction: {name} {six_digits(getattr(proved, name))} there, {six_digits(getattr(asked, name))} here"
+        for name in names
+    ]
+
+
+# ----------------------------------------------------------------------
+# A guarantee of slow sliding: a fault, its box of constants in cells, the loop that runs, and its bounds.
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingGuarantee:
+    """Claims about one loop around slow sliding; `check` decides them.
+
+    Attributes
+    ----------
+    task : SlidingTask
+    held : Held
+    cuts : Cuts
+        How the box of constants falls into cells.
+    claims : SlidingClaims
+    """
+
+    task: SlidingTask
+    held: Held
+    cuts: Cuts
+    claims: SlidingClaims
+
+    @property
+    def covers(self) -> str:
+        """For what it holds, in short."""
+        stress = LowerBound(self.task.stress).quantity("Pa")
+        return f"the stated constants of friction and every shear stress disturbance up to {stress}, {self.lasts}"
+
+    @property
+    def lasts(self) -> str:
+        """For how long it holds, in short."""
+        return f"while the reference goes {float(self.task.distance):.4g} m"
+
+    def __repr__(self) -> str:
+        return f"SlidingGuarantee({self.task.name}: |ln(v/V)| <= {self.claims.log_rate:.4g})"
+
+    @property
+    def controller(self) -> "SampledController":
+        """The law for `simulate`, with its T_s and the delay, lag and rock that it is proved for."""
+        return self.held.controller
+
+    @cached_property
+    def cells(self) -> tuple[SlidingTask, ...]:
+        """The task on every cell."""
+        return cells(self.task, self.cuts)
+
+    def check(self) -> Verdict:
+        """PROVED if the claims follow from themselves on every cell, in ball arithmetic; else UNDECIDED."""
+        for cell in self.cells:
+            bounds = cell_bounds(cell, self.held, self.claims)
+            if isinstance(bounds, NoGuarantee) or not follows(bounds, self.claims):
+                return Verdict.UNDECIDED
+        return Verdict.PROVED
+
+    @property
+    def peak_slip_rate(self) -> UpperBound:
+        """Ve^Y [m/s] from above."""
+        return UpperBound(self.task.rate * exponential(self.claims.log_rate))
+
+    @property
+    def pressures(self) -> tuple[LowerBound, UpperBound]:
+        """Least and largest pressure in the fault [Pa]."""
+        return self._within(self.claims.push)
+
+    @property
+    def valve_pressures(self) -> tuple[LowerBound, UpperBound]:
+        """Least and largest pressure at the valve, what is planned included [Pa]."""
+        return self._within(self.claims.asked)
+
+    def _within(self, size: UpperBound) -> tuple[LowerBound, UpperBound]:
+        """Ends of p* while the reference goes its distance, and a size [Pa] beyond."""
+        return LowerBound(-size), UpperBound(self.task.pressure_per_slip * self.task.distance + size)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts, SI."""
+        claims, (low, high), (least, largest) = self.claims, self.pressures, self.valve_pressures
+        return {
+            "peak_slip_rate": self.peak_slip_rate.exact,
+            "log_rate": claims.log_rate.exact,
+            "log_state": claims.log_state.exact,
+            "slip_error": claims.slip_error.exact,
+            "pressure": [low.exact, high.exact],
+            "asked_pressure": [least.exact, largest.exact],
+            "stress": str(self.task.stress),
+            "cells": len(self.cells),
+        }
+
+    def sentence(self) -> str:
+        """What is guaranteed, for people; bounds rounded up, those of what it is guaranteed for down."""
+        task, held, claims = self.task, self.held, self.claims
+        ratio = UpperBound(exponential(claims.log_rate))
+        (low, high), (least, largest) = self.pressures, self.valve_pressures
+        empty = "" if task.distance else "about nothing, as the reference goes 0 m, which takes no time: "
+        under = f"for every shear stress disturbance of at most {LowerBound(task.stress).quantity('Pa')}"
+        under = under if task.stress else "without disturbance"
+        return (
+            f"{empty}from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, "
+            f"{under}, {_along(task)}{_box(task)}: the slip rate never "
+            f"exceeds {ratio:.4g} V = {self.peak_slip_rate:.3g} m/s {self.lasts}, the slip stays within "
+            f"{claims.slip_error:.3g} m of it, the pressure in the fault between {low.quantity('Pa')} and "
+            f"{high.quantity('Pa')}, at the valve between {least.quantity('Pa')} and {largest.quantity('Pa')} "
+            f"({', '.join(['with inertia', *_friction(task)])})"
+        )
+
+
+def _path(held: Held) -> str:
+    said = f"held over {float(held.step):.6g} s"
+    said += f", {float(held.delay):.6g} s late" if held.delay else ""
+    said += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
+    said += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
+    noise = LowerBound(held.slip_noise)
+    return said + (f", with any noise of at most {noise:.6g} m in the measured slip" if held.slip_noise else "")
+
+
+def _along(task: SlidingTask) -> str:
+    """The references, where there is more than one."""
+    slow, fast = UpperBound(1 - task.swing), LowerBound(1 + task.swing)
+    return f"every reference whose rate stays between {slow:.6g} V and {fast:.6g} V, " if task.swing else ""
+
+
+def _friction(task: SlidingTask) -> list[str]:
+    """What a reader would not expect, who expects ageing."""
+    said = ["friction regularised"] if task.regularised else []
+    return said + (["state by the slip law"] if task.state_law == "slip" else [])
+
+
+def _box(task: SlidingTask) -> str:
+    said = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
+    wide = [
+        f"{short} from {_inside(*task.ranges[axis])}"
+        for axis, short in said.items()
+        if task.ranges[axis][0] < task.ranges[axis][1]
+    ]
+    return f"for all constant {', '.join(wide)}" if wide else "for a, b and D_c as they are given"
+
+
+def _inside(low: Fraction, high: Fraction) -> str:
+    """Ends of a range on its inner side, with as many digits as it takes."""
+    for digits in range(6, 16):
+        ends = f"{UpperBound(low):.{digits}g}", f"{LowerBound(high):.{digits}g}"
+        if Fraction(ends[0]) < Fraction(ends[1]):
+            return " to ".join(ends)
+    return f"{low} to {high}"

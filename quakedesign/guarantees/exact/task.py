@@ -1,0 +1,278 @@
+"""From a fault's data to the ranges and inputs of its error loop, by rational inequalities.
+
+About p*(t), the pressure that would hold the fault at rest at the reference r(t), the error e = x − (r, r′) follows
+
+    e1′ = e2,   e2′ = s·e1 − w·e2 + β·b·(p − p*) + φ − w·r′ − r″.
+
+p* balances N̂(μ*σ′ − μ(r, 0)(σ′ − p*)) = (k̂ − φ1)r; s and w are chords of friction between x and (r, 0), times N̂(σ′
+− p*), with −k̂ + φ1 and η̂ − φ2; β·b = μ(x)N̂. So all three lie in ranges for every friction μ(x) with the bounds
+and slopes given, and, k̂, N̂ and φ1 being constant, b·|dp*/dt| = |s_r|r′/β_r with s_r, β_r in the same
+ranges. r stands still outside [0, t_op].
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise, product
+from math import comb
+
+from quakedesign.errors import ParameterError
+from quakedesign.laws import NominalModel
+
+Range = tuple[Fraction, Fraction]
+_HALVINGS = 7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Friction:
+    """All that is used of friction [-], [1/m], [s/m]: μ at rest at the start, its bounds, and its chords' bounds.
+
+    Attributes
+    ----------
+    static, least, largest : Fraction
+    weakening, strengthening : Fraction
+        Largest fall and rise of μ per slip.
+    rate_slope : Fraction
+        Largest |Δμ/Δrate|.
+    """
+
+    static: Fraction
+    least: Fraction
+    largest: Fraction
+    weakening: Fraction
+    strengthening: Fraction
+    rate_slope: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A fault, its reference and its disturbance, as a certificate states them. SI units.
+
+    Attributes
+    ----------
+    name : str
+    density, shear_modulus, length, damping, normal_stress : Fraction
+        ρ, G, L, η, σ′; of one square of a patch of several.
+    spreads : (Fraction, Fraction, Fraction)
+        Relative half-widths of k̂, η̂ and N̂ [-].
+    friction : Friction
+    shape : tuple of Fraction
+        Coefficients of r/target over t/t_op, lowest power first.
+    target_slip, operation_time : Fraction
+        [m], [s].
+    amplitude : Fraction
+        Bound of the disturbance φ(t) [m/s²].
+    change : Fraction or None
+        Bound of |φ′| [m/s³], for a disturbance that starts at 0 and has one; None: φ is any measurable function.
+    growths : (Fraction, Fraction)
+        φ1 [1/s²] and φ2 [1/s]: what the disturbance adds per slip and per slip rate.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    name: str
+    density: Fraction
+    shear_modulus: Fraction
+    length: Fraction
+    damping: Fraction
+    normal_stress: Fraction
+    spreads: tuple[Fraction, Fraction, Fraction]
+    friction: Friction
+    shape: tuple[Fraction, ...]
+    target_slip: Fraction
+    operation_time: Fraction
+    amplitude: Fraction
+    change: Fraction | None
+    growths: tuple[Fraction, Fraction]
+
+    def __post_init__(self) -> None:
+        law = self.friction
+        rock = (self.density, self.shear_modulus, self.length, self.normal_stress)
+        positive = (*rock, law.least, self.target_slip, self.operation_time)
+        nonnegative = (self.damping, law.weakening, law.strengthening, law.rate_slope, self.amplitude)
+        sound = (
+            min(positive) > 0
+            and min(nonnegative) >= 0
+            and all(0 <= v < 1 for v in self.spreads)
+            and law.least <= law.static <= law.largest
+            and (self.change is None or self.change >= 0)
+        )
+        if not sound:
+            raise ParameterError(f"the data of {self.name} must be physical. Received others. Check their signs.")
+        if not _rises_from_rest_to_rest(self.shape):
+            raise ParameterError(
+                "the reference's shape must rise from 0 to 1 with slope 0 at both ends. Received another. "
+                "Give the coefficients, lowest power first."
+            )
+
+    def _spread(self, value: Fraction, number: int) -> Range:
+        return value * (1 - self.spreads[number]), value * (1 + self.spreads[number])
+
+    @property
+    def stiffness(self) -> Range:
+        """k̂ = G/(ρL²) [1/s²]."""
+        return self._spread(self.shear_modulus / (self.density * self.length**2), 0)
+
+    @property
+    def specific_damping(self) -> Range:
+        """η̂ = η/(ρL³) [1/s]."""
+        return self._spread(self.damping / (self.density * self.length**3), 1)
+
+    @property
+    def area_per_mass(self) -> Range:
+        """N̂ = 1/(ρL) [m²/kg]."""
+        return self._spread(1 / (self.density * self.length), 2)
+
+    @property
+    def authority(self) -> Fraction:
+        """b = μ_res·N̂_min [m²/kg]."""
+        return self.friction.least * self.area_per_mass[0]
+
+    @property
+    def beta(self) -> Range:
+        """β = μN̂/b [-]."""
+        return Fraction(1), self.friction.largest * self.area_per_mass[1] / self.authority
+
+    @cached_property
+    def stress(self) -> Range:
+        """σ′ − p* [Pa] at every reference: a ratio that is monotone in r between the points tried, and in μ and κ."""
+        law, target = self.friction, self.target_slip
+        breaks = {Fraction(0), target}
+        breaks |= {(law.static - law.least) / law.weakening} if law.weakening else set()
+        breaks |= {(law.largest - law.static) / law.strengthening} if law.strengthening else set()
+        kappa = _hull((k - self.growths[0]) / n for k, n in product(self.stiffness, self.area_per_mass))
+        return _hull(
+            (law.static * self.normal_stress - c * r) / mu
+            for r in breaks
+            if r <= target
+            for c in kappa
+            for mu in (max(law.least, law.static - law.weakening * r),
+                       min(law.largest, law.static + law.strengthening * r))
+        )  # fmt: skip
+
+    @property
+    def rest_pressure(self) -> Range:
+        """p* [Pa]."""
+        return self.normal_stress - self.stress[1], self.normal_stress - self.stress[0]
+
+    @cached_property
+    def slip_chord(self) -> Range:
+        """s [1/s²]."""
+        law, k = self.friction, self.stiffness
+        low, high = _hull(
+            n * stress * c
+            for n in self.area_per_mass
+            for stress in self.stress
+            for c in (law.weakening, -law.strengthening)
+        )
+        return low - k[1] + self.growths[0], high - k[0] + self.growths[0]
+
+    @cached_property
+    def rate_chord(self) -> Range:
+        """w [1/s]."""
+        most = self.area_per_mass[1] * max(map(abs, self.stress)) * self.friction.rate_slope
+        low, high = self.specific_damping
+        return low - most - self.growths[1], high + most - self.growths[1]
+
+    @cached_property
+    def reference_rates(self) -> tuple[Fraction, Fraction]:
+        """Bounds of r′ [m/s] and |r″| [m/s²]."""
+        bounds = []
+        for order in (1, 2):
+            bound = max(abs(v) for v in _range_of(_derived(self.shape, order)))
+            bounds.append(bound * self.target_slip / self.operation_time**order)
+        return bounds[0], bounds[1]
+
+    @property
+    def reference_jerk(self) -> Fraction:
+        """Bound of |r‴| [m/s³] within the task; where r″ jumps at its ends there is none."""
+        bound = max(map(abs, _range_of(_derived(self.shape, 3))))
+        return bound * self.target_slip / self.operation_time**3
+
+    def require_smooth_reference(self) -> None:
+        """Refuse a reference whose acceleration jumps at its start or end.
+
+        Raises
+        ------
+        ParameterError
+        """
+        bent = _derived(self.shape, 2)
+        if bent[0] or sum(bent):
+            raise ParameterError(
+                "a law that uses the slip rate itself needs a reference that starts and ends without acceleration. "
+                f"Received one of {self.name} that does not. Feed back the errors."
+            )
+
+    @property
+    def model(self) -> NominalModel:
+        """Middle of the ranges."""
+        s, w, beta = ((low + high) / 2 for low, high in (self.slip_chord, self.rate_chord, self.beta))
+        return NominalModel(slip=s, rate=w, gain=beta * self.authority)
+
+    @property
+    def half_ranges(self) -> dict[str, Fraction]:
+        """Half the ranges of s, w and β by the output that they multiply."""
+        return {
+            name: (high - low) / 2
+            for name, (low, high) in (
+                ("slip_error", self.slip_chord),
+                ("slip_rate_error", self.rate_chord),
+                ("push", self.beta),
+            )
+        }
+
+    @property
+    def reference_force(self) -> Fraction:
+        """Bound of |w·r′ + r″| [m/s²]."""
+        first, second = self.reference_rates
+        return max(map(abs, self.rate_chord)) * first + second
+
+    @property
+    def drift(self) -> Fraction:
+        """Bound of b·|dp*/dt| [m/s³], β being at least 1."""
+        return max(map(abs, self.slip_chord)) * self.reference_rates[0]
+
+
+def _hull(values: Iterable[Fraction]) -> Range:
+    listed = list(values)
+    return min(listed), max(listed)
+
+
+def _derived(shape: tuple[Fraction, ...], order: int) -> tuple[Fraction, ...]:
+    for _ in range(order):
+        shape = tuple(n * c for n, c in enumerate(shape))[1:]
+    return shape
+
+
+def _bernstein(shape: tuple[Fraction, ...]) -> list[Fraction]:
+    """Coefficients on [0, 1] in Bernstein's basis, whose hull holds every value there."""
+    n = len(shape) - 1
+    return [sum((Fraction(comb(i, j), comb(n, j)) * shape[j] for j in range(i + 1)), Fraction(0)) for i in range(n + 1)]
+
+
+def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
+    """Coefficients on both halves (de Casteljau), on the right one from its end."""
+    left, right = [], []
+    while row:
+        left.append(row[0])
+        right.append(row[-1])
+        row = [(a + b) / 2 for a, b in pairwise(row)]
+    return left, right
+
+
+def _range_of(shape: tuple[Fraction, ...]) -> Range:
+    """Enclosure of a polynomial on [0, 1], by halving."""
+    rows = [_bernstein(shape)]
+    for _ in range(_HALVINGS):
+        rows = [half for row in rows for half in _halves(row)]
+    return _hull(v for row in rows for v in row)
+
+
+def _rises_from_rest_to_rest(shape: tuple[Fraction, ...]) -> bool:
+    """Whether a polynomial goes from 0 to 1 on [0, 1] with slope 0 at both ends and never falls."""
+    slope = _derived(shape, 1)
+    ends = shape[:1] == (Fraction(0),) and sum(shape) == 1 and slope[:1] == (Fraction(0),) and sum(slope) == 0
+    return ends and _range_of(slope)[0] >= 0

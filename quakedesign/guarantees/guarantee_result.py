@@ -1,0 +1,550 @@
+"""Results of a guarantee: proved bounds or a reason, reported with the worst case found.
+
+One class for loops on a moving reference, and one for rate-and-state faults in slow sliding.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from math import exp, log
+from typing import Any, ClassVar, Unpack
+
+import numpy as np
+
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.exact import LowerBound, UpperBound, exact_text, float_above, rational, shortly
+from quakedesign.fault import Fault
+from quakedesign.fault.fault_toml import AGEINGS
+from quakedesign.guarantees.exact.fault_data import sliding_task
+from quakedesign.guarantees.exact.impossibility import SlidingPush, SmallestPeak, longest_diffusion, smallest_peak
+from quakedesign.guarantees.exact.loop import Around, Held, Pump
+from quakedesign.guarantees.exact.sliding_task import SlidingTask
+from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.statement import Guarantee, SlidingGuarantee, guarantee
+from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding, worst_found, worst_sliding
+from quakedesign.guarantees.search.compensated_search import Compensation
+from quakedesign.guarantees.search.estimate import own_poles
+from quakedesign.guarantees.search.lqg import MEASURED, measured_by, sliding_model
+from quakedesign.guarantees.search.sliding_design import (
+    LOG_RATES,
+    Prove,
+    WellReach,
+    designed_sliding,
+    farthest,
+    largest_stress,
+    proved_sliding,
+    suitable,
+    two_digits,
+    what_would_do,
+)
+from quakedesign.laws import LinearLaw, RestLimit
+from quakedesign.loop.sensing.differentiator import least_bound
+from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.sos.exact.strict import texts
+
+# ----------------------------------------------------------------------
+# What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds.
+
+_TOLD = (
+    "step",
+    "slip_noise",
+    "rate_noise",
+    "initial_slip",
+    "initial_slip_rate",
+    "jitter",
+    "delay_jitter",
+    "averaging",
+    "longest_step",
+)
+_GROWS = 1 + 1e-6  # a factor per sample; eigenvalues that are 1 twice are rounded by less
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopAnswer:
+    """Guarantee of one loop, or why there is none.
+
+    Attributes
+    ----------
+    fault : Fault
+    found : Guarantee or NoGuarantee
+    worst, worst_with_stick : WorstFound or None
+        Of a search on the same loop; None without a guarantee.
+    shorter : Guarantee or None
+        For a design without a guarantee at its step: one near the longest step that has one.
+    asked_step : Fraction or None
+        T_s [s] that has no guarantee where `shorter` has one.
+    nearest : (str, Guarantee) or None
+        For a loop without a guarantee: another quantity of its setup and a design with the value nearest to it that
+        has one, all else as it is; `GAINS` for a design in place of given gains.
+    compensation : Compensation or None
+        Gains, scale and settings of a sliding mode that runs in the scheme ``compensated``.
+    """
+
+    fault: Fault
+    found: Guarantee | NoGuarantee
+    worst: WorstFound | None = None
+    worst_with_stick: WorstFound | None = None
+    shorter: Guarantee | None = None
+    asked_step: Fraction | None = None
+    nearest: tuple[str, Guarantee] | None = None
+    compensation: Compensation | None = None
+
+    @property
+    def proved(self) -> bool:
+        """Whether there is a guarantee."""
+        return isinstance(self.found, Guarantee)
+
+    def lines(self) -> list[str]:
+        """For people: the sentence first, then what was seen."""
+        if not isinstance(self.found, Guarantee):
+            said = [self.found.sentence()]
+            if self.asked_step is not None:
+                said = [f"not guaranteed at T_s = {float(self.asked_step):g} s: {self.found.reason}"]
+            if self.shorter is not None:
+                said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
+            if self.nearest is not None:
+                said.append(f"{_with_nearest(*self.nearest)}: {self.nearest[1].sentence()}")
+            if len(said) == 1:
+                said.append("no T_s was found for which a design is proved with this box, disturbance and setup")
+            return said
+        said = [f"proved: {self.found.sentence()}", *self._at_rest()]
+        for name, seen in (("worst found", self.worst), ("worst found with stick", self.worst_with_stick)):
+            if seen is not None:
+                ends = seen.pressures
+                pressure = "" if ends is None else f", pressure {ends[0] / 1e6:.4g} MPa to {ends[1] / 1e6:.4g} MPa"
+                said.append(
+                    f"{name}: slip error {seen.slip_error:.3g} m, slip-rate error {seen.slip_rate_error:.3g} m/s"
+                    f"{pressure}"
+                )
+        said += [*self._told(), *self.task_lines()]
+        if self.leaves_with_stick:
+            said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
+        return said if self.compensation is None else [*said, self.compensation.sentence()]
+
+    @property
+    def grows_at_rest(self) -> float | None:
+        """Time [s] in which the law's states grow e-fold while friction holds the fault at rest; None if they do not.
+
+        Then what is measured no longer answers to the pressure, and the law is left to itself.
+        """
+        if not isinstance(self.found, Guarantee):
+            return None
+        held = self.found.held
+        growth = float(np.max(np.abs(own_poles(held.law)), initial=0.0))
+        return float(held.step) / log(growth) if growth > _GROWS else None
+
+    @property
+    def differentiator_bound(self) -> UpperBound | None:
+        """λ_d [m/s³] from which on the differentiator tells what is proved; None for a law without one."""
+        if not isinstance(self.found, Guarantee) or measured_by(self.found.held.law) != MEASURED[2]:
+            return None
+        return UpperBound(least_bound(self.found.slip_acceleration, self.found.held.slip_noise, self.found.held.step))
+
+    def _told(self) -> list[str]:
+        """For people; nothing of a law without a differentiator."""
+        bound = self.differentiator_bound
+        if bound is None:
+            return []
+        return [
+            "told by the implicit differentiator of the slip error, n_d = 2 with any n_f, from rest: with lambda_d of "
+            f"{bound:.3g} m/s^3 or more it is (3x - 4x_1 + x_2)/(2 T_s) of the last three readings, for ever"
+        ]
+
+    def _at_rest(self) -> list[str]:
+        """For people; nothing of a law that does not grow."""
+        time = self.grows_at_rest
+        if time is None:
+            return []
+        return [
+            "NOT for a fault that sticks: by itself the law is unstable, and while friction holds the fault at rest "
+            f"its pressure grows e-fold in {time:.3g} s"
+        ]
+
+    def limit_lines(self) -> list[str]:
+        """What no controller can do at the same T_s, for people; empty where that is not known."""
+        limit = self.limit
+        if limit is None or not isinstance(self.found, Guarantee):
+            return []
+        held = self.found.held
+        step = f"{float(max(held.step, held.longest_step)):.6g} s"
+        step += " with that noise" if held.noise else ""
+        both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
+        rate = f"{limit.slip_rate_error:.3g} m/s"
+        return [f"no controller held over T_s = {step} keeps the slip-rate error below {rate}{both}"]
+
+    def task_lines(self) -> list[str]:
+        """What is said of the task, whatever law it is for."""
+        return self.limit_lines() + self._narrower_class()
+
+    def _narrower_class(self) -> list[str]:
+        """That the fault's own disturbance belongs to the class ``rate`` as well, for people."""
+        given = self.fault.disturbance
+        own = isinstance(self.found, Guarantee) and self.found.task.change is None
+        if not own or given.constant or not given.largest_rate:
+            return []
+        change = UpperBound(self.fault.disturbance_bounds[1])
+        return [
+            f"this covers disturbances that jump; the fault's own changes by at most {change:.3g} m/s^3, for which the "
+            "class rate may prove much less"
+        ]
+
+    @property
+    def limit(self) -> SmallestPeak | None:
+        """What no controller can do at the same T_s and delay, told as much; None for the class ``rate``."""
+        if not isinstance(self.found, Guarantee) or self.found.task.change is not None:
+            return None
+        held = self.found.held
+        rate_noise = None if held.law.of_slip_alone else held.rate_noise
+        step = max(held.step, held.longest_step)
+        return smallest_peak(self.found.task, step, held.delay, slip_noise=held.slip_noise, rate_noise=rate_noise)
+
+    @property
+    def leaves_with_stick(self) -> bool:
+        """Whether a course with stick was found beyond the claims."""
+        if not isinstance(self.found, Guarantee) or self.worst_with_stick is None:
+            return False
+        claims, seen = self.found.claims, self.worst_with_stick
+        (least, largest), ends = claims.pressures[-1], seen.pressures
+        if ends is not None and not least <= ends[0] <= ends[1] <= largest:
+            return True
+        return seen.slip_error > claims.slip_error or seen.slip_rate_error > claims.slip_rate_error
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; exact numbers as texts."""
+        if not isinstance(self.found, Guarantee):
+            gain = self.found.small_gain
+            other = self.shorter
+            shorter = None if other is None else {"step": str(other.held.step), **other.claims.to_dict()}
+            return {
+                "verdict": "undecided",
+                "sentence": self.found.sentence(),
+                "reason": self.found.reason,
+                "small_gain": None if gain is None else gain.exact,
+                "shorter": shorter,
+                "nearest": self.nearest and _nearest(*self.nearest),
+            }
+        bounds, held = self.found.bounds(), self.found.held
+        small = None if isinstance(bounds, NoGuarantee) else float_above(bounds.small_gain)
+        return {
+            "verdict": "proved",
+            "sentence": self.found.sentence(),
+            **self.found.claims.to_dict(),
+            "small_gain": small,
+            "worst_found": self.worst and asdict(self.worst),
+            "worst_found_with_stick": self.worst_with_stick and asdict(self.worst_with_stick),
+            "grows_at_rest": self.grows_at_rest,
+            "rest_limit": _rest_limit(self.found.rest_limit),
+            "limit": _limit(self.limit),
+            "measured": measured_by(held.law),
+            "differentiator_bound": None if self.differentiator_bound is None else self.differentiator_bound.exact,
+            **{name: str(getattr(held, name)) for name in _TOLD},
+            "pump": None if held.pump is None else held.pump.to_dict(),
+            "law": _law(held.law),
+            **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
+        }
+
+
+GAINS = "gains"
+_QUANTITIES = {
+    "delay_jitter": ("jitter of the delay", "s"),
+    "jitter": ("jitter", "s"),
+    "averaging": ("averaging time", "s"),
+    "delay": ("delay", "s"),
+    "lag": ("lag", "s"),
+    "diffusion": ("diffusion time L^2/D", "s"),
+}
+
+
+def _with_nearest(name: str, found: Guarantee) -> str:
+    """For people."""
+    if name == GAINS:
+        return "with designed gains"
+    if name in _QUANTITIES:
+        title, unit = _QUANTITIES[name]
+        if not getattr(found.held, name):
+            return f"without any {title}"
+        return f"with a {title} of at most {LowerBound(getattr(found.held, name)).quantity(unit)}"
+    pump = found.held.pump
+    if pump is None:
+        return "with a pump without limits"
+    return f"with a pump of at least {UpperBound(pump.rate or 0).quantity('Pa/s')}"
+
+
+def _nearest(name: str, found: Guarantee) -> dict[str, Any]:
+    """Plain values, SI; exact numbers as texts."""
+    pump = found.held.pump
+    value = getattr(found.held, name, None) if name in _QUANTITIES else pump and pump.rate
+    return {"quantity": name, "value": None if value is None else str(value), **found.claims.to_dict()}
+
+
+def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> LoopAnswer:
+    """A guarantee beside the worst that a search finds on its loop; about a second.
+
+    Where a course with stick leaves a claim of a slow input gain, that of any gain takes its place if it is wider than
+    the course.
+    """
+    if isinstance(found, NoGuarantee):
+        return LoopAnswer(fault=fault, found=found)
+    seen = LoopAnswer(
+        fault=fault, found=found, worst=worst_found(found), worst_with_stick=worst_found(found, sticks=True)
+    )
+    return seen if found.slow_gain is None or not seen.leaves_with_stick else _with_room(seen, found)
+
+
+def _with_room(seen: LoopAnswer, found: Guarantee) -> LoopAnswer:
+    anyhow, worst = guarantee(found.task, found.held), seen.worst_with_stick
+    if isinstance(anyhow, NoGuarantee) or worst is None:
+        return seen
+    left = ["slip_error"] if worst.slip_error > found.claims.slip_error else []
+    left += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate_error > found.claims.slip_rate_error else []
+    claims = replace(found.claims, **{name: getattr(anyhow.claims, name) for name in left})
+    wider = replace(seen, found=replace(found, claims=claims))
+    return seen if wider.leaves_with_stick or wider.found.check() is not Verdict.PROVED else wider
+
+
+def _limit(limit: SmallestPeak | None) -> dict[str, str | None] | None:
+    if limit is None:
+        return None
+    slip = limit.slip_error
+    return {"slip_rate_error": limit.slip_rate_error.exact, "slip_error": None if slip is None else slip.exact}
+
+
+def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
+    names = ("width", "per_slip", "resolution", "least", "largest", "fastest")
+    return None if limit is None else {name: exact_text(getattr(limit, name)) for name in names}
+
+
+def _law(law: LinearLaw) -> dict[str, Any]:
+    root = law.root
+    lines = {} if root is None else {"slopes": texts(root.slopes), "remainder": exact_text(root.remainder)}
+    matrices = {name: [texts(row) for row in getattr(law, name)] for name in ("update", "measured")}
+    rows = {name: texts(getattr(law, name)) for name in ("output", "feedback", "applied")}
+    return {**lines, "states": list(law.states), **matrices, **rows}
+
+
+# ----------------------------------------------------------------------
+# What is guaranteed of a law that holds a rate-and-state fault in slow sliding, as `guarantee` says it.
+
+Tell = Callable[[str, float], None]
+"""Of what is being done, and the fraction done [-]."""
+_TRIFLE = Fraction(1)  # stress [Pa] that is tried where a law is estimated to stand none: another law may stand more
+_SEARCHED = 0.8  # of the work, when a law of a search is proved
+_SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of an estimate that may be too large
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingAnswer:
+    """Guarantee of slow sliding, or why there is none.
+
+    Attributes
+    ----------
+    found : SlidingGuarantee or NoGuarantee
+    task : SlidingTask
+    held : Held or None
+        The law as it runs; None where no law was found.
+    """
+
+    found: SlidingGuarantee | NoGuarantee
+    task: SlidingTask
+    held: Held | None
+    compensation: ClassVar[None] = None
+
+    @property
+    def proved(self) -> bool:
+        """Whether there is a guarantee."""
+        return isinstance(self.found, SlidingGuarantee)
+
+    @cached_property
+    def worst(self) -> WorstSliding | None:
+        """The worst that a search finds, beside a guarantee; some tenths of a second for every corner of the box."""
+        return worst_sliding(self.found) if isinstance(self.found, SlidingGuarantee) else None
+
+    def lines(self) -> list[str]:
+        """For people."""
+        if self.worst is None:
+            return [self.found.sentence()]
+        seen = f"slip error {self.worst.slip_error:.3g} m, slip rate {exp(self.worst.log_rate):.4g} V"
+        return [f"proved: {self.found.sentence()}", f"worst found without inertia: {seen}"]
+
+    def limit_lines(self) -> list[str]:
+        """What no controller can do at the same T_s; none is known."""
+        return []
+
+    def task_lines(self) -> list[str]:
+        """What is said of the task, whatever law it is for; nothing."""
+        return []
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; exact numbers as texts."""
+        if not isinstance(self.found, SlidingGuarantee):
+            return {"verdict": "undecided", "sentence": self.found.sentence(), "reason": self.found.reason}
+        held = self.found.held
+        return {
+            "verdict": "proved",
+            "sentence": self.found.sentence(),
+            **self.found.to_dict(),
+            **{name: str(getattr(held, name)) for name in ("step", "diffusion", "lag", "delay", "slip_noise")},
+            "measured": "slip",
+            "worst_found": self.worst and asdict(self.worst),
+        }
+
+
+def answer_sliding(
+    fault: Fault,
+    *,
+    controller: str = "elqr",
+    step: Fraction | None = None,
+    stress: Fraction | None = None,
+    spread: Fraction = Fraction(0),
+    tell: Tell = lambda what, done: None,
+    **around: Unpack[Around],
+) -> SlidingAnswer:
+    """Design and prove a law for a rate-and-state fault at the mean rate of its task.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : str
+        ``elqr``.
+    step : Fraction, optional
+        T_s [s]; the fault's unless given.
+    stress : Fraction, optional
+        Bound of the shear stress disturbance [Pa]; the largest that the design is seen to stand unless given.
+    spread : Fraction
+        By how much of their values a, b and D_c may be off [-].
+    tell : callable, optional
+        Called with what is being done and the fraction done [-].
+    **around : Fraction, Pump
+        As in `design_held`; a lag or a diffusion is needed. A proof is one that the pump can hold all of its pressures.
+
+    Raises
+    ------
+    ParameterError, UnsupportedError
+    """
+    box = fault.box
+    if controller != "elqr" or any((box.stiffness, box.damping, box.authority)):
+        raise UnsupportedError(
+            "slow sliding is guaranteed of elqr, with the box of a, b and D_c that a spread gives; sliding modes do "
+            "not apply to it, as the slip rate follows the pressure at once. Received "
+            f"{controller} and the box {box.name}. Give --controller elqr, --box paper and --spread."
+        )
+    if not 0 <= spread < 1:
+        meant = f": {float(spread):g} % is {float(spread) / 100:g}" if 1 <= spread < 100 else ""
+        raise ParameterError(f"a spread must be from 0 to below 1. Received {float(spread):g}. Change it{meant}.")
+    if stress is not None and stress <= 0:
+        raise ParameterError(f"a stress must be above 0. Received {shortly(stress)} Pa. Change it, or leave it out.")
+    if not (around.get("lag") or around.get("diffusion")):
+        raise ParameterError(
+            "slow sliding is guaranteed through rock or a lag between well and fault. Received neither. Give "
+            "--diffusion, such as '833 s', or --lag."
+        )
+    held_over = rational(fault.sampling_time) if step is None else step
+    task = sliding_task(fault, stress or _TRIFLE, spread)
+    pump = around.pop("pump", None)
+    if pump is not None and pump.rate is not None:
+        raise ParameterError(
+            f"the rate of a pump is not known of slow sliding. Received {shortly(pump.rate)} Pa/s. Leave it out."
+        )
+    prove = _proof(pump, tell, given=stress is not None)
+    tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
+    answer, reach, remedy = _answer(task, held_over, LOG_RATES[0], around, prove), WellReach(share=Fraction(1)), ""
+    if answer.held is None:
+        tell("how far the well may be", 0.3)
+        reach = farthest(task, suitable(task, held_over), around, stressed=stress is not None)
+        remedy = _remedy(fault, task, held_over, reach, around, prove, spread)
+    for log_rate in LOG_RATES[1:]:
+        if (answer.proved and (stress or answer.task.stress > _TRIFLE)) or reach.share < 1:
+            break
+        tell(f"a law for |ln(v/V)| up to {log_rate}", _SEARCHED)
+        smaller = _answer(task, held_over, log_rate, around, prove, reach.numbers)
+        more = smaller.proved and (not answer.proved or smaller.task.stress > answer.task.stress)
+        answer = smaller if more else answer
+    if isinstance(answer.found, NoGuarantee) and not remedy and stress:
+        pumped: dict[str, Any] = {} if pump is None else {"pump": pump}
+        remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, **around, **pumped))
+        if remedy and answer.held is None:
+            none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
+            answer = replace(answer, found=NoGuarantee(reason=none, small_gain=None))
+    if isinstance(answer.found, NoGuarantee):
+        why = (stress and _beyond(fault, stress, around)) or answer.found.reason
+        return replace(answer, found=replace(answer.found, reason="; ".join(filter(None, (why, remedy)))))
+    return answer
+
+
+def _beyond(fault: Fault, stress: Fraction, around: Around) -> str:
+    """Why no controller holds the fault under a stress [Pa] through its rock; empty where that is not proved."""
+    most = rational(fault.effective_normal_stress)
+    push = SlidingPush(model=sliding_model(fault), amplitude=stress)
+    far = longest_diffusion(push, most, Fraction(0))
+    if far is None or around.get("diffusion", 0) <= far:
+        return ""
+    return (
+        f"no controller whatever whose pressure is within {LowerBound(most).quantity('Pa')} of what the reference "
+        f"needs holds the nominal fault, linearised, through rock of L^2/D above {far.quantity('s')}"
+    )
+
+
+def _under_less(answer: SlidingAnswer) -> str:
+    """The stress for which a proof was found that is not for the one that was asked for; empty without one."""
+    if not answer.proved:
+        return ""
+    most = LowerBound(answer.task.stress).quantity("Pa")
+    return f"a proof was found for a stress of at most {most}: give --stress '{most}'; somewhat more may do"
+
+
+def _remedy(
+    fault: Fault, task: SlidingTask, step: Fraction, reach: WellReach, around: Around, prove: Prove, spread: Fraction
+) -> str:
+    """Which T_s, V or path would do; empty where a law was followed through all of the path at the T_s asked for."""
+    if reach.share < 1:
+        return what_would_do(fault, task, reach, around, prove, spread=spread)
+    suits = suitable(task, step)
+    near = f"T_s near D_c/({AGEINGS:g} V), here {float(suits):.2g} s, suits: set sampling_time in [task]"
+    return "" if suits == step else near
+
+
+def _proof(pump: Pump | None, tell: Tell, *, given: bool) -> Prove:
+    """Proofs whose pressures the pump can hold, under the task's stress if that is given, or about the largest."""
+
+    def tried(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+        under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
+        tell(f"{under}: proof", _SEARCHED)
+        found = _held_by(pump, proved_sliding(task, held, log_rate=log_rate))
+        tell(f"{under}: {'proved' if isinstance(found, SlidingGuarantee) else 'not proved'}", _SEARCHED)
+        return found
+
+    def about_the_largest(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+        most = largest_stress(task, held, log_rate=log_rate)
+        found: SlidingGuarantee | NoGuarantee
+        for share in _SHARES if most else _SHARES[:1]:
+            found = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), held, log_rate)
+            if isinstance(found, SlidingGuarantee):
+                break
+        return found
+
+    return tried if given else about_the_largest
+
+
+def _answer(
+    task: SlidingTask,
+    step: Fraction,
+    log_rate: Fraction,
+    around: Around,
+    prove: Prove,
+    near: np.ndarray | None = None,
+) -> SlidingAnswer:
+    """With |ln(v/V)| at most `log_rate`, searched near the numbers of a law as well if they are told."""
+    design = designed_sliding(task, step, log_rate=log_rate, near=near, **around)
+    if isinstance(design, NoGuarantee):
+        return SlidingAnswer(found=design, task=task, held=None)
+    proved = prove(task, design, log_rate)
+    return SlidingAnswer(found=proved, task=proved.task if isinstance(proved, SlidingGuarantee) else task, held=design)
+
+
+def _held_by(pump: Pump | None, found: SlidingGuarantee | NoGuarantee) -> SlidingGuarantee | NoGuarantee:
+    """A guarantee whose pressures at the valve the pump can hold."""
+    if pump is None or isinstance(found, NoGuarantee):
+        return found
+    too_much = pump.exceeded(*found.valve_pressures)
+    return NoGuarantee(reason=too_much, small_gain=None) if too_much else found

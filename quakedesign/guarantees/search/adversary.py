@@ -1,0 +1,734 @@
+"""Falsification of guaranteed loops: worst case found, a lower bound on the errors.
+
+Chapters: sampled loop on a moving reference, with disturbance, friction slope, damping and input gain at
+their extremes; slow sliding, with adverse shear stress at the corners of the box of a, b and D_c.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+from quakedesign.cache import search_once
+from quakedesign.guarantees.exact.loop import Held
+from quakedesign.guarantees.exact.sliding_small_gain import loop_of, model_of
+from quakedesign.guarantees.exact.sliding_task import SlidingTask
+from quakedesign.guarantees.exact.statement import ContinuousPeaks, Guarantee, SlidingGuarantee
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.guarantees.search.estimate import PERIODS, moved, periods_to_forget
+from quakedesign.laws import NOISES
+from quakedesign.laws.implicit_root import root_of
+from quakedesign.loop import PeriodicLoop
+from quakedesign.loop.periodic import Matrix, Row
+
+# ----------------------------------------------------------------------
+# The worst that a search finds on the loop of a guarantee: what is seen, beside what is proved.
+
+_PIECES = 6
+_SWEEPS = 8
+_MANY, _FEW = 512, 2  # courses that switch after random times, and their sweeps: where the fault sticks, sweeps stall
+_COURSES, _LEAST_COURSES = 24, 8  # for each of the two outputs; fewer where they are longer
+_CLIMBING, _CLIMBS = 48, 8  # courses that climb from the best of those, and how often
+_CHANGED = 0.15, 0.4, 1.0  # shares of the pieces whose inputs are those of the adjoint, in turn
+_BLOCK = 8  # pieces that change together, at most
+_SOON = 1, 2, 4, 8, 16  # periods after which errors are looked at as well where a loop does not start at rest
+_SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
+_LEVELS = 400  # of a disturbance of bounded rate above 0
+_SEED = 7
+_NEARLY = Fraction(31, 32)  # of the time between two events, so that they never meet
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorstFound:
+    """Largest errors that were reached.
+
+    Attributes
+    ----------
+    slip_error : float
+        [m].
+    slip_rate_error : float
+        [m/s].
+    least_pressure, largest_pressure : float or None
+        At the valve [Pa]; None where they are not followed: without stick, or a limit at rest.
+    """
+
+    slip_error: float
+    slip_rate_error: float
+    least_pressure: float | None = None
+    largest_pressure: float | None = None
+
+    @property
+    def pressures(self) -> tuple[float, float] | None:
+        """Least and largest [Pa], if they are followed."""
+        least, largest = self.least_pressure, self.largest_pressure
+        return None if least is None or largest is None else (least, largest)
+
+
+def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> WorstFound:
+    """Adversarial courses of disturbance, friction slope, damping and input gain, all at their ends.
+
+    Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64 to 512
+    periods long, as the loop forgets; in continuous time a period is that of the fastest pole, 1/|λ|. A disturbance of
+    bounded rate is the best of all for a costate (`_steepest`). With `sticks` the fault does not slide backward:
+    friction holds it wherever the loop would, along the reference at its largest rate and at a twentieth of that, and
+    courses that switch after random times are tried as well. Noise is at its ends too. An implicit step ends where its
+    equation says, inside its lines or not. A box of starts is left from its corners. With jitter each event is as early
+    or as late as it may be, by no clock each interval as short or as long; pressures rise at once, as a pump of any
+    rate may do, and means are of their middle alone.
+    """
+    slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
+    least, largest = pressures or (None, None)
+    return WorstFound(slip_error=slip, slip_rate_error=rate, least_pressure=least, largest_pressure=largest)
+
+
+def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
+    """Largest slip error [m] and slip-rate error [m/s]; the least and largest pressure [Pa] if they are followed."""
+    searches = [_CourseSearch(claim, sticks, 2 * _COURSES)]
+    searches[0].follow(searches[0].random(), _SWEEPS)
+    if sticks:
+        searches.append(_CourseSearch(claim, sticks, _MANY))
+        switched = searches[1].follow(searches[1].switching(), _FEW)
+        if searches[1].limit is None:
+            best = searches[1].best(min(_CLIMBING, 2 * len(searches[0].aim)))
+            searches.append(_CourseSearch(claim, sticks, len(best), numbers=best))
+            searches[2].ascend(switched[:, best])
+    for periods in _SOON if claim.loop.start else ():
+        searches.append(_CourseSearch(claim, sticks, 2 * _COURSES, periods))
+        searches[-1].follow(searches[-1].random(), _SWEEPS)
+    pressures = [search.rest_limit.seen for search in searches if search.rest_limit is not None]
+    ends = [min(low for low, _ in pressures), max(high for _, high in pressures)] if pressures else []
+    return [max(search.largest[k] for search in searches) for k in (0, 1)] + ends
+
+
+@dataclass(frozen=True, slots=True)
+class _Event:
+    """A jump and the time after it, `soon` where it may be left to the next one, `late` where that is the same again.
+
+    `samples` where the law is told something. Of a time that may pass as if it were none there may be any part, `free`.
+    """
+
+    jump: Matrix
+    duration: Fraction
+    samples: bool
+    soon: bool = False
+    late: bool = False
+    free: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _EventPieces:
+    """One event: its jump, for every vertex e^{Ah} and what constant inputs add, and h [s]."""
+
+    of: _Event
+    jump: np.ndarray
+    steps: np.ndarray
+    added: np.ndarray
+    length: float
+
+    def moved_on(self, vertex: int = 0) -> np.ndarray:
+        """Map of the whole time."""
+        return np.linalg.matrix_power(self.steps[vertex], _PIECES)
+
+
+_ON_TIME: dict[str, Any] = dict.fromkeys(("jitter", "delay_jitter", "averaging", "ramp"), Fraction(0))
+
+
+def _on_time(held: Held) -> tuple[Held, Fraction, Fraction]:
+    """The loop without jitter whose events are moved, by how much its samples are, and its pressures before its time.
+
+    Where pressures arrive with a sample they are moved with that. Events keep their order. A first sample that has to
+    be at its instant is as early as the earliest.
+    """
+    off, late, delay = held.jitter, held.jitter + held.delay_jitter, held.delay
+    if any(held.start) or held.law.first:
+        off /= 2
+    part = delay % held.step
+    alone = not off and not part
+    if alone:
+        delay, late = delay + late, late / 2 * _NEARLY  # at its time or later
+    elif part:
+        off = min(off, part / 2, (held.step - part) / 2)
+        late = min(late, _NEARLY * (part - off), _NEARLY * (held.step - part - off))
+        delay += late
+    plain = replace(held, delay=delay, pump=None, longest_step=Fraction(0), **_ON_TIME)
+    return plain, off, 2 * late if alone or part else Fraction(0)
+
+
+def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, more: Fraction = Fraction(0)) -> list[_Event]:
+    """Those of one period from the earliest sample on: samples off by some time, pressures up to some time early.
+
+    By no clock each period may have up to some time more.
+    """
+    sample, *others = loop.segments
+    waits = sample.duration - early - off if others else sample.duration - 2 * off
+    found = [_Event(sample.jump, 2 * off, samples=True, soon=True)] if off else []
+    found.append(_Event(sample.jump, waits, samples=True, late=bool(off)))
+    for arrival in others:
+        found += [_Event(arrival.jump, early, samples=False, soon=True)] if early else []
+        found.append(_Event(arrival.jump, arrival.duration - off, samples=False, late=bool(early)))
+    still = tuple(tuple(Fraction(i == j) for j in range(len(loop.flow))) for i in range(len(loop.flow)))
+    return [*found, *([_Event(still, more, samples=False, free=True)] if more else [])]
+
+
+@dataclass(slots=True)
+class _Limit:
+    """Limit at rest of the pressure that is asked for, as b·(p − p*) [m/s²], of every course; b·p* is `rest`.
+
+    A course may be a part of the task, so that p* is at first that at its start or at either end of its range.
+    """
+
+    place: int
+    told: np.ndarray
+    width: float
+    moved: float
+    rests: np.ndarray
+    highest: np.ndarray
+    last: np.ndarray
+    ends: tuple[float, float]
+    within: tuple[float, float]
+    faster: np.ndarray
+    rest: np.ndarray
+    authority: float
+    seen: list[float]
+
+    @classmethod
+    def of(
+        cls, claim: Guarantee, held: Held, size: int, back: np.ndarray, numbers: np.ndarray | None = None
+    ) -> "_Limit | None":
+        """That of a guarantee along references of some rates [m/s], in a loop; None where it has none."""
+        limit, law, authority = claim.rest_limit, claim.held.law, float(claim.task.authority)
+        if limit is None:
+            return None
+        place, step = 2 + len(law.states), float(claim.held.step)
+        told = np.zeros(size)
+        asked = _of_asked(claim.task, held)
+        told[: len(asked)] = asked
+        told[2:place] = [float(v) / authority for v in law.applied]
+        rests = float(limit.resolution) - back * step  # of the slip error from sample to sample
+        moved, none = float(claim.task.drift) * step, np.zeros(len(back))
+        ends: Any = tuple(float(p) * authority for p in claim.task.rest_pressure)
+        least, largest, fastest = limit.range or (Fraction(-(10**30)), Fraction(10**30), Fraction(0))
+        within = float(least) * authority, float(largest) * authority
+        faster = float(fastest) - back * step
+        rest = np.array((0.0, *ends))[(np.arange(len(back)) if numbers is None else numbers) // 2 % 3]
+        return cls(
+            *(place, told, float(limit.width) * authority, moved, rests, none, none),
+            *(ends, within, faster, rest, authority, [0.0, 0.0]),
+        )
+
+    def anew(self) -> "_Limit":
+        """At the start of a course, while this one stays as it is."""
+        return replace(self, highest=np.zeros_like(self.highest), last=np.zeros_like(self.last))
+
+    def cut(self, state: np.ndarray, sampled: np.ndarray) -> np.ndarray:
+        """States after a sample of some courses, the law told what is applied."""
+        asked, highest = state[:, self.place], self.highest - self.moved
+        stuck = state[:, 0] - self.last <= self.rests
+        applied = np.where(stuck, np.maximum(asked, highest - self.width), asked)
+        inside = np.clip(applied, self.within[0] - self.rest, self.within[1] - self.rest)
+        applied = np.where(state[:, 0] - self.last <= self.faster, inside, applied)
+        if sampled.any():
+            pressures = (applied + self.rest)[sampled] / self.authority
+            self.seen[:] = [min(self.seen[0], float(pressures.min())), max(self.seen[1], float(pressures.max()))]
+        self.highest = np.where(sampled, np.maximum(highest, applied), self.highest)
+        self.last = np.where(sampled, state[:, 0], self.last)
+        return np.asarray(state + np.outer((applied - asked) * sampled, self.told))
+
+    def follow(self, before: np.ndarray, after: np.ndarray) -> None:
+        """p* drifts, and with it what all pressures are less it."""
+        drifted = after[:, self.place] - before[:, self.place]
+        self.highest = self.highest + drifted
+        self.rest = np.clip(self.rest - drifted, *self.ends)
+
+
+def _of_asked(task: Task, held: Held) -> list[float]:
+    """What the first jump of a period makes of what is asked for, [m/s²] and all states: of a law that asks for e1."""
+    zero = Fraction(0)
+    still = tuple((zero, zero) for _ in held.law.states)
+    law = replace(held.law, measured=still, feedback=(1 / task.authority, zero), root=None, first=())
+    jump = replace(held, law=law, rate_noise=zero).loop(task).segments[0].jump
+    return [float(row[0] - (i == 0)) for i, row in enumerate(jump)]
+
+
+class _CourseSearch:
+    """Many courses at once; `largest` holds |e1| and |e2|."""
+
+    def __init__(
+        self,
+        claim: Guarantee | ContinuousPeaks,
+        sticks: bool,
+        courses: int,
+        periods: int | None = None,
+        *,
+        numbers: np.ndarray | None = None,
+    ) -> None:
+        task, loop = claim.task, claim.loop
+        held, off, early = _on_time(claim.held) if isinstance(claim, Guarantee) else (None, Fraction(0), Fraction(0))
+        loop = held.loop(task) if held else loop
+        root, noise = (held.law.root, held.noise) if held else (None, {})
+        self.limit = float(task.amplitude) if task.change is not None else None
+        flow, inputs = _with_disturbance(task, loop)
+        self.size, self.root, self.step = len(flow), root, float(loop.period)
+        self.sudden = _filled(loop.sampled.get("root", ()), self.size)
+        self.noise = np.array([float(noise.get(name, 0)) for name in NOISES])
+        self.heard = np.array([_filled(loop.sampled.get(name, ()), self.size) for name in NOISES])
+        self.start = np.array([_filled(column, self.size) for column in loop.start]).reshape(-1, self.size)
+        beta = [float(b) for b in task.beta]
+        push = np.zeros(self.size)
+        push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
+        ends = product(task.beta, task.slip_chord, task.rate_chord)
+        vertices = [_at(task, flow, push, *map(float, v)) for v in ends]
+        more = claim.held.slack if isinstance(claim, Guarantee) else Fraction(0)
+        events = _events(loop, off, early, more) if loop.segments else [_flowing(flow)]
+        self.parts = [_pieces(vertices, inputs, event, none=more > 0) for event in events]
+        self.punctual = bool(held and (held.law.first or any(held.start)))  # at first
+        if periods is None:
+            periods = _periods_to_forget(self.parts, len(loop.states))
+            courses = 2 * max(courses // 2 * PERIODS // periods, _LEAST_COURSES) if numbers is None else courses
+        numbers = np.arange(courses) if numbers is None else numbers  # of courses, whose kinds follow from them
+        paces = np.where(numbers // 2 % 2, 1, _SLOW)
+        self.back = float(task.reference_rates[0]) * paces if sticks else None
+        self.rest_limit = None
+        if self.back is not None and isinstance(claim, Guarantee):
+            self.rest_limit = _Limit.of(claim, held or claim.held, self.size, self.back, numbers)
+        self.allowed = np.ones((courses, len(self.parts[0].steps)), dtype=bool)
+        slow = isinstance(claim, Guarantee) and claim.slow_gain is not None
+        if (slow or self.limit is not None) and beta[0] < beta[1]:  # β is slow; it stays at either end
+            half = len(vertices) // 2
+            self.allowed[numbers % 2 == 0, :half] = self.allowed[numbers % 2 == 1, half : len(vertices)] = False
+        self.aim, self.kinds = np.zeros((courses, self.size)), numbers // 4 % 4
+        if sticks:  # behind its reference a fault that rests is not what it is ahead of it
+            self.aim[self.kinds == 0, 0], self.aim[self.kinds % 2 == 1, 1], self.aim[self.kinds == 2, 0] = 1, 1, -1
+        else:
+            self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
+        self.marks = np.empty((0, courses))
+        self.steps = periods * len(self.parts) * _PIECES
+        self.largest = (0.0, 0.0)
+
+    def follow(self, costates: np.ndarray, sweeps: int) -> np.ndarray:
+        """Follow the maximum principle forward and backward; the costates of the last sweep forward."""
+        slopes = None
+        last = costates
+        for left in reversed(range(sweeps)):
+            chosen, held, jumped = self._forward(last := costates, slopes)
+            costates = self._backward(chosen, held, jumped)
+            if self.limit is not None and left <= sweeps // 2:  # before, by the sign of its costate
+                slopes = self._slopes(costates, chosen, self.limit)
+        return last
+
+    def best(self, count: int) -> np.ndarray:
+        """Numbers of the best courses of the last sweep, a quarter of each kind."""
+        reached = self.marks.max(axis=0)
+        kinds = [np.flatnonzero(self.kinds == kind) for kind in range(4)]
+        return np.concatenate([kind[np.argsort(-reached[kind])[: count // 4]] for kind in kinds])
+
+    def ascend(self, costates: np.ndarray) -> None:
+        """Climb: of each course the inputs of some pieces become those of its adjoint, and stay so where it goes on.
+
+        Where the fault sticks, the maximum principle for all pieces at once stalls. The adjoint is that of the largest
+        error, whenever it is reached.
+        """
+        random = np.random.default_rng(_SEED)
+        chosen, held, jumped = self._forward(costates, None)
+        top, kept = self.marks.max(axis=0), costates
+        for turn in range(_CLIMBS):
+            adjoint = self._backward(chosen, held, jumped, self.marks.argmax(axis=0))
+            blocks = random.random((-(-self.steps // (1 + turn % _BLOCK)), len(top))) < _CHANGED[turn % len(_CHANGED)]
+            changed = np.repeat(blocks, 1 + turn % _BLOCK, axis=0)[: self.steps]
+            tried = np.where((changed & adjoint.any(axis=2))[:, :, None], adjoint, kept)
+            now = self._forward(tried, None)
+            reached = self.marks.max(axis=0)
+            better = reached > top
+            kept = np.where(better[None, :, None], tried, kept)
+            top = np.maximum(top, reached)
+            chosen, held, jumped = now
+
+    def _slopes(self, costates: np.ndarray, chosen: list[np.ndarray], limit: float) -> np.ndarray:
+        """Of a disturbance of bounded rate, in every piece, over the largest: the best along the vertices chosen."""
+        held, moved = np.empty(costates.shape[:2]), np.empty(costates.shape[:2])
+        for number, (costate, vertices) in enumerate(zip(costates[:, :, :-1], chosen, strict=True)):
+            part = self.parts[number // _PIECES % len(self.parts)]
+            held[number] = (part.steps[vertices][:, :-1, -1] * costate).sum(axis=1)
+            moved[number] = (part.added[vertices][:, :-1, -1] * costate).sum(axis=1)
+        most = np.array([self.parts[n // _PIECES % len(self.parts)].added[0, -1, -1] for n in range(self.steps)])
+        return _steepest(held, moved, most, limit)
+
+    def random(self) -> np.ndarray:
+        """Costates that change at every step."""
+        random = np.random.default_rng(_SEED)
+        found = random.standard_normal((self.steps, *self.aim.shape))
+        return np.asarray(found * random.choice([1.0, 1e3], (1, *self.aim.shape)))
+
+    def switching(self) -> np.ndarray:
+        """Costates of the slip-rate error that change sign after random times."""
+        random, courses = np.random.default_rng(_SEED), len(self.aim)
+        flips = np.cumsum(random.random((self.steps, courses)) < 10 ** random.uniform(-2.5, 0, courses), axis=0)
+        found = np.zeros((self.steps, *self.aim.shape))
+        found[:, :, 1] = 1 - 2 * ((flips + random.integers(2, size=courses)) % 2)
+        return found
+
+    def _forward(
+        self, costates: np.ndarray, slopes: np.ndarray | None
+    ) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+        state, chosen, held, jumped = self._started(costates[0]), [], [], []
+        marks = []
+        limit = self.rest_limit and self.rest_limit.anew()
+        self._seen(state)
+        for number, costate in enumerate(costates):
+            part = self.parts[number // _PIECES % len(self.parts)]
+            if number % _PIECES == 0:
+                if not part.of.late:
+                    now = self._soon(part, state, costates, number)
+                jumps = ~now if part.of.late else now
+                after = self._sampled(part, state, costate)
+                after = limit.cut(after, jumps) if limit and part.of.samples else after
+                state = np.where(jumps[:, None], after, state)
+                jumped.append(jumps)
+            ahead = np.einsum("vij,cj->cvi", part.steps, state)
+            push = _pushes(part.added, costate)
+            ways = np.sign(push)
+            if slopes is not None:
+                ways[:, :, -1] = slopes[number][:, None]
+            gain = np.einsum("cvi,ci->cv", ahead, costate) + (push * ways).sum(axis=2)
+            best = np.where(self.allowed, gain, -np.inf).argmax(axis=1)
+            row = np.arange(len(best))
+            following = ahead[row, best] + np.einsum("cij,cj->ci", part.added[best], ways[row, best])
+            chosen.append(best)
+            held.append(self._held(state, following, part.length))
+            if limit:
+                limit.follow(state, following)
+            state = following
+            self._seen(state)
+            marks.append((state[:, : self.size] * self.aim).sum(axis=1))
+        self.marks = np.array(marks)
+        return chosen, held, jumped
+
+    def _soon(self, part: _EventPieces, state: np.ndarray, costates: np.ndarray, number: int) -> np.ndarray:
+        """Courses that jump at once: where it may be left to the next event, those for which the costate is better."""
+        if not part.of.soon or number + _PIECES >= len(costates) or (self.punctual and number == 0):
+            return np.ones(len(state), dtype=bool)
+        following = self.parts[(number // _PIECES + 1) % len(self.parts)]
+        on = part.moved_on()
+        gained = state @ (on @ part.jump - part.jump @ on).T
+        return np.asarray(np.einsum("ci,ci->c", costates[number + _PIECES] @ following.steps[0], gained) >= 0)
+
+    def _seen(self, state: np.ndarray) -> None:
+        slip, rate = np.abs(state[:, :2]).max(axis=0)
+        self.largest = max(self.largest[0], float(slip)), max(self.largest[1], float(rate))
+
+    def _started(self, costate: np.ndarray) -> np.ndarray:
+        """Corners of the box of starts, by the costate after the first piece; with stick no slip rate is backward."""
+        part = self.parts[0]
+        state = np.sign(costate @ part.steps[0] @ part.jump @ self.start.T) @ self.start
+        if self.back is not None:
+            state[:, 1] = np.maximum(state[:, 1], -self.back)
+        return np.asarray(state)
+
+    def _sampled(self, part: _EventPieces, state: np.ndarray, costate: np.ndarray) -> np.ndarray:
+        """After a jump; that of a sample hears noise, for which the costate is that after the first piece."""
+        after: np.ndarray = state @ part.jump.T
+        if not part.of.samples:
+            return after
+        noise = self.noise * np.sign(costate @ part.steps[0] @ self.heard.T)
+        return np.asarray(after + noise @ self.heard + self._beside_the_line(state[:, :2] + noise))
+
+    def _beside_the_line(self, told: np.ndarray) -> np.ndarray | float:
+        """What the true end of an implicit step adds to that of the nominal loop."""
+        if self.root is None:
+            return 0.0
+        line = float(self.root.middle) / self.step * told[:, 0]
+        return np.outer(root_of(self.root.pull, self.step, told[:, 0], told[:, 1]) + line, self.sudden)
+
+    def _held(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
+        """Keep every state where it can be; mask of what is held there."""
+        mask = np.zeros(state.shape, dtype=bool)
+        if self.back is not None:
+            mask[:, 1] = stuck = state[:, 1] < -self.back
+            above = np.maximum(before[:, 1] + self.back, 0)  # slip rate before; it falls to zero, then the fault sticks
+            moving = above / np.where(stuck, above - state[:, 1] - self.back, 1)
+            state[stuck, 0] = (before[:, 0] - length * self.back + length * moving * above / 2)[stuck]
+            state[stuck, 1] = -self.back[stuck]
+        if self.limit is not None:
+            mask[:, -1] = np.abs(state[:, -1]) > self.limit
+            state[:, -1] = np.clip(state[:, -1], -self.limit, self.limit)
+        return mask
+
+    def _backward(
+        self,
+        chosen: list[np.ndarray],
+        held: list[np.ndarray],
+        jumped: list[np.ndarray],
+        when: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Costates of the aim at the end, or of every course after a piece."""
+        last = np.full(len(self.aim), len(chosen) - 1) if when is None else when
+        costate, found = np.zeros(self.aim.shape), []
+        for number in reversed(range(len(chosen))):
+            costate = np.where((last == number)[:, None], self.aim, costate)
+            part = self.parts[number // _PIECES % len(self.parts)]
+            costate = np.where(held[number], 0, costate)
+            found.append(costate)
+            costate = np.einsum("cij,ci->cj", part.steps[chosen[number]], costate)
+            if number % _PIECES == 0:
+                costate = np.where(jumped[number // _PIECES][:, None], costate @ part.jump, costate)
+        return np.array(found[::-1])
+
+
+def _steepest(held: np.ndarray, moved: np.ndarray, most: np.ndarray, limit: float) -> np.ndarray:
+    """Slopes in [-1, 1], of every course, for the largest sum of `held`·φ + `moved`·slope over the pieces.
+
+    φ is 0 at first, changes by slope·`most` over a piece and stays within the limit, on a grid of the smallest change.
+    """
+    if not limit or not most.min():
+        return np.zeros(held.shape)
+    size = int(min(np.ceil(limit / most.min()), _LEVELS))
+    grid = np.linspace(-limit, limit, 2 * size + 1)
+    share = limit / size / most  # slope of a step to the next level; none is taken where that is above 1
+    worth, ways = np.zeros((held.shape[1], len(grid))), np.zeros((*held.shape, len(grid)), dtype=np.int8)
+    for number in reversed(range(len(held))):
+        rate = moved[number][:, None] * share[number]
+        down, up = np.full_like(worth, -np.inf), np.full_like(worth, -np.inf)
+        down[:, 1:], up[:, :-1] = worth[:, :-1] - rate, worth[:, 1:] + rate
+        ahead = np.stack([down, worth, up]) if share[number] <= 1 else worth[None]
+        best = ahead.argmax(axis=0)
+        ways[number] = best - len(ahead) // 2
+        worth = np.take_along_axis(ahead, best[None], axis=0)[0] + held[number][:, None] * grid
+    level, slopes = np.full(held.shape[1], size), np.zeros(held.shape)
+    for number, way in enumerate(ways):
+        taken = way[np.arange(len(level)), level]
+        level, slopes[number] = level + taken, taken * share[number]
+    return slopes
+
+
+def _pushes(added: np.ndarray, costates: np.ndarray) -> np.ndarray:
+    """What every constant input at a vertex does to every costate, one sum for all; several times as fast as einsum."""
+    vertices, size, inputs = added.shape
+    rows = added.transpose(1, 0, 2).reshape(size, vertices * inputs)
+    found = np.multiply.outer(costates[:, 0], rows[0])
+    for i in range(1, size):
+        found += np.multiply.outer(costates[:, i], rows[i])
+    return np.reshape(found, (len(costates), vertices, inputs))
+
+
+def _with_disturbance(task: Task, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
+    """Flow and columns of all inputs at full size; a disturbance of bounded rate is one more state."""
+    flow = np.array(loop.flow, dtype=float)
+    push, drift = (np.array(loop.inputs[name], dtype=float) for name in ("acceleration", "drift"))
+    force, slow = float(task.reference_force), drift * float(task.drift)
+    if task.change is None:
+        return flow, np.array([push * (force + float(task.amplitude)), slow]).T
+    size = len(flow)
+    wide = np.zeros((size + 1, size + 1))
+    wide[:size, :size], wide[1, size] = flow, 1
+    columns = np.zeros((size + 1, 3))
+    columns[:size, 0], columns[:size, 1], columns[size, 2] = push * force, slow, float(task.change)
+    return wide, columns
+
+
+def _at(task: Task, flow: np.ndarray, push: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
+    """Flow at a vertex, from the nominal one: slopes act on the errors, the input gain on the push."""
+    found, model = flow.copy(), task.model
+    found[1] += (beta - float(model.gain / task.authority)) * push
+    found[1, :2] += slip - float(model.slip), float(model.rate) - rate
+    return found
+
+
+def _filled(column: Row, size: int) -> np.ndarray:
+    """A column, with zeros below."""
+    return np.array([*column, *[0] * (size - len(column))], dtype=float)
+
+
+def _flowing(flow: np.ndarray) -> _Event:
+    """A period of a loop without jumps."""
+    still = tuple(tuple(Fraction(i == j) for j in range(len(flow))) for i in range(len(flow)))
+    return _Event(still, Fraction(1 / max(abs(np.linalg.eigvals(flow)))), samples=True)
+
+
+def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, event: _Event, *, none: bool = False) -> _EventPieces:
+    """Pieces of an event; with `none` there is one vertex more, at which no time passes where that is free."""
+    length, size = float(event.duration) / _PIECES, len(inputs)
+    found = [moved(flow, inputs, length) for flow in vertices]
+    if none:
+        found.append((np.eye(size), np.zeros(inputs.shape)) if event.free else found[0])
+    steps, added = zip(*found, strict=True)
+    return _EventPieces(event, _widened(event.jump, size), np.array(steps), np.array(added), length)
+
+
+def _periods_to_forget(parts: list[_EventPieces], size: int) -> int:
+    """How many periods a loop of so many states remembers at the vertex that forgets last, within limits."""
+    maps = np.eye(parts[0].jump.shape[0])[None]
+    for part in parts:
+        jump = np.eye(len(part.jump)) if part.of.late else part.jump
+        maps = np.linalg.matrix_power(part.steps, _PIECES) @ jump @ maps
+    return periods_to_forget(np.abs(np.linalg.eigvals(maps[:, :size, :size])).max())
+
+
+def _widened(jump: Any, size: int) -> np.ndarray:
+    found = np.eye(size)
+    found[: len(jump), : len(jump)] = np.array(jump, dtype=float)
+    return found
+
+
+# ----------------------------------------------------------------------
+# The worst that a search finds on the loop of a guarantee of slow sliding: what is seen, beside what is proved.
+
+_SLIDING_PIECES = 4  # of a part of the period
+_SLOPES = (1.0, 1.15)  # of e^y − 1 over y, in the linear loop that a course is found for
+_NEWTON = 4
+_AXES = ("direct_effect", "evolution_effect", "critical_slip")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorstSliding:
+    """Largest errors that were reached, absolute values.
+
+    Attributes
+    ----------
+    log_rate : float
+        Of ln(v/V) [-].
+    slip_error : float
+        [m].
+    """
+
+    log_rate: float
+    slip_error: float
+
+
+def worst_sliding(claim: SlidingGuarantee) -> WorstSliding:
+    """Adversarial stresses at the corners of the box of a, b and D_c, on the plant without inertia.
+
+    For every corner and every piece at which a course may end, the stress, and the rate of the reference within its
+    swing, are at their ends as the impulse response of the loop, linearised, says, which is the worst for the linear
+    loop; what it comes to is seen on the exponentials themselves, with four Runge–Kutta steps a part of the period.
+    Both may jump at every end of a piece. The normal stress is that at the start; noise is none. A rate below V counts
+    by its logarithm as one above it.
+    """
+    rate, slip = search_once(lambda: _searched_sliding(claim), "worst sliding", claim)
+    return WorstSliding(log_rate=rate, slip_error=slip)
+
+
+def _searched_sliding(claim: SlidingGuarantee) -> list[float]:
+    found = [[0.0, 0.0]]
+    for corner in corners(claim.task):
+        plant = SlidingPieces(claim, corner)
+        found += [plant.largest(*course).tolist() for course in courses(claim, plant)]
+    return [max(values) for values in zip(*found, strict=True)]
+
+
+def corners(task: SlidingTask) -> list[SlidingTask]:
+    """The task at every corner of the box of a, b and D_c."""
+    ends = [dict.fromkeys(task.ranges[axis]) for axis in _AXES]
+    points = [dict(zip(_AXES, ((v, v) for v in corner), strict=True)) for corner in product(*ends)]
+    return [replace(task, ranges={**task.ranges, **point}) for point in points]
+
+
+def courses(claim: SlidingGuarantee, plant: "SlidingPieces") -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Stresses [Pa] and r′/V − 1 [-] for every piece, shape (pieces, courses): worst for the linear loop."""
+    for slope in _SLOPES:
+        loop, maps = plant.linear(slope)
+        aims = np.array([np.array(loop.outputs["log_rate"], dtype=float), np.eye(len(loop.states))[0]])
+        count = len(maps)
+        signs = np.ones((2, _remembered(maps) * count, 2 * count))
+        for last in range(count):
+            costates = aims
+            for number in range(signs.shape[1] - count + last, -1, -1):
+                step, pushes, jump = maps[number % count]
+                signs[:, number, [2 * last, 2 * last + 1]] = np.sign(costates @ pushes).T
+                costates = costates @ step @ jump
+        yield float(claim.task.stress) * signs[0], float(claim.task.swing) * signs[1]
+
+
+def _remembered(maps: list[tuple[Any, Any, Any]]) -> int:
+    whole = np.eye(len(maps[0][0]))
+    for step, _, jump in maps:
+        whole = step @ jump @ whole
+    return periods_to_forget(np.abs(np.linalg.eigvals(whole)).max())
+
+
+class SlidingPieces:
+    """The plant at a corner, in pieces of its periods: exact pressures, Runge–Kutta steps of slip and state."""
+
+    def __init__(self, claim: SlidingGuarantee, corner: SlidingTask) -> None:
+        self._claim, self._corner = claim, corner
+        model: Any = model_of(claim.task, claim.claims)
+        self._loop = loop_of(claim.held, model, claim.task)
+        normal = float(corner.ranges["normal_stress"][0])
+        self._strength, self._weakening = (normal * float(corner.ranges[a][0]) for a in _AXES[:2])
+        self._rate, self._stiffness = float(corner.rate), float(corner.stiffness)
+        self._radiation, self._coefficient = float(corner.radiation), float(corner.ranges["coefficient"][0])
+        self._ageing = self._rate / float(corner.ranges["critical_slip"][0])
+        self._friction = float(corner.ranges["direct_effect"][0]), float(corner.ranges["evolution_effect"][0])
+
+    def linear(self, slope: float) -> tuple[PeriodicLoop, list[tuple[Any, Any, Any]]]:
+        """Linear loop, and of every piece e^{Ah}, what 1 Pa of stress and r′ = 2V add, and the jump before it."""
+        model: Any = model_of(self._corner, self._claim.claims)
+        steep = Fraction(slope).limit_denominator(1000)
+        strength = Fraction(self._strength) + self._corner.radiation * self._corner.rate * steep
+        plain = replace(
+            model,
+            slope=steep,
+            state_slope=Fraction(1),
+            strength=strength.limit_denominator(10**9),
+            weakening=Fraction(self._weakening).limit_denominator(10**9),
+        )
+        loop = loop_of(self._claim.held, plain, self._corner)
+        flow, pushes = np.array(loop.flow, dtype=float), np.zeros((len(loop.states), 2))
+        pushes[:, 0], pushes[0, 1] = np.array(loop.inputs["stress"], dtype=float), -self._rate
+        return loop, [(*moved(flow, pushes, length), jump) for length, jump in _parts(loop)]
+
+    def largest(self, stress: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+        """Largest |ln(v/V)| and slip error [m] of courses of the stress [Pa] and of r′/V − 1, (pieces, courses)."""
+        parts, size = _parts(self._loop), len(self._loop.states)
+        flow, row = np.array(self._loop.flow, dtype=float)[2:, 2:], np.array(self._loop.outputs["push"], float)[2:]
+        halves = [expm(flow * length / 2) for length, _ in parts]
+        state, found = np.zeros((size, stress.shape[1])), np.zeros(2)
+        for number, (pushed, faster) in enumerate(zip(stress, ahead, strict=True)):
+            length, jump = parts[number % len(parts)]
+            state = jump @ state
+            half = halves[number % len(parts)]
+            middle = half @ state[2:]
+            after = half @ middle
+            pressures = [row @ v for v in (state[2:], middle, after)]
+            moved = self._step(state[:2], pressures, pushed, faster, length)
+            state = np.vstack([moved, after])
+            reached = [self.log_rate(moved, pressures[2], end) for end in (pushed, -pushed)]
+            found = np.maximum(found, [np.max(np.abs(reached)), np.max(np.abs(moved[0]))])
+        return found
+
+    def _step(self, now: Any, pressures: list[Any], stress: Any, ahead: Any, length: float) -> Any:
+        """Slip error and log state after a piece."""
+        first = self._rates(now, pressures[0], stress, ahead)
+        second = self._rates(now + length / 2 * first, pressures[1], stress, ahead)
+        third = self._rates(now + length / 2 * second, pressures[1], stress, ahead)
+        fourth = self._rates(now + length * third, pressures[2], stress, ahead)
+        return now + length / 6 * (first + 2 * second + 2 * third + fourth)
+
+    def _rates(self, now: Any, pressure: Any, stress: Any, ahead: Any) -> Any:
+        y = self.log_rate(now, pressure, stress)
+        slips = self._corner.state_law == "slip"
+        aged = self._ageing * (-np.exp(y) * (y + now[1]) if slips else np.expm1(-now[1]) - np.expm1(y))
+        return np.array([self._rate * (np.expm1(y) - ahead), aged])
+
+    def log_rate(self, now: Any, pressure: Any, stress: Any) -> Any:
+        """ln(v/V) of slip error [m], log state, pressure error [Pa] and stress [Pa], by Newton's method."""
+        a, b = self._friction
+        normal = self._strength / a - pressure
+        driving = stress - self._stiffness * now[0] + self._coefficient * pressure - normal * b * now[1]
+        y = driving / (normal * a + self._radiation * self._rate)
+        for _ in range(_NEWTON):
+            excess = normal * a * y + self._radiation * self._rate * np.expm1(y) - driving
+            y = y - excess / (normal * a + self._radiation * self._rate * np.exp(y))
+        return y
+
+
+def _parts(loop: PeriodicLoop) -> list[tuple[float, np.ndarray]]:
+    """Length [s] of every piece of a period, and the jump before it."""
+    still, found = np.eye(len(loop.states)), []
+    for segment in loop.segments:
+        jumps = [np.array(segment.jump, dtype=float), *[still] * (_SLIDING_PIECES - 1)]
+        found += [(float(segment.duration) / _SLIDING_PIECES, jump) for jump in jumps]
+    return found

@@ -1,0 +1,352 @@
+"""Design of sliding modes in the scheme ``compensated``, with guaranteed bounds.
+
+The implicit step of a law is read from the scheme as a sum of signed powers; then scale, weight and
+authority are chosen by their certified bounds.
+"""
+
+from bisect import bisect_left
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from functools import lru_cache, partial
+from itertools import product
+from typing import Any, Unpack
+
+import sympy as sp
+
+from quakedesign.cache import search_once
+from quakedesign.errors import UnsupportedError, require_known
+from quakedesign.exact import LowerBound, UpperBound, fraction_of, to_sympy
+from quakedesign.fault.model import require_ordinary
+from quakedesign.guarantees.exact.loop import Around, Held
+from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, holds
+from quakedesign.guarantees.exact.statement import Guarantee, guarantee
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.guarantees.search.estimate import BoundsEstimate, estimated
+from quakedesign.guarantees.search.linear_design import OBJECTIVES
+from quakedesign.laws import Controller, ImplicitRoot, Power, Sampling, SlidingMode
+from quakedesign.laws import compensated as compensated_law
+from quakedesign.laws.cta import ContinuousTwisting
+from quakedesign.loop import discrete_law
+from quakedesign.loop.discrete_law import DiscreteLaw
+from quakedesign.loop.schemes.compensated import Compensated
+from quakedesign.loop.schemes.implicit import end_rate, end_slip
+from quakedesign.symbolic import SignedPower
+
+# ----------------------------------------------------------------------
+# The implicit step of a law as a sum of signed powers, read off the expression that the scheme itself evaluates.
+
+_NAMES = {end_slip: "slip", end_rate: "rate"}
+_DIGITS = 60
+_WIDTH = Fraction(1, 10**40)  # relative, around numbers that are no fractions
+
+
+def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -> tuple[Power, ...]:
+    """q of w = e2 − q(e1 + T_s·w, w), for the scheme ``compensated``.
+
+    Parameters
+    ----------
+    controller : Controller
+    step, authority : Fraction
+        T_s [s], B0 [m²/kg].
+
+    Raises
+    ------
+    UnsupportedError
+        For a law with a feed-forward, or whose pressure is no falling sum of signed powers of the errors.
+    """
+    pull, feed_forward, _ = _derived(DiscreteLaw.of(controller, 0.0))
+    if feed_forward != 0:
+        raise UnsupportedError("a law with a feed-forward has no guarantee in an implicit step. Use feedforward none.")
+    numbers = {discrete_law.step: to_sympy(step), discrete_law.authority: to_sympy(authority)}
+    return _terms(-pull.xreplace(numbers))
+
+
+@lru_cache(maxsize=256)
+def _derived(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
+    """For every T_s and B0; searches ask for the same few scales again and again."""
+    return Compensated.derive(law)
+
+
+def _terms(expression: sp.Expr) -> tuple[Power, ...]:
+    """Terms of an expression that never falls."""
+    return tuple(_term(part) for part in sp.Add.make_args(sp.expand_mul(expression)))
+
+
+def _term(expression: sp.Expr) -> Power:
+    factor, core = expression.as_independent(end_slip, end_rate, as_Add=False)
+    if factor.is_nonnegative and core in _NAMES:
+        return Power(factor=_enclosed(factor), exponent=Fraction(1), argument=_NAMES[core])
+    if factor.is_nonnegative and isinstance(core, SignedPower) and core.args[1].is_Rational:
+        inner = _NAMES.get(core.args[0]) or _terms(core.args[0])
+        return Power(factor=_enclosed(factor), exponent=fraction_of(core.args[1]), argument=inner)
+    raise UnsupportedError(
+        "an implicit step with a guarantee needs a pressure that is a falling sum of signed powers. "
+        f"Received the term {expression}. Use another law."
+    )
+
+
+def _enclosed(value: sp.Expr) -> tuple[Fraction, Fraction]:
+    """Rational ends around a number, equal for a rational."""
+    if value.is_Rational:
+        return fraction_of(value), fraction_of(value)
+    near = fraction_of(sp.Rational(str(value.evalf(_DIGITS))))
+    return near * (1 - _WIDTH), near * (1 + _WIDTH)
+
+
+# ----------------------------------------------------------------------
+# A sliding mode in the scheme ``compensated``: scale, weight and authority chosen by what can be guaranteed.
+
+GUARANTEED = "compensated"
+WEIGHTS = tuple(Fraction(k, 20) for k in range(2, 11))
+_RATIOS = tuple(Fraction(k, 20) for k in range(17, 22))  # of B0 to the middle of the input gain
+_ROOM = Fraction(5, 4)  # share of the smallest peak that `tracking` may spend
+_SLOPES = tuple(Fraction(v) for v in ("1", "0.99", "0.97", "0.93", "0.88", "0.8", "0.7", "0.6"))
+_REMAINDERS = tuple(Fraction(v) for v in ("0", "0.02", "0.1"))  # of the slip-rate error of a deadbeat step
+_NEARLY = 2  # of these slopes are near enough to a deadbeat step for the choice of a scale
+_MARGIN = Fraction(21, 20)
+_DEADBEAT = ImplicitRoot(pull=(Power(factor=(Fraction(1), Fraction(1)), exponent=Fraction(0), argument="slip"),))
+_ROOTS = tuple(Fraction(f"{10 ** (k / 24):.1e}") for k in range(-48, 73))  # ρ of λ = ρ⁶
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Compensation:
+    """A sliding mode that runs in the scheme ``compensated``, and what is guaranteed of it.
+
+    Attributes
+    ----------
+    controller : SlidingMode
+        A law of samples, see its `sampling`.
+    found : Guarantee or NoGuarantee
+    """
+
+    controller: SlidingMode
+    found: Guarantee | NoGuarantee
+
+    @property
+    def weight(self) -> Fraction:
+        """Number a of the scheme [-]."""
+        return _settings(self.controller)["weight"]
+
+    @property
+    def authority(self) -> Fraction:
+        """B0 of the scheme [m²/kg]."""
+        return _settings(self.controller)["authority"]
+
+    @property
+    def limited(self) -> SlidingMode:
+        """The controller with the limit against windup of its guarantee, if it has one."""
+        limit, sampling = getattr(self.found, "rest_limit", None), self.controller.sampling
+        if limit is None or sampling is None:
+            return self.controller
+        given = ((part.name, getattr(limit, part.name)) for part in fields(limit))
+        more = tuple((f"rest_{name}", value) for name, value in given if value is not None)
+        return replace(self.controller, sampling=replace(sampling, settings=(*sampling.settings, *more)))
+
+    def sentence(self) -> str:
+        """Settings for people, and how the step ends."""
+        law = self.controller
+        gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in law.gains.items())
+        settings = f"weight {float(self.weight):g} and B0 = {float(self.authority):.4g} m²/kg"
+        return (
+            f"{law.title} with {gains}, λ = {float(law.scale):.4g} and the divisor {float(law.divisor):.6g} m²/kg, in "
+            f"the scheme compensated with {settings}{self._end()}"
+        )
+
+    def _end(self) -> str:
+        if isinstance(self.found, NoGuarantee) or self.found.held.law.root is None:
+            return ""
+        root = self.found.held.law.root
+        low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
+        if low == high == 1 and not root.remainder:
+            deadbeat = "; its implicit step is deadbeat, e1 + T_s·w = 0, for all errors that are claimed"
+            return f"{deadbeat}, so it answers as any other law whose step is"
+        return (
+            f"; its implicit step ends at w = -γ·e1/T_s with γ from {low:.3g} to {high:.3g}, up to "
+            f"{UpperBound(root.remainder):.2g} m/s, for all errors that are claimed"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts."""
+        law = self.controller
+        return {
+            "scheme": GUARANTEED,
+            "gains": {name: str(v) for name, v in law.gains.items()},
+            "scale": str(law.scale),
+            "divisor": str(law.divisor),
+            "weight": str(self.weight),
+            "authority": str(self.authority),
+        }
+
+
+def compensated(
+    task: Task,
+    controller: SlidingMode,
+    weight: Fraction,
+    authority: Fraction,
+    step: Fraction,
+    **around: Unpack[Around],
+) -> Guarantee | NoGuarantee:
+    """Guarantee of given settings: the narrowest lines around the root, of a few, that close the circle.
+
+    Raises
+    ------
+    ParameterError
+        For a weight outside (0, 1], an authority or times that are not positive.
+    """
+    try:
+        pull = implicit_pull(controller, step, authority)
+    except UnsupportedError as error:
+        return NoGuarantee(reason=str(error), small_gain=None)
+    held = _held(ImplicitRoot(pull=pull), weight, authority, step, around)
+    first = guarantee(task, held)
+    deadbeat = estimated(task, held)
+    if isinstance(first, Guarantee) or deadbeat is None or isinstance(deadbeat.bounds, NoGuarantee):
+        return first
+    size = deadbeat.bounds.slip_rate_error
+    for share, slope in product(_REMAINDERS, _SLOPES):
+        root = ImplicitRoot(pull=pull, slopes=(slope, Fraction(1)), remainder=share * size)
+        wider = replace(held, law=replace(held.law, root=root))
+        near = estimated(task, wider)
+        if near is None or isinstance(near.bounds, NoGuarantee):
+            continue
+        errors = near.bounds.slip_error + held.slip_noise, near.bounds.slip_rate_error + held.rate_noise
+        within = holds(root, step, *errors)
+        found = guarantee(task, wider) if within else None
+        if isinstance(found, Guarantee):
+            return found
+    return first
+
+
+def design_compensated(
+    task: Task,
+    controller: SlidingMode,
+    step: Fraction,
+    *,
+    objective: str = "tracking",
+    weights: tuple[Fraction, ...] = WEIGHTS,
+    **around: Unpack[Around],
+) -> Compensation:
+    """Weight, authority and scale of a sliding mode with given base gains, chosen over certified bounds.
+
+    Where the sign of the slip error holds the root, the step is deadbeat, e1 + T_s·w = 0, whatever the gains. So weight
+    and authority are chosen for the deadbeat step, on a grid of `weights`: ``peak`` for the smallest certified
+    slip-rate error, ``tracking`` for the smallest slip error under a disturbance that drifts, among those whose
+    certified slip-rate error is at most a quarter above the smallest. λ = ρ⁶ is then the smallest for which the step is
+    deadbeat, or nearly so, for all errors that are claimed.
+
+    Raises
+    ------
+    ParameterError
+    """
+    require_ordinary(step=step)
+    weight, authority, errors = _deadbeat(task, step, objective, weights, **around)
+    settings = ("weight", weight), ("authority", authority)
+    path: dict[str, Any] = {name: around.get(name, Fraction(0)) for name in ("delay", "lag", "diffusion")}
+    sampling = Sampling(step=step, scheme=GUARANTEED, settings=settings, **path)
+    law = replace(controller, gains=dict(controller.gains), sampling=sampling)
+    try:
+        if errors is not None:
+            law = law.scaled(_scale(law, authority, step, errors))
+    except UnsupportedError as error:
+        return Compensation(controller=law, found=NoGuarantee(reason=str(error), small_gain=None))
+    return Compensation(controller=law, found=compensated(task, law, weight, authority, step, **around))
+
+
+def recovered(found: Guarantee) -> Compensation:
+    """The sliding mode whose implicit step a guarantee is about, its gains read off the step; of 2-CTA alone.
+
+    Raises
+    ------
+    UnsupportedError
+        For the step of another law, whose gains stand inside of powers.
+    """
+    held, law, root = found.held, found.held.law, found.held.law.root
+    refusal = UnsupportedError(
+        "gains are read off the implicit step of a 2-CTA in the scheme compensated. Received a certificate of another "
+        "law. Take the controller of its design, or its gains, scale, weight and authority in that scheme."
+    )
+    if root is None or len(law.measured) != 3 or not (law.feedback[2] > 0 and 0 < law.measured[2][1] <= 1):
+        raise refusal
+    gain, weight = 1 / law.feedback[2], law.measured[2][1]
+    authority = gain / held.step
+    one = ContinuousTwisting.from_values(("1",) * 4, divisor=authority)
+    units = implicit_pull(one, held.step, authority)
+    if [(t.exponent, t.argument) for t in units] != [(t.exponent, t.argument) for t in root.pull]:
+        raise refusal
+    sizes = [t.factor[0] / unit.factor[0] for t, unit in zip(root.pull, units, strict=True)]
+    doubled = {name: replace(one, gains={**one.gains, name: Fraction(2)}) for name in one.gains}
+    pulls = {name: implicit_pull(other, held.step, authority) for name, other in doubled.items()}
+    gains = {name: sizes[next(i for i, t in enumerate(pulls[name]) if t != units[i])] for name in one.gains}
+    settings = ("weight", weight), ("authority", authority)
+    sampling = Sampling(step=held.step, scheme=GUARANTEED, settings=settings, **held.path)
+    controller = replace(one, gains=gains, sampling=sampling)
+    again = replace(root, pull=implicit_pull(controller, held.step, authority))
+    if compensated_law(again, weight, gain) != law:
+        raise refusal
+    return Compensation(controller=controller, found=found)
+
+
+def _settings(law: SlidingMode) -> dict[str, Fraction]:
+    return dict(law.sampling.settings) if law.sampling else {}
+
+
+@lru_cache(maxsize=64)
+def _deadbeat(
+    task: Task, step: Fraction, objective: str, weights: tuple[Fraction, ...], **around: Unpack[Around]
+) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
+    """Weight and authority for a deadbeat step, of any law, and the errors that it leaves, if it has a guarantee."""
+    require_known(objective, OBJECTIVES, "objective")
+    question = "deadbeat", task, step, objective, weights, sorted(around.items())
+    search = partial(_deadbeat_search, task, step, objective, weights, around)
+    weight, authority, *errors = map(Fraction, search_once(search, *question))
+    return weight, authority, (errors[0], errors[1]) if errors else None
+
+
+def _deadbeat_search(
+    task: Task, step: Fraction, objective: str, weights: tuple[Fraction, ...], around: Around
+) -> list[str]:
+    """The same, as texts."""
+    seen = dict[tuple[Fraction, Fraction], BoundsEstimate]()
+    for weight, ratio in product(weights, _RATIOS):
+        choice = weight, _short(ratio * task.model.gain)
+        found = estimated(task, _held(_DEADBEAT, *choice, step, around))
+        if found is not None and isinstance(found.bounds, Bounds):
+            seen[choice] = found
+    if not seen:
+        return [str(weights[0]), str(_short(task.model.gain))]
+    peaks = {choice: float(_bounds(found).slip_rate_error) for choice, found in seen.items()}
+    least = min(peaks, key=lambda choice: peaks[choice])
+    if objective == "tracking":
+        allowed = [choice for choice in seen if peaks[choice] <= _ROOM * peaks[least]]
+        least = min(allowed, key=lambda choice: seen[choice].drift_gain)
+    bounds = _bounds(seen[least])
+    slip_noise, rate_noise = around.get("slip_noise", 0), around.get("rate_noise", 0)
+    return [str(v) for v in (*least, bounds.slip_error + slip_noise, bounds.slip_rate_error + rate_noise)]
+
+
+def _scale(controller: SlidingMode, authority: Fraction, step: Fraction, errors: tuple[Fraction, Fraction]) -> Fraction:
+    """Smallest λ of a ladder for which the step is deadbeat, or nearly, for errors of a size and a little more."""
+    slip, rate = (_MARGIN * v for v in errors)
+
+    def deadbeat(slope: Fraction, root: Fraction) -> bool:
+        pull = implicit_pull(controller.scaled(root**6), step, authority)
+        return holds(ImplicitRoot(pull=pull, slopes=(slope, Fraction(1))), step, slip, rate)
+
+    for slope in _SLOPES[:_NEARLY]:
+        index = bisect_left(_ROOTS, True, key=partial(deadbeat, slope))
+        if index < len(_ROOTS):
+            return _ROOTS[index] ** 6
+    return controller.scale
+
+
+def _held(root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, around: Around) -> Held:
+    return Held(law=compensated_law(root, weight, step * authority), step=step, **around)
+
+
+def _bounds(estimate: BoundsEstimate) -> Bounds:
+    assert isinstance(estimate.bounds, Bounds)
+    return estimate.bounds
+
+
+def _short(value: Fraction) -> Fraction:
+    return Fraction(f"{float(value):.3e}")

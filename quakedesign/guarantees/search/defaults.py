@@ -1,0 +1,242 @@
+"""Default designs of a fault: e-LQR and sliding mode for its own T_s or the longest proved.
+
+The second chapter states which schemes of a sliding mode have a guarantee (``compensated`` only) and why.
+"""
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, Unpack
+
+from quakedesign.errors import require_known
+from quakedesign.exact import UpperBound
+from quakedesign.guarantees.exact.loop import Around
+from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.statement import Guarantee
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.guarantees.search.compensated_search import (
+    GUARANTEED,
+    WEIGHTS,
+    Compensation,
+    compensated,
+    design_compensated,
+)
+from quakedesign.guarantees.search.linear_design import (
+    continued,
+    design_at,
+    design_held,
+    longest_delay,
+    longest_step,
+    reached_again,
+    reached_delay,
+    reached_step,
+    tightened,
+)
+from quakedesign.guarantees.search.lqg import MEASURED
+from quakedesign.laws import SlidingMode
+from quakedesign.loop import schemes
+from quakedesign.lyapunov.exact.premises import Premise
+
+# ----------------------------------------------------------------------
+# The default designs of a fault: for its own T_s, else for the longest T_s that has a guarantee.
+
+REACH = frozenset({"sampling_time", "delay"})
+"""Premises of a guarantee, see `SampledDesign.premises`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledDesign:
+    """A law of samples for a fault, and how far laws like it reach.
+
+    Attributes
+    ----------
+    step : Fraction
+        T_s of the fault [s].
+    runs : Guarantee or None
+        Of the loop that runs, at the fault's T_s or a shorter one; None where none was found.
+    reason : str
+        Why there is no guarantee at the fault's T_s; empty if there is.
+    longest_step : Fraction
+        Longest T_s found for which a design has a guarantee [s].
+    longest_delay : Fraction
+        Longest delay found at the T_s that runs [s].
+    """
+
+    step: Fraction
+    runs: Guarantee | None
+    reason: str
+    longest_step: Fraction = Fraction(0)
+    longest_delay: Fraction = Fraction(0)
+
+    def premises(self) -> tuple[Premise, ...]:
+        """What the guarantee asks for of the hardware, and how far other designs would go."""
+        return (
+            Premise(
+                name="sampling_time",
+                required=self.step,
+                certified=self.longest_step,
+                unit="s",
+                note="T_s of the fault, and the longest for which a design with a guarantee was found",
+            ),
+            Premise(
+                name="delay",
+                required=self.runs.held.delay if self.runs else Fraction(0),
+                certified=self.longest_delay,
+                unit="s",
+                note="from the measurement to the pressure: that of the design, and the longest for which a design, an "
+                "e-LQR that knows it, has a guarantee",
+            ),
+        )
+
+
+def sampled_design(
+    task: Task, step: Fraction, objective: str = "tracking", *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> SampledDesign:
+    """e-LQR for a T_s [s], or for the longest shorter one that has a guarantee; the rest as in `design_held`.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown objective.
+    """
+    told: Any = {"measured": measured, **around}
+    found = design_held(task, step, objective=objective, **told)
+    longest = longest_step(task, **told)
+    if isinstance(found, NoGuarantee):
+        found = continued(task, step, longest, **told) or found
+    reason = found.reason if isinstance(found, NoGuarantee) else ""
+    if isinstance(found, NoGuarantee) and longest is not None:
+        found = design_at(task, longest)
+    if isinstance(found, NoGuarantee):
+        return SampledDesign(step=step, runs=None, reason=reason)
+    delayed, own = longest_delay(task, found.held.step, **told), found.held.delay
+    return SampledDesign(
+        step=step,
+        runs=found,
+        reason=reason,
+        longest_step=max(found.held.step, longest.guarantee.held.step if longest else found.held.step),
+        longest_delay=max(own, delayed.held.delay) if delayed else own,
+    )
+
+
+def sampled_sliding_mode(
+    task: Task, law: SlidingMode, step: Fraction, objective: str = "tracking", **noise: Unpack[Around]
+) -> tuple[Compensation, SampledDesign]:
+    """Sliding mode with the base gains of a law for a T_s [s], or for the longest shorter one that has a guarantee.
+
+    How far others would go is looked for with the smallest weight, which has the smallest peak where T_s is long; none
+    of them knows of a delay.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown objective.
+    """
+
+    def careful(time: Fraction, delay: Fraction = Fraction(0)) -> Compensation:
+        around = noise | {"delay": delay}
+        return design_compensated(task, law, time, objective="peak", weights=WEIGHTS[:1], **around)
+
+    question = (task, law, *(item for item in sorted(noise.items()) if item[1]))
+    made = design_compensated(task, law, step, objective=objective, **noise)
+    reason = made.found.reason if isinstance(made.found, NoGuarantee) else ""
+    most = step if reason else None
+    longest = reached_again(
+        lambda time: careful(time).found,
+        lambda attempt: reached_step(task, attempt, most),
+        *(*question, step, most),
+    )
+    if reason and longest is not None:
+        made = design_compensated(task, law, longest.held.step, objective=objective, **noise)
+        made = careful(longest.held.step) if isinstance(made.found, NoGuarantee) else made
+    if isinstance(made.found, NoGuarantee):
+        return made, SampledDesign(step=step, runs=None, reason=reason)
+    runs = tightened(made.found)
+    held = runs.held
+    delayed = reached_again(
+        lambda delay: careful(held.step, delay).found,
+        lambda attempt: reached_delay(held.step, attempt, held.step / 8),
+        *(*question, held.step, "delay"),
+    )
+    return replace(made, found=runs), SampledDesign(
+        step=step,
+        runs=runs,
+        reason=reason,
+        longest_step=max(held.step, longest.held.step if longest else held.step),
+        longest_delay=delayed.held.delay if delayed else Fraction(0),
+    )
+
+
+# ----------------------------------------------------------------------
+# What is guaranteed of a sliding mode as a scheme runs it, and why most schemes have nothing.
+
+
+def guarantee_of(task: Task, law: SlidingMode, **noise: Unpack[Around]) -> Guarantee | NoGuarantee:
+    """What is guaranteed of a sliding mode as it runs: something only of one for the scheme ``compensated``."""
+    own = law.sampling
+    if own is None or own.scheme != GUARANTEED:
+        scheme, step = ("continuous", Fraction(0)) if own is None else (own.scheme, own.step)
+        return NoGuarantee(reason=_why_none(task, type(law), scheme, step), small_gain=None)
+    settings = dict(own.settings)
+    if not {"weight", "authority"} <= settings.keys():
+        reason = f"the scheme {GUARANTEED} has a guarantee with a weight and an authority. Give both in its settings"
+        return NoGuarantee(reason=reason, small_gain=None)
+    around: Any = {**own.path, **noise}
+    return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, **around))
+
+
+def sliding_mode(
+    task: Task,
+    law: type[SlidingMode],
+    step: Fraction,
+    *,
+    gains: tuple[str, ...] = (),
+    scheme: str = GUARANTEED,
+    objective: str = "tracking",
+    **around: Unpack[Around],
+) -> Compensation | NoGuarantee:
+    """Design a sliding mode with given base gains, or the first ones known for it, in a scheme.
+
+    Parameters
+    ----------
+    task : Task
+    law : type
+    step : Fraction
+        T_s [s].
+    gains : tuple of str
+        Base gains (λ = 1); none for those that a design tries first.
+    scheme : str
+    objective : str
+        ``tracking`` or ``peak``.
+    **around : Fraction
+        As in `design_held`.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown scheme or objective, or a wrong number of gains.
+    """
+    require_known(scheme, sorted(schemes()), "scheme")
+    base = law.from_values(gains) if gains else law.base_gains()[0].law
+    if scheme != GUARANTEED:
+        return NoGuarantee(reason=_why_none(task, law, scheme, step), small_gain=None)
+    known = replace(base, gains=dict(base.gains), divisor=task.authority)
+    made = design_compensated(task, known, step, objective=objective, **around)
+    return replace(made, found=tightened(made.found))
+
+
+def _why_none(task: Task, law: type[SlidingMode], scheme: str, step: Fraction) -> str:
+    if scheme == "continuous":
+        return f"a pressure that follows {law.title} at every instant is run by no sampled controller{_REMEDY}"
+    if scheme == "implicit":
+        rest = UpperBound(step**2 * task.authority * max(map(abs, task.rest_pressure)))
+        return (
+            "the implicit step knows no disturbance, so that a constant pressure p* holds it at e1 = T_s²·B0·p*, here "
+            f"up to {rest:.2g} m{_REMEDY}"
+        )
+    return (
+        f"at e1 = 0 the slope of {law.title} is infinite, so that its pressure held over T_s chatters, and no linear "
+        f"loop with a range of slopes covers it{_REMEDY}"
+    )
+
+
+_REMEDY = f". Use the scheme {GUARANTEED}"

@@ -1,0 +1,818 @@
+"""Search for linear sampled laws with the best guaranteed bounds.
+
+Chapters: guarantees with a slowly varying input gain; design of a law with a disturbance estimate;
+longest sampling period, delay and diffusion time that have a guarantee; certified peaks of an e-LQR in
+continuous time.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import hypot, inf, log, log10, sqrt
+from typing import Any, Unpack, overload
+
+import numpy as np
+from scipy.linalg import LinAlgError
+from scipy.optimize import OptimizeResult, minimize
+
+from quakedesign.cache import search_once
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.exact import UpperBound
+from quakedesign.fault import Fault
+from quakedesign.fault.model import require_ordinary
+from quakedesign.guarantees.exact.fault_data import task_of
+from quakedesign.guarantees.exact.loop import Around, Held, Pump
+from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, SlowGain
+from quakedesign.guarantees.exact.statement import ContinuousPeaks, Guarantee, above, continuous_peaks, guarantee
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.guarantees.search.estimate import (
+    BoundsEstimate,
+    closeness,
+    estimated,
+    own_poles,
+    short,
+    slowly_estimated,
+    spectral_radius,
+)
+from quakedesign.guarantees.search.lqg import (
+    MEASURED,
+    LawFamily,
+    family_of,
+    measured_by,
+    require_surroundings,
+    why_no_law,
+)
+from quakedesign.guarantees.search.unclocked import unclocked_estimate, unclocked_guarantee
+from quakedesign.laws.elqr import ExtendedLQR
+from quakedesign.loop import PeriodicLoop, exact_integrals
+from quakedesign.lyapunov.exact.claim import Verdict
+
+# ----------------------------------------------------------------------
+# Guarantees that use how slowly the input gain changes, where friction depends on the slip alone.
+
+_PARTS = 8
+_SHARE = 0.5  # of the slowest decay, for what is past to grow by
+
+
+def best_guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
+    """Guarantee with an input gain that is slow, where the friction's is and it helps, else with any.
+
+    Where samples follow no clock that is one with a set that the loop never leaves.
+    """
+    if held.longest_step:
+        return unclocked_guarantee(task, held)
+    slow = slow_gain(task, held)
+    found = guarantee(task, held) if slow is None else guarantee(task, held, slow)
+    if slow is None or isinstance(found, Guarantee):
+        return found
+    anyhow = guarantee(task, held)
+    return anyhow if isinstance(anyhow, Guarantee) else found
+
+
+@overload
+def tightened(found: Guarantee) -> Guarantee: ...
+@overload
+def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee: ...
+def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee:
+    """A guarantee with a slow input gain in place of one with any, where there is one."""
+    if isinstance(found, NoGuarantee) or found.slow_gain is not None or found.reach is not None:
+        return found
+    better = best_guarantee(found.task, found.held)
+    return better if isinstance(better, Guarantee) else found
+
+
+def slow_gain(task: Task, held: Held) -> SlowGain | None:
+    """Parts and growth for a proof; None where friction depends on the slip rate or a nominal loop is not stable."""
+    if task.friction.rate_slope:
+        return None
+    parts = SlowGain(parts=_PARTS, growth=Fraction(1))
+    decay = min(_decay(held.loop(task, model)) for model in parts.models(task))
+    return replace(parts, growth=short(_SHARE * decay, 2)) if decay > 0 else None
+
+
+def _decay(loop: PeriodicLoop) -> float:
+    """Of the slowest mode [1/s]."""
+    return -log(max(spectral_radius(loop), 1e-12)) / float(loop.period)
+
+
+# ----------------------------------------------------------------------
+# A law with a disturbance estimate for the loop as it runs, chosen by what can be guaranteed.
+
+OBJECTIVES = ("tracking", "peak")
+_EVALUATIONS = 150
+_FEW = 45  # evaluations near a law that has a guarantee at another time
+_SURE = 0.9  # closeness that is near enough
+_NARROW = 1.25  # room of those: more of it costs what is proved of the slip error too
+_FEWER = 80  # evaluations where samples follow no clock
+_CREEPING = 0.1  # what the slip error over a period counts beside the slip-rate error, so that the loop does not creep
+MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
+_MOST_GROWTH = 50.0  # logarithm; no law of samples answers that, and predictions far beyond it overflow
+_FAILED = 1e6
+_HOPELESS = 1.2  # small gain of a whole search after which no other start is tried
+_SETTLES = 0.9  # per period of the family, of what a law does by itself while the fault sticks, but for its integral
+_WIDE = 0.05  # around a small number, at first
+_FAR, _ENOUGH = 3.0, 40  # small gain that a search gives up at after so many evaluations
+
+
+@dataclass(frozen=True, slots=True)
+class Closest:
+    """Of a family of laws for one loop that which comes nearest to a guarantee.
+
+    Attributes
+    ----------
+    closeness : float
+        As `closeness` in floats: below 1 where a proof is to be expected, else 1 more than the small gain.
+    numbers : numpy.ndarray
+        Of the law in its family.
+    held : Held
+    """
+
+    closeness: float
+    numbers: np.ndarray
+    held: Held
+
+    @property
+    def small_gain(self) -> float:
+        """Of errors that are 0, or those that follow from themselves [-]."""
+        return self.closeness if self.closeness < 1 else self.closeness - 1
+
+
+def closest(
+    task: Task,
+    step: Fraction,
+    *,
+    near: np.ndarray | None = None,
+    measured: str = MEASURED[0],
+    **around: Unpack[Around],
+) -> Closest | NoGuarantee:
+    """The law that comes nearest to a guarantee, or one that is well within it; why there is no law at all.
+
+    The search begins near the numbers of another law, if there is one, else where good laws of the family were seen.
+    """
+    if around.get("delay", 0) > MOST_DELAY * step:
+        return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
+    laws = _Laws.of(task, step, measured, around)
+    if isinstance(laws, NoGuarantee):
+        return laws
+    least, x = inf, np.array(laws.family.starts[0])
+    starts = sorted(laws.family.starts, key=lambda start: laws.close(np.array(start))[0])
+    for start in starts if near is None else (near,):
+        least, x = min((least, x), laws.closest(start, _FEW if near is not None else _EVALUATIONS), key=lambda v: v[0])
+        if least < _SURE:
+            break
+    return Closest(least, x, laws.held(x))
+
+
+def nearby(
+    task: Task, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> Guarantee | NoGuarantee:
+    """Design for the smallest certified slip-rate error, sought near the numbers of a law for another T_s or delay.
+
+    Near the longest of these a law is proved with a slow input gain alone, of which `design_held` knows too late.
+    """
+    laws = _Laws.of(task, step, measured, around)
+    if isinstance(laws, NoGuarantee):
+        return laws
+    found = best_guarantee(task, laws.held(laws.least_peak_near(near)))
+    return found if isinstance(found, Guarantee) else best_guarantee(task, laws.held(near))
+
+
+def design_held(
+    task: Task,
+    step: Fraction,
+    *,
+    objective: str = "tracking",
+    room: float | None = None,
+    measured: str = MEASURED[0],
+    **around: Unpack[Around],
+) -> Guarantee | NoGuarantee:
+    """Feedback with a disturbance estimate, its two gains and its weight chosen over certified bounds.
+
+    Where the slip alone is measured, a steady-state Kalman observer of slip, slip rate and disturbance, its two gains
+    and the sizes of its process noise chosen in the same way.
+
+    ``peak``: the smallest certified slip-rate error. ``tracking``: the smallest slip error under a disturbance that
+    drifts, among laws whose certified slip-rate error is at most `room` times the smallest. With a lag, or a layer
+    between well and fault, the law carries a model of the path.
+
+    Parameters
+    ----------
+    task : Task
+    step : Fraction
+        T_s [s].
+    objective : str
+    room : float, optional
+        What ``tracking`` may spend of the smallest certified slip-rate error [-]; 1.6 unless given, of an observer,
+        whose smallest is larger, 1.4, by no clock 1.25.
+    measured : str
+        One of `MEASURED`; the differentiator is the implicit one of order 2, from rest.
+    **around : Fraction
+        Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s], as in `Held`; 0 unless given.
+
+    Raises
+    ------
+    ParameterError
+        For another objective or other measurements, or times and noise that are negative or too long.
+    """
+    delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
+    require_known(objective, OBJECTIVES, "objective")
+    if step <= 0 or not 0 <= delay <= MOST_DELAY * step or lag < 0:
+        raise ParameterError(
+            f"a design needs a positive step, a delay of 0 to {MOST_DELAY} steps and a lag of 0 or more. Received "
+            f"{float(step):.4g} s, {float(delay):.4g} s, {float(lag):.4g} s. Shorten the delay."
+        )
+    laws = _Laws.of(task, step, measured, around)
+    if isinstance(laws, NoGuarantee):
+        return laws
+    behind_rock, starts = bool(laws.template.diffusion), laws.family.starts
+    least, x = 10 * _FAILED, np.array(starts[0])
+    for start in starts:
+        least, x = min((least, x), laws.least_peak(start), key=lambda reached: reached[0])
+        if behind_rock and _hopeless(least):
+            break
+    if behind_rock and (none := laws.without_bounds(x)) is not None and _hopeless(least):
+        return none  # a proof of that takes a minute
+    seen = laws.seen(x)
+    if objective == "tracking" and seen is not None and isinstance(seen.bounds, Bounds):
+        limit = (room or laws.room) * float(seen.bounds.slip_rate_error)
+        _, x = min((laws.least_drift(start, limit) for start in (x, starts[1])), key=lambda reached: reached[0])
+    found = best_guarantee(task, laws.held(x))
+    noise = {name: v for name, v in laws.template.noise.items() if v}
+    if isinstance(found, Guarantee) or not noise:
+        return found
+    quiet = around | dict.fromkeys(noise, Fraction(0))
+    without = design_held(task, step, objective=objective, room=room, measured=measured, **quiet)  # type: ignore[arg-type]
+    return found if isinstance(without, NoGuarantee) else _with_noise(without, noise)
+
+
+def _with_noise(without: Guarantee, noise: Mapping[str, Fraction]) -> Guarantee | NoGuarantee:
+    """What a law that is proved without noise comes to with it: no small gain depends on noise."""
+    held = replace(without.held, **noise)  # type: ignore[arg-type]
+    found = best_guarantee(without.task, held)
+    if isinstance(found, Guarantee):
+        return found
+    anyhow = guarantee(without.task, held)  # with an input gain that may jump, which noise does not move
+    why = anyhow.reason if isinstance(anyhow, NoGuarantee) and anyhow.small_gain is None else "nothing is proved"
+    units = {"slip_noise": "m", "rate_noise": "m/s"}
+    said = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
+    return replace(found, reason=f"with {said} {why}; without it a law is proved")
+
+
+@dataclass(frozen=True)
+class _Laws:
+    """Laws among which a search chooses for one loop, and what is seen of each."""
+
+    task: Task
+    family: LawFamily
+    template: Held
+    question: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, task: Task, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
+        """Laws for a T_s [s] and what is around them, or why there are none."""
+        require_surroundings(around)
+        if (none := _unpredictable(task, step)) is not None:
+            return none
+        if reason := why_no_law(step, measured, around):
+            return NoGuarantee(reason=reason, small_gain=None)
+        require_known(measured, MEASURED, "measured")
+        middle = (step + (around.get("longest_step") or step)) / 2  # for which a law predicts that is told no time
+        family = family_of(task, middle, measured, around)
+        template = Held(law=family.law(np.array(family.starts[0])), step=step, **around)
+        return cls(task, family, template, (task, step, measured, tuple(sorted(around.items()))))
+
+    def held(self, x: np.ndarray) -> Held:
+        """The loop of a law."""
+        return replace(self.template, law=self.family.law(x))
+
+    def seen(self, x: np.ndarray) -> BoundsEstimate | None:
+        """What is estimated of a law; None where there is none of these numbers."""
+        judged = slowly_estimated if self.template.diffusion and not self.task.friction.rate_slope else estimated
+        judged = unclocked_estimate if self.template.longest_step else judged
+        try:
+            return judged(self.task, self.held(x)) if self.family.admits(x) else None
+        except LinAlgError:  # of a Riccati equation
+            return None
+
+    def closest(self, start: Sequence[float] | np.ndarray, evaluations: int) -> tuple[float, np.ndarray]:
+        """Smallest closeness to a guarantee near a start, and where."""
+
+        def cost(x: np.ndarray) -> float:
+            return self.quiet(x, _FAILED * min(self.close(x)[0], 9.0)) / _FAILED
+
+        return _search_once(
+            ("closest", *self.question), cost, start, enough=_SURE, evaluations=evaluations, far=1 + _FAR, wide=True
+        )
+
+    def least_peak_near(self, start: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Where the cost of a peak is smallest near a law that may be proved with a slow input gain alone."""
+
+        def cost(x: np.ndarray) -> float:
+            found, bounds = self.close(x)
+            peak = _FAILED * min(found, 9.0) if bounds is None else _decibels(bounds, self.family.period)
+            return self.quiet(x, peak)
+
+        return _search_once(("near peak", *self.question), cost, start, evaluations=_FEW, wide=True)[1]
+
+    def close(self, x: np.ndarray) -> tuple[float, Bounds | None]:
+        try:
+            return closeness(self.task, self.held(x)) if self.family.admits(x) else (inf, None)
+        except LinAlgError:  # of a Riccati equation
+            return inf, None
+
+    def without_bounds(self, x: np.ndarray) -> NoGuarantee | None:
+        """Why a law has no bounds; None where it has, or is none."""
+        seen = self.seen(x)
+        return seen.bounds if seen is not None and isinstance(seen.bounds, NoGuarantee) else None
+
+    def least_peak(self, start: Sequence[float] | np.ndarray, **settings: Any) -> tuple[float, np.ndarray]:
+        """Smallest cost of a peak near a start, and where; given up where it stays far from a guarantee.
+
+        Through a layer every evaluation takes a tenth of a second.
+        """
+        far = _FAR * _FAILED if self.template.diffusion else inf
+        settings = self._effort | settings
+
+        def cost(x: np.ndarray) -> float:
+            return self.quiet(x, _peak_cost(self.seen(x), self.family.period))
+
+        return _search_once(("peak", *self.question), cost, start, far=far, **settings)
+
+    def least_drift(self, start: Sequence[float] | np.ndarray, limit: float) -> tuple[float, np.ndarray]:
+        """Smallest cost of a drift near a start, and where, within a limit of the slip-rate error [m/s]."""
+
+        def cost(x: np.ndarray) -> float:
+            return self.quiet(x, _drift_cost(self.seen(x), limit))
+
+        return _search_once(("drift", limit, *self.question), cost, start, **self._effort)
+
+    @property
+    def room(self) -> float:
+        """What ``tracking`` may spend of the smallest certified slip-rate error, see `design_held`."""
+        return _NARROW if self.template.longest_step else self.family.room
+
+    @property
+    def _effort(self) -> dict[str, Any]:
+        """Evaluations of a search, where one takes a twentieth of a second."""
+        return {"evaluations": _FEWER} if self.template.longest_step else {}
+
+    def quiet(self, x: np.ndarray, cost: float) -> float:
+        """The cost of a law; that of none where the law, left to itself while the fault sticks, settles too slowly."""
+        if cost >= 10 * _FAILED:
+            return cost
+        slowest = _SETTLES ** float(self.template.step / self.family.period)
+        over = float(np.abs(own_poles(self.family.law(x))[1:]).max(initial=0)) / slowest
+        return cost if over <= 1 else max(cost, min(over, 9.0) * _FAILED)
+
+
+def _hopeless(cost: float) -> bool:
+    """Whether a whole search ends at a small gain from which nothing was seen to lead to a guarantee."""
+    return _HOPELESS * _FAILED < cost < 9 * _FAILED
+
+
+def _unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
+    """No law of samples, where the errors of the model outgrow within a period what a prediction can hold."""
+    require_ordinary(step=step)
+    rate, slip = float(task.model.rate), max(float(task.model.slip), 0.0)
+    growth = float(step) * (hypot(rate, 2 * sqrt(slip)) - rate) / 2
+    if growth <= _MOST_GROWTH:
+        return None
+    return NoGuarantee(reason=f"errors grow by e^{growth:.3g} within T_s = {float(step):.4g} s", small_gain=None)
+
+
+def _search_once(
+    question: tuple[Any, ...], cost: Callable[[np.ndarray], float], start: Sequence[float] | np.ndarray, **settings: Any
+) -> tuple[float, np.ndarray]:
+    """What `_search` finds, or has found for a question that says all about the cost, see `quakedesign.cache`."""
+
+    def search() -> list[Any]:
+        least, x = _search(cost, start, **settings)
+        return [least, x.tolist()]
+
+    least, x = search_once(search, *question, np.array(start).tolist(), sorted(settings.items()))
+    return least, np.array(x)
+
+
+def _search(
+    cost: Callable[[np.ndarray], float],
+    start: Sequence[float] | np.ndarray,
+    *,
+    enough: float = -inf,
+    evaluations: int = _EVALUATIONS,
+    far: float = inf,
+    wide: bool = False,
+) -> tuple[float, np.ndarray]:
+    """Smallest cost found and where; the search ends below `enough`, or after a while still above `far`.
+
+    It begins a twentieth of each number around the start; if `wide`, as far around those that are small.
+    """
+    least, count = inf, 0
+
+    def counted(x: np.ndarray) -> float:
+        nonlocal least, count
+        count, found = count + 1, cost(x)
+        least = min(least, found)
+        return found
+
+    def stop(intermediate_result: OptimizeResult) -> None:
+        if intermediate_result.fun < enough or (count >= _ENOUGH and far < least < 9 * _FAILED):
+            raise StopIteration
+
+    options: dict[str, Any] = {"maxfev": evaluations, "xatol": 2e-3, "fatol": 1e-3}
+    if wide:
+        first = np.array(start, dtype=float)
+        options["initial_simplex"] = np.vstack([first, first + np.diag(np.maximum(np.abs(first) / 20, _WIDE))])
+    found = minimize(counted, np.array(start), method="Nelder-Mead", options=options, callback=stop)
+    return float(found.fun), found.x
+
+
+def _peak_cost(found: BoundsEstimate | None, period: Fraction) -> float:
+    """Decibels of the slip-rate error; where there is no bound, how far from one."""
+    if found is None:
+        return 10 * _FAILED
+    if isinstance(found.bounds, NoGuarantee):
+        return _FAILED * min(float(found.bounds.small_gain or 9), 9.0)
+    return _decibels(found.bounds, period)
+
+
+def _decibels(bounds: Bounds, period: Fraction) -> float:
+    return 10 * log10(float(bounds.slip_rate_error) + _CREEPING * float(bounds.slip_error / period))
+
+
+def _drift_cost(found: BoundsEstimate | None, limit: float) -> float:
+    if found is None or isinstance(found.bounds, NoGuarantee):
+        return 10 * _FAILED
+    over = max(0.0, float(found.bounds.slip_rate_error) / limit - 1)
+    return 10 * log10(found.drift_gain) + 1000 * over
+
+
+# ----------------------------------------------------------------------
+# How long a sampling time and a delay may be for a designed loop to have a guarantee.
+
+Search = Callable[[Fraction, np.ndarray | None], Closest | NoGuarantee]
+Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
+_ATTEMPTS = 12
+_NEAR = Fraction(1, 16)  # share of the longest time by which the end of the reach is left open
+_CLOSE = Fraction(1, 16)  # the same where designs are continued
+_LOOSE = Fraction(1, 10)  # the same of delays and what else may be 0, each of which takes longer
+_BACK = Fraction(39, 40)  # of a time whose law is not proved after all
+_EDGE, _AIM = 0.92, 0.985  # small gain that is at the end of the reach, and that which a time is sought for
+_POWER = 1.3  # of a time with which the small gain was seen to grow
+_LEAST = 0.01  # small gain that is counted with
+_LONGEST_TIMES_FAR = 2.0  # small gain from which a time is halved
+
+
+RATE = "rate_limit"
+LIMITING = (RATE, "delay_jitter", "jitter", "averaging", "delay", "lag", "diffusion")
+"""What of a setup may be too much for any design, what is easiest to change first."""
+_LONGEST_TIMES_FEWER = 8  # attempts, each of which begins anew where its first law fails
+_ANY_RATE = Fraction(10**30)  # [Pa/s]
+
+
+@dataclass(frozen=True, slots=True)
+class Longest:
+    """A guarantee at nearly the longest time that has one, and the numbers of its law."""
+
+    guarantee: Guarantee
+    numbers: np.ndarray
+
+
+def longest_step(task: Task, *, measured: str = MEASURED[0], **around: Unpack[Around]) -> Longest | None:
+    """A guarantee at nearly the longest T_s that has one, whatever the T_s of the fault; None where none is found.
+
+    Laws are those that come nearest to a guarantee, each sought near that of the T_s before.
+
+    Parameters
+    ----------
+    task : Task
+    measured, **around
+        As in `design_held`.
+    """
+
+    def search(step: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
+        return closest(task, step, near=near, measured=measured, **around)
+
+    path: dict[str, Any] = {**around}
+    late = sum(float(path.get(name) or 0) for name in ("delay", "lag", "diffusion"))
+    return _farthest(task, search, _first_step(task, late), None)
+
+
+def reached_step(task: Task, attempt: Attempt, most: Fraction | None = None) -> Guarantee | None:
+    """The same for any kind of design, an attempt at a T_s [s]."""
+    first = _first_step(task)
+    return _last(reached(attempt, first if most is None else min(first, most), most=most))
+
+
+def _first_step(task: Task, late: float = 0.0) -> Fraction:
+    """T_s to begin with [s], where a pressure acts late [s]: of the fastest pole, of a stable fault of its spring."""
+    slip, rate = float(task.slip_chord[1]), float(task.rate_chord[0])
+    pole = (sqrt(max(rate**2 + 4 * slip, 0.0)) - rate) / 2 if slip > 0 or rate < 0 else 0.0
+    pace = pole if pole > 0 else sqrt(abs(slip)) or 1 / float(task.operation_time)
+    return Fraction(f"{_SHARE / pace / (1 + pace * late):.3g}")
+
+
+def continued(
+    task: Task, step: Fraction, longest: Longest | None, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> Guarantee | None:
+    """Design for a T_s [s] near one for a longer T_s, where a search at T_s alone found none; None without one."""
+    if longest is None or longest.guarantee.held.step < step:
+        return None
+    found = nearby(task, step, longest.numbers, measured=measured, **around)
+    return found if isinstance(found, Guarantee) else None
+
+
+def design_at(task: Task, longest: Longest) -> Guarantee:
+    """Design for a small slip-rate error at T_s and all else of a guarantee, which stays where there is none."""
+    held = longest.guarantee.held
+    found = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), **held.around)
+    return min(
+        (longest.guarantee, *([found] if isinstance(found, Guarantee) else [])), key=lambda g: g.claims.slip_rate_error
+    )
+
+
+def longest_delay(
+    task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> Guarantee | None:
+    """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
+
+    def search(delay: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
+        return closest(task, step, near=near, measured=measured, **(around | {"delay": delay}))
+
+    found = _farthest(task, search, Fraction(0), MOST_DELAY * step, unit=step / 2)
+    return None if found is None else found.guarantee
+
+
+def farthest_rock(
+    task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> Guarantee | None:
+    """A guarantee through nearly the largest L²/D of rock that has one; None where none is found."""
+
+    def search(time: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
+        return closest(task, step, near=near, measured=measured, **(around | {"diffusion": time}))
+
+    found = _farthest(task, search, max(_first_step(task), step), None)
+    return None if found is None else found.guarantee
+
+
+def nearest_setup(
+    task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+) -> tuple[str, Guarantee] | None:
+    """Of a loop without a guarantee: a quantity of its setup, and a guarantee with nearly the most of it that has one.
+
+    It is the first of `LIMITING` without which a design has a guarantee at T_s and with all else as it is; None without
+    one. Of a pump it is the rate, with nearly the lowest that will do.
+    """
+    pump, told = around.get("pump"), measured
+    for name in LIMITING:
+        rated = name == RATE
+        asked: Any = (pump.rate if pump else None) if rated else around.get(name)
+        if not asked:
+            continue
+
+        def search(value: Fraction, near: np.ndarray | None, name: str = name, rated: bool = rated) -> Any:
+            other: Any = {"pump": _ramped(pump, value), "ramp": value} if rated else {name: value}
+            return closest(task, step, near=near, measured=told, **(around | other))
+
+        most = step / 2 if rated else asked
+        first, unit = Fraction(0), min(asked, step) / 2
+        if rated or "jitter" in name:
+            unit = min(most, step) / 16
+        elif name == "diffusion":
+            first, unit = min(max(_first_step(task), step), asked), Fraction(0)
+        found = _farthest(task, search, first, most, unit=unit, attempts=_LONGEST_TIMES_FEWER)
+        if found is not None and rated:
+            return name, with_lowest_rate(found.guarantee)
+        if found is not None:
+            return name, found.guarantee
+    return None
+
+
+def _ramped(pump: Pump | None, ramp: Fraction) -> Pump | None:
+    """A pump that makes any change within a time [s], or at once."""
+    limited = replace(pump or Pump(), rate=_ANY_RATE if ramp else None)
+    return None if limited == Pump() else limited
+
+
+def with_lowest_rate(found: Guarantee) -> Guarantee:
+    """The same guarantee of the slowest pump that makes the largest change within the ramp."""
+    held, step = found.held, found.claims.largest_step
+    if held.pump is None or step is None or not held.ramp:
+        return found
+    slower = replace(found, held=replace(held, pump=replace(held.pump, rate=above(step / held.ramp))))
+    return slower if slower.check() is Verdict.PROVED else found
+
+
+def _farthest(
+    task: Task,
+    search: Search,
+    first: Fraction,
+    most: Fraction | None,
+    unit: Fraction = Fraction(0),
+    attempts: int = _ATTEMPTS,
+) -> Longest | None:
+    """A proof at nearly the longest time for which laws come near enough to a guarantee.
+
+    Parameters
+    ----------
+    search : callable
+        Of a time [s] and the numbers of a law for another one.
+    first : Fraction
+        Time to try first [s].
+    most : Fraction, optional
+        Longest time to try [s].
+    unit : Fraction
+        Time to try after 0 [s].
+    attempts : int
+        Number of times at most.
+    """
+    good: Closest | None = None
+    time, at, bad, before = first, first, None, None
+    for _ in range(attempts):
+        found = search(time, None if good is None else good.numbers)
+        if attempts < _ATTEMPTS and good is not None and bad is None and not _within(found):
+            found = search(time, None)
+        small = None if isinstance(found, NoGuarantee) else found.small_gain
+        if isinstance(found, Closest) and _within(found):
+            good, at = found, time
+        else:
+            if good is None and (not time or not _nearer(small, before)):
+                return None
+            bad, before = (time, small), small
+        open_end = (_LOOSE if unit else _CLOSE) * bad[0] if bad is not None else Fraction(0)
+        edge = good is not None and good.closeness > _EDGE and not unit
+        if good is not None and (at == most or edge or (bad is not None and bad[0] - at <= open_end)):
+            break
+        time = _time_between(good, at, bad, most, unit)
+    return None if good is None else _proved_near(task, search, good, at)
+
+
+def _within(found: Closest | NoGuarantee) -> bool:
+    return isinstance(found, Closest) and found.closeness < 1
+
+
+def _proved_near(task: Task, search: Search, good: Closest, time: Fraction) -> Longest | None:
+    """A proof at a time or a little below."""
+    for _ in range(_ATTEMPTS):
+        found = best_guarantee(task, good.held)
+        if isinstance(found, Guarantee):
+            return Longest(found, good.numbers)
+        time = Fraction(f"{float(time * _BACK):.3g}")
+        nearer = search(time, good.numbers)
+        if isinstance(nearer, Closest):
+            good = nearer
+    return None
+
+
+def _time_between(
+    good: Closest | None, at: Fraction, bad: tuple[Fraction, float | None] | None, most: Fraction | None, unit: Fraction
+) -> Fraction:
+    """Time to try next [s], in three digits: where the small gain, drawn straight, is that of the end of the reach."""
+    if good is None:
+        assert bad is not None
+        time, small = bad
+        return (
+            time / 2
+            if small is None or small > _LONGEST_TIMES_FAR
+            else Fraction(f"{0.9 * float(time) / max(small, 1.0):.3g}")
+        )
+    if bad is None:
+        grown = 2.0 if unit else min((_AIM / max(good.small_gain, _LEAST)) ** (1 / _POWER), 2.0)
+        ahead = float(at) * grown if at else float(unit)
+        time = Fraction(f"{ahead:.3g}")
+        return time if most is None else min(time, most)
+    width, share = float(bad[0] - at), 0.5
+    if bad[1] is not None and bad[1] > max(1.0, good.small_gain):
+        share = min(max((_AIM - good.small_gain) / (bad[1] - good.small_gain), 0.2), 0.8)
+    return Fraction(f"{float(at) + share * width:.3g}")
+
+
+def reached_delay(step: Fraction, attempt: Attempt, first: Fraction) -> Guarantee | None:
+    """The same for any kind of design, an attempt at a delay [s], and the one to try first."""
+    return _last(reached(attempt, first, most=MOST_DELAY * step))
+
+
+def reached_again(attempt: Attempt, search: Callable[[Attempt], Guarantee | None], *question: Any) -> Guarantee | None:
+    """What a search for the longest time ends with, tried at once where it ended before; each attempt is for itself.
+
+    Parameters
+    ----------
+    attempt : callable
+        What it answers depends on the time [s] and the question alone.
+    search : callable
+        Of an attempt.
+    *question
+        Values that say everything, see `quakedesign.cache`.
+    """
+    made: dict[Fraction, Guarantee | NoGuarantee] = {}
+
+    def once(time: Fraction) -> Guarantee | NoGuarantee:
+        if time not in made:
+            made[time] = attempt(time)
+        return made[time]
+
+    def ended() -> list[str]:
+        last = search(once)
+        return [str(time) for time, found in made.items() if found is last]
+
+    for time in search_once(ended, "reach", *question):
+        if isinstance(found := once(Fraction(time)), Guarantee):
+            return found
+    return search(once)
+
+
+def _last(found: tuple[Guarantee, ...]) -> Guarantee | None:
+    return found[-1] if found else None
+
+
+def reached(
+    attempt: Attempt, first: Fraction, *, most: Fraction | None = None, attempts: int = _ATTEMPTS
+) -> tuple[Guarantee, ...]:
+    """Guarantees at growing times: twice the first and so on or half of it, then by bisection.
+
+    It ends without any where half the time brings the small gain too little nearer to 1.
+
+    Parameters
+    ----------
+    attempt : callable
+    first : Fraction
+        Time to try first [s].
+    most : Fraction, optional
+        Longest time to try [s].
+    attempts : int
+        Number of times at most.
+    """
+    found: list[Guarantee] = []
+    time, good, bad, small_gain = first, None, None, None
+    for _ in range(attempts):
+        answer = attempt(time)
+        if isinstance(answer, Guarantee):
+            found.append(answer)
+            good = time
+        else:
+            if good is None and not _nearer(answer.small_gain, small_gain):
+                break
+            bad, small_gain = time, answer.small_gain
+        if good is not None and (good == most or (bad is not None and bad - good <= _NEAR * bad)):
+            break
+        time = _next(good, bad, most)
+    return tuple(found)
+
+
+def _nearer(now: Fraction | float | None, before: Fraction | float | None) -> bool:
+    """Whether twice what half the time has brought would bring the small gain below 1, or may: nothing is known."""
+    return now is None or before is None or now - 2 * (before - now) < 1
+
+
+def _next(good: Fraction | None, bad: Fraction | None, most: Fraction | None) -> Fraction:
+    """Time to try, in three digits between two others."""
+    if good is not None and bad is not None:
+        return Fraction(f"{float(good + bad) / 2:.3g}")
+    if good is None:
+        assert bad is not None
+        return bad / 2
+    return 2 * good if most is None else min(2 * good, most)
+
+
+# ----------------------------------------------------------------------
+# How fast a fault can slip at most under a given e-LQR whose pressure acts at once, as the theorem proves it.
+
+CLASSES = ("amplitude", "rate")
+
+
+def certified_peaks(
+    fault: Fault, controller: ExtendedLQR, *, disturbance_class: str = "amplitude"
+) -> ContinuousPeaks | NoGuarantee:
+    """Bounds of slip, slip rate and pressure in continuous time, of everything that reference and disturbance cause.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : ExtendedLQR
+        With either feedback.
+    disturbance_class : str
+        ``"amplitude"``: any measurable disturbance as large as the fault's; ``"rate"``: no faster either.
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown class.
+    ParameterError
+        For a law that starts with a pressure other than zero, friction with a state, or the class ``rate`` and a
+        disturbance that does not start at 0.
+    """
+    require_known(disturbance_class, CLASSES, "disturbance class", UnknownNameError)
+    if controller.offset:
+        raise ParameterError("a certified peak needs a law that starts with p = 0. Received one with an offset.")
+    law = exact_integrals(tuple(controller.gains.values()), of_state=controller.feedback == "state")
+    needed = 1 + any(law.of_reference)
+    if len(law.states) < needed:
+        few = f"too few integrals for feedback of the {controller.feedback}: {needed} needed, {len(law.states)} in use"
+        return NoGuarantee(reason=few, small_gain=None)
+    found, limits = continuous_peaks(task_of(fault, rate_limited=disturbance_class == "rate"), law), controller.limits
+    if limits is None or isinstance(found, NoGuarantee):
+        return found
+    low, high = found.claims.least_pressure, found.claims.largest_pressure
+    if limits.lowest < low and high < limits.highest:
+        return found
+    reason = f"the pressure may reach a limit of the law, from {low.quantity('Pa')} to {high.quantity('Pa')}"
+    return NoGuarantee(reason=reason, small_gain=None)

@@ -1,0 +1,566 @@
+"""LQG designs of sampled laws for a fault behind a lag or a diffusion path.
+
+Chapters: regulator by a discrete Riccati equation on fault and path; parametrised families of laws for
+searches; e-LQR with Kalman observer for slow sliding, in scaled variables; linearised fault in slow
+sliding and its poles.
+"""
+
+from cmath import sqrt
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import exp, log10
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from scipy.linalg import LinAlgError, expm, solve_discrete_are
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import fraction_of, rational, shortly, to_sympy
+from quakedesign.fault import Fault
+from quakedesign.guarantees.exact.loop import Around
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.guarantees.search.estimate import rounded, short
+from quakedesign.laws import (
+    ErrorPrediction,
+    LinearLaw,
+    NominalModel,
+    PathModel,
+    Prediction,
+    disturbance_estimate,
+    estimate_through_path,
+    observer_through_path,
+    slip_observer,
+)
+from quakedesign.laws.sampled_law import Row
+from quakedesign.loop import SHORTEST, Layer, SlidingModel
+from quakedesign.loop.layer import MODES
+from quakedesign.loop.sensing.differentiator import ORDER, names_before, told_by_differences
+from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_rate
+
+# ----------------------------------------------------------------------
+# Laws for a fault behind a lag or a layer of rock: gains of a discrete Riccati equation on fault and path.
+
+THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # where good laws were seen
+BEHIND_LAG = ((-2.4, -6.0, 0.3), (-1.0, -4.0, 0.5))
+_MOST_STATES = 20  # of a loop
+_WITHOUT_PATH = 6  # e1, e2, π2, d, the valve, its last step or the well, of a law that does not know the lag
+
+
+def path_modes(step: Fraction, around: Around, *, observed: bool = False) -> int:
+    """How many modes of a layer a law may know so that the loop keeps within the states of a file; 0 without one.
+
+    Below 0 there are too many states even so. A law of the slip alone has one state more.
+    """
+    ages = -int(-around.get("delay", Fraction(0)) // step)
+    layer, behind = MODES if around.get("diffusion") else 0, bool(around.get("lag"))
+    free = _MOST_STATES - _WITHOUT_PATH - layer - behind - 2 * ages - observed
+    return free if layer else min(free, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class PathFeedback:
+    """A model of fault and path, and the feedback of both by a linear quadratic regulator on the sampled pair."""
+
+    model: PathModel
+    gain: Fraction
+    flow: np.ndarray
+    first: np.ndarray
+    unit: float
+    push: float
+
+    @classmethod
+    def of(cls, model: NominalModel, step: Fraction, around: Around, *, observed: bool = False) -> "PathFeedback":
+        """With as many modes of a layer as a law may know, of the slip alone if `observed`."""
+        gain = float(model.gain)
+        flow, first = _sampled(model, step, around, path_modes(step, around, observed=observed))
+        path = PathModel(
+            of_errors=rounded(flow[:2, :2]),
+            of_pressures=rounded(flow[:2, 2:] / gain),
+            of_asked=rounded([first[:2] / gain])[0],
+            kept=rounded(flow[2:, 2:]),
+        )
+        unit = float(around.get("diffusion") or step + around.get("delay", 0) + around["lag"])
+        return cls(path, short(gain), flow, first, unit, unit * gain)
+
+    def gains(self, slip: float, pressure: float) -> Row:
+        """For logarithms of the weights of slip error and pressure, that of the slip-rate error being 1.
+
+        Time is in L²/D or, without a layer, in what passes before a pressure acts.
+
+        Raises
+        ------
+        LinAlgError
+            Where the Riccati equation has no solution.
+        """
+        weights = np.zeros(self.flow.shape)
+        weights[0, 0], weights[1, 1] = exp(slip) / self.unit**2, 1
+        cost = exp(pressure) * self.push**2
+        riccati = solve_discrete_are(self.flow, self.first[:, None], weights, np.array([[cost]]))
+        found = self.first @ riccati @ self.flow / (cost + self.first @ riccati @ self.first)
+        return tuple(short(float(v)) for v in found)
+
+
+def _sampled(model: NominalModel, step: Fraction, around: Around, modes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Over one period: what becomes of e1, e2, the path's pressures and those asked for before, and of p [Pa]."""
+    delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
+    whole, late = int(delay // step), float(delay % step)
+    ages = whole + (late > 0)
+    lagging, layer = int(lag > 0), Layer(time=around.get("diffusion") or lag)
+    size = 2 + lagging + modes
+    shares = np.array([float(layer.share(i)) for i in range(modes)])
+    rates = np.array([float(layer.rate(i)) for i in range(modes)])
+    flow = np.zeros((size + 1, size + 1))  # the last one is the valve's pressure
+    well = 2 if lagging else size
+    flow[0, 1] = 1
+    flow[1, :2] = float(model.slip), -float(model.rate)
+    flow[1, size - modes : size] = float(model.gain) * shares
+    flow[1, well] += float(model.gain) * (1 - shares.sum())
+    if lagging:
+        flow[2, [2, size]] = -1 / float(lag), 1 / float(lag)
+    for i, rate in enumerate(rates):
+        mode = size - modes + i
+        flow[mode, mode], flow[mode, well] = -rate, rate
+    whole_size = size + ages + 1  # with p last
+    period = np.eye(whole_size)
+    for valve, duration in ((size + ages - 1, late), (size + whole - 1 if whole else size + ages, float(step) - late)):
+        part = expm(flow * duration)
+        turn = np.eye(whole_size)
+        turn[:size, :size], turn[:size, valve] = part[:size, :size], part[:size, size]
+        period = turn @ period if duration else period
+    if ages:
+        period[size:-1] = 0
+        period[size, -1] = 1
+        period[range(size + 1, size + ages), range(size, size + ages - 1)] = 1
+    return period[:-1, :-1], period[:-1, -1]
+
+
+# ----------------------------------------------------------------------
+# Laws of a few numbers without units for one model, T_s and delay, among which searches choose.
+
+MEASURED = ("slip-and-rate", "slip", "differentiator")
+_STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
+_NOT_BY_DIFFERENCES = ("diffusion", "lag", "initial_slip", "initial_slip_rate", "jitter", "averaging")
+_GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same where the slip rate is told late
+_OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains, and decades above what noise allows
+_DECADES = 4.0  # of process noise over that of the measurement, at most, at the start
+_FEWEST_MODES = 2  # of a layer, of a law that knows its path
+_WIDEST = 12.0  # decades, or exponents of weights, at which Riccati equations are still solved well
+_FAINT = 1e-12  # process noise of everything, so that the filter forgets its start
+
+
+@dataclass(frozen=True, slots=True)
+class LawFamily:
+    """Laws of numbers x, where to begin, which x make one, and what ``tracking`` may spend of the smallest peak.
+
+    The slip error counts over `period` [s] beside the slip-rate error, so that a loop does not creep.
+    """
+
+    law: Callable[[np.ndarray], LinearLaw]
+    starts: tuple[tuple[float, ...], ...]
+    admits: Callable[[np.ndarray], bool]
+    room: float
+    period: Fraction
+
+
+def measured_by(law: LinearLaw) -> str:
+    """Which of `MEASURED` a law is for."""
+    return MEASURED[2] if law.states[-ORDER:] == names_before() else MEASURED[law.of_slip_alone]
+
+
+def require_surroundings(around: Around) -> None:
+    """Refuse rock and noise below zero.
+
+    Raises
+    ------
+    ParameterError
+    """
+    told: dict[str, Any] = {**around}
+    for name, unit in (("diffusion", "s"), ("slip_noise", "m"), ("rate_noise", "m/s")):
+        value = told.get(name, Fraction(0))
+        if value < 0:
+            what = name.replace("_", " ")
+            raise ParameterError(f"{what} must be 0 or more. Received {shortly(value)} {unit}. Leave out the sign.")
+
+
+def why_no_law(step: Fraction, measured: str, around: Around) -> str:
+    """Why there are no laws for a loop; empty if there are."""
+    if around.get("longest_step") and measured != MEASURED[0]:
+        return "samples that follow no clock are designed for with slip and slip rate measured"
+    if measured == MEASURED[2] and any(around.get(name) for name in _NOT_BY_DIFFERENCES):
+        return "what a differentiator tells is known from rest, at the instants of a clock, without a lag or rock"
+    if not around.get("diffusion"):
+        return ""
+    if SHORTEST * around["diffusion"] < step:
+        return f"a layer of L^2/D = {float(around['diffusion']):.4g} s is faster than T_s/{SHORTEST}; leave it out"
+    known = path_modes(step, around, observed=measured == "slip") >= _FEWEST_MODES
+    return "" if known else "a law that knows delay and layer has too many states"
+
+
+def family_of(task: Task, step: Fraction, measured: str, around: Around) -> LawFamily:
+    """Feedback with an estimate of the disturbance, from slip and slip rate, from the slip alone or a differentiator.
+
+    Through a lag or a layer it is a feedback of the pressures on their way as well, which the law simulates.
+
+    Parameters
+    ----------
+    task : Task
+    step : Fraction
+        T_s [s].
+    measured : str
+        One of `MEASURED`.
+    around : Around
+        Near the bound of whose noise of the slip an observer's search begins; `why_no_law` must have no reason.
+    """
+    if measured == MEASURED[2]:
+        told = family_of(task, step, MEASURED[0], around)
+        return replace(told, law=lambda x: told_by_differences(told.law(x), step), starts=(*_GENTLE, *told.starts))
+    delay = around.get("delay", Fraction(0))
+    observed, noise = measured == "slip", around.get("slip_noise", Fraction(0))
+    if around.get("diffusion") or (around.get("lag") and path_modes(step, around, observed=observed) >= 0):
+        return (_observers_through_path if observed else _through_path)(task, step, around)
+    if observed:
+        return _observers(task, step, delay, noise)
+    scale, prediction = _Scale.of(task, step), _ahead(task, step, delay)
+    expected = Prediction(
+        of_slip=prediction.of_errors[1][0],
+        of_rate=prediction.of_errors[1][1],
+        of_pushes=tuple(v[1] for v in prediction.of_pushes),
+        ahead=prediction.ahead,
+        ahead_of_pushes=prediction.ahead_of_pushes,
+    )
+
+    def law(x: np.ndarray) -> LinearLaw:
+        return disturbance_estimate(scale.gains(x), short(float(x[2])), expected, scale.gain)
+
+    return LawFamily(law, _STARTS, lambda x: bool(0 < x[2] < 1), room=1.6, period=step)
+
+
+def _through_path(task: Task, step: Fraction, around: Around) -> LawFamily:
+    feedback = PathFeedback.of(task.model, step, around)
+
+    def law(x: np.ndarray) -> LinearLaw:
+        slip, pressure, weight = map(float, x)
+        return estimate_through_path(feedback.gains(slip, pressure), short(weight), feedback.model, feedback.gain)
+
+    def admits(x: np.ndarray) -> bool:
+        return bool(0 < x[2] < 1 and np.abs(x[:2]).max() < _WIDEST)
+
+    return LawFamily(law, _path_starts(around), admits, room=1.6, period=step + around.get("diffusion", 0))
+
+
+def _observers_through_path(task: Task, step: Fraction, around: Around) -> LawFamily:
+    feedback, kalman = PathFeedback.of(task.model, step, around, observed=True), _Kalman.of(task, step)
+    decades = kalman.decades(task, around.get("slip_noise", Fraction(0)))
+
+    def law(x: np.ndarray) -> LinearLaw:
+        gains, corrections = feedback.gains(float(x[0]), float(x[1])), kalman.corrections(float(x[2]), float(x[3]))
+        return observer_through_path(gains, corrections, feedback.model, feedback.gain)
+
+    noisy = [(decades + acceleration, decades + level) for *_, acceleration, level in _OBSERVERS]
+    starts = tuple((*path[:2], *above) for path, above in zip(_path_starts(around), noisy, strict=False))
+    return LawFamily(law, starts, _solvable, room=1.4, period=step + around.get("diffusion", 0))
+
+
+def _path_starts(around: Around) -> tuple[tuple[float, float, float], ...]:
+    return THROUGH_ROCK if around.get("diffusion") else BEHIND_LAG
+
+
+def _solvable(x: np.ndarray) -> bool:
+    return bool(np.abs(x).max() < _WIDEST)
+
+
+def _observers(task: Task, step: Fraction, delay: Fraction, noise: Fraction) -> LawFamily:
+    """Steady-state Kalman observers: two gains, decades of the variances of accelerations and of the level's steps."""
+    scale, prediction, kalman = _Scale.of(task, step), _ahead(task, step, delay), _Kalman.of(task, step)
+
+    def law(x: np.ndarray) -> LinearLaw:
+        return slip_observer(scale.gains(x), kalman.corrections(float(x[2]), float(x[3])), prediction, scale.gain)
+
+    decades = kalman.decades(task, noise)
+    starts = tuple((k1, k2, decades + a, decades + b) for k1, k2, a, b in _OBSERVERS)
+    return LawFamily(law, starts, lambda x: _solvable(x[2:]), room=1.4, period=step)
+
+
+@dataclass(frozen=True, slots=True)
+class _Kalman:
+    """Filters of slip error, slip-rate error and a level of all accelerations, from the slip: of one T_s [s]."""
+
+    follows: np.ndarray
+    units: np.ndarray
+    step: float
+
+    @classmethod
+    def of(cls, task: Task, step: Fraction) -> "_Kalman":
+        period = float(step)
+        units = np.diag([1, 1 / period, 1 / period**2])
+        return cls(np.linalg.inv(units) @ expm(_flow(task) * period) @ units, units, period)
+
+    def decades(self, task: Task, noise: Fraction) -> float:
+        """Where a search begins: of what the disturbance moves within T_s, over the noise [m]."""
+        moved = float(task.amplitude) * self.step**2
+        return _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
+
+    def corrections(self, acceleration: float, level: float) -> tuple[Fraction, Fraction, Fraction]:
+        """Per innovation of the slip, whose noise has the variance 1, by the Riccati equation of the filter."""
+        pushed = self.follows[:, 2] * [1, 1, 0]
+        process = 10**acceleration * np.outer(pushed, pushed) + np.diag([0, 0, 10**level]) + _FAINT * np.eye(3)
+        covariance = solve_discrete_are(self.follows.T, np.eye(3)[:, :1], process, np.eye(1))
+        first, second, third = self.units @ covariance[:, 0] / (covariance[0, 0] + 1)
+        return short(float(first)), short(float(second)), short(float(third))
+
+
+@dataclass(frozen=True, slots=True)
+class _Scale:
+    """β0·b of the model, in a few digits [m²/kg], and T_s [s]."""
+
+    gain: Fraction
+    model_gain: float
+    step: float
+
+    @classmethod
+    def of(cls, task: Task, step: Fraction) -> "_Scale":
+        gain = float(task.model.gain)
+        return cls(short(gain), gain, float(step))
+
+    def gains(self, x: np.ndarray) -> tuple[Fraction, Fraction]:
+        """k1 [Pa/m] and k2 [Pa·s/m]."""
+        return short(float(x[0]) / self.model_gain / self.step**2), short(float(x[1]) / self.model_gain / self.step)
+
+
+def _flow(task: Task) -> np.ndarray:
+    """Of e1, e2 and a constant push."""
+    return np.array([[0, 1, 0], [float(task.model.slip), -float(task.model.rate), 1], [0, 0, 0]])
+
+
+def _ahead(task: Task, step: Fraction, delay: Fraction) -> ErrorPrediction:
+    """What the model says of the next sample, and of the time at which a pressure arrives; numbers of four digits."""
+    flow, period, late = _flow(task), float(step), float(delay)
+
+    def pushed(duration: float) -> np.ndarray:
+        """Errors after a unit push for some time."""
+        return np.array(expm(flow * duration))[:2, 2]
+
+    whole, part = int(delay // step), float(delay % step)
+    ages = whole + (1 if part else 0)
+    pushes = [np.zeros(2)] * (ages + 1)
+    pushes[whole] = pushed(period - part)
+    if part:
+        pushes[whole + 1] = pushed(period) - pushes[whole]
+    arriving = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in range(1, ages + 1)]
+    return ErrorPrediction(
+        of_errors=rounded(expm(flow * period)[:2, :2]),
+        of_pushes=rounded(pushes),
+        ahead=rounded(expm(flow * late)[:2, :2]),
+        ahead_of_pushes=rounded(arriving),
+    )
+
+
+# ----------------------------------------------------------------------
+# An e-LQR that holds slow sliding: LQ on the sampled plant through its path, fed by a Kalman observer of the slip.
+#
+# The model is scaled: slip error in D, pressures and stresses in N, time in 1/ρ = D/V; the law carries the slow modes
+# of
+# the layer of rock and a level of everything that it does not know. Whatever the numbers, its states rest where it
+# asks
+# for a constant pressure without errors: the gain of the level, and how the level moves the slip, follow from that.
+
+SLIDING_MODES = 4
+_DIGITS = 9
+_LEAST = 1e-12  # cost of what costs nothing, so that Riccati's equation has one solution
+_ZERO, _ONE = Fraction(0), Fraction(1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weights:
+    """What LQ and observer trade, in the scaled model.
+
+    Attributes
+    ----------
+    slip, state, pressure : float
+        LQ weights of x², z² and u² beside y².
+    slip_noise, state_noise, level_noise : float
+        Variances of what moves x, z and the level from sample to sample, beside that of the measured x.
+    """
+
+    slip: float
+    state: float
+    pressure: float
+    slip_noise: float
+    state_noise: float
+    level_noise: float
+
+
+FAVOURED = Weights(slip=4.4e-3, state=5.5e-3, pressure=344.0, slip_noise=5.9e3, state_noise=1.4e-4, level_noise=162.0)
+"""Of a search for the smallest worst peak of y under bounded stresses: a = 0.01, b = 0.015, ρL²/D = 1, ρT_s = 0.05."""
+
+
+def sliding_law(
+    model: SlidingModel, step: Fraction, *, diffusion: Fraction = _ZERO, weights: Weights = FAVOURED
+) -> LinearLaw:
+    """Law of samples of the slip error, its pressure held over a step [s] and brought through rock of L²/D [s].
+
+    The pressure is what the law adds to that which the reference needs. States: predicted x, z, the modes of the layer
+    and the level; all scaled.
+
+    Raises
+    ------
+    ParameterError
+        When no gains are found: the step, or the way through the rock, is too long for the instability.
+    """
+    layer = Layer(time=diffusion * model.state_rate) if diffusion else None
+    modes = SLIDING_MODES if layer else 0
+    shares = [layer.share(i) for i in range(modes)] if layer else []
+    scaled_step = step * model.state_rate
+    fades = [short(exp(-float(layer.rate(i) * scaled_step)), _DIGITS) for i in range(modes)] if layer else []
+    seen = _reading(model, shares)
+    moved = expm(_sliding_flow(seen, layer, modes) * float(scaled_step))
+    size = 2 + modes
+    own = [[short(v, _DIGITS) for v in row[: size + 2]] for row in moved[:2]]
+    for row in own:  # (x, z, modes, level, pressure): a level that the pressure balances moves nothing
+        row[size] = (sum(row[2:size], _ZERO) + row[size + 1]) / model.coefficient
+    update = [
+        *own,
+        *([*[_ZERO] * (2 + i), fade, *[_ZERO] * (size - 1 - i - 1), 1 - fade] for i, fade in enumerate(fades)),
+        [*[_ZERO] * size, _ONE, _ZERO],
+    ]
+    gains, corrections = _gains(update, seen, weights)
+    gains.append((1 + sum(gains[2:], _ZERO)) / model.coefficient)
+    stress, length = model.weakening / model.evolution, model.rate / model.state_rate
+    return _law(update, gains, corrections, length=length, stress=stress)
+
+
+def _reading(model: SlidingModel, shares: Sequence[Fraction]) -> Any:
+    """y of (x, z, modes, level, pressure), scaled."""
+    normal, length = model.weakening / model.evolution, model.rate / model.state_rate
+    pressure = [*shares, _ZERO, 1 - sum(shares, _ZERO)]
+    row = [-model.stiffness * length / normal, -model.evolution, *(model.coefficient * c for c in pressure)]
+    row[-2] = _ONE
+    return np.array([float(v * normal / model.strength) for v in row])
+
+
+def _sliding_flow(seen: Any, layer: Layer | None, modes: int) -> Any:
+    """Generator of (x, z, modes, level, pressure): x′ = y, z′ = −y − z."""
+    flow = np.zeros((4 + modes, 4 + modes))
+    flow[0], flow[1] = seen, -seen
+    flow[1, 1] -= 1
+    for i in range(modes):
+        speed = float(layer.rate(i)) if layer else 0.0
+        flow[2 + i, 2 + i], flow[2 + i, -1] = -speed, speed
+    return flow
+
+
+def _gains(update: list[list[Fraction]], seen: Any, w: Weights) -> tuple[list[Fraction], list[Fraction]]:
+    """LQ gains on (x, z, modes), and how the observer corrects x, z and the level."""
+    moved = np.array(update, dtype=float)
+    size = len(moved) - 1
+    cost = np.outer(seen[:size], seen[:size]) + np.diag([w.slip, w.state, *[0.0] * (size - 2)]) + _LEAST * np.eye(size)
+    of_state, of_pressure, held = moved[:size, :size], moved[:size, -1:], [0, 1, size]
+    own, told = moved[np.ix_(held, held)], np.array([[1.0, 0.0, 0.0]])
+    try:
+        value = solve_discrete_are(of_state, of_pressure, cost, np.array([[w.pressure]]))
+        spread = solve_discrete_are(own.T, told.T, np.diag([w.slip_noise, w.state_noise, w.level_noise]), np.eye(1))
+    except (LinAlgError, ValueError):
+        raise ParameterError(
+            "slow sliding needs a step and a path that its instability lets be. Received ones for which Riccati's "
+            "equation has no solution. Shorten them."
+        ) from None
+    gains = of_pressure.T @ value @ of_state / (w.pressure + of_pressure.T @ value @ of_pressure)
+    corrections = spread[:, 0] / (spread[0, 0] + 1)
+    return [short(v, _DIGITS) for v in gains[0]], [short(v, _DIGITS) for v in corrections]
+
+
+def _law(
+    update: list[list[Fraction]],
+    gains: list[Fraction],
+    corrections: list[Fraction],
+    *,
+    length: Fraction,
+    stress: Fraction,
+) -> LinearLaw:
+    """u = −K(π + l(x − π_x)), π⁺ = A(π + l(x − π_x)) + Bu, with the slip in m and the pressure in Pa outside."""
+    size = len(gains)
+    spread = [corrections[0], corrections[1], *[_ZERO] * (size - 3), corrections[2]]
+    closed = [[row[j] - row[size] * gains[j] for j in range(size)] for row in update]
+
+    def of_measured(row: Sequence[Fraction]) -> Fraction:
+        return sum((v * c for v, c in zip(row, spread, strict=True)), _ZERO)
+
+    def of_predicted(row: Sequence[Fraction]) -> list[Fraction]:
+        return [v - of_measured(row) * (j == 0) for j, v in enumerate(row)]
+
+    return LinearLaw(
+        states=("slip", "state", *(f"mode{i}" for i in range(size - 3)), "level"),
+        update=tuple(tuple(of_predicted(row)) for row in closed),
+        measured=tuple((of_measured(row) / length, _ZERO) for row in closed),
+        output=tuple(-stress * v for v in of_predicted(gains)),
+        feedback=(-stress * of_measured(gains) / length, _ZERO),
+    )
+
+
+# ----------------------------------------------------------------------
+# A fault with rate-and-state friction about slow sliding along its task, linearised, and its poles.
+
+_SLIDING_MODEL_ONE, _NEAR = Fraction(1), Fraction(1, 10)
+
+
+def sliding_model(fault: Fault) -> SlidingModel:
+    """A fault about sliding along its task at the mean rate V, linearised; η and k with it, at the pressure 0.
+
+    Raises
+    ------
+    UnsupportedError
+        For friction without a state.
+    """
+    law = fault.friction.exact()
+    errors = sliding_errors(law)
+    rate = mean_rate(fault)
+    at = {sliding_rate: to_sympy(rate)}
+    direct, evolution = (_number(slope.subs(at)) for slope in errors.slopes)
+    normal = rational(fault.effective_normal_stress)
+    return SlidingModel(
+        rate=rate,
+        state_rate=_number(errors.decays[1].subs(at)),
+        slope=_SLIDING_MODEL_ONE,
+        state_slope=_SLIDING_MODEL_ONE,
+        strength=normal * direct + rational(fault.damping) / (fault.squares * rational(fault.side) ** 2) * rate,
+        weakening=normal * evolution,
+        direct=direct,
+        evolution=evolution,
+        stiffness=rational(fault.shear_modulus) / rational(fault.side),
+        coefficient=_number(law.steady_coefficient(to_sympy(rate))),
+    )
+
+
+def mean_rate(fault: Fault) -> Fraction:
+    """V [m/s]: the target slip over the operation time."""
+    return rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
+
+
+def near_path(model: SlidingModel) -> Fraction:
+    """L²/D [s] of rock that hardly delays the pressure: a tenth of the time in which the state ages, D_c/V."""
+    return _NEAR / model.state_rate
+
+
+def growth_rate(model: SlidingModel) -> float:
+    """Real part of the fastest eigenvalue [1/s] about steady sliding, without control."""
+    return max(pole.real for pole in sliding_poles(model))
+
+
+def sliding_poles(model: SlidingModel) -> tuple[complex, complex]:
+    """Both eigenvalues [1/s] about steady sliding, without control.
+
+    With x in D they are those of ρ((−κ, −β), (κ, β − 1)), κ = KD/S, β = weakening/S, S = strength.
+    """
+    speed, length = float(model.state_rate), model.rate / model.state_rate
+    kappa, beta = (float(v / model.strength) for v in (model.stiffness * length, model.weakening))
+    trace = beta - 1 - kappa
+    root = sqrt(trace**2 - 4 * kappa)
+    return speed * (trace + root) / 2, speed * (trace - root) / 2
+
+
+def _number(expression: Any) -> Fraction:
+    """Rational near a SymPy number; itself if it is rational."""
+    value = expression if expression.is_Rational else sp.N(expression, 30)
+    return fraction_of(value) if value.is_Rational else rational(str(value))

@@ -1,0 +1,520 @@
+"""Search for slow-sliding laws with a guarantee over a box of friction constants.
+
+The second chapter finds how distant a well, or how fast the sliding, may be, by continuation from an easy
+case.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import floor, log10
+from typing import Any, Unpack
+
+import numpy as np
+from scipy.optimize import OptimizeResult, minimize
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import UpperBound, rational
+from quakedesign.fault import Fault
+from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, sliding_step
+from quakedesign.guarantees.exact.fault_data import sliding_task
+from quakedesign.guarantees.exact.loop import Around, Held
+from quakedesign.guarantees.exact.sliding_small_gain import (
+    SlidingClaims,
+    after_a_step,
+    bounds_from,
+    cell_bounds,
+    follows,
+    loop_of,
+    model_of,
+)
+from quakedesign.guarantees.exact.sliding_task import MOST_CELLS, Cuts, SlidingTask, parts
+from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.statement import SlidingGuarantee
+from quakedesign.guarantees.search.estimate import gains_of, short, spectral_radius
+from quakedesign.guarantees.search.lqg import Weights, sliding_law
+from quakedesign.laws import LinearLaw
+from quakedesign.loop import PeriodicLoop, SlidingModel
+from quakedesign.lyapunov import Verdict
+
+# ----------------------------------------------------------------------
+# A law that holds slow sliding, chosen by what can be guaranteed of it, and cells that cover a box of constants.
+
+LOG_RATES = (Fraction(1, 2), Fraction(1, 4), Fraction(1, 8))
+"""Bounds of |ln(v/V)| in the order in which they are tried: the sectors of a smaller one are narrower."""
+_STARTS = (
+    (-1.02, -1.74, 6.76, 0.97, -5.19, 3.11, -0.06, 0.39, -0.12),
+    (-6.0, -0.9, 4.6, 1.2, -5.9, 2.3, -0.17, 0.52, -0.05),
+)
+"""Logarithms of the weights and of what a, b and D of the law's model are over the fault's: ρL²/D = 1, ρT_s = 0.06."""
+_SIMPLEX = (0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.05, 0.05, 0.05)
+_EVALUATIONS = 120
+_HOPELESS = 60  # laws after which a search ends that has found none with bounds
+_POOR, _PATIENCE = 2.0, 40  # cost of the best of so many laws with which a search ends: too far from 1
+_FORGETTING = 0.972  # largest eigenvalue of a period, so that the proof need not sum many
+_GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}  # over Y, pressures in 2a of the normal stress
+_TURNS = 6
+_SHRINKING = 24
+_MEASURED = 2
+_SPARE = 1.02
+_ROOM = 1.05  # of claims over what an estimate gives
+_NEAR = 0.89  # by which an estimate has to be better than its claims, as the proof's sums are larger
+_FAILED = 50.0
+_SMALL = Fraction(1, 10**4)  # of the normal stress
+_DIGITS, _SHORT = 6, 3
+_ENDS = {"direct_effect": 0, "evolution_effect": 1, "critical_slip": 0}  # of the ranges at the worst corner
+_AXES = tuple(_ENDS)
+_NAMES = tuple(SlidingClaims.__dataclass_fields__)
+
+
+def proved_sliding(
+    task: SlidingTask, held: Held, *, log_rate: Fraction = LOG_RATES[0]
+) -> SlidingGuarantee | NoGuarantee:
+    """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or why there are none."""
+    corner = worst_corner(task)
+    claims = _claims(corner, held, log_rate)
+    if claims is None or (corner != task and _excess(corner, held, claims) >= _NEAR):
+        return NoGuarantee(reason=_too_much(task, log_rate), small_gain=None)
+    try:
+        cuts = _cut(task, held, claims, [MOST_CELLS - 1])
+        by_estimate = SlidingGuarantee(task=task, held=held, cuts=cuts, claims=claims)
+        smaller = replace(by_estimate, claims=_smallest_claims(by_estimate))
+        if smaller.check() is Verdict.PROVED:
+            return smaller
+        _cut(corner, held, claims, [0], exactly=True)  # no cuts of a box help where this does not do
+        return replace(by_estimate, cuts=_cut(task, held, claims, [MOST_CELLS - 1], exactly=True))
+    except ParameterError:
+        return NoGuarantee(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box", small_gain=None)
+
+
+def _smallest_claims(found: SlidingGuarantee) -> SlidingClaims:
+    """What claims that follow from themselves on every cell come to if followed from again and again.
+
+    By the estimate times what the bounds are more than it, measured on the worst cell. All that is bounded grows with
+    the claims, so that what follows from claims follows from itself as well.
+    """
+    claims = found.claims
+    for _ in range(_MEASURED):
+        worst = max(found.cells, key=lambda cell: _excess(cell, found.held, claims))
+        bounds, estimate = cell_bounds(worst, found.held, claims), _estimate(worst, found.held, claims)
+        if isinstance(bounds, NoGuarantee) or estimate is None:
+            break
+        room = {name: _SPARE * float(bounds[name]) / float(estimate[name]) for name in _NAMES}
+        claims = _followed(found, claims, room)
+    return claims
+
+
+def _followed(found: SlidingGuarantee, claims: SlidingClaims, room: Mapping[str, float]) -> SlidingClaims:
+    """Claims that follow by the estimate, with room, until they hardly change."""
+    for _ in range(_SHRINKING):
+        every = [_estimate(cell, found.held, claims) for cell in found.cells]
+        if any(one is None for one in every):
+            break
+        most = {name: max(float(one[name]) for one in every if one) for name in room}
+        following = {name: min(most[name] * v, float(getattr(claims, name))) for name, v in room.items()}
+        still = all(v > 0.99 * float(getattr(claims, name)) for name, v in following.items())
+        claims = _as_claims(following)
+        if still:
+            break
+    return claims
+
+
+def largest_stress(task: SlidingTask, held: Held, *, log_rate: Fraction = LOG_RATES[0]) -> Fraction:
+    """About the largest stress [Pa] for which `proved_sliding` may succeed, with two digits; 0 for none."""
+    corner = worst_corner(task)
+    claims, some = _guess(corner, log_rate), _SMALL * corner.ranges["normal_stress"][0]
+    found = [_estimate(replace(corner, stress=stress), held, claims) for stress in (Fraction(0), some)]
+    rest, more = (0.0 if one is None else float(one["log_rate"]) for one in found)
+    room = (1 if corner == task else _NEAR) * _NEAR * float(log_rate) - rest
+    if None in found or room <= 0:
+        return Fraction(0)
+    return two_digits(Fraction(float(some) * room / (more - rest)))
+
+
+def two_digits(value: Fraction) -> Fraction:
+    """At most a positive rational, with two digits."""
+    scale = Fraction(10) ** (floor(log10(value)) - 1)
+    return floor(value / scale) * scale
+
+
+def designed_sliding(
+    task: SlidingTask,
+    step: Fraction,
+    *,
+    log_rate: Fraction = LOG_RATES[0],
+    near: np.ndarray | None = None,
+    **around: Unpack[Around],
+) -> Held | NoGuarantee:
+    """The law with the smallest estimated bounds at the least stable corner of the box, |ln(v/V)| up to `log_rate`.
+
+    The search begins `near` the numbers of a law as well, if they are told.
+    """
+    chosen, _ = searched_sliding(task, step, log_rate, around, near=near)
+    if chosen is not None:
+        return chosen
+    ageing = float(task.ranges["critical_slip"][0] / task.rate)
+    path = "".join(f", {title} = {float(v):.4g} s" for title, v in _path(around).items() if v)
+    reason = (
+        f"no law held over {float(step):g} s was found whose loop is stable and forgets within some hundred periods, "
+        f"D_c/V = {ageing:.3g} s{path}"
+    )
+    return NoGuarantee(reason=reason, small_gain=None)
+
+
+def _path(around: Around) -> dict[str, Fraction]:
+    zero = Fraction(0)
+    return {"L^2/D": around.get("diffusion", zero), "lag": around.get("lag", zero), "delay": around.get("delay", zero)}
+
+
+def searched_sliding(
+    task: SlidingTask,
+    step: Fraction,
+    log_rate: Fraction,
+    around: Around,
+    *,
+    near: np.ndarray | None = None,
+    enough: float = 0.0,
+    most: int = _EVALUATIONS,
+) -> tuple[Held | None, np.ndarray]:
+    """A law with small estimated bounds, None for none, and its numbers, near which another search may begin.
+
+    Parameters
+    ----------
+    task : SlidingTask
+    step, log_rate, around
+        As of `designed_sliding`.
+    near : array, optional
+        Numbers to begin with beside the usual ones.
+    enough : float
+        Estimated bound of |ln(v/V)| over `log_rate` with which the search ends.
+    most : int
+        Number of laws that are estimated.
+    """
+    corner = worst_corner(task)
+    claims = _guess(corner, log_rate)
+
+    def held(x: np.ndarray) -> Held | None:
+        law = _law(corner, task, step, around, x)
+        return None if law is None else Held(law=law, step=step, **around)
+
+    costs: list[float] = []
+
+    def cost(x: np.ndarray) -> float:
+        costs.append(estimated(x))
+        return costs[-1]
+
+    def estimated(x: np.ndarray) -> float:
+        tried = held(x)
+        if tried is None:
+            return _FAILED
+        model = model_of(corner, claims)
+        if model is None:
+            return 2 * _FAILED
+        loop = loop_of(tried, model, corner)
+        radius = spectral_radius(loop)
+        if radius > _FORGETTING:
+            return _FAILED + radius
+        found = _estimate_of(loop, corner, tried, claims)
+        return _FAILED / 2 if found is None else float(found["log_rate"] / log_rate)
+
+    def ends(intermediate_result: OptimizeResult) -> None:
+        cost = intermediate_result.fun
+        patience = _HOPELESS if cost >= _FAILED / 2 else _PATIENCE
+        if (cost >= _POOR and len(costs) > patience) or cost <= enough:
+            raise StopIteration
+
+    best = min([np.array(start) for start in _STARTS] + ([] if near is None else [near]), key=cost)
+    if min(costs) <= enough:
+        return held(best), best
+    simplex = np.vstack([best, best + np.diag(_SIMPLEX)])
+    options = {"initial_simplex": simplex, "maxfev": most}
+    reached = minimize(cost, best, method="Nelder-Mead", options=options, callback=ends)
+    return (held(reached.x) if reached.fun < _FAILED / 2 else None), reached.x
+
+
+def worst_corner(task: SlidingTask) -> SlidingTask:
+    """Small a, large b, small D: where the fault is least stable."""
+    fixed = {axis: (task.ranges[axis][end],) * 2 for axis, end in _ENDS.items()}
+    return replace(task, ranges={**task.ranges, **fixed})
+
+
+def _law(corner: SlidingTask, task: SlidingTask, step: Fraction, around: Around, x: np.ndarray) -> LinearLaw | None:
+    sizes = map(float, np.exp(np.clip(x[:6], -30, 30)))
+    weights = Weights(**dict(zip(Weights.__dataclass_fields__, sizes, strict=True)))
+    a, b, d = (_middle(task, axis) * short(float(np.exp(v)), _DIGITS) for axis, v in zip(_AXES, x[6:], strict=True))
+    normal = _middle(task, "normal_stress")
+    model = SlidingModel(
+        rate=task.rate,
+        state_rate=task.rate / d,
+        slope=Fraction(1),
+        state_slope=Fraction(1),
+        strength=normal * a + task.radiation * task.rate,
+        weakening=normal * b,
+        direct=a,
+        evolution=b,
+        stiffness=task.stiffness,
+        coefficient=_middle(task, "coefficient"),
+    )
+    try:
+        return sliding_law(model, step, diffusion=around.get("diffusion", Fraction(0)), weights=weights)
+    except ParameterError:
+        return None
+
+
+def _middle(task: SlidingTask, axis: str) -> Fraction:
+    low, high = task.ranges[axis]
+    return (low + high) / 2
+
+
+def _guess(task: SlidingTask, log_rate: Fraction) -> SlidingClaims:
+    pressure = 2 * task.ranges["direct_effect"][1] * task.ranges["normal_stress"][0] * log_rate
+    return _as_claims(
+        {
+            "log_rate": log_rate,
+            "log_state": _GUESSES["log_state"] * float(log_rate),
+            "slip_error": task.ranges["critical_slip"][1] * log_rate,
+            "push": _GUESSES["push"] * float(pressure),
+            "asked": _GUESSES["asked"] * float(pressure),
+        }
+    )
+
+
+def _as_claims(values: Mapping[str, Any]) -> SlidingClaims:
+    return SlidingClaims(**{name: UpperBound(short(float(v), _SHORT)) for name, v in values.items()})
+
+
+def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims | None:
+    """Claims that follow from themselves, by the estimate, with the bound of y as told; None for none."""
+    claims = _guess(task, log_rate)
+    for _ in range(_TURNS):
+        found = _estimate(task, held, claims)
+        if found is None:
+            return None
+        wider = {k: float(found[k]) * _ROOM / _NEAR for k in _NAMES}
+        if min(float(getattr(claims, k)) / v for k, v in wider.items() if k != "log_rate") >= 1 / _ROOM:
+            break
+        try:
+            claims = _as_claims({**wider, "log_rate": log_rate})
+        except ParameterError:  # larger than claims may be
+            return None
+    else:
+        return None
+    return claims if float(found["log_rate"]) < float(log_rate) else None
+
+
+def _estimate(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
+    model = model_of(task, claims)
+    return None if model is None else _estimate_of(loop_of(held, model, task), task, held, claims)
+
+
+def _estimate_of(loop: PeriodicLoop, task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
+    gains = gains_of(loop)
+    if gains is None:
+        return None
+    count = len(next(iter(gains.values())))
+    ends = [held.step * Fraction(i, count - 1) for i in range(count)] if len(loop.segments) == 1 else None
+    phases = after_a_step(loop)
+    if len(phases) != count:
+        phases = tuple(ends) if ends and loop.fading else (max(phases),) * count
+    found = bounds_from(task, held, claims, loop, gains, phases)
+    return None if isinstance(found, NoGuarantee) else found
+
+
+def _cut(task: SlidingTask, held: Held, claims: SlidingClaims, left: list[int], *, exactly: bool = False) -> Cuts:
+    """Cuts of a box until the claims follow on every cell; `left` counts the cuts that there may still be.
+
+    By the estimate, or `exactly`.
+
+    Raises
+    ------
+    ParameterError
+        When that takes too many.
+    """
+    wide = [axis for axis in _AXES if task.ranges[axis][0] < task.ranges[axis][1]]
+    if _excess(task, held, claims) < (_NEAR if wide else 1):
+        found = cell_bounds(task, held, claims) if exactly else None
+        if not exactly or (isinstance(found, dict) and follows(found, claims)):
+            return (None,)
+    if not wide or left[0] < 1:
+        raise ParameterError(
+            f"a box must fall into at most {MOST_CELLS} cells on which its claims follow. Received one that does not."
+        )
+    left[0] -= 1
+    middles = {axis: (task.ranges[axis][0] + task.ranges[axis][1]) / 2 for axis in wide}
+    halves = {axis: parts(task, axis, at) for axis, at in middles.items()}
+    axis = min(wide, key=lambda name: _excess(halves[name][_ENDS[name]], held, claims))
+    below, above = (_cut(part, held, claims, left, exactly=exactly) for part in halves[axis])
+    return ((axis, middles[axis]), *below, *above)
+
+
+def _excess(task: SlidingTask, held: Held, claims: SlidingClaims) -> float:
+    """How much larger than the claims the bounds may be, by the estimate."""
+    found = _estimate(task, held, claims)
+    if found is None:
+        return _FAILED
+    return max(float(found[k]) / float(getattr(claims, k)) for k in _NAMES)
+
+
+def _too_much(task: SlidingTask, log_rate: Fraction) -> str:
+    return (
+        f"a stress of {float(task.stress):.3g} Pa is not shown to leave |ln(v/V)| below {float(log_rate):.3g} with the "
+        "laws that were tried"
+    )
+
+
+# ----------------------------------------------------------------------
+# How far a well may be, or how fast a fault may slide, for a law to hold it: from near and slow on, law after law.
+#
+# Times in D_c/V, the loop hardly depends on V: a proof for a share of the rock's L²/D is nearly one for that share of
+# V.
+
+Prove = Callable[[SlidingTask, Held, Fraction], SlidingGuarantee | NoGuarantee]
+"""Of a task, a law as it runs and a bound of |ln(v/V)|."""
+
+PATH = {"diffusion": "L^2/D", "lag": "the lag"}
+_EASY = Fraction(1)  # D_c/V through which laws are found at once
+_FARTHER = Fraction(13, 10), Fraction(9, 8), Fraction(17, 16)  # the next one where no law is found farther
+_WELL_ROOM = Fraction(3, 4)
+_NEARER = 3  # times that half the path is tried
+_LAWS = 40  # that are tried for a share of the path
+_ENOUGH = 0.5  # of the bound of |ln(v/V)|, by the estimate
+_SLOWER = 1.05  # spare, as damping does not scale with V
+_WELL_DIGITS = 2
+_SUITABLE = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class WellReach:
+    """How far a well was followed with a law.
+
+    Attributes
+    ----------
+    share : Fraction
+        Of the path [-]; 0 where no law was found.
+    held : Held or None
+        The law there.
+    numbers : array or None
+        Its numbers, near which a search may begin.
+    log_rate : Fraction
+        Bound of |ln(v/V)| of its estimate.
+    """
+
+    share: Fraction = Fraction(0)
+    held: Held | None = None
+    numbers: np.ndarray | None = None
+    log_rate: Fraction = LOG_RATES[-1]
+
+
+def suitable(task: SlidingTask, step: Fraction) -> Fraction:
+    """T_s [s] if it is within twice D_c/(20 V), or else that."""
+    suits = task.ranges["critical_slip"][0] / task.rate / int(AGEINGS)
+    return step if suits / _SUITABLE <= step <= _SUITABLE * suits else two_digits(suits)
+
+
+def farthest(
+    task: SlidingTask, step: Fraction, around: Around, *, stressed: bool, most: Fraction = Fraction(1)
+) -> WellReach:
+    """How much of a path, lag and rock, a law can be followed along, from where one is easily found.
+
+    Parameters
+    ----------
+    task : SlidingTask
+    step : Fraction
+        T_s [s].
+    around : Fraction
+        As of `designed_sliding`; with a lag or rock.
+    stressed : bool
+        Whether the stress of the task is given, so that larger bounds of |ln(v/V)| may be needed.
+    most : Fraction
+        Largest share.
+    """
+    ageing = task.ranges["critical_slip"][0] / task.rate
+    rates = LOG_RATES[::-1] if stressed else LOG_RATES[-1:]
+    reached = WellReach()
+    share = min(most, _EASY * ageing / (around.get("lag", Fraction(0)) + around.get("diffusion", Fraction(0))))
+    for _ in range(1 + _NEARER):
+        reached = _followed_well(task, step, around, share, reached, rates)
+        if reached.share:
+            break
+        share /= 2
+    farther = list(_FARTHER)
+    while 0 < reached.share < most and farther:
+        share = min(most, farther[0] * reached.share)
+        reached = _followed_well(task, step, around, share, reached, rates)
+        if reached.share < share:
+            farther.pop(0)
+    if 0 < reached.share < most:  # with room for a proof, whose bounds are larger than their estimate
+        return _followed_well(task, step, around, _WELL_ROOM * reached.share, reached, rates)
+    return reached
+
+
+def _followed_well(
+    task: SlidingTask, step: Fraction, around: Around, share: Fraction, before: WellReach, rates: tuple[Fraction, ...]
+) -> WellReach:
+    """A law for a share of the path, near the one before, or that one where none is found."""
+    for log_rate in rates:
+        held, numbers = searched_sliding(
+            task, step, log_rate, shortened(around, share), near=before.numbers, enough=_ENOUGH, most=_LAWS
+        )
+        if held is not None:
+            return WellReach(share=share, held=held, numbers=numbers, log_rate=log_rate)
+    return before
+
+
+def shortened(around: Around, share: Fraction) -> Around:
+    """Share of lag and rock."""
+    nearer = around.copy()
+    if "lag" in around:
+        nearer["lag"] = share * around["lag"]
+    if "diffusion" in around:
+        nearer["diffusion"] = share * around["diffusion"]
+    return nearer
+
+
+def what_would_do(
+    fault: Fault, task: SlidingTask, reach: WellReach, around: Around, prove: Prove, *, spread: Fraction
+) -> str:
+    """For which part of a path, and for which V through all of it, a proof was found; in words, for a `reach` below 1.
+
+    Parameters
+    ----------
+    fault : Fault
+    task : SlidingTask
+        Of the fault.
+    reach : WellReach
+    around : Fraction
+        As of `designed_sliding`.
+    prove : callable
+    spread : Fraction
+        Of the task.
+    """
+    if reach.held is None or reach.numbers is None:
+        return "none was found with a well that is much nearer either: a smaller spread, stress or noise may do"
+    held, proof = reach.held, prove(task, reach.held, reach.log_rate)
+    said = [_slower(fault, task, reach, around, prove, spread)]
+    if isinstance(proof, SlidingGuarantee):
+        path = " and ".join(f"{title} = {float(v):.3g} s" for name, title in PATH.items() if (v := getattr(held, name)))
+        said.append(f"at this V for {path} with T_s = {float(held.step):.3g} s{_under(proof)}")
+    found = ", and ".join(filter(None, said))
+    return f"a proof was found {found}" if found else "a smaller spread, stress or noise may do"
+
+
+def _slower(fault: Fault, task: SlidingTask, reach: WellReach, around: Around, prove: Prove, spread: Fraction) -> str:
+    """A task with the same target slip that takes longer, through the whole path; empty where none is proved."""
+    time = float(short(_SLOWER * fault.reference.operation_time / float(reach.share), _WELL_DIGITS))
+    reference = replace(fault.reference, operation_time=time)
+    slow = replace(fault, reference=reference, sampling_time=sliding_step(fault.friction, reference))
+    asked, step = sliding_task(slow, task.stress, spread), rational(slow.sampling_time)
+    held, _ = searched_sliding(asked, step, reach.log_rate, around, near=reach.numbers, enough=_ENOUGH, most=_LAWS)
+    proof = None if held is None else prove(asked, held, reach.log_rate)
+    if not isinstance(proof, SlidingGuarantee):
+        return ""
+    return (
+        f"with this path for V = {float(asked.rate):.3g} m/s{_under(proof)}: in [task] target_slip = "
+        f"'{fault.reference.target_slip:g} m', operation_time = '{time:g} s', sampling_time = '{float(step):g} s'"
+        f"{f' (but {beyond})' if (beyond := beyond_rates(fault.friction, float(asked.rate))) else ''}"
+    )
+
+
+def _under(proof: SlidingGuarantee) -> str:
+    return f" under a stress of at most {float(proof.task.stress):.3g} Pa (a law designed for it alone may stand more)"

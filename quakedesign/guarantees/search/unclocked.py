@@ -1,0 +1,341 @@
+"""Guarantees of loops whose samples follow no clock: the set that their state never leaves, found in floats."""
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from scipy.linalg import LinAlgError, expm
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
+
+from quakedesign.exact import UpperBound
+from quakedesign.guarantees.exact.invariant_set import SOONEST, InvariantPolytope, reduced
+from quakedesign.guarantees.exact.loop import Held, channels_of
+from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee
+from quakedesign.guarantees.exact.statement import Guarantee, guarantee
+from quakedesign.guarantees.exact.task import Task
+from quakedesign.guarantees.search.estimate import BoundsEstimate, gains_of, short
+
+MOST_SIZE = 3  # entries of the state at a sample: hulls of more take too long
+_SAMPLE_PIECES, _BETWEEN_PIECES = 6, 8
+_FEW, _MANY = 60, 160  # facets
+_DIRECTIONS = 3  # in which points are followed, for a facet
+_TURNS, _TURN, _STILL, _FAR = 400, 8, 1e-3, 1e4
+_ROUNDS, _ANEW, _POLICIES = 8, 2, 40
+_LOOSE = 1.02  # what inputs may have more than is wanted
+_TRACE = 1e-3  # of all others beside one input, so that every entry of the state is moved
+_NONE = 9.0  # small gain where no set is found
+_RAISED = (1.002, 1.01, 1.04)  # what is added from sample to sample, so that digits can be cut
+_SEED = 5
+_DIGITS = 7
+
+
+def unclocked_guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
+    """Guarantee with a set that is found for it, or what speaks against one."""
+    found: Guarantee | NoGuarantee = NoGuarantee(reason="no set was found that the loop never leaves", small_gain=None)
+    for raised in _RAISED:
+        reach = _reach(task, held, raised)
+        if not isinstance(reach, InvariantPolytope):
+            return reach or found
+        found = guarantee(task, held, reach=reach)
+        if isinstance(found, Guarantee):
+            break
+    return found
+
+
+def unclocked_estimate(task: Task, held: Held) -> BoundsEstimate | None:
+    """Bounds of a set with few facets, its small gain that of the inputs without it; None where there is no set."""
+    middle = replace(held, step=(held.step + held.longest_step) / 2, longest_step=Fraction(0))
+    gains, loop = gains_of(middle.loop(task)), _Floats.of(task, held)
+    sides = loop.sides(loop.own, _FEW) if gains is not None and loop.fits else None
+    if gains is None or sides is None:
+        return None
+    largest, columns = sides.largest(loop, loop.own), loop.columns(sides, _FEW)
+    share, bounds = loop.solved(loop.own, largest, columns)
+    if bounds is None:
+        return BoundsEstimate(NoGuarantee(reason="", small_gain=UpperBound(Fraction(share))), 1.0)
+    slip, rate, push = (Fraction(float(v)) for v in largest + (bounds - loop.own) @ columns)
+    found = Bounds(slip_error=slip, slip_rate_error=rate, push=push, small_gain=Fraction(share))
+    return BoundsEstimate(found, max(gains["slip_error", "drift"]))
+
+
+@dataclass(frozen=True)
+class _Floats:
+    """A loop from sample to sample, as in `quakedesign.guarantees.exact.invariant_set`.
+
+    `inputs` flow and `sampled` enter with a sample, both in the order of the channels, zeros where they do not; `force`
+    is what an acceleration that is no input by itself may be about, of a disturbance of bounded rate, else 0.
+    """
+
+    flow: np.ndarray
+    seen: np.ndarray
+    kept: np.ndarray
+    rows: np.ndarray
+    inputs: np.ndarray
+    sampled: np.ndarray
+    own: np.ndarray
+    shares: np.ndarray
+    interval: tuple[float, float]
+    force: float
+
+    @classmethod
+    def of(cls, task: Task, held: Held) -> "_Floats":
+        """Of a law that follows no clock."""
+        loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
+        seen, kept = (
+            np.array([[int(v.p) / int(v.q) for v in row] for row in part.tolist()])
+            for part in reduced(loop.segments[0].jump)
+        )
+        none = (0,) * len(loop.states)
+        return cls(
+            flow=np.array(loop.flow, dtype=float),
+            seen=seen,
+            kept=kept,
+            rows=np.array(list(loop.outputs.values()), dtype=float),
+            inputs=np.array([loop.inputs.get(channel.name, none) for channel in channels], dtype=float),
+            sampled=np.array([loop.sampled.get(channel.name, none) for channel in channels], dtype=float),
+            own=np.array([float(channel.own) for channel in channels]),
+            shares=np.array([[float(channel.shares.get(y, 0)) for y in loop.outputs] for channel in channels]),
+            interval=(float(held.step), float(held.longest_step)),
+            force=0.0 if task.change is None else float(task.amplitude),
+        )
+
+    @property
+    def fits(self) -> bool:
+        """Whether its state at a sample is small enough."""
+        return len(self.seen) <= MOST_SIZE
+
+    @property
+    def at_samples(self) -> list[float]:
+        """Ends of pieces up to the longest interval, the first ones before the shortest."""
+        soonest, latest = self.interval
+        early = [soonest * i / SOONEST for i in range(SOONEST)]
+        return [*early, *np.linspace(soonest, latest, _SAMPLE_PIECES + 1).tolist()]
+
+    @property
+    def between(self) -> list[float]:
+        """Ends of pieces of the longest interval."""
+        return [float(v) for v in np.linspace(0, self.interval[1], _BETWEEN_PIECES + 1)]
+
+    def reached(self, bounds: np.ndarray, directions: int) -> np.ndarray | None:
+        """Points that inputs within bounds reach, the farthest in many directions; None where they grow.
+
+        From the shortest, the middle and the longest interval the best is taken.
+        """
+        maps, pushes = zip(*(self._interval(time, bounds) for time in np.linspace(*self.interval, 3)), strict=True)
+        scale = np.abs(np.vstack(pushes)).sum(axis=0)
+        maps, pushes = [m * scale / scale[:, None] for m in maps], [push / scale for push in pushes]
+        white, size = np.eye(len(scale)), np.ones(len(scale))
+        points = np.zeros((directions, len(scale)))
+        unit = np.random.default_rng(_SEED).standard_normal(points.shape)
+        for turn in range(_TURNS):
+            ahead = unit @ white
+            points = _farthest(ahead, points, maps, pushes)
+            if turn % _TURN == _TURN - 1:
+                before, size = size, np.max(np.abs(points), axis=0)
+                if np.max(size) > _FAR:
+                    return None
+                if np.max(np.abs(size / before - 1)) <= _STILL:
+                    break
+                white = np.linalg.inv(np.linalg.cholesky(points.T @ points / directions))
+        return np.asarray(points * scale)
+
+    def _interval(self, time: float, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Map from sample to sample, and what the inputs add, in quarters of the time."""
+        step, quarter = expm(self.flow * time), time / SOONEST
+        halves = [expm(self.flow * quarter * (i + 0.5)) for i in range(SOONEST)]
+        added = [self.seen @ half @ (self.inputs * bounds[:, None]).T * quarter for half in halves]
+        told = self.seen @ step @ (self.sampled * bounds[:, None]).T
+        pushes = np.hstack([*added, told]).T
+        return self.seen @ step @ self.kept, pushes[np.abs(pushes).any(axis=1)]
+
+    def sides(self, bounds: np.ndarray, facets: int, raised: float = 1) -> "_Sides | None":
+        """The set of so many facets for inputs within bounds; None where none is found."""
+        points = self.reached(bounds, _DIRECTIONS * facets)
+        try:
+            return points if points is None else _Sides.still(self, _facets(points, facets), bounds, raised)
+        except (LinAlgError, QhullError):
+            return None
+
+    def columns(self, sides: "_Sides", facets: int) -> np.ndarray:
+        """What an input of size 1 does to the outputs, at most, from the set of all of them; 0 where nothing feeds it.
+
+        Of the acceleration, where little of it is not fed, from a set of its own.
+        """
+        fed, own = self.shares.any(axis=1), sides.largest(self, self.own)
+        found = np.where(fed, 1 / np.where(self.own > 0, self.own, np.inf), 0)[:, None] * own
+        if self.force:
+            alone = np.where(np.arange(len(self.own)) == 0, self.force, _TRACE * self.own)
+            of_force = self.sides(alone, facets)
+            found[0] = np.inf if of_force is None else of_force.largest(self, alone) / self.force
+        return np.asarray(found)
+
+    def solved(self, bounds: np.ndarray, largest: np.ndarray, columns: np.ndarray) -> tuple[float, np.ndarray | None]:
+        """Small gain, and inputs that make outputs that bring no more of them, near bounds that make these outputs."""
+        if not np.isfinite(columns).all():
+            return _NONE, None
+        feeds = self.shares @ columns.T
+        share = float(np.abs(np.linalg.eigvals(feeds)).max())
+        if share >= 1:
+            return share, None
+        return share, bounds + np.linalg.solve(np.eye(len(feeds)) - feeds, self.own + self.shares @ largest - bounds)
+
+    def along(
+        self, rows: np.ndarray, ends: list[float], first: int, frame: np.ndarray, bounds: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows at the ends from the first on, what the inputs add there, and by how much pieces may lie above both.
+
+        `frame` bounds the entries of the state at a sample.
+        """
+        now, area, found = rows, np.zeros(len(rows)), list[tuple[np.ndarray, np.ndarray]]()
+        bends, sizes, told = list[np.ndarray](), bounds[:, None] * np.abs(self.inputs), bounds @ np.abs(self.sampled)
+        most, largest = _majorant(self.flow), np.abs(self.kept) @ frame + told
+        for i, end in enumerate(ends):
+            if i >= first:
+                found.append((now @ self.kept, area + np.abs(now @ self.sampled.T) @ bounds))
+            if i + 1 == len(ends):
+                break
+            h = ends[i + 1] - end
+            following, within = now @ expm(self.flow * h), np.abs(expm(most * h))
+            bent, slope = np.abs(now @ self.flow @ self.flow) @ within, np.abs(now @ self.flow) @ within
+            heights = (np.abs(now @ self.inputs.T) + np.abs(following @ self.inputs.T)) @ bounds
+            area = area + heights * h / 2 + bent @ sizes.sum(axis=0) * h**3 / 12
+            if i >= first:
+                bends.append((bent @ largest + slope @ sizes.sum(axis=0)) * h**2 / 8)
+            now = following
+        along, added = (np.array(part).swapaxes(0, 1) for part in zip(*found, strict=True))
+        return along, added, np.array(bends).T
+
+
+def _majorant(flow: np.ndarray) -> np.ndarray:
+    return np.asarray(np.where(np.eye(len(flow)), np.maximum(flow, 0), np.abs(flow)))
+
+
+def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pushes: list[np.ndarray]) -> np.ndarray:
+    """In every direction the farthest of what follows the points and their negatives."""
+    row, found = np.arange(len(ahead)), list[tuple[np.ndarray, np.ndarray]]()
+    for step, push in zip(maps, pushes, strict=True):
+        heights = ahead @ step @ points.T
+        best = np.abs(heights).argmax(axis=1)
+        after = np.sign(heights[row, best])[:, None] * (points[best] @ step.T) + np.sign(ahead @ push.T) @ push
+        found.append(((ahead * after).sum(axis=1), after))
+    choice = np.array([height for height, _ in found]).argmax(axis=0)
+    return np.asarray(np.array([after for _, after in found])[choice, row])
+
+
+def _reach(task: Task, held: Held, raised: float) -> InvariantPolytope | NoGuarantee | None:
+    """A set in numbers of few digits, for inputs that it makes no larger than it is for."""
+    loop = _Floats.of(task, held)
+    if not loop.fits:
+        return NoGuarantee(reason="the law has too many states for a set that the loop never leaves", small_gain=None)
+    bounds, sides, found = loop.own, loop.sides(loop.own, _MANY), None
+    if sides is None:
+        return None
+    columns = loop.columns(sides, _MANY)
+    for turn in range(_ROUNDS):
+        largest = sides.largest(loop, bounds)
+        wanted = loop.own + loop.shares @ largest
+        if (wanted <= bounds).all():
+            found = sides.exact(loop, bounds)
+            if (wanted >= bounds / _LOOSE).all():
+                break
+        share, more = loop.solved(bounds, largest, columns)
+        if more is None:
+            gain = UpperBound(Fraction(share))
+            reason = f"small gain {gain:.3g}, which must be below 1, of intervals up to the longest"
+            return NoGuarantee(reason=reason, small_gain=gain)
+        bounds = np.maximum(more, loop.own) * raised
+        again = loop.force and turn < _ANEW  # what the inputs do to each other's sets is seen by then
+        following = loop.sides(bounds, _MANY, raised) if again else _Sides.still(loop, sides.facets, bounds, raised)
+        if following is None:
+            break
+        sides = following
+    return found
+
+
+def _facets(points: np.ndarray, count: int) -> np.ndarray:
+    """Normals of so many facets of a hull, as different as can be, so that the farthest point is at 1."""
+    both = np.vstack([points, -points])
+    white = np.linalg.inv(np.linalg.cholesky(both.T @ both / len(both)))
+    normals = ConvexHull(both @ white.T, qhull_options="QJ").equations[:, :-1]
+    chosen = [int(i) for i in np.abs(normals).argmax(axis=0)]
+    alike = np.abs(normals @ normals[chosen].T).max(axis=1)
+    while len(chosen) < min(count, len(normals)):
+        chosen.append(int(alike.argmin()))
+        alike = np.maximum(alike, np.abs(normals @ normals[chosen[-1]]))
+    found = normals[chosen] @ white
+    return np.asarray(found / np.abs(found @ points.T).max(axis=1)[:, None])
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """The set of all states with |h·ξ| at most 1."""
+
+    facets: np.ndarray
+
+    @classmethod
+    def still(cls, loop: _Floats, normals: np.ndarray, bounds: np.ndarray, raised: float) -> "_Sides | None":
+        """The smallest with these normals that a loop does not leave, found by turns of policies; None if it grows."""
+        sides, before = cls(normals), np.inf
+        for _ in range(_POLICIES):
+            now = sides._grown(loop, bounds, raised)
+            if now is None or now.max() > _FAR:
+                return None
+            sides = cls(sides.facets / now[:, None])
+            if (change := float(np.abs(now - 1).max())) < 1e-6 or (change < 1e-3 and change >= before):
+                return sides
+            before = change
+        return None
+
+    def _grown(self, loop: _Floats, bounds: np.ndarray, raised: float) -> np.ndarray | None:
+        """How far every side has to be moved for the policies that are best now."""
+        along, added, bends = loop.along(self.facets @ loop.seen, loop.at_samples, SOONEST, self._frame, bounds)
+        above = np.maximum(np.pad(bends, ((0, 0), (1, 0))), np.pad(bends, ((0, 0), (0, 1))))
+        added = (added + above) * raised
+        bases = self._bases(along)
+        shares = self._shares(bases, along)
+        totals, count = shares.sum(axis=2) + added, len(self.facets)
+        row, best = np.arange(count), totals.argmax(axis=1)
+        moves, own = np.zeros((count, count)), added[row, best]
+        np.add.at(moves, (row[:, None], bases[row, best]), shares[row, best])
+        if np.abs(np.linalg.eigvals(moves)).max() >= 1:
+            return np.asarray(totals.max(axis=1))
+        return np.asarray(np.linalg.solve(np.eye(count) - moves, own))
+
+    @property
+    def _frame(self) -> np.ndarray:
+        size = self.facets.shape[1]
+        return np.asarray(np.abs(np.linalg.inv(self.facets[:size])).sum(axis=1))
+
+    def _shares(self, bases: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Of every row, how much of each facet of its basis it is, absolute values."""
+        return np.asarray(np.abs(np.linalg.solve(self.facets[bases].swapaxes(-1, -2), along[..., None])[..., 0]))
+
+    def _bases(self, along: np.ndarray) -> np.ndarray:
+        """Of every row the facets that meet where it is largest."""
+        frame = self._frame
+        scaled = self.facets * frame
+        both = np.vstack([np.column_stack([sign * scaled, -np.ones(len(scaled))]) for sign in (1, -1)])
+        corners = HalfspaceIntersection(both, np.zeros(len(frame)), qhull_options="QJ")
+        meet = np.sort(np.array(corners.dual_facets) % len(scaled), axis=1)
+        return np.asarray(meet[(along * frame @ corners.intersections.T).argmax(axis=2)])
+
+    def largest(self, loop: _Floats, bounds: np.ndarray) -> np.ndarray:
+        """Bound of every output."""
+        along, added, bends = loop.along(loop.rows, loop.between, 0, self._frame, bounds)
+        heights = self._shares(self._bases(along), along).sum(axis=2) + added
+        return np.asarray((np.maximum(heights[:, 1:], heights[:, :-1]) + bends).max(axis=1))
+
+    def exact(self, loop: _Floats, bounds: np.ndarray) -> InvariantPolytope:
+        """Rounded."""
+        facets = tuple(tuple(short(float(v), _DIGITS) for v in row) for row in self.facets)
+        rounded = _Sides(np.array(facets, dtype=float))
+        after, frame = rounded.facets @ loop.seen, rounded._frame
+        samples = loop.along(after, loop.at_samples, SOONEST, frame, bounds)[0]
+        outputs = loop.along(loop.rows, loop.between, 0, frame, bounds)[0]
+        at_samples, between = (_as_tuples(rounded._bases(rows)) for rows in (samples, outputs))
+        inputs = tuple(short(float(v) * (1 + 10.0**-5), _DIGITS) for v in bounds)
+        return InvariantPolytope(inputs=inputs, facets=facets, at_samples=at_samples, between=between)
+
+
+def _as_tuples(bases: np.ndarray) -> tuple[tuple[tuple[int, ...], ...], ...]:
+    return tuple(tuple(tuple(basis) for basis in line) for line in bases.tolist())

@@ -1,0 +1,260 @@
+"""What a record tells of a friction law, and what it does not."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault import FrictionLaw
+from quakedesign.identification.fitting import CONFIDENCE, Fit
+from quakedesign.identification.record import Record
+
+_CORRELATED = 2.0  # samples
+_DECISIVE = 10.0  # of AIC: odds of about 150 to 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterEstimate:
+    """One parameter with its profile likelihood at 95 %.
+
+    Attributes
+    ----------
+    name, unit : str
+        The unit is SI.
+    value : float
+        Best fit.
+    low, high : float
+        Of this parameter alone; infinite (or 0) where the record sets no end.
+    least, most : float
+        Of all parameters at once: ends of the smallest box around their joint region.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    least: float
+    most: float
+
+    @property
+    def identified(self) -> bool:
+        """Whether the record sets both ends, of the joint region too."""
+        return all(math.isfinite(end) for end in (self.low, self.high, self.least, self.most))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Value and ends, None for an end that the record does not set."""
+        ends = {name: getattr(self, name) for name in ("value", "low", "high")}
+        known = {name: end if math.isfinite(end) else None for name, end in ends.items()}
+        return {**known, "unit": self.unit, "identified": self.identified}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outlier:
+    """A sample that noise does not explain, left out of the fit.
+
+    Attributes
+    ----------
+    time : float
+        As in the record [s], since its first sample.
+    size : float
+        Measured less simulated friction [-].
+    """
+
+    time: float
+    size: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rival:
+    """Another law with as many parameters, which explains the record less well.
+
+    Attributes
+    ----------
+    law : str
+        Its name.
+    squares : float
+        How many times as large the weighted sum of squares is that it leaves.
+    excess : float
+        By how much its AIC is higher, twice the fall of the logarithm of the likelihood.
+    """
+
+    law: str
+    squares: float
+    excess: float
+
+    def __str__(self) -> str:
+        told = f"{self.law} fits worse: squares {self.squares:.4g} times as large, AIC higher by {self.excess:.3g}"
+        return told if self.excess > _DECISIVE else f"{told}; so little that the record hardly tells the laws apart"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identification:
+    """Friction parameters of a record with their confidence regions.
+
+    Attributes
+    ----------
+    record : Record
+    fit : Fit
+    used : ndarray of bool
+        Samples of the record that the fit is about.
+    estimates : dict of ParameterEstimate
+        By name: quantities of the law, the stiffness where it was fitted.
+    difference : ParameterEstimate or None
+        Of the direct and the evolution effect, for laws that have both.
+    law : FrictionLaw
+        With the best values.
+    notes : tuple of str
+        What was taken for granted.
+    seed : int
+        Of the starts.
+    rival : Rival or None
+        The law that was fitted as well and not taken, where none was asked for.
+    """
+
+    record: Record
+    fit: Fit
+    used: "np.ndarray"
+    estimates: dict[str, ParameterEstimate]
+    difference: ParameterEstimate | None
+    law: FrictionLaw
+    notes: tuple[str, ...]
+    seed: int
+    rival: Rival | None = None
+
+    def __repr__(self) -> str:
+        ends = {e.name: f"{e.value:.4g} ({e.low:.4g} to {e.high:.4g}) {e.unit}" for e in self.estimates.values()}
+        told = ", ".join(f"{name} {text}".strip() for name, text in ends.items())
+        return f"Identification({self.record.name!r}, {self.law.name}: {told})"
+
+    @property
+    def identified(self) -> bool:
+        """Whether the record tells every parameter."""
+        return all(estimate.identified for estimate in self.estimates.values())
+
+    @property
+    def explained(self) -> bool:
+        """Whether law and machine explain the record: whether what is left looks like noise from sample to sample."""
+        return self.fit.correlation <= _CORRELATED
+
+    def to_try(self) -> list[str]:
+        """What may explain a record better, where law and machine explain it only in part."""
+        other = "no --law, which fits both laws with a state" if self.law.state_names else "another --law"
+        return [
+            "--figure, which shows where",
+            *([other] if self.rival is None else []),
+            *(["--stiffness of the machine, if it was measured"] if "stiffness" in self.estimates else []),
+            "a record without trend, and without steps that differ from the others",
+        ]
+
+    @property
+    def box(self) -> dict[str, tuple[float, float]]:
+        """Ranges that hold every set of parameters which the record allows at 95 %, by name."""
+        return {name: (estimate.least, estimate.most) for name, estimate in self.estimates.items()}
+
+    @cached_property
+    def outliers(self) -> tuple[Outlier, ...]:
+        """Samples left out, largest first."""
+        times, sizes = self.record.time[self.used], self.fit.residuals
+        places = np.flatnonzero(~self.fit.kept)
+        found = [Outlier(time=float(times[i]), size=float(sizes[i])) for i in places]
+        return tuple(sorted(found, key=lambda outlier: -abs(outlier.size)))
+
+    def allows(self, values: Mapping[str, float]) -> bool:
+        """Whether the record allows a set of parameters: whether it lies in the joint region at 95 %.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            All that were fitted, in SI units.
+        """
+        coordinates = self.fit.experiment.coordinates
+        if missing := {c.name for c in coordinates} - set(values):
+            raise ParameterError(
+                f"values must hold all that was fitted. Received none of {', '.join(sorted(missing))}."
+            )
+        fitted = self.fit.experiment.inward([values[c.name] for c in coordinates])
+        return self.fit.distance(fitted) <= self.fit.threshold(len(coordinates))
+
+    def untold(self) -> list[str]:
+        """Sentences about what the record cannot tell; none where it tells everything."""
+        open_ = [estimate for estimate in self.estimates.values() if not estimate.identified]
+        names = {estimate.name for estimate in open_}
+        told = []
+        if self.difference is not None and self.difference.identified:
+            pair = self.difference.name.split(" - ")
+            if names >= set(pair):
+                told.append(
+                    f"{pair[0]} and {pair[1]} are not identifiable from this record: only "
+                    f"{_between(self.difference)} is"
+                )
+                open_ = [estimate for estimate in open_ if estimate.name not in pair]
+        return told + [f"{e.name} is not identifiable from this record: {_one_sided(e)}" for e in open_]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that JSON can hold; SI units."""
+        fit = self.fit
+        return {
+            "law": self.law.name,
+            "identified": self.identified,
+            "not_identifiable": self.untold(),
+            "parameters": {name: estimate.to_dict() for name, estimate in self.estimates.items()},
+            "difference": None
+            if self.difference is None
+            else {"of": self.difference.name, **self.difference.to_dict()},
+            "chosen": {
+                name: {"value": getattr(self.law, name), "unit": field.metadata["unit"]}
+                for name, field in self.law.quantities().items()
+                if name not in self.estimates
+            },
+            "confidence": CONFIDENCE,
+            "residual": {
+                "noise": fit.noise,
+                "unit": "",
+                "samples": int(fit.kept.sum()),
+                "correlation": fit.correlation,
+            },
+            "measurements": int(np.sum(fit.counts)),
+            "rival": None if self.rival is None else asdict(self.rival),
+            "box": {name: [_finite(end) for end in ends] for name, ends in self.box.items()},
+            "outliers": [{"time": o.time, "time_unit": "s", "size": o.size, "size_unit": ""} for o in self.outliers],
+            "starts": {"seed": self.seed, "searches": fit.starts, "agreeing": fit.agreeing},
+            "assumptions": list(self.notes),
+        }
+
+
+def estimate(fit: Fit, place: int, alone: tuple[float, float], jointly: tuple[float, float]) -> ParameterEstimate:
+    """Estimate of one coordinate from the ends of its profiles as they are fitted."""
+    coordinate = fit.experiment.coordinates[place]
+    low, high, least, most = (coordinate.outward(end) if math.isfinite(end) else end for end in (*alone, *jointly))
+    return ParameterEstimate(
+        name=coordinate.name,
+        unit=coordinate.unit,
+        value=coordinate.outward(float(fit.fitted[place])),
+        low=low,
+        high=high,
+        least=min(least, low),
+        most=max(most, high),
+    )
+
+
+def _finite(end: float) -> float | None:
+    return end if math.isfinite(end) else None
+
+
+def _between(estimate: ParameterEstimate) -> str:
+    unit = f" {estimate.unit}" if estimate.unit else ""
+    return f"{estimate.name} = {estimate.value:.4g}{unit} ({estimate.low:.4g} to {estimate.high:.4g})"
+
+
+def _one_sided(estimate: ParameterEstimate) -> str:
+    unit = f" {estimate.unit}" if estimate.unit else ""
+    if math.isfinite(estimate.high):
+        return f"at most {estimate.high:.4g}{unit}, without a lower end"
+    if math.isfinite(estimate.low):
+        return f"at least {estimate.low:.4g}{unit}, without an upper end"
+    return "any value fits as well"

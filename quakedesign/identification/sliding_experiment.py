@@ -1,0 +1,316 @@
+"""Simulated velocity-step and hold experiments with rate-and-state friction.
+
+A spring loads a block without inertia; the load point follows the record. The stiff equations are
+integrated by an L-stable Rosenbrock step of order 3, with exact derivatives.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from quakedesign.fault import FrictionLaw
+from quakedesign.identification.experiment import Coordinate, Experiment, fitted_quantities
+from quakedesign.symbolic.casadi_printer import to_casadi
+from quakedesign.symbolic.plant import x1
+from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
+
+# ----------------------------------------------------------------------
+# A linearly implicit step for stiff equations, as an expression that can be differentiated exactly.
+
+ORDER = 3
+SOURCE = "RODAS3 of Sandu, Verwer, Blom, Spee, Carmichael and Potra (1997), Atmos. Environ. 31(20), 3459"
+_DIAGONAL = 0.5
+
+
+def step(field: Callable[[Any], Any], y: Any, length: Any) -> tuple[Any, Any]:
+    """State after one L-stable step of order 3, and the estimate of its error (that of an embedded order 2).
+
+    Parameters
+    ----------
+    field : callable
+        dy/dt of y, both CasADi SX columns; time must not enter.
+    y : casadi.SX
+        State before.
+    length : casadi.SX
+        Of the step [s]; nothing changes when it is 0.
+
+    Returns
+    -------
+    tuple of casadi.SX
+    """
+    rates = field(y)
+    inverse = ca.inv(ca.SX.eye(y.numel()) - _DIAGONAL * length * ca.jacobian(rates, y))
+
+    def stage(at: Any, memory: Any) -> Any:
+        return _DIAGONAL * (inverse @ (length * at + memory))
+
+    first = stage(rates, 0)
+    second = stage(rates, 4 * first)
+    third = stage(field(y + 2 * first), first - second)
+    fourth = stage(field(y + 2 * first + third), first - second - 8 * third / 3)
+    return y + 2 * first + third + fourth, fourth
+
+
+# ----------------------------------------------------------------------
+# Friction with a state on a block that a spring draws: the experiment behind velocity steps and holds.
+#
+# The far end follows the recorded load point, from sample to sample at a constant rate. Inertia is left out: the
+# spring
+# balances friction, k(x − slip) = σ'μ, and the time derivative of that gives the slip rate (the plant of
+# `quakedesign.symbolic.rate_and_state_plant`, without damping, on a record's time).
+
+_MOST_STEPS = 30  # a sample on average; what needs more runs away, or is far too sparse for its law
+_SAFETY = 0.9
+_SHORTEST = 1e-8  # of the time between two samples
+STIFFNESS = "stiffness"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """What an experiment is driven with, between neighbouring samples.
+
+    Attributes
+    ----------
+    lengths : ndarray
+        [s].
+    rates : ndarray
+        Of the load point [m/s].
+    growth : ndarray
+        d(log σ')/dt [1/s].
+    compliance : ndarray
+        1/σ' half-way [1/Pa, 1/N, or 1].
+    first_rate : float
+        At which it slides steadily before the first sample [m/s].
+    """
+
+    lengths: "np.ndarray"
+    rates: "np.ndarray"
+    growth: "np.ndarray"
+    compliance: "np.ndarray"
+    first_rate: float
+
+    @cached_property
+    def inputs(self) -> "np.ndarray":
+        """Rates, growth and compliance, one column a sample."""
+        return np.array([self.rates, self.growth, self.compliance])
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingExperiment(Experiment):
+    """Simulated friction of a law with state.
+
+    Attributes
+    ----------
+    law : FrictionLaw
+        With any values for what is fitted.
+    drive : Drive
+    coordinates : tuple of Coordinate
+        Logarithmic: the quantities that are fitted, and the stiffness where it is.
+    stiffness : float, optional
+        Where it is given, in units of normal stress, or of normal force, per m.
+    normal_unit : str
+        ``"Pa"``, ``"N"`` or nothing.
+    steps : tuple of tuple of float
+        Lengths [s] of the steps that are taken between neighbouring samples.
+    """
+
+    law: FrictionLaw
+    drive: Drive
+    coordinates: tuple[Coordinate, ...]
+    stiffness: float | None
+    normal_unit: str
+    steps: tuple[tuple[float, ...], ...]
+
+    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Friction coefficient [-] at every sample, sliding steadily at the first."""
+        states = self._states(fitted)[:, self._sampled]
+        friction: np.ndarray = self._readings["friction"](states, np.asarray(fitted)).full().ravel()
+        return friction
+
+    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Derivatives from the variational equations of the steps themselves: exact for what `friction` computes."""
+        q = np.asarray(fitted)
+        start = self._build["start_with_slopes"](q).full()
+        found = self._accumulated[1](start, self._inputs, np.tile(q[:, None], self._inputs.shape[1])).full()
+        sampled = np.hstack([start, found])[:, self._sampled]
+        read: np.ndarray = self._readings["slopes"](sampled, q).full().T
+        return read
+
+    def rates(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Slip rate [m/s] at every sample."""
+        rates: np.ndarray = np.exp(self._states(fitted)[0, self._sampled])
+        return rates
+
+    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+        """The mass from which on inertia would have been seen."""
+        rates = self.rates(fitted)
+        acceleration = float(np.max(np.abs(np.diff(rates) / self.drive.lengths * self.drive.compliance)))
+        if not (acceleration > 0 and self.normal_unit):
+            return ()
+        unit = {"Pa": "kg/m^2", "N": "kg"}[self.normal_unit]
+        return (f"without inertia, which reaches the noise for a block of {noise / acceleration:.2g} {unit}",)
+
+    def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
+        """The law with a working range, where it has one, about twice as wide as the slip rates of the experiment."""
+        law, rates = Experiment.best_law(self, fitted), self.rates(fitted)
+        ends = {
+            "slowest_rate": float(f"{np.min(rates) / 2:.2g}"),
+            "fastest_rate": float(f"{2 * np.max(rates):.2g}"),
+        }
+        return replace(law, **{name: end for name, end in ends.items() if name in law.quantities()})  # type: ignore[type-var]
+
+    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "SlidingExperiment":
+        """The same experiment in as many steps as an accuracy of friction needs at given coordinates.
+
+        By the embedded estimate; the same steps are then taken at other coordinates too, so that friction is smooth in
+        them. Where no number of steps suffices, because the block runs away, nothing changes.
+        """
+        taken = _Course(
+            self._build["trial"], np.asarray(fitted), accuracy, self.drive, self._build["start"](fitted)
+        ).steps()
+        return self if taken is None else replace(self, steps=taken)
+
+    def _states(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Logarithms of rate and states [SI] after every step, the first before all of them."""
+        q = np.asarray(fitted)
+        start = self._build["start"](q).full()
+        found = self._accumulated[0](start, self._inputs, np.tile(q[:, None], self._inputs.shape[1])).full()
+        return np.hstack([start, found])
+
+    @cached_property
+    def _sampled(self) -> "np.ndarray":
+        return np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
+
+    @cached_property
+    def _inputs(self) -> "np.ndarray":
+        between = np.repeat(self.drive.inputs, [len(lengths) for lengths in self.steps], axis=1)
+        return np.vstack([np.concatenate(self.steps), between])
+
+    @cached_property
+    def _accumulated(self) -> tuple[Any, Any]:
+        length = self._inputs.shape[1]
+        return tuple(self._build[name].mapaccum(length) for name in ("step", "step_with_slopes"))
+
+    @cached_property
+    def _readings(self) -> dict[str, Any]:
+        """Functions of all samples at once, the coordinates shared."""
+        readings = {}
+        for name in ("friction", "slopes"):
+            one = self._build[f"{name}_of_state"]
+            states, q = ca.MX.sym("states", one.size1_in(0), len(self._sampled)), ca.MX.sym("q", one.size1_in(1))
+            readings[name] = ca.Function(name, [states, q], [one.map(len(self._sampled))(states, q)])
+        return readings
+
+    @cached_property
+    def _build(self) -> dict[str, Any]:
+        return _built(self.law, tuple(c.name for c in self.coordinates), self.stiffness, self.drive.first_rate)
+
+
+@dataclass(frozen=True)
+class _Course:
+    """One simulation with steps of its own choice."""
+
+    trial: Any
+    fitted: "np.ndarray"
+    accuracy: float
+    drive: Drive
+    start: Any
+
+    def steps(self) -> tuple[tuple[float, ...], ...] | None:
+        """Lengths of the steps between all samples; None where they become too many or too short."""
+        y, length, found, left = self.start, float("inf"), [], _MOST_STEPS * len(self.drive.lengths)
+        for whole, between in zip(self.drive.lengths.tolist(), self.drive.inputs.T.tolist(), strict=True):
+            taken: list[float] = []
+            rest = whole
+            while rest > 0:
+                length, left = (length if length < _SAFETY * rest else rest), left - 1
+                if left < 0 or length < _SHORTEST * whole:
+                    return None
+                after, error = self.trial(y, [length, *between], self.fitted)
+                factor = self._factor(float(error))
+                if factor >= 1:
+                    taken.append(length)
+                    y, rest = after, (0.0 if length == rest else rest - length)
+                length *= _SAFETY * factor if factor < 1 else max(_SAFETY * factor, 1.0)
+            found.append(tuple(taken))
+        return tuple(found)
+
+    def _factor(self, error: float) -> float:
+        """How much longer a step with the accuracy wanted would be, within limits."""
+        if not error <= 1e3:
+            return 0.1
+        return float(min(max((self.accuracy / max(error, 1e-300)) ** (1 / ORDER), 0.1), 5.0))
+
+
+@lru_cache(maxsize=8)
+def _built(law: FrictionLaw, names: tuple[str, ...], stiffness: float | None, first_rate: float) -> dict[str, Any]:
+    """CasADi Functions of a step, its derivatives and what is read, for logarithms of rate, states and coordinates."""
+    model = _Model(law, names, stiffness)
+    count, size = len(names), 1 + len(law.state_names)
+    q, u = ca.SX.sym("q", count), ca.SX.sym("u", 4)
+    y, slopes = ca.SX.sym("y", size), ca.SX.sym("slopes", size, count)
+    after, error = step(lambda at: model.field(at, u, q), y, u[0])
+    moved = ca.jacobian(after, y) @ slopes + ca.jacobian(after, q)
+    start = model.start(first_rate, q)
+    read = model.friction(y, q)
+    read_slope = ca.jacobian(read, y) @ slopes + ca.jacobian(read, q)
+    whole = ca.vertcat(y, ca.vec(slopes))
+    outputs = {
+        "step": ([y, u, q], [after]),
+        "step_with_slopes": ([whole, u, q], [ca.vertcat(after, ca.vec(moved))]),
+        "trial": ([y, u, q], [after, ca.sum2(ca.fabs(ca.jacobian(read, y)) * ca.fabs(error.T))]),
+        "start": ([q], [start]),
+        "start_with_slopes": ([q], [ca.vertcat(start, ca.vec(ca.jacobian(start, q)))]),
+        "friction_of_state": ([y, q], [read]),
+        "slopes_of_state": ([whole, q], [read_slope.T]),
+    }
+    return {name: ca.Function(name, inputs, ca.cse(found)) for name, (inputs, found) in outputs.items()}
+
+
+@dataclass(frozen=True)
+class _Model:
+    """One law in CasADi, its quantities exponentials of the coordinates or numbers."""
+
+    law: FrictionLaw
+    names: tuple[str, ...]
+    stiffness: float | None
+
+    def friction(self, y: Any, q: Any) -> Any:
+        return self._casadi([self._expressions[0]], y, q)[0]
+
+    def field(self, y: Any, u: Any, q: Any) -> Any:
+        """d/dt of the logarithms of rate and states, from d(σ'μ)/dt = k(load rate − rate)."""
+        friction, *ageing = self._expressions
+        slopes = [friction.diff(x) for x in (rate, *self._states)]
+        (mu, mu_rate), others = (found := self._casadi([friction, *slopes, *ageing], y, q))[:2], found[2:]
+        size = len(self._states)
+        load, growth, compliance = u[1], u[2], u[3]
+        stiffness = self.stiffness if self.stiffness is not None else ca.exp(q[self.names.index(STIFFNESS)])
+        v = ca.exp(y[0])
+        drawn = stiffness * compliance * (load - v) - growth * mu
+        drawn -= sum(slope * change for slope, change in zip(others[:size], others[size:], strict=True))
+        return ca.vertcat(drawn / (v * mu_rate), *(others[size + i] / ca.exp(y[1 + i]) for i in range(size)))
+
+    def start(self, first_rate: float, q: Any) -> Any:
+        """Steady sliding."""
+        steady = self.law.symbolic().steady_state(rate)
+        values = fitted_quantities(self.law, self.names, q) | {rate: ca.SX(first_rate)}
+        return ca.log(ca.vertcat(first_rate, *to_casadi(steady, values)))
+
+    @property
+    def _states(self) -> tuple[Any, ...]:
+        return state_symbols(self.law.state_names)
+
+    @cached_property
+    def _expressions(self) -> list[Any]:
+        law = self.law.symbolic()
+        friction = without_overflow(law.coefficient(x1, rate, *self._states))
+        return [friction, *law.state_rates(x1, rate, *self._states)]
+
+    def _casadi(self, expressions: Any, y: Any, q: Any) -> list[Any]:
+        moving = {x: ca.exp(y[i]) for i, x in enumerate((rate, *self._states))}
+        return to_casadi(expressions, fitted_quantities(self.law, self.names, q) | moving)

@@ -1,0 +1,205 @@
+"""Simulated experiments with slip-weakening friction, and friction curves over slip.
+
+The block follows the measured slip, or is loaded by a stiff spring.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from quakedesign.fault import FrictionLaw
+from quakedesign.identification.experiment import Coordinate, Experiment
+from quakedesign.symbolic.casadi_printer import to_numpy
+from quakedesign.symbolic.plant import x1
+
+# ----------------------------------------------------------------------
+# Friction over slip, with its slopes, of a law that depends on slip alone.
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Friction of a law over slip, in NumPy, for logarithms of what is fitted.
+
+    Attributes
+    ----------
+    law : FrictionLaw
+    names : tuple of str
+        What is fitted, in its order.
+    """
+
+    law: FrictionLaw
+    names: tuple[str, ...]
+
+    def friction(self, slip: "np.ndarray", fitted: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+        """Friction [-] and its slope in slip [1/m]."""
+        friction, per_slip = self._rows(self._expressions[:2], slip, fitted)
+        return friction, per_slip
+
+    def slopes(self, slip: "np.ndarray", fitted: "np.ndarray") -> "np.ndarray":
+        """Derivatives in the logarithms, shape (slips, names)."""
+        rows = self._rows(self._expressions[2:], slip, fitted)
+        slopes: np.ndarray = np.array(rows).T * np.exp(fitted[: len(self.names)])
+        return slopes
+
+    def _rows(self, expressions: Any, slip: "np.ndarray", fitted: "np.ndarray") -> "list[np.ndarray]":
+        values = dict(zip(self._symbols, np.exp(fitted[: len(self.names)]), strict=True))
+        return [row + np.zeros_like(slip) for row in to_numpy(expressions, values | {x1: slip})]
+
+    @cached_property
+    def _symbols(self) -> list[Any]:
+        return [self.law.symbols()[name] for name in self.names]
+
+    @cached_property
+    def _expressions(self) -> list[Any]:
+        friction = sp.sympify(self.law.symbolic().coefficient(x1, 0)).rewrite(sp.Piecewise)
+        return [friction, *(friction.diff(symbol) for symbol in (x1, *self._symbols))]
+
+
+# ----------------------------------------------------------------------
+# Friction that weakens with slip: at a measured slip, or on a block that a stiff spring draws.
+
+START = "start_friction"
+_MOST_ITERATIONS = 100
+_SMALL = 1e-13
+_SMALL_SHARE = 0.3  # of the noise of friction, that adds 4 % to it
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredSlip(Experiment):
+    """Friction of a law at the slip that was measured.
+
+    Attributes
+    ----------
+    law : FrictionLaw
+        With any values for what is fitted.
+    slip : ndarray
+        [m], not negative.
+    slip_noise : float
+        Its standard deviation [m].
+    coordinates : tuple of Coordinate
+        Logarithmic.
+    """
+
+    law: FrictionLaw
+    slip: "np.ndarray"
+    slip_noise: float
+    coordinates: tuple[Coordinate, ...]
+
+    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Friction coefficient [-] at every slip."""
+        return self._curve.friction(self.slip, fitted)[0]
+
+    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Derivatives in the logarithms."""
+        return self._curve.slopes(self.slip, fitted)
+
+    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+        """Whether the noise of the slip, which the fit leaves out, is felt in friction."""
+        felt = float(np.max(np.abs(self._curve.friction(self.slip, fitted)[1]))) * self.slip_noise
+        if felt <= _SMALL_SHARE * noise:
+            return ()
+        return (
+            f"the slip is known exactly, although its noise of {self.slip_noise:.2g} m moves friction by {felt:.2g}",
+        )
+
+    @cached_property
+    def _curve(self) -> Curve:
+        return Curve(self.law, tuple(c.name for c in self.coordinates))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawn(Experiment):
+    """A block that sticks until its strength is reached and then slips as far as the spring and friction balance.
+
+    Slip never falls. A spring so soft that friction falls faster than it makes the block jump, which no balance
+    describes: there is no such experiment then.
+
+    Attributes
+    ----------
+    law : FrictionLaw
+    load_point : ndarray
+        Displacement since the first sample [m].
+    normal : ndarray
+        Normal stress or force [Pa, N, or 1].
+    coordinates : tuple of Coordinate
+        Quantities of the law, the stiffness where it is fitted, and `START` (not logarithmic) last.
+    stiffness : float, optional
+        Where it is given.
+    """
+
+    law: FrictionLaw
+    load_point: "np.ndarray"
+    normal: "np.ndarray"
+    coordinates: tuple[Coordinate, ...]
+    stiffness: float | None
+
+    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Shear over normal force [-] at every sample."""
+        slip, _ = self._slip(fitted)
+        friction: np.ndarray = self._held(fitted) - self._softness(fitted) * slip
+        return friction
+
+    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Derivatives, those of slip from the balance at the sample where it was reached."""
+        slip, since = self._slip(fitted)
+        softness = self._softness(fitted)
+        at_fixed_slip = self._held_slopes(fitted, slip)
+        laws = np.zeros_like(at_fixed_slip)
+        laws[:, : len(self._curve.names)] = self._curve.slopes(slip[since], fitted)
+        per_slip = self._curve.friction(slip[since], fitted)[1]
+        moved = (at_fixed_slip[since] - laws) / (softness[since] + per_slip)[:, None]
+        moved[slip == 0] = 0
+        slopes: np.ndarray = at_fixed_slip - softness[:, None] * moved
+        return slopes
+
+    def slip(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Slip [m] at every sample."""
+        return self._slip(fitted)[0]
+
+    def _stiffness(self, fitted: "np.ndarray") -> float:
+        return float(np.exp(fitted[-2])) if self.stiffness is None else self.stiffness
+
+    def _softness(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Fall of shear over normal force per slip [1/m]."""
+        softness: np.ndarray = self._stiffness(fitted) / self.normal
+        return softness
+
+    def _held(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Shear over normal force if nothing slips."""
+        held: np.ndarray = fitted[-1] * self.normal[0] / self.normal + self._softness(fitted) * self.load_point
+        return held
+
+    def _held_slopes(self, fitted: "np.ndarray", slip: "np.ndarray") -> "np.ndarray":
+        held_slopes = np.zeros((len(slip), len(fitted)))
+        held_slopes[:, -1] = self.normal[0] / self.normal
+        if self.stiffness is None:
+            held_slopes[:, -2] = self._softness(fitted) * (self.load_point - slip)
+        return held_slopes
+
+    def _slip(self, fitted: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+        """Slip [m] at every sample, and the sample at which it was reached."""
+        held, softness = self._held(fitted), self._softness(fitted)
+        strength, weakening = self._curve.friction(np.zeros(1), fitted)
+        if np.min(softness + weakening) <= 0:
+            return np.full(len(held), np.nan), np.arange(len(held))
+        low, high = np.zeros(len(held)), np.where(held > strength, held / softness, 0)
+        slip = np.zeros(len(held))
+        for _ in range(_MOST_ITERATIONS):
+            friction, per_slip = self._curve.friction(slip, fitted)
+            excess = held - softness * slip - friction
+            low, high = np.where(excess >= 0, slip, low), np.where(excess <= 0, slip, high)
+            after = slip + excess / (softness + per_slip)
+            after = np.where((after >= low) & (after <= high), after, (low + high) / 2)
+            change, slip = np.max(np.abs(after - slip)), after
+            if change <= _SMALL * high.max():
+                break
+        largest = np.maximum.accumulate(slip)
+        new = np.where(slip == largest, np.arange(len(held)), 0)
+        return largest, np.maximum.accumulate(new)
+
+    @cached_property
+    def _curve(self) -> Curve:
+        return Curve(self.law, tuple(c.name for c in self.coordinates if c.name in self.law.quantities()))

@@ -1,0 +1,336 @@
+"""What every law offers to the proof, and what one that acts on a fault offers besides."""
+
+import tomllib
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from fractions import Fraction
+from functools import partial
+from importlib.resources import files
+from types import MappingProxyType
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, runtime_checkable
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError, UnknownNameError
+from quakedesign.exact import rational, six_digits
+from quakedesign.fault import Fault
+from quakedesign.laws.feed_forward import NONE, FeedForward
+from quakedesign.laws.loop_field import LoopField
+from quakedesign.text import shown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signals:
+    """What a control law may read.
+
+    Attributes
+    ----------
+    slip, slip_rate : Expr
+        x1 [m], x2 [m/s].
+    slip_error, slip_rate_error : Expr
+        e1 = x1 − r [m], e2 = x2 − r' [m/s].
+    integrals : tuple of Expr
+        The law's own states ξ.
+    reference_acceleration : Expr
+        r'' [m/s²]; zero unless told, as for a reference at rest.
+    """
+
+    slip: sp.Expr
+    slip_rate: sp.Expr
+    slip_error: sp.Expr
+    slip_rate_error: sp.Expr
+    integrals: tuple[sp.Expr, ...]
+    reference_acceleration: sp.Expr = sp.S.Zero
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sampling:
+    """How a law of samples runs, and in no other way: with the scheme, the numbers and the T_s of what is proved of it.
+
+    Attributes
+    ----------
+    step : Fraction
+        T_s [s].
+    scheme : str
+        Of `quakedesign.loop.schemes`.
+    settings : tuple of (str, Fraction)
+        Numbers of the scheme by name, in its own units.
+    delay, lag, diffusion : Fraction
+        From measurement to valve, time constant of the pump and L²/D of the rock [s] for which it is meant: between law
+        and fault in every run, and in `loop_transfer`, unless told.
+    longest : Fraction
+        By no clock: each sample comes T_s to this after the last [s], in `simulate`; 0 where a clock tells.
+    """
+
+    step: Fraction
+    scheme: str = "explicit"
+    settings: tuple[tuple[str, Fraction], ...] = ()
+    delay: Fraction = Fraction(0)
+    lag: Fraction = Fraction(0)
+    diffusion: Fraction = Fraction(0)
+    longest: Fraction = Fraction(0)
+
+    @property
+    def path(self) -> dict[str, Any]:
+        """Delay, lag and L²/D [s] between law and fault."""
+        return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
+
+    def __str__(self) -> str:
+        numbers = "".join(f", {name} {float(value)!r}" for name, value in self.settings)
+        return f"{self.scheme}{numbers}"
+
+
+L = TypeVar("L", bound="Law", covariant=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseGains(Generic[L]):
+    """Gains of a law with λ = 1, the bound on |h'| that they are meant for, and where they come from.
+
+    Attributes
+    ----------
+    law : Law
+    lipschitz : Fraction
+        [m/s³]
+    source : str
+    literature : bool
+        False for gains that were found with this package.
+    """
+
+    law: L
+    lipschitz: Fraction
+    source: str
+    literature: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law(ABC):
+    """A law with exact gains whose closed loop can be proved.
+
+    Attributes
+    ----------
+    gains : mapping of str to Fraction
+        Exact gains, in the units of `gain_units`; numbers and texts are converted.
+
+    Raises
+    ------
+    ParameterError
+        For a missing, unknown, or not finite gain.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    source: ClassVar[str]
+    gain_units: ClassVar[Mapping[str, str]]
+
+    gains: Mapping[str, Fraction]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.gains, Mapping):
+            raise ParameterError(
+                f"gains of {self.name} must be a mapping of name to number. Received {shown(self.gains)}. "
+                "Take from_values for gains in order."
+            )
+        if set(self.gains) != set(self.gain_units):
+            raise ParameterError(
+                f"{self.name} needs the gains {', '.join(self.gain_units)}. Received {', '.join(self.gains) or 'none'}."
+            )
+        exact = {name: rational(self.gains[name], f"gain {name}") for name in self.gain_units}
+        object.__setattr__(self, "gains", MappingProxyType(exact))
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "__repr__" not in vars(cls):  # dataclasses write one of their own otherwise
+            type.__setattr__(cls, "__repr__", Law.__repr__)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name} ≈ {six_digits(v)}' for name, v in self.numbers.items())})"
+
+    @property
+    def numbers(self) -> dict[str, Fraction]:
+        """Gains and all other exact numbers of the law, by name."""
+        return dict(self.gains)
+
+    def __reduce__(self) -> tuple[Any, tuple[()]]:
+        # A read-only view cannot be pickled, and campaigns send controllers to other processes.
+        entries = {f.name: getattr(self, f.name) for f in fields(self)} | {"gains": dict(self.gains)}
+        return partial(type(self), **entries), ()
+
+    @classmethod
+    @abstractmethod
+    def loop_field(cls) -> LoopField:
+        """Return the closed loop in symbols, derived from the law, as certificates need it."""
+
+    @classmethod
+    def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
+        """Return a law from gains in order.
+
+        Raises
+        ------
+        ParameterError
+            When their number is wrong.
+        """
+        if len(values) != len(cls.gain_units):
+            raise ParameterError(
+                f"{cls.name} needs {len(cls.gain_units)} gains ({', '.join(cls.gain_units)}). Received {len(values)}."
+            )
+        named = {name: rational(v, f"gain {name}") for name, v in zip(cls.gain_units, values, strict=True)}
+        return cls(gains=named, **more)
+
+    @classmethod
+    def base_gains(cls) -> tuple[BaseGains[Self], ...]:
+        """Return gains that are known to be good, in the order in which a design tries them.
+
+        Raises
+        ------
+        UnknownNameError
+            When there are none for the law.
+        """
+        data = tomllib.loads((files("quakedesign.laws") / "families.toml").read_text(encoding="utf-8"))
+        if cls.name not in (known := {group["law"] for group in data.values()}):
+            raise UnknownNameError(f"base gains exist for {', '.join(sorted(known))}. Received {cls.name!r}.")
+        return tuple(
+            BaseGains(
+                law=cls.from_values(tuple(gains)),
+                lipschitz=Fraction(group["lipschitz"]),
+                source=group["source"],
+                literature=group["literature"],
+            )
+            for group in data.values()
+            if group["law"] == cls.name
+            for gains in group["gains"]
+        )
+
+    @property
+    def lipschitz_limit(self) -> Fraction | None:
+        """Bound on |h'| [m/s³] from which on no certificate exists; None where the law knows of none."""
+        return None
+
+    @classmethod
+    def counterexample(
+        cls, gains: Mapping[str, Fraction], uncertain: Mapping[str, tuple[Fraction, Fraction]]
+    ) -> Mapping[str, Mapping[str, Fraction]] | None:
+        """Suggest a Filippov equilibrium away from the origin, as ``parameters``, ``point`` and ``weights``.
+
+        Only a suggestion, to be checked in exact arithmetic; None where the law knows of none.
+        """
+        return None
+
+    def _exact_gains(self) -> list[sp.Rational]:
+        return [sp.Rational(v.numerator, v.denominator) for v in self.gains.values()]
+
+
+Designed = TypeVar("Designed", covariant=True)
+
+
+@runtime_checkable
+class DesignProblem(Protocol[Designed]):
+    """What a law is asked for when it is to find gains for a fault, and what it may ask for in turn.
+
+    Searches for proofs stand behind it, so that a law need not know them; see `quakedesign.synthesis.design`, also for
+    its options ``objective``, ``continuous``, ``feedforward``, ``measured`` and ``noise``.
+    """
+
+    @property
+    def fault(self) -> Fault:
+        """The fault."""
+
+    def by_method(self, law: "type[Controller]") -> Designed:
+        """Gains by the method of the family that a law belongs to."""
+
+    def assessed(self, controller: "Controller") -> Designed:
+        """Verdict on gains that the law has found itself."""
+
+    def undecided(self, name: str, reason: str) -> Designed:
+        """Answer of a law that found no gains."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller(Law):
+    """A law that acts on the slip of a fault through the fluid pressure.
+
+    Attributes
+    ----------
+    gains : mapping of str to Fraction
+        By name, exact; their units are the law's `gain_units`.
+    """
+
+    integral_units: ClassVar[tuple[str, ...]]
+
+    @property
+    def sampling(self) -> Sampling | None:
+        """How a law of samples runs; None for a law in continuous time, which any scheme runs."""
+        return None
+
+    @property
+    def sampling_time(self) -> float | None:
+        """T_s [s] of a law of samples; None in continuous time."""
+        return float(self.sampling.step) if self.sampling else None
+
+    def other_step(self, fault: Fault) -> str:
+        """That a law of samples does not run at the T_s of a fault, for which it is not proved; empty if it does."""
+        if self.sampling_time in (None, fault.sampling_time):
+            return ""
+        return f"NOT for the fault's T_s = {fault.sampling_time:g} s: it runs once every {self.sampling_time:.4g} s"
+
+    @property
+    def of_slip(self) -> Any:
+        """Matrices of a linear law of samples that is told the slip alone (`quakedesign.laws.LinearLaw`), or None."""
+        return None
+
+    @property
+    def while_moving(self) -> "Controller":
+        """The law of a fault that moves, without what it does at rest alone."""
+        return self
+
+    @property
+    def scale(self) -> Fraction | None:
+        """λ [-], which stretches the loop; None for a law without."""
+        return None
+
+    @property
+    def divisor(self) -> Fraction | None:
+        """μ0N̂0 [m²/kg], by which ν is divided; None for a law that asks for pressures."""
+        return None
+
+    @property
+    def feedforward(self) -> FeedForward:
+        """What is added to ν from what is known of the plant."""
+        return NONE
+
+    @classmethod
+    def for_authority(cls, values: "tuple[str | float | Fraction, ...]", authority: Fraction) -> Self:
+        """Return a law from gains in order, as they are given for a fault with the least μN̂ of `authority` [m²/kg]."""
+        return cls.from_values(values)
+
+    def scaled(self, scale: str | float | Fraction) -> Self:
+        """Return the same base gains with another λ; refused by a law without."""
+        raise ParameterError(f"a scale belongs to a sliding mode. Received {self.name}. Leave it out.")
+
+    def with_divisor(self, divisor: Fraction) -> Self:
+        """Return the same gains with another divisor; refused by a law without."""
+        raise ParameterError(f"{self.name} has no divisor. Received the divisor {divisor}. Leave it out.")
+
+    def with_feedforward(self, feedforward: FeedForward) -> Self:
+        """Return the same law with another feed-forward; any but none is refused by a law without."""
+        if feedforward != NONE:
+            raise ParameterError(f"a feed-forward belongs to a sliding mode. Received {self.name}. Leave it out.")
+        return self
+
+    @classmethod
+    def design(cls, problem: DesignProblem[Designed]) -> Designed:
+        """Return gains with a proof for a fault, by the method of the law's family; a law may have a way of its own."""
+        return problem.by_method(cls)
+
+    def premises(self, fault: Fault, certificate: Any) -> tuple[Any, ...]:
+        """Premises of its proofs on a fault beside those of its family, see `quakedesign.lyapunov.exact.premises`."""
+        return ()
+
+    @abstractmethod
+    def pressure(self, signals: Signals) -> sp.Expr:
+        """Fluid pressure p [Pa] that the law asks for."""
+
+    @abstractmethod
+    def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
+        """Time derivatives of the law's own states."""

@@ -1,0 +1,208 @@
+"""Gains carried from one fault to a similar one, with exponents inferred from the terms of the law.
+
+A law keeps its effect if every one of its terms scales as what it adds to: the pressure with λ_p, an integral state's
+rate with that state over time. Slip errors scale with λ_δ, slip-rate errors with λ_δ/λ_t. These conditions are linear
+in the exponents of the gains; they are read off the SymPy expression of the law and solved exactly, so a user's own
+law is carried like the ones of the paper (appendix, with ERRATA 19 and 20).
+"""
+
+import tomllib
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from fractions import Fraction
+from functools import cache
+from importlib.resources import files
+from types import MappingProxyType
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import fraction_of, rational
+from quakedesign.fault.similarity import Radical, Scales, power_product, radical
+from quakedesign.laws.base import Controller, Signals
+from quakedesign.laws.catalogue import control_law
+from quakedesign.symbolic.homogeneity import size_of
+
+Form = dict[str, Fraction]
+"""Exponents of `BASES`."""
+
+BASES = ("slip", "time", "output")
+"""What the dimension of a gain is made of; `output` is p [Pa], or ν = p·(divisor) for a law with a divisor."""
+
+UNROUNDED = {("lab-fault", "elqr"): ("1250000000/3", "6250000/9", "125000000/3", "1250000/9")}
+"""Laboratory gains before they were rounded for print; only these give the printed real-fault gains (ERRATA 25)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawDimensions:
+    """Exponents of slip, time and output in every gain and integral state of a law.
+
+    Attributes
+    ----------
+    gains, integrals : mapping of str to Form
+        By name; integral states are ``xi1``, ``xi2`` and so on.
+    """
+
+    gains: Mapping[str, Form]
+    integrals: Mapping[str, Form]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CarriedGains:
+    """Exact gains of a law on a fault, rational or roots of rationals.
+
+    Attributes
+    ----------
+    law : Controller
+        The law with its options; its own gains are those that were carried first.
+    gains : mapping of str to Radical
+        In the units of `gain_units`.
+    integrals : mapping of str to Radical
+        Factors by which the integral states grew from the first fault to this one.
+    """
+
+    law: Controller
+    gains: Mapping[str, Radical]
+    integrals: Mapping[str, Radical]
+
+    def controller(self, digits: int = 12) -> Controller:
+        """Controller with these gains; irrational ones rounded to so many significant digits."""
+        return replace(self.law, gains={name: gain.nearest(digits) for name, gain in self.gains.items()})
+
+
+def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction | None = None) -> CarriedGains:
+    """Gains that do on the target what the given ones do on the source.
+
+    Parameters
+    ----------
+    gains : Controller or CarriedGains
+        The latter to carry on, or back with `scales.inverse()`, without any rounding.
+    scales : Scales
+        From source to target.
+    divisor : Fraction, optional
+        μ0N̂0 of the carried law [m²/kg], for laws that have one; it stays what it is unless given, as in the
+        appendix of the paper, where ν then scales as the pressure.
+
+    Raises
+    ------
+    ParameterError
+        For a divisor where the law has none, or a law whose terms do not fit together.
+    """
+    start = gains if isinstance(gains, CarriedGains) else exact(gains)
+    law, output = start.law, scales.of("Pa")
+    if divisor is not None:
+        law = law.with_divisor(divisor)
+        output *= Fraction(divisor) / (start.law.divisor or 1)
+    factors = {"slip": scales.of("slip_m"), "time": scales.of("s"), "output": output}
+    dimensions = law_dimensions(law)
+    return CarriedGains(
+        law=law,
+        gains=_grown(start.gains, dimensions.gains, factors),
+        integrals=_grown(start.integrals, dimensions.integrals, factors),
+    )
+
+
+def exact(controller: Controller) -> CarriedGains:
+    """Gains of a controller before they are carried anywhere."""
+    return CarriedGains(
+        law=controller,
+        gains=MappingProxyType({name: radical(gain) for name, gain in controller.gains.items()}),
+        integrals=MappingProxyType({name: radical(1) for name in _integral_names(controller)}),
+    )
+
+
+def _grown(values: Mapping[str, Radical], forms: Mapping[str, Form], factors: Mapping[str, Radical]) -> Any:
+    return MappingProxyType({name: value * _factor(forms[name], factors) for name, value in values.items()})
+
+
+def _factor(form: Form, factors: Mapping[str, Radical]) -> Radical:
+    return power_product(factors, form)
+
+
+def _integral_names(controller: Controller) -> list[str]:
+    return [f"xi{i}" for i, _ in enumerate(controller.integral_units, start=1)]
+
+
+def law_dimensions(controller: Controller) -> LawDimensions:
+    """Dimensions of all gains and integral states of a law, inferred from its expressions.
+
+    Raises
+    ------
+    ParameterError
+        When the terms of the law do not fit together, or leave the dimension of a gain open.
+    """
+    symbols = {name: sp.Symbol(name, positive=True) for name in controller.gain_units}
+    integrals = {name: sp.Symbol(name, real=True) for name in _integral_names(controller)}
+    slip, time, output = (sp.Dummy(base) for base in BASES)
+    x1, e1, x2, e2 = sp.symbols("x1 e1 x2 e2", real=True)
+    signals = Signals(slip=x1, slip_error=e1, slip_rate=x2, slip_rate_error=e2, integrals=tuple(integrals.values()))
+    unknown = {symbol: symbol for symbol in (*symbols.values(), *integrals.values())}
+    sizes = {**unknown, x1: slip, e1: slip, x2: slip - time, e2: slip - time}
+    twin, conditions = _with_gains(controller, symbols), list[sp.Expr]()
+    equations = [(twin.pressure(signals), output)]
+    equations += [(rate, xi - time) for xi, rate in zip(integrals.values(), twin.integral_rates(signals), strict=True)]
+    for expression, left in equations:
+        whole = sp.sympify(expression)
+        if strange := whole.free_symbols - sizes.keys():
+            names = ", ".join(sorted(map(str, strange)))
+            raise ParameterError(f"{controller.name} must depend on gains and signals only. Received {names}.")
+        conditions.append(size_of(whole, sizes, conditions) - left)
+    solution = _solved(conditions, [*unknown], [slip, time, output], controller.name)
+    return LawDimensions(gains={n: solution[n] for n in symbols}, integrals={n: solution[n] for n in integrals})
+
+
+def _with_gains(controller: Controller, symbols: Mapping[str, sp.Symbol]) -> Controller:
+    """The law with symbols for gains; only for building expressions."""
+    twin = copy(controller)
+    kind = type("Symbolic", (type(controller),), {"_exact_gains": lambda _: list(symbols.values())})
+    object.__setattr__(twin, "__class__", kind)
+    object.__setattr__(twin, "gains", symbols)
+    return twin
+
+
+def _solved(conditions: list[sp.Expr], unknown: list[sp.Symbol], bases: list[sp.Symbol], law: str) -> dict[str, Form]:
+    """Every unknown dimension in terms of `BASES`, from linear expressions that vanish."""
+    reduced, pivots = sp.linear_eq_to_matrix(conditions, *unknown, *bases)[0].rref()
+    if any(pivot >= len(unknown) for pivot in pivots):
+        raise ParameterError(
+            f"the terms of {law} do not fit together: no units of its gains make each term fit what it adds to. "
+            "Check exponents, and make every constant with a unit a gain."
+        )
+    free = [symbol.name for i, symbol in enumerate(unknown) if i not in pivots]
+    if free:
+        raise ParameterError(
+            f"the terms of {law} leave the unit of {', '.join(free)} open. Every gain must appear alone."
+        )
+    forms = {}
+    for row, pivot in enumerate(pivots):
+        values = {base: reduced[row, len(unknown) + i] for i, base in enumerate(BASES)}
+        forms[unknown[pivot].name] = {base: -fraction_of(v) for base, v in values.items() if v}
+    return forms
+
+
+@cache
+def printed_gains(fault_name: str, law: str) -> Mapping[str, str]:
+    """Gains as the paper prints them, with their digits; empty where it prints none."""
+    data = tomllib.loads((files("quakedesign.laws") / "published.toml").read_text(encoding="utf-8"))
+    table = data.get(fault_name)
+    entry = table.get(law) if isinstance(table, dict) else None
+    names = control_law(law).gain_units if entry else ()
+    return MappingProxyType(dict(zip(names, entry["gains"], strict=True)) if entry else {})
+
+
+def agrees(value: Radical, printed: str) -> bool:
+    """True where a number rounds to a printed one, decided in exact arithmetic."""
+    half = Fraction(Decimal(1).scaleb(int(Decimal(printed).as_tuple().exponent))) / 2
+    low, high = rational(printed) - half, rational(printed) + half
+    return _below(low, value) and _below(value, high)
+
+
+def _below(left: Radical | Fraction, right: Radical | Fraction) -> bool:
+    a, b = radical(left), radical(right)
+    if a.sign != b.sign:
+        return a.sign < b.sign
+    quotient = a / b if a.sign else radical(1)
+    return quotient.radicand <= 1 if a.sign >= 0 else quotient.radicand >= 1

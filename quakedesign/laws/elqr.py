@@ -1,0 +1,129 @@
+"""Linear state feedback with double integral action."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.exact import to_sympy
+from quakedesign.laws.base import Controller, Signals
+from quakedesign.laws.loop_field import LoopField
+
+FEEDBACKS = ("error", "state")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureLimits:
+    """Where the pressure stops (ERRATA 23), and how fast the integrals come back meanwhile.
+
+    Attributes
+    ----------
+    lowest, highest : Fraction
+        [Pa]; highest below the effective normal stress, so that the fault does not open.
+    recovery_time : Fraction
+        Time constant [s] of both integrals while p is at a limit.
+    """
+
+    lowest: Fraction
+    highest: Fraction
+    recovery_time: Fraction = Fraction(1)
+
+    def __post_init__(self) -> None:
+        if not self.lowest < 0 < self.highest or self.recovery_time <= 0:
+            raise ParameterError(
+                "limits must be lowest < 0 < highest with a positive recovery_time. Received "
+                f"{float(self.lowest):.4g} Pa, {float(self.highest):.4g} Pa, {float(self.recovery_time):.4g} s. "
+                "Withdrawal is negative."
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExtendedLQR(Controller):
+    """e-LQR: p = −Kx_a with ξ1' = x1 − r, ξ2' = ξ1 (eqs. double_integrator and u).
+
+    Attributes
+    ----------
+    feedback : str
+        ``"state"``: k1 and k2 act on x1 and x2, as printed in eq. u. ``"error"``: they act on x1 − r and
+        x2 − r', which keeps p small and the error of tracking a ramp too (ERRATA 29). The loop about a
+        constant reference is the same.
+    limits : PressureLimits, optional
+        p is held inside them; the integrals are then driven back by the part that was cut off (back-calculation, Åström
+        and Rundqwist 1989, Proc. Amer. Control Conf., 1693). The loop field is the one without limits.
+    offset : Fraction
+        p for Kx_a = 0 [Pa]: a start without a jump is an offset, since ξ starts at 0.
+    """
+
+    name: ClassVar[str] = "elqr"
+    title: ClassVar[str] = "e-LQR"
+    source: ClassVar[str] = "eqs. double_integrator and u of the paper; ERRATA 29"
+    gain_units: ClassVar[Mapping[str, str]] = {"k1": "Pa/m", "k2": "Pa s/m", "k3": "Pa/(m s)", "k4": "Pa/(m s^2)"}
+    integral_units: ClassVar[tuple[str, ...]] = ("m s", "m s^2")
+
+    feedback: str = "error"
+    limits: PressureLimits | None = None
+    offset: Fraction = Fraction(0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.limits is not None and not self.gains["k4"]:
+            raise ParameterError(
+                "limits need k4 other than 0, through which the integrals are driven back. Received 0."
+            )
+        require_known(self.feedback, FEEDBACKS, "feedback")
+
+    def pressure(self, signals: Signals) -> sp.Expr:
+        """Return p [Pa] = offset − Kx_a, eq. u, inside the limits if there are any."""
+        wanted = self._wanted(signals)
+        if self.limits is None:
+            return wanted
+        return sp.Min(sp.Max(wanted, to_sympy(self.limits.lowest)), to_sympy(self.limits.highest))
+
+    def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
+        """ξ1' = x1 − r and ξ2' = ξ1; at a limit both also follow it with the double pole −1/recovery_time."""
+        rates = signals.slip_error, signals.integrals[0]
+        if self.limits is None:
+            return rates
+        excess = self.pressure(signals) - self._wanted(signals)
+        return tuple(rate + back * excess for rate, back in zip(rates, self._driven_back(), strict=True))
+
+    def _wanted(self, signals: Signals) -> sp.Expr:
+        ends = {
+            "error": (signals.slip_error, signals.slip_rate_error),
+            "state": (signals.slip, signals.slip_rate),
+        }[self.feedback]
+        asked = -sum(k * x for k, x in zip(self._exact_gains(), (*ends, *signals.integrals), strict=True))
+        return asked + to_sympy(self.offset) if self.offset else asked
+
+    def _driven_back(self) -> tuple[sp.Expr, sp.Expr]:
+        """l1, l2 for which ξ' = (l1, l2)(k3ξ1 + k4ξ2) + (0, ξ1) has the double pole −1/τ."""
+        assert self.limits is not None
+        *_, k3, k4 = self._exact_gains()
+        pace = 1 / to_sympy(self.limits.recovery_time)
+        first = -(pace**2) / k4
+        return first, (-2 * pace - first * k3) / k4
+
+    @classmethod
+    def loop_field(cls) -> LoopField:
+        """Return the loop about the equilibrium of a constant reference (ERRATA 8), all uncertainty in s, w and β.
+
+        x2' = s·x1 − w·x2 + β·b·p, where s [1/s²] is the chord of everything that depends on slip (friction,
+        spring, disturbance), w [1/s] that of everything that depends on slip rate, b = μ_res·N̂_min [m²/kg].
+        """
+        x1, x2, xi1, xi2 = sp.symbols("x1 x2 xi1 xi2", real=True)
+        beta, s, w, authority = sp.symbols("beta s w b", real=True)
+        gains = tuple(sp.Symbol(name, real=True) for name in cls.gain_units)
+        states = (x1, x2, xi1, xi2)
+        pressure = -sum(k * x for k, x in zip(gains, states, strict=True))
+        field = {x1: x2, x2: sp.expand(s * x1 - w * x2 + beta * authority * pressure), xi1: x1, xi2: xi1}
+        return LoopField(
+            states=dict.fromkeys(states, 1),
+            field=field,
+            gains=gains,
+            constants=(authority,),
+            uncertain=(beta, s, w),
+            domain="reals",
+        )

@@ -1,0 +1,128 @@
+"""The end of an implicit step as a third signal of a law: w solves w = e2 − q(e1 + T_s·w, w), q odd and never falling.
+
+q is a sum of signed powers with factors that are not negative, of the slip error and the slip-rate error at the end of
+the step or of such sums again, so that it is monotone by construction; ⌈x⌋⁰ is the set-valued sign. F(w) = w − e2 + q
+is then strongly monotone and has one root, which falls with e1 and rises with e2.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import shortly
+
+SIGNALS = ("slip", "rate")
+MOST_TERMS = 16
+MOST_EXPONENT = 6
+_TINY = 1e-300
+_HALVINGS = 50
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Power:
+    """One term c⌈x⌋^a of a monotone sum.
+
+    Attributes
+    ----------
+    factor : (Fraction, Fraction)
+        Ends of a range that holds c ≥ 0; equal for a rational one.
+    exponent : Fraction
+        a ≥ 0, numerator and denominator at most 6.
+    argument : str or tuple of Power
+        x: ``slip``, e1 at the end of the step [m], ``rate``, e2 there [m/s], or a sum.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    factor: tuple[Fraction, Fraction]
+    exponent: Fraction
+    argument: "str | tuple[Power, ...]"
+
+    def __post_init__(self) -> None:
+        low, high = self.factor
+        power = self.exponent
+        sound = 0 <= low <= high and 0 <= power.numerator <= MOST_EXPONENT and power.denominator <= MOST_EXPONENT
+        if not sound or (self.argument not in SIGNALS and (isinstance(self.argument, str) or not self.argument)):
+            raise ParameterError(
+                "a term of an implicit step needs 0 <= factor, an exponent p/q with p, q at most 6 that is not "
+                f"negative, and slip, rate or a sum. Received {shortly(low)} to {shortly(high)} and {power}."
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImplicitRoot:
+    """The sum q, and between which lines its root is said to lie for the errors that are claimed of the loop.
+
+    Attributes
+    ----------
+    pull : tuple of Power
+        q [m/s].
+    slopes : (Fraction, Fraction)
+        γ0 ≤ γ1 in [0, 1]: |T_s·w + γ·e1| ≤ T_s·ε for some γ between them.
+    remainder : Fraction
+        ε [m/s].
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    pull: tuple[Power, ...]
+    slopes: tuple[Fraction, Fraction] = (Fraction(1), Fraction(1))
+    remainder: Fraction = Fraction(0)
+
+    def __post_init__(self) -> None:
+        if not 0 < sum(1 for _ in _all_terms(self.pull)) <= MOST_TERMS:
+            raise ParameterError(f"an implicit step must have 1 to {MOST_TERMS} terms. Received none or more.")
+        if not 0 <= self.slopes[0] <= self.slopes[1] <= 1 or self.remainder < 0:
+            raise ParameterError(
+                "slopes of an implicit step must be ordered within [0, 1], its remainder not negative. Received "
+                f"{self.slopes[0]}, {self.slopes[1]}, {self.remainder}."
+            )
+
+    @property
+    def middle(self) -> Fraction:
+        """Slope of the nominal loop."""
+        return (self.slopes[0] + self.slopes[1]) / 2
+
+    @property
+    def half_range(self) -> Fraction:
+        """Of the slope."""
+        return (self.slopes[1] - self.slopes[0]) / 2
+
+
+def pulled(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
+    """q in floats or arrays of them, middle of the factors, ⌈0⌋⁰ = 0."""
+    signals, total = {"slip": slip, "rate": rate}, 0.0
+    for term in terms:
+        nested = term.argument
+        value = signals[nested] if isinstance(nested, str) else pulled(nested, slip, rate)
+        sign = (value > 0) * 1.0 - (value < 0)
+        total = total + float(sum(term.factor)) / 2 * sign * abs(value) ** float(term.exponent)
+    return total
+
+
+def root_of(terms: tuple[Power, ...], step: float, slip: Any, rate: Any) -> Any:
+    """w in floats or arrays of them, by halving down to rounding; exact where the sign of the end slip holds it."""
+    deadbeat = -slip / step
+    after, before = (deadbeat - rate + pulled(terms, way * _TINY, deadbeat) for way in (1, -1))
+    first = -rate + pulled(terms, slip, 0 * rate)
+    low, high = (first > 0) * -first, (first < 0) * -first
+    held = (before <= 0) & (after >= 0)
+    if not (held | (low == high)).all():
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            above = middle - rate + pulled(terms, slip + step * middle, middle) > 0
+            low, high = low + (middle - low) * ~above, high + (middle - high) * above
+    return deadbeat * held + (low + high) / 2 * ~held
+
+
+def _all_terms(terms: tuple[Power, ...]) -> Iterator[Power]:
+    for term in terms:
+        yield term
+        if not isinstance(term.argument, str):
+            yield from _all_terms(term.argument)

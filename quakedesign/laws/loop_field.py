@@ -1,0 +1,274 @@
+"""Closed loop of a control law as an uncertain vector field, the subject of a certificate.
+
+The first chapter checks names, roots, units and states, so that a certificate describes the intended
+loop.
+"""
+
+import dataclasses
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.laws.field_terms import FieldTerms
+from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
+from quakedesign.symbolic.term_expressions import to_terms, without_nesting
+from quakedesign.symbolic.terms import Term
+
+# ----------------------------------------------------------------------
+# What a closed loop must be like so that a certificate is about the loop that its author wrote.
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
+_MOST_STATES, _HEAVIEST = 6, 12  # as in proofs/FORMAT.md
+_KINDS = ("positive", "nonnegative", "negative", "nonpositive", "nonzero", "rational")
+
+
+def sound_states(states: Mapping[sp.Symbol, int], domain: str) -> dict[sp.Symbol, int]:
+    """States with their weights as integers.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown domain; none or more than 6 states; one that is declared of one sign; weights that are not
+        integers from 1 to 12 on `cells` or 1 on `reals`.
+    """
+    if domain not in ("cells", "reals"):
+        raise ParameterError(f"the domain of a loop must be cells or reals. Received {domain!r}.")
+    if not 1 <= len(states) <= _MOST_STATES:
+        raise ParameterError(f"a loop needs 1 to {_MOST_STATES} states. Received {len(states)}.")
+    signed = [s for s in states if any(getattr(s, f"is_{kind}") is not None for kind in _KINDS)]
+    if signed:
+        raise ParameterError(
+            f"a state takes both signs. Received {signed[0]}, declared otherwise. Declare it with real=True only."
+        )
+    most = _HEAVIEST if domain == "cells" else 1
+    wrong = {s: w for s, w in states.items() if not 1 <= w <= most}
+    if wrong:
+        (state, weight), *_ = wrong.items()
+        allowed = f"integers from 1 to {most}" if most > 1 else "1"
+        raise ParameterError(
+            f"weights must be {allowed} on {domain}. Received {weight} for {state}. "
+            "Multiply all weights by one number, or divide them."
+        )
+    return {s: int(w) for s, w in states.items()}
+
+
+def sound_field(
+    field: Mapping[sp.Symbol, sp.Expr], known: Iterable[sp.Symbol], states: Iterable[sp.Symbol]
+) -> dict[sp.Symbol, sp.Expr]:
+    """Rate of every state, in the order of the states; SymPy's own signs and absolute values as signed powers.
+
+    Parameters
+    ----------
+    field : mapping of Symbol to Expr
+    known : iterable of Symbol
+        Everything that a rate may hold.
+    states : iterable of Symbol
+
+    Returns
+    -------
+    dict of Symbol to Expr
+
+    Raises
+    ------
+    ParameterError
+        When a rate is missing or one too many, or holds a float, an infinity or an unknown symbol.
+    """
+    order, allowed = tuple(states), set(known)
+    if set(order) != set(field):
+        raise ParameterError(
+            f"a field needs one rate for each of {', '.join(map(str, order))}. "
+            f"Received rates of {', '.join(map(str, field)) or 'none'}."
+        )
+    rates = {s: _signed(sp.sympify(field[s])) for s in order}
+    for state, rate in rates.items():
+        _require_exact(rate, f"the rate of {state}")
+        _require_known(rate, allowed, f"the rate of {state}")
+    return rates
+
+
+def _signed(rate: sp.Expr) -> sp.Expr:
+    """sign(x) as ⌈x⌋⁰ and |x|^a as one power."""
+    signed = rate.replace(sp.sign, lambda x: SignedPower(x, 0)).replace(sp.Abs, lambda x: AbsolutePower(x, 1))
+    return signed.replace(
+        lambda e: e.is_Pow and isinstance(e.base, AbsolutePower) and e.exp.is_Rational,
+        lambda e: AbsolutePower(e.base.args[0], e.base.args[1] * e.exp),
+    )
+
+
+def _require_exact(expression: sp.Expr, what: str) -> None:
+    inexact = [*expression.atoms(sp.Float), *(v for v in (sp.nan, sp.oo, -sp.oo, sp.zoo) if expression.has(v))]
+    if inexact:
+        raise ParameterError(
+            f"{what} must be exact and finite. Received {inexact[0]} in {expression}. "
+            "Write numbers as sympy.Rational, such as Rational(3, 2)."
+        )
+
+
+def _require_known(expression: sp.Expr, known: set[sp.Symbol], what: str) -> None:
+    unknown = sorted(expression.free_symbols - known, key=str)
+    if unknown:
+        twin = " Another symbol of this name has other assumptions." * (str(unknown[0]) in map(str, known))
+        raise ParameterError(
+            f"{what} must hold only {', '.join(sorted(map(str, known))) or 'numbers'}. "
+            f"Received {unknown[0]}.{twin} Declare every symbol once."
+        )
+
+
+def require_names(symbols: Iterable[sp.Symbol]) -> None:
+    """Refuse names that a certificate file cannot hold, and equal ones.
+
+    Raises
+    ------
+    ParameterError
+    """
+    names = [str(symbol) for symbol in symbols]
+    wrong = [name for name in names if not _NAME.fullmatch(name)]
+    twice = [name for name, n in Counter(names).items() if n > 1]
+    if wrong or twice:
+        raise ParameterError(
+            "names in a loop must be different, of letters, digits and _, beginning with a letter, at most 40 "
+            f"characters. Received {(wrong or twice)[0]!r}{' twice' * (not wrong)}. Rename it."
+        )
+
+
+def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Symbol]) -> None:
+    """Refuse a root of anything but a gain or constant.
+
+    Raises
+    ------
+    ParameterError
+    """
+    known = set(numbers)
+    for root, of in roots.items():
+        if of not in known:
+            raise ParameterError(f"the root {root} must be that of a gain or constant. Received {of}.")
+
+
+def require_units(
+    units: Mapping[sp.Symbol, sp.Expr], states: Iterable[sp.Symbol], numbers: Iterable[sp.Symbol]
+) -> None:
+    """Refuse a unit of anything but a state, or one that holds anything but gains, constants and roots.
+
+    Raises
+    ------
+    ParameterError
+    """
+    order, known = tuple(states), set(numbers)
+    for state, unit in units.items():
+        if state not in order:
+            raise ParameterError(f"units belong to states, {', '.join(map(str, order))}. Received one of {state}.")
+        _require_exact(sp.sympify(unit), f"the unit of {state}")
+        _require_known(sp.sympify(unit), known, f"the unit of {state}")
+
+
+# ----------------------------------------------------------------------
+# A closed loop in symbols, as a law derives it, and its terms.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopField:
+    """A closed loop as an uncertain vector field, the subject of a certificate.
+
+    Attributes
+    ----------
+    states : dict of Symbol to int
+        States and their weights.
+    field : dict of Symbol to Expr
+        Time derivative of every state, in gains, constants and uncertain parameters.
+    gains, constants, uncertain : tuple of Symbol
+    domain : str
+        ``"cells"`` for signed powers, ``"reals"`` for polynomials.
+    roots : mapping of Symbol to Symbol
+        Symbols that stand for the positive square root of a gain.
+    units : mapping of Symbol to Expr
+        Error that one unit of a state stands for, where it is not one unit; in gains.
+
+    Raises
+    ------
+    ParameterError
+        For names that are equal or that a certificate file cannot hold, an unknown domain, states of one sign, weights
+        that are no integers from 1 to 12, a rate that is missing, inexact or holds an unknown symbol, a root of
+        anything but a gain or constant, a unit of anything but a state.
+    """
+
+    states: dict[sp.Symbol, int]
+    field: dict[sp.Symbol, sp.Expr]
+    gains: tuple[sp.Symbol, ...]
+    constants: tuple[sp.Symbol, ...]
+    uncertain: tuple[sp.Symbol, ...]
+    domain: str
+    roots: Mapping[sp.Symbol, sp.Symbol] = dataclasses.field(default_factory=dict)
+    units: Mapping[sp.Symbol, sp.Expr] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        numbers = (*self.gains, *self.constants)
+        known = (*self.states, *numbers, *self.uncertain, *self.roots)
+        object.__setattr__(self, "states", sound_states(self.states, self.domain))
+        require_names(known)
+        require_roots(self.roots, numbers)
+        require_units(self.units, self.states, (*numbers, *self.roots))
+        object.__setattr__(self, "field", sound_field(self.field, known, self.states))
+
+    @property
+    def degree(self) -> int:
+        """Lowest degree of the Lyapunov functions to try, see `lowest_degree`."""
+        return lowest_degree(self.states.values(), self.domain)
+
+    @property
+    def terms(self) -> FieldTerms:
+        """The same as plain data, with a name for the argument of every nested power.
+
+        Raises
+        ------
+        CertificateError
+            For parts that certificates cannot express, and rates that are unbounded near the origin.
+        """
+        states = tuple(self.states)
+        names = [s.name for s in (*self.gains, *self.constants, *self.uncertain, *self.roots, *states)]
+        lifts, rates = without_nesting([self.field[s] for s in states], states, names)
+        powers = (*states, *lifts)
+        speeds = {s.name: to_terms(rate, powers) for s, rate in zip(states, rates, strict=True)}
+        _require_bounded(speeds)
+        arguments = {lift.name: to_terms(argument, powers) for lift, argument in lifts.items()}
+        gains, constants, uncertain = (tuple(s.name for s in g) for g in (self.gains, self.constants, self.uncertain))
+        return FieldTerms(
+            states={s.name: weight for s, weight in self.states.items()},
+            field=speeds,
+            gains=gains,
+            constants=constants,
+            uncertain=uncertain,
+            domain=self.domain,
+            roots={root.name: of.name for root, of in self.roots.items()},
+            lifts=_occurring(arguments, speeds),
+        )
+
+
+def lowest_degree(weights: Iterable[int], domain: str) -> int:
+    """Degree of the product of the two heaviest states, from where on a V can couple them; 2 on the reals."""
+    *_, first, second = (1, *sorted(weights))
+    return first + second if domain == "cells" else 2
+
+
+def _require_bounded(speeds: Mapping[str, Iterable[Term]]) -> None:
+    """Refuse a negative power that no other factor of its product makes up for."""
+    for state, terms in speeds.items():
+        for of, exponent, kind in (factor for term in terms for factor in term.factors if factor[1] < 0):
+            power = f"|{of}|^({exponent})" if kind == "a" else f"⌈{of}⌋^({exponent})"
+            raise CertificateError(
+                f"every rate must be bounded near the origin. Received one of {state} with {power}, which is unbounded "
+                f"where {of} = 0. Multiply it by a power of {of} that makes up for it."
+            )
+
+
+def _occurring(
+    lifts: Mapping[str, tuple[Term, ...]], speeds: Mapping[str, Iterable[Term]]
+) -> dict[str, tuple[Term, ...]]:
+    """Lifts that the field, or one of these, needs: a sign squared is 1, and leaves its argument unused."""
+    used = {name for terms in speeds.values() for term in terms for name, _, _ in term.factors}
+    for lift, terms in reversed(list(lifts.items())):
+        used |= {name for term in terms for name, _, _ in term.factors} if lift in used else set()
+    return {lift: terms for lift, terms in lifts.items() if lift in used}

@@ -1,0 +1,260 @@
+"""Sampled laws as controllers of a simulation, and the compensated implicit step.
+
+Chapters: a law as expressions in states and reference; a sampled linear law as a controller; the implicit
+step with a disturbance estimate in place of integral states, for simulation and proof.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from fractions import Fraction
+from functools import partial
+from types import MappingProxyType
+from typing import Any, ClassVar, Self
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.exact import fraction_of, to_sympy
+from quakedesign.laws.base import Controller, Sampling, Signals
+from quakedesign.laws.implicit_root import ImplicitRoot
+from quakedesign.laws.loop_field import LoopField
+from quakedesign.laws.sampled_law import LinearLaw, RestLimit
+from quakedesign.symbolic import plant
+
+# ----------------------------------------------------------------------
+# A law as expressions in the states of the fault and in the reference.
+
+r, r_rate, r_acceleration = sp.symbols("r r_rate r_acceleration", real=True)
+
+
+def integral_symbols(controller: Controller | None) -> tuple[sp.Symbol, ...]:
+    """Symbols ξ1, ξ2 … of the law's own states."""
+    count = len(controller.integral_units) if controller else 0
+    return tuple(sp.Symbol(f"xi_{i + 1}", real=True) for i in range(count))
+
+
+def law_expressions(controller: Controller) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
+    """Pressure [Pa] and ξ' of a law, in x1, x2, r, r', r'' and ξ."""
+    signals = Signals(
+        slip=plant.x1,
+        slip_rate=plant.x2,
+        slip_error=plant.x1 - r,
+        slip_rate_error=plant.x2 - r_rate,
+        integrals=integral_symbols(controller),
+        reference_acceleration=r_acceleration,
+    )
+    return controller.pressure(signals), controller.integral_rates(signals)
+
+
+def cut_off(
+    asked: sp.Expr,
+    states: tuple[sp.Expr, ...],
+    slip: sp.Expr,
+    reference: sp.Expr,
+    width: sp.Expr,
+    per_slip: sp.Expr,
+    resolution: sp.Expr,
+    *,
+    within: tuple[sp.Expr, ...] | None = None,
+) -> tuple[sp.Expr, ...]:
+    """The pressure [Pa] that is applied at a sample in place of what is asked for, and `RestLimit.STATES` after it.
+
+    Parameters
+    ----------
+    asked : Expr
+        [Pa].
+    states : tuple of Expr
+        `RestLimit.STATES` before it.
+    slip, reference : Expr
+        [m].
+    width, per_slip, resolution : Expr
+        [Pa], [Pa/m], [m].
+    within : tuple of Expr, optional
+        Least and largest pressure [Pa], and the slip between two samples [m] up to which they are not passed.
+    """
+    highest, last = states
+    moved = per_slip * reference
+    short = sp.Max(highest - moved - width - asked, 0)
+    applied = asked + sp.Piecewise((short, slip <= last + resolution), (0, True))
+    if within is not None:
+        least, largest, fastest = within
+        inside = sp.Max(least, sp.Min(largest, applied)) - applied
+        applied += sp.Piecewise((inside, slip <= last + fastest), (0, True))
+    return applied, highest + sp.Max(applied + moved - highest, 0), slip
+
+
+# ----------------------------------------------------------------------
+# A linear law of samples as a controller that simulations run.
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledController(Controller):
+    """p = Cz + Dy, whose states z ← Fz + Gy are those of the scheme ``explicit`` with the step T_s: ξ ← ξ + T_s·ξ′.
+
+    Attributes
+    ----------
+    law : LinearLaw
+    step : Fraction
+        T_s [s] for which it is meant.
+    delay, lag, diffusion, longest : Fraction
+        As of `Sampling` [s].
+    rest_limit : RestLimit, optional
+        Of its pressure; its states are then told what is applied, and those of the limit follow them.
+    gains : mapping of str to Fraction
+        Read off the law: p = −k1·e1 − k2·e2 − Σ gain·state, every state under its name.
+    """
+
+    name: ClassVar[str] = "sampled"
+    title: ClassVar[str] = "e-LQR"
+    source: ClassVar[str] = "quakedesign.laws.sampled_law"
+
+    gains: Mapping[str, Fraction] = field(default_factory=dict, init=False)
+    law: LinearLaw
+    step: Fraction
+    delay: Fraction = Fraction(0)
+    lag: Fraction = Fraction(0)
+    diffusion: Fraction = Fraction(0)
+    longest: Fraction = Fraction(0)
+    rest_limit: RestLimit | None = None
+
+    def __post_init__(self) -> None:
+        values = (-v for v in (*self.law.feedback, *self.law.output))
+        object.__setattr__(self, "gains", MappingProxyType(dict(zip(self.gain_units, values, strict=True))))
+
+    def __reduce__(self) -> tuple[Any, tuple[()]]:
+        told = {part.name: getattr(self, part.name) for part in fields(self) if part.init}
+        return partial(type(self), **told), ()
+
+    @property
+    def sampling(self) -> Sampling:
+        """By the scheme ``explicit``, once every T_s."""
+        return Sampling(step=self.step, delay=self.delay, lag=self.lag, diffusion=self.diffusion, longest=self.longest)
+
+    @property
+    def of_slip(self) -> LinearLaw | None:
+        """The law, if it does without the slip rate."""
+        return self.law if self.law.of_slip_alone else None
+
+    @property
+    def while_moving(self) -> "SampledController":
+        """The linear law, without its limit at rest."""
+        return replace(self, rest_limit=None)
+
+    @property
+    def gain_units(self) -> Mapping[str, str]:  # type: ignore[override]
+        """Of a state: Pa per its own unit."""
+        return {"k1": "Pa/m", "k2": "Pa s/m", **dict.fromkeys(self.law.states, "Pa")}
+
+    @property
+    def integral_units(self) -> tuple[str, ...]:  # type: ignore[override]
+        """One for every state; the law's own."""
+        return ("-",) * len(self.law.states) + (RestLimit.UNITS if self.rest_limit else ())
+
+    def pressure(self, signals: Signals) -> sp.Expr:
+        """Cz + Dy, at rest within the limit [Pa]."""
+        return self._decided(signals)[0]
+
+    def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
+        """(Fz + Gy − z)/T_s, of what the limit cuts off what the law makes of it besides, and of the limit's states."""
+        cut, after = self._decided(signals)[1:]
+        z, seen, period = signals.integrals, self._read(signals), to_sympy(self.step)
+        told = self.law.applied or (Fraction(0),) * len(self.law.states)
+        rows = zip(self.law.update, self.law.measured, told, z, strict=False)
+        rates = [(_combined((*own, *fed), seen) - state) / period + to_sympy(h) * cut for own, fed, h, state in rows]
+        return (*rates, *((new - old) / period for new, old in zip(after, z[len(rates) :], strict=True)))
+
+    def _decided(self, signals: Signals) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...]]:
+        """The pressure that is applied, what that is more than is asked for, over T_s, and the limit's states after."""
+        asked = _combined((*self.law.output, *self.law.feedback), self._read(signals))
+        if self.rest_limit is None:
+            return asked, sp.S.Zero, ()
+        states = signals.integrals[len(self.law.states) :]
+        limit, reference = self.rest_limit, signals.slip - signals.slip_error
+        numbers = (to_sympy(v) for v in (limit.width, limit.per_slip, limit.resolution))
+        within = None if limit.range is None else tuple(to_sympy(v) for v in limit.range)
+        applied, *after = cut_off(asked, states, signals.slip, reference, *numbers, within=within)
+        return applied, (applied - asked) / to_sympy(self.step), tuple(after)
+
+    def _read(self, signals: Signals) -> tuple[Any, ...]:
+        return (*signals.integrals[: len(self.law.states)], signals.slip_error, signals.slip_rate_error)
+
+    @classmethod
+    def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
+        """Refuse: gains in order do not make its matrices."""
+        raise UnsupportedError("a sampled law is made from its matrices, not from gains in order. Use LinearLaw.")
+
+    @classmethod
+    def loop_field(cls) -> LoopField:
+        """Refuse: it has no loop in continuous time."""
+        raise UnsupportedError("a sampled law has no loop in continuous time. Use a guarantee of the loop that runs.")
+
+
+def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Expr:
+    return sp.Add(*(to_sympy(v) * signal for v, signal in zip(numbers, signals, strict=True)))
+
+
+# ----------------------------------------------------------------------
+# What an implicit step does with an estimate of the disturbance in place of integral states; simulated and proved.
+#
+# Both functions take floats, SymPy and CasADi expressions. The estimate d follows what the slip rate did over the
+# last
+# period beyond T_s·B0·p, and the pressure takes the slip rate to the end w of the step, less d.
+
+_STATES = ("rate_error_before", "push_before", "disturbance")
+
+
+def followed(rate_error: Any, before: Any, pushed: Any, estimate: Any, weight: Any, gain: Any) -> Any:
+    """d ← d + a[(e2 − e2⁻)/(T_sB0) − p⁻ − d] [Pa], with the gain T_sB0 [m/(s Pa)]."""
+    return estimate + weight * ((rate_error - before) / gain - pushed - estimate)
+
+
+def compensation_answered(rate_error: Any, end_rate: Any, estimate: Any, gain: Any) -> Any:
+    """p = (w − e2)/(T_sB0) − d [Pa]."""
+    return (end_rate - rate_error) / gain - estimate
+
+
+def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearLaw:
+    """The compensated step as matrices; its states are e2⁻, T_sB0·p⁻ and T_sB0·d, all in m/s, for numbers of one size.
+
+    The first sample, before which there is none, says nothing of the disturbance: there e2⁻ = e2.
+
+    Parameters
+    ----------
+    root : ImplicitRoot
+        Of the step's end w.
+    weight : Fraction
+        a [-], above 0 and at most 1.
+    gain : Fraction
+        T_sB0 [m/(s Pa)], positive.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not 0 < weight <= 1 or gain <= 0:
+        raise ParameterError(
+            "a compensated step needs a weight in (0, 1] and a positive gain. Received "
+            f"{float(weight):.4g} and {float(gain):.4g}. Change them."
+        )
+    known = before, pushed, estimate, _, rate_error, end_rate = sp.symbols("before pushed estimate e1 e2 w")
+    share, size = to_sympy(weight), to_sympy(gain)
+    level = followed(rate_error, before, pushed / size, estimate / size, share, size)
+    pressure = compensation_answered(rate_error, end_rate, level, size)
+    rows = [_coefficients(expression, known) for expression in (rate_error, size * pressure, size * level)]
+    output = _coefficients(pressure, known)
+    return LinearLaw(
+        states=_STATES,
+        update=tuple(row[:3] for row in rows),
+        measured=tuple(row[3:] for row in rows),
+        output=output[:3],
+        feedback=output[3:],
+        root=root,
+        first=tuple(tuple(Fraction(k == 1 == entry) for k in (0, 1)) for entry in (1, 0, 0)),
+        applied=(Fraction(0), gain, Fraction(0)),
+    )
+
+
+def _coefficients(expression: sp.Expr, known: tuple[sp.Symbol, ...]) -> tuple[Fraction, ...]:
+    """Of a linear expression."""
+    expanded = sp.expand(expression)
+    return tuple(fraction_of(sp.Rational(expanded.coeff(symbol))) for symbol in known)

@@ -1,0 +1,566 @@
+"""Sampled linear control laws as exact matrices: p = Cz + Dy, z⁺ = Fz + Gy.
+
+Chapters: feedback with a disturbance estimate and the sampled e-LQR; slip-only feedback with an observer;
+laws with a model of the diffusion path between well and fault; a pressure limit at rest that prevents
+integrator windup.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import ClassVar
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import shortly
+from quakedesign.laws.implicit_root import ImplicitRoot
+
+# ----------------------------------------------------------------------
+# Linear laws that run once per sample, as exact matrices.
+
+Row = tuple[Fraction, ...]
+Matrix = tuple[Row, ...]
+
+MEASURED = ("slip_error", "slip_rate_error")
+NOISES = ("slip_noise", "rate_noise")
+MOST_STATES = 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearLaw:
+    """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z from 0 unless told.
+
+    With an implicit root the law is linear but for w, the end of an implicit step from e1 and e2, and y = (e1, e2, w).
+
+    Attributes
+    ----------
+    states : tuple of str
+        Names of z; their units are the law's own.
+    update : tuple of rows
+        F.
+    measured : tuple of rows
+        G, two columns: for e1 [m] and e2 [m/s]; a third for w [m/s].
+    output : tuple of Fraction
+        C, so that Cz is in Pa.
+    feedback : (Fraction, Fraction)
+        D [Pa/m, Pa·s/m]; a third entry for w [Pa·s/m].
+    root : ImplicitRoot, optional
+        What w solves; None for a linear law.
+    first : tuple of rows
+        S, two columns: z = S(e1, e2) at the first sample, as they are measured then; without rows 0.
+    applied : tuple of Fraction
+        What z⁺ gains per Pa that is applied beyond p, where limits cut it off; without entries the law is not told.
+
+    Raises
+    ------
+    ParameterError
+        When the sizes do not fit, or there are more than 12 states.
+    """
+
+    states: tuple[str, ...]
+    update: Matrix
+    measured: Matrix
+    output: Row
+    feedback: Row
+    root: ImplicitRoot | None = None
+    first: Matrix = ()
+    applied: Row = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        seen = len(MEASURED) + (self.root is not None)
+        require_sizes(self.states, self.update, self.measured, self.output, self.feedback, seen)
+        if self.first and [len(row) for row in self.first] != [len(MEASURED)] * len(self.states):
+            raise ParameterError(
+                f"first of a linear law needs {len(self.states)} rows of {len(MEASURED)} entries, or none. Received "
+                f"{len(self.first)} rows. Complete them."
+            )
+        if self.applied and len(self.applied) != len(self.states):
+            raise ParameterError(
+                f"applied of a linear law needs {len(self.states)} entries, or none. Received {len(self.applied)}. "
+                "Complete them."
+            )
+
+    @property
+    def of_slip_alone(self) -> bool:
+        """Whether it does without the slip rate."""
+        return self.root is None and not any(row[1] for row in (*self.measured, self.feedback))
+
+
+def require_sizes(
+    states: tuple[str, ...], own: Matrix, measured: Matrix, output: Row, feedback: Row, seen: int = len(MEASURED)
+) -> None:
+    """Refuse matrices of a law whose sizes do not fit, and too many states.
+
+    Raises
+    ------
+    ParameterError
+    """
+    n = len(states)
+    fits = (
+        n <= MOST_STATES
+        and len(set(states)) == n
+        and [len(row) for row in own] == [n] * n
+        and [len(row) for row in measured] == [seen] * n
+        and len(output) == n
+        and len(feedback) == seen
+    )
+    if not fits:
+        raise ParameterError(
+            f"a linear law needs F of n × n, G of n × {seen}, C of n and D of {seen} entries, n at most {MOST_STATES} "
+            f"states of different names. Received {n} states ({', '.join(states)}) and other sizes. Complete them."
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NominalModel:
+    """Middle of what may be: e2' = s·e1 − w·e2 + β·b·(p − p*) + d, which a law predicts with.
+
+    Attributes
+    ----------
+    slip : Fraction
+        s [1/s²].
+    rate : Fraction
+        w [1/s].
+    gain : Fraction
+        β·b [m²/kg], positive.
+    """
+
+    slip: Fraction
+    rate: Fraction
+    gain: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prediction:
+    """What a law expects, from its model; any numbers give a law, good ones a good one.
+
+    Attributes
+    ----------
+    of_slip, of_rate : Fraction
+        Of e1 and e2 now, for e2 at the next sample.
+    of_pushes : tuple of Fraction
+        γ_j [s]: what βb·p + d adds to that, p being what was asked for j samples ago, from 0 on.
+    ahead : tuple of rows
+        Of e1 and e2 now, for both when the pressure asked for now arrives; the unit matrix without delay.
+    ahead_of_pushes : tuple of (Fraction, Fraction)
+        What βb·p + d adds to these [s², s], p being what was asked for j samples ago, from 1 on.
+
+    Raises
+    ------
+    ParameterError
+        When the pushes of both do not fit, or those of the next sample add up to zero.
+    """
+
+    of_slip: Fraction
+    of_rate: Fraction
+    of_pushes: Row
+    ahead: Matrix = ((Fraction(1), Fraction(0)), (Fraction(0), Fraction(1)))
+    ahead_of_pushes: Matrix = ()
+
+    def __post_init__(self) -> None:
+        if len(self.of_pushes) != len(self.ahead_of_pushes) + 1 or not sum(self.of_pushes):
+            raise ParameterError(
+                "a prediction needs pushes from 0 and from 1 sample ago on, those of the next sample not zero in all. "
+                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)}. Complete them."
+            )
+
+
+def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
+    """The e-LQR as it is sampled: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1⁺ = ξ1 + T_s·e1, ξ2⁺ = ξ2 + T_s·ξ1 if k4 ≠ 0.
+
+    Parameters
+    ----------
+    gains : tuple of Fraction
+        k1 … k4 [Pa/m, Pa·s/m, Pa/(m s), Pa/(m s²)].
+    step : Fraction
+        T_s [s].
+
+    Raises
+    ------
+    ParameterError
+        When there are not four gains.
+    """
+    if len(gains) != 4:
+        raise ParameterError(f"gains of summed_integrals must be four. Received {len(gains)}. Give k1 to k4.")
+    k1, k2, k3, k4 = gains
+    zero, one = Fraction(0), Fraction(1)
+    if not k4:  # a PID, of which ξ2 is no part
+        return LinearLaw(
+            states=("xi1",), update=((one,),), measured=((step, zero),), output=(-k3,), feedback=(-k1, -k2)
+        )
+    return LinearLaw(
+        states=("xi1", "xi2"),
+        update=((one, zero), (step, one)),
+        measured=((step, zero), (zero, zero)),
+        output=(-k3, -k4),
+        feedback=(-k1, -k2),
+    )
+
+
+def disturbance_estimate(
+    gains: tuple[Fraction, Fraction], weight: Fraction, prediction: Prediction, gain: Fraction
+) -> LinearLaw:
+    """Feedback of slip and slip rate, and a level d of everything else that the last period showed.
+
+    d ← d + a(e2 − π)/Σγ_j, p = −k1ê1 − k2ê2 − d/(βb) with ê = e as expected when p arrives, and
+    π ← of_slip·e1 + of_rate·e2 + Σγ_j(βb·p_j + d). The estimate follows the innovation of the slip rate and has no
+    trend, so that it does not wind up while the fault sticks. States: π [m/s], d [m/s²], and the pressures p_1, p_2 …
+    asked for before [Pa].
+
+    Parameters
+    ----------
+    gains : (Fraction, Fraction)
+        k1, k2 [Pa/m, Pa·s/m].
+    weight : Fraction
+        a [-].
+    prediction : Prediction
+    gain : Fraction
+        β·b of the model [m²/kg], positive.
+    """
+    require_gain(gain)
+    late = len(prediction.ahead_of_pushes)
+    size = 4 + late  # rows act on (π, d, p_1 …) and then on (e1, e2)
+    share, one = weight / sum(prediction.of_pushes), Fraction(1)
+    level = unit_row(size, {0: -share, 1: one, size - 1: share})
+    errors = unit_row(size, {size - 2: one}), unit_row(size, {size - 1: one})
+    waiting = [unit_row(size, {2 + j: one}) for j in range(late)]
+    asked, pushes = answered(gains, gain, errors, level, waiting, prediction.ahead, prediction.ahead_of_pushes)
+    own = unit_row(size, {size - 2: prediction.of_slip, size - 1: prediction.of_rate})
+    predicted = combined((one, own), *zip(prediction.of_pushes, pushes, strict=True))
+    pushed = (gain * prediction.of_pushes[0], Fraction(0))
+    return law_of_rows(("predicted_rate", "disturbance"), [predicted, level], asked, waiting, pushed)
+
+
+def require_gain(gain: Fraction) -> None:
+    """Refuse a model whose pressure does nothing, or the wrong thing."""
+    if gain <= 0:
+        raise ParameterError(f"the gain of a model must be positive. Received {shortly(gain)} m²/kg. Check its sign.")
+
+
+def answered(
+    gains: tuple[Fraction, Fraction],
+    gain: Fraction,
+    errors: tuple[Row, Row],
+    level: Row,
+    waiting: list[Row],
+    ahead: Matrix,
+    ahead_of_pushes: Matrix,
+) -> tuple[Row, list[Row]]:
+    """The pressure asked for, and βb·p_j + d for it and every one that waits."""
+    one = Fraction(1)
+    before = [combined((gain, row), (one, level)) for row in waiting]
+    expected = [
+        combined(
+            *zip(row, errors, strict=True), *((v[i], push) for v, push in zip(ahead_of_pushes, before, strict=True))
+        )
+        for i, row in enumerate(ahead)
+    ]
+    asked = combined((-gains[0], expected[0]), (-gains[1], expected[1]), (-1 / gain, level))
+    return asked, [combined((gain, asked), (one, level)), *before]
+
+
+def law_of_rows(names: tuple[str, ...], own: list[Row], asked: Row, waiting: list[Row], pushed: Row) -> LinearLaw:
+    """Law of rows that act on its states and then on e1 and e2; pressures on their way move one place on.
+
+    Its own states gain `pushed` per Pa that is applied.
+    """
+    rows = [*own, *[asked, *waiting][: len(waiting)]]
+    return LinearLaw(
+        states=(*names, *(f"asked_{j + 1}_ago" for j in range(len(waiting)))),
+        update=tuple(row[:-2] for row in rows),
+        measured=tuple(row[-2:] for row in rows),
+        output=asked[:-2],
+        feedback=asked[-2:],
+        applied=(*pushed, *[Fraction(1), *[Fraction(0)] * len(waiting)][: len(waiting)]),
+    )
+
+
+def unit_row(size: int, entries: dict[int, Fraction]) -> Row:
+    """Row of zeros but for these entries."""
+    return tuple(entries.get(i, Fraction(0)) for i in range(size))
+
+
+def combined(*parts: tuple[Fraction, Row]) -> Row:
+    """Combination of rows."""
+    scaled = ([factor * v for v in row] for factor, row in parts)
+    return tuple(sum(column, Fraction(0)) for column in zip(*scaled, strict=True))
+
+
+# ----------------------------------------------------------------------
+# A law of samples that measures the slip alone: an observer of both errors and of the disturbance.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorPrediction:
+    """What an observer expects of both errors, from its model; any numbers give a law, good ones a good one.
+
+    Attributes
+    ----------
+    of_errors : tuple of rows
+        Φ: of e1 and e2 now, for both at the next sample.
+    of_pushes : tuple of (Fraction, Fraction)
+        γ_j [s², s]: what βb·p + d adds to that, p being what was asked for j samples ago, from 0 on.
+    ahead, ahead_of_pushes : tuple of rows
+        As those of `Prediction`.
+
+    Raises
+    ------
+    ParameterError
+        When the pushes of both do not fit.
+    """
+
+    of_errors: Matrix
+    of_pushes: Matrix
+    ahead: Matrix = ((Fraction(1), Fraction(0)), (Fraction(0), Fraction(1)))
+    ahead_of_pushes: Matrix = ()
+
+    def __post_init__(self) -> None:
+        if len(self.of_pushes) != len(self.ahead_of_pushes) + 1:
+            raise ParameterError(
+                "a prediction needs pushes from 0 and from 1 sample ago on. "
+                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)}. Complete them."
+            )
+
+
+def slip_observer(
+    gains: tuple[Fraction, Fraction],
+    corrections: tuple[Fraction, Fraction, Fraction],
+    prediction: ErrorPrediction,
+    gain: Fraction,
+) -> LinearLaw:
+    """Feedback of the slip alone: an observer of slip error, slip-rate error and the level d of everything else.
+
+    ê ← π + l·(e1 − π1) and d ← d + l3(e1 − π1), p = −k1ê1 − k2ê2 − d/(βb) with ê as expected when p arrives, and π ←
+    Φê + Σγ_j(βb·p_j + d). The level has no trend. States: π [m, m/s], d [m/s²], and the pressures p_1, p_2 … asked for
+    before [Pa].
+
+    Parameters
+    ----------
+    gains : (Fraction, Fraction)
+        k1, k2 [Pa/m, Pa·s/m].
+    corrections : (Fraction, Fraction, Fraction)
+        l1, l2, l3 [-, 1/s, 1/s²].
+    prediction : ErrorPrediction
+    gain : Fraction
+        β·b of the model [m²/kg], positive.
+
+    Raises
+    ------
+    ParameterError
+    """
+    require_gain(gain)
+    late = len(prediction.ahead_of_pushes)
+    size, one = 5 + late, Fraction(1)  # rows act on (π1, π2, d, p_1 …) and then on (e1, e2)
+    innovation = unit_row(size, {0: -one, size - 2: one})
+    slip, rate, level = (combined((one, unit_row(size, {i: one})), (v, innovation)) for i, v in enumerate(corrections))
+    waiting = [unit_row(size, {3 + j: one}) for j in range(late)]
+    asked, pushes = answered(gains, gain, (slip, rate), level, waiting, prediction.ahead, prediction.ahead_of_pushes)
+    predicted = [
+        combined(
+            (of_slip, slip),
+            (of_rate, rate),
+            *((v[i], push) for v, push in zip(prediction.of_pushes, pushes, strict=True)),
+        )
+        for i, (of_slip, of_rate) in enumerate(prediction.of_errors)
+    ]
+    pushed = (*(gain * v for v in prediction.of_pushes[0]), Fraction(0))
+    return law_of_rows(("predicted_slip", "predicted_rate", "disturbance"), [*predicted, level], asked, waiting, pushed)
+
+
+# ----------------------------------------------------------------------
+# Laws that carry a model of what stands between their pressure and the fault.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathModel:
+    """What a law expects of fault and path; any numbers give a law, good ones a good one.
+
+    Attributes
+    ----------
+    of_errors : tuple of rows
+        Φ: of e1 and e2 now, for both at the next sample.
+    of_pressures : tuple of rows
+        m_i [s², s]: what βb·q_i adds to either, q_i being the pressures of the path.
+    of_asked : tuple of Fraction
+        n [s², s]: what βb·p adds to either, p being what is asked for now.
+    kept : tuple of rows
+        R with q⁺ = Rq + (1 − R1)p, so that q = p where p is constant.
+
+    Raises
+    ------
+    ParameterError
+        When sizes do not fit, or no pressure moves the fault.
+    """
+
+    of_errors: Matrix
+    of_pressures: Matrix
+    of_asked: Row
+    kept: Matrix
+
+    def __post_init__(self) -> None:
+        n = len(self.of_pressures[0])
+        sizes = [len(row) for row in (*self.kept, *self.of_pressures)]
+        if sizes != [n] * (n + 2) or not self.of_constant[1]:
+            raise ParameterError(
+                f"a model of {n} pressures needs {n} × {n} numbers of how they are kept, and a constant pressure must "
+                "move the fault. Received another one. Complete it."
+            )
+
+    @property
+    def of_constant(self) -> Row:
+        """Γ [s², s]: what βb·p adds where p is constant."""
+        return tuple(sum(row, own) for row, own in zip(self.of_pressures, self.of_asked, strict=True))
+
+
+def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: Fraction) -> LinearLaw:
+    """Feedback of slip, slip rate and the path's pressures, and a level d of all else that the last period showed.
+
+    d ← d + a(e2 − π)/Γ2, p = −k1e1 − k2e2 − Σ k_i(q_i + d/(βb)) − d/(βb), π ← Φ2e + βb(Σ m_2iq_i + n2p) + Γ2d, and q ←
+    Rq + (1 − R1)p, which is not measured but known. States: π [m/s], d and βb·q [m/s²], for numbers of one size.
+
+    Parameters
+    ----------
+    gains : tuple of Fraction
+        k1 [Pa/m], k2 [Pa·s/m] and k_i [-] of every pressure.
+    weight : Fraction
+        a [-].
+    model : PathModel
+    gain : Fraction
+        β·b of the model [m²/kg], positive.
+
+    Raises
+    ------
+    ParameterError
+        When the gains do not fit, or the model's is not positive.
+    """
+    size, one = 4 + len(model.kept), Fraction(1)  # rows act on (π, d, q) and then on (e1, e2)
+    share = weight / model.of_constant[1]
+    level = unit_row(size, {0: -share, 1: one, size - 1: share})
+    errors = unit_row(size, {size - 2: one}), unit_row(size, {size - 1: one})
+    return _through(("predicted_rate", "disturbance"), gains, model, gain, errors, level)
+
+
+def observer_through_path(
+    gains: Row, corrections: tuple[Fraction, Fraction, Fraction], model: PathModel, gain: Fraction
+) -> LinearLaw:
+    """The same of the slip alone: an observer of slip error, slip-rate error and the level d of everything else.
+
+    ê ← π + l(e1 − π1) and d ← d + l3(e1 − π1), p of ê as that of `estimate_through_path` of e, and π ← Φê + βb(Σ m_iq_i
+    + np) + Γd. States: π [m, m/s], d and βb·q [m/s²].
+
+    Parameters
+    ----------
+    gains : tuple of Fraction
+        k1 [Pa/m], k2 [Pa·s/m] and k_i [-] of every pressure.
+    corrections : (Fraction, Fraction, Fraction)
+        l1, l2, l3 [-, 1/s, 1/s²].
+    model : PathModel
+    gain : Fraction
+        β·b of the model [m²/kg], positive.
+
+    Raises
+    ------
+    ParameterError
+        As `estimate_through_path`.
+    """
+    size, one = 5 + len(model.kept), Fraction(1)  # rows act on (π1, π2, d, q) and then on (e1, e2)
+    innovation = unit_row(size, {0: -one, size - 2: one})
+    slip, rate, level = (combined((one, unit_row(size, {i: one})), (v, innovation)) for i, v in enumerate(corrections))
+    return _through(("predicted_slip", "predicted_rate", "disturbance"), gains, model, gain, (slip, rate), level)
+
+
+def _through(
+    names: Sequence[str], gains: Row, model: PathModel, gain: Fraction, errors: tuple[Row, Row], level: Row
+) -> LinearLaw:
+    """Law of the last so many predictions, the level and the path, from rows for the errors and the level."""
+    count, own = len(model.kept), len(names)
+    if len(gains) != 2 + count or gain <= 0:
+        raise ParameterError(
+            f"a law with a model of {count} pressures needs {2 + count} gains and a positive gain of the model. "
+            f"Received {len(gains)} and {shortly(gain)} m²/kg. Complete them."
+        )
+    path = [unit_row(len(level), {own + i: Fraction(1)}) for i in range(count)]
+    away = [combined((1 / gain, q), (1 / gain, level)) for q in path]
+    asked = combined(*((-k, row) for k, row in zip(gains, (*errors, *away), strict=True)), (-1 / gain, level))
+    expected = zip(model.of_errors, model.of_pressures, model.of_asked, model.of_constant, strict=True)
+    predicted = [
+        combined(*zip(now, errors, strict=True), *zip(pushed, path, strict=True), (gain * n, asked), (constant, level))
+        for now, pushed, n, constant in expected
+    ]
+    fresh = [gain * (1 - sum(row)) for row in model.kept]
+    kept = [combined(*zip(row, path, strict=True), (new, asked)) for row, new in zip(model.kept, fresh, strict=True)]
+    rows = [*predicted[1 - own :], level, *kept]
+    return LinearLaw(
+        states=(*names, *(f"path{i}" for i in range(count))),
+        update=tuple(row[:-2] for row in rows),
+        measured=tuple(row[-2:] for row in rows),
+        output=asked[:-2],
+        feedback=asked[-2:],
+        applied=(*[gain * n for n in model.of_asked[1 - own :]], Fraction(0), *fresh),
+    )
+
+
+# ----------------------------------------------------------------------
+# A limit of the pressure while the fault rests, so that a law does not wind up while friction holds it.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RestLimit:
+    """While a fault rests, its pressure is no further below any earlier one than a width.
+
+    And, beyond `width`, than `per_slip` for what the reference moved since. A loop whose pressure stays within P of p*,
+    where dp*/dr is at most `per_slip`, never reaches a limit with a width of 2P: it takes nothing from what is proved.
+    Where friction holds the fault, what is measured does not answer, and an integral goes on; ahead of its reference it
+    clamps a fault that rests anyway, without end. Then the pressure is cut off here, and the law is told. As soon as
+    the fault moves this is over, whatever moves it. Pressures that are proved never to be passed are cut off as well,
+    at rest and after it, unless the fault moves faster than is proved: then the law is free.
+
+    Attributes
+    ----------
+    width : Fraction
+        [Pa].
+    per_slip : Fraction
+        [Pa/m].
+    resolution : Fraction
+        Slip between two samples, as it is measured, up to which a fault rests [m].
+    least, largest : Fraction, optional
+        Pressures that are never passed where the loop is as it is proved [Pa]; both or none.
+    fastest : Fraction
+        Slip between two samples, as it is measured, up to which they are not passed [m].
+    STATES : tuple of str
+        Largest p + per_slip·r of all samples so far [Pa], r being the reference, which never falls, and the slip that
+        was measured last [m].
+
+    Raises
+    ------
+    ParameterError
+        For a width that is not positive, or another number that is negative.
+    """
+
+    STATES: ClassVar[tuple[str, ...]] = ("highest_pressure", "last_slip")
+    UNITS: ClassVar[tuple[str, ...]] = ("Pa", "m")
+
+    width: Fraction
+    per_slip: Fraction
+    resolution: Fraction = Fraction(0)
+    least: Fraction | None = None
+    largest: Fraction | None = None
+    fastest: Fraction = Fraction(0)
+
+    @property
+    def range(self) -> tuple[Fraction, Fraction, Fraction] | None:
+        """Least and largest pressure, and up to which slip between two samples; None without them."""
+        return None if self.least is None or self.largest is None else (self.least, self.largest, self.fastest)
+
+    def __post_init__(self) -> None:
+        if (self.least is None) != (self.largest is None) or not (self.least or 0) <= 0 <= (self.largest or 0):
+            ends = [None if end is None else f"{float(end):.4g} Pa" for end in (self.least, self.largest)]
+            raise ParameterError(
+                "least and largest pressure of a limit at rest must have 0 between them, both or none of them given. "
+                f"Received {ends[0]} and {ends[1]}. Change them."
+            )
+        if self.width <= 0 or min(self.per_slip, self.resolution, self.fastest) < 0:
+            raise ParameterError(
+                "a limit at rest needs a positive width, and no other number below 0. Received "
+                f"{shortly(self.width)} Pa, {shortly(self.per_slip)} Pa/m and {shortly(self.resolution)} m. "
+                "Check their signs."
+            )

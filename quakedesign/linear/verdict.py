@@ -1,0 +1,250 @@
+"""Verdict on a given gain K of a fault, with the files that prove it.
+
+Definiteness of a matrix is written as a sum of squares (proofs/FORMAT.md).
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from quakedesign.errors import OutputError
+from quakedesign.exact import rational
+from quakedesign.fault import Fault
+from quakedesign.guarantees import ContinuousPeaks, NoGuarantee
+from quakedesign.guarantees.exact.guarantee_files import save_guarantee
+from quakedesign.guarantees.search.linear_design import certified_peaks
+from quakedesign.laws.elqr import ExtendedLQR
+from quakedesign.linear.linear_problem import LinearProblem, Matrix
+from quakedesign.linear.printed_theorem import (
+    InverseOptimality,
+    both_tests,
+    compare_feedback,
+    inverse_optimality,
+    printed_row,
+)
+from quakedesign.linear.riccati import smallest_gain
+from quakedesign.linear.robust_stability import Analysis, analysis
+from quakedesign.linear.sampled_stability import HeldLoop, VaryingVerdict, held_loop
+from quakedesign.linear.uncertainty_bounds import uncertainty_bounds
+from quakedesign.lyapunov import Certificate, Verdict
+from quakedesign.sos import Answer
+from quakedesign.sos.exact.polynomial import constant
+from quakedesign.sos.exact.polynomial_statement import Statement
+from quakedesign.sos.exact.proofs import Square, SumOfSquares
+
+# ----------------------------------------------------------------------
+# Definite matrices as files about polynomials (FORMAT.md): a sum of squares on all variables proves definiteness.
+
+_LARGEST = 16
+
+
+def inverse_optimality_files(optimality: InverseOptimality) -> list[Answer]:
+    """P and Q0 of a K that is optimal for a Q ≥ Q0 + R·D; nothing for another verdict."""
+    if optimality.P is None or optimality.Q0 is None:
+        return []
+    return definite_files({"P": optimality.P, "Q": optimality.Q0})
+
+
+def held_files(problem: LinearProblem, gains: Sequence[Fraction], verdict: VaryingVerdict) -> list[Answer]:
+    """Every form, in SI, whose definiteness proves a held loop; nothing for another verdict."""
+    return definite_files(verdict.proof.forms(problem, gains)) if verdict.proof is not None else []
+
+
+def definite_files(forms: Mapping[str, Matrix]) -> list[Answer]:
+    """Answers that together prove every matrix positive definite, each about forms in variables of their own.
+
+    Parameters
+    ----------
+    forms : mapping of str to matrix (n × n)
+        The variables of a form are its name with the numbers 1 … n; n at most 16.
+    """
+    return [_answer(group) for group in _groups(forms)]
+
+
+def _groups(forms: Mapping[str, Matrix]) -> Iterator[dict[str, Matrix]]:
+    """Forms in order, together of at most 16 variables."""
+    group: dict[str, Matrix] = {}
+    for name, matrix in forms.items():
+        if group and sum(map(len, group.values())) + len(matrix) > _LARGEST:
+            yield group
+            group = {}
+        group[name] = matrix
+    if group:
+        yield group
+
+
+def _answer(group: Mapping[str, Matrix]) -> Answer:
+    names = [f"{name}{i + 1}" for name, matrix in group.items() for i in range(len(matrix))]
+    units = [tuple(int(i == j) for j in range(len(names))) for i in range(len(names))]
+    polynomial: dict[tuple[int, ...], Fraction] = {}
+    squares, before = [], 0
+    for matrix in group.values():
+        size = len(matrix)
+        basis = tuple(units[before : before + size])
+        for i in range(size):
+            for j in range(i, size):
+                place = tuple(a + b for a, b in zip(basis[i], basis[j], strict=True))
+                polynomial[place] = matrix[i][j] * (1 if i == j else 2)
+        gram = tuple(matrix[i][j] for i in range(size) for j in range(i, size))
+        squares.append(Square(basis=basis, gram=gram))
+        before += size
+    asked = Statement(
+        variables=tuple(names),
+        polynomial={e: c for e, c in polynomial.items() if c},
+        degree=2,
+        multiplier=constant(len(names)),
+    )
+    return Answer(statement=asked, proof=SumOfSquares(squares=tuple(squares)))
+
+
+# ----------------------------------------------------------------------
+# Everything that is decided of a given K on a fault, with the files that prove it.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearVerdict:
+    """Verdict on a K.
+
+    Attributes
+    ----------
+    fault : Fault
+    controller : ExtendedLQR
+    analysis : Analysis
+    facts : mapping
+        See `linear_facts`.
+    held : HeldLoop
+        What is decided when p is held over the sampling period asked for.
+    peaks : ContinuousPeaks, NoGuarantee or None
+        In continuous time; None when they were not asked for.
+    asked : str or None
+        Class of the disturbance for which peaks were asked for.
+    """
+
+    fault: Fault
+    controller: ExtendedLQR
+    analysis: Analysis
+    facts: Mapping[str, Any]
+    held: HeldLoop
+    peaks: ContinuousPeaks | NoGuarantee | None
+    asked: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values: exact numbers as texts, measured ones as numbers, SI."""
+        return {
+            **self.analysis.to_dict(),
+            **self.facts,
+            "peaks": self.peaks.to_dict() if isinstance(self.peaks, ContinuousPeaks) else None,
+        }
+
+    def proofs(self) -> dict[str, Certificate | Answer | ContinuousPeaks]:
+        """Every proof that has a file format, by name."""
+        by_name: dict[str, Certificate | Answer | ContinuousPeaks] = dict(self.analysis.certificates)
+        if isinstance(self.peaks, ContinuousPeaks):
+            by_name["peaks"] = self.peaks
+        problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
+        several = {"inverse-optimal": inverse_optimality_files(inverse_optimality(problem, gains))}
+        several["held"] = held_files(problem, gains, self.held.runs)
+        for name, answers in several.items():
+            by_name |= {f"{name}{f'-{n}' if n else ''}": answer for n, answer in enumerate(answers)}
+        return by_name
+
+    def save(self, out: Path, *, force: bool = False) -> dict[str, str]:
+        """Write every proof: the one of stability to `out`, the others beside it with their names added.
+
+        Returns
+        -------
+        dict of str to str
+            Path of every proof, by name.
+
+        Raises
+        ------
+        OutputError
+            When one of the files exists and `force` is not given, or the folder cannot be written.
+        """
+        proofs = self.proofs()
+        paths = {
+            name: out if name == "stability" else out.with_name(f"{out.stem}-{name}{out.suffix}") for name in proofs
+        }
+        known = [str(path) for path in paths.values() if path.exists()]
+        if known and not force:
+            raise OutputError(
+                f"certificate files must be new. Received {', '.join(known)}, which exist. "
+                "Give --force to replace them."
+            )
+        for name, proof in proofs.items():
+            if isinstance(proof, ContinuousPeaks):
+                save_guarantee(proof, paths[name])
+            else:
+                proof.save(paths[name])
+        return {name: str(path) for name, path in paths.items()}
+
+
+def judge(
+    fault: Fault, controller: ExtendedLQR, *, step: float | str | None = None, peaks: str | None = None
+) -> LinearVerdict:
+    """Decide what holds for a given K on a fault over its uncertainty box.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : ExtendedLQR
+    step : number or text, optional
+        Sampling period [s]; the fault's without.
+    peaks : str, optional
+        Class of the disturbance, ``"amplitude"`` or ``"rate"``, for which peaks are certified.
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown class.
+    ParameterError
+        For friction with a state, or a period that is not positive.
+    """
+    fault.require_memoryless("a verdict on gains")
+    period = rational(fault.sampling_time if step is None else step, "step")
+    bounded = certified_peaks(fault, controller, disturbance_class=peaks) if peaks is not None else None
+    held = held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), period)
+    return LinearVerdict(
+        fault=fault,
+        controller=controller,
+        facts=linear_facts(fault, controller, held),
+        analysis=analysis(fault, controller),
+        held=held,
+        peaks=bounded,
+        asked=peaks,
+    )
+
+
+def linear_facts(fault: Fault, controller: ExtendedLQR, held: HeldLoop) -> dict[str, Any]:
+    """Bounds, both tests of Theorem 2, sampled stability and the cost of both kinds of feedback.
+
+    Parameters
+    ----------
+    fault : Fault
+    controller : ExtendedLQR
+    held : HeldLoop
+        What is decided of the same gains when p is held.
+
+    Returns
+    -------
+    dict
+        Keys ``inverse_optimal`` (whether K is optimal for a Q that covers the uncertainty; None when undecided),
+        ``tests``, ``bounds``, ``smallest_gain``, ``held`` and ``feedback``; SI.
+    """
+    gains, problem = tuple(controller.gains.values()), LinearProblem.of(fault)
+    tests = both_tests(problem, gains, printed_row(fault))
+    least = smallest_gain(problem)
+    decided = {Verdict.PROVED: True, Verdict.REFUTED: False, Verdict.UNDECIDED: None}
+    return {
+        "inverse_optimal": decided[tests.sound.verdict],
+        "tests": tests.to_dict(),
+        "bounds": uncertainty_bounds(fault).to_dict(),
+        "smallest_gain": {"k1": least.slip, "k2": least.rate},
+        "held": held.to_dict(),
+        "feedback": [
+            {"feedback": c.feedback, "lag": c.lag, "largest_term": c.largest_term, "pressure": c.pressure}
+            for c in (compare_feedback(fault, gains) if gains[3] else ())
+        ],
+    }

@@ -1,0 +1,255 @@
+"""Sampled actuator stages: delay, quantisation, rate limit, and saturation of pressure."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import casadi as ca
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault.model import require_positive
+from quakedesign.loop.actuators.base import Option, SampledStage
+from quakedesign.loop.sensing.measurement import Measurement, generator, uniform
+
+# ----------------------------------------------------------------------
+# Time that the computation takes.
+
+MOST_SAMPLES = 100
+_SAME = 1e-9  # of a sampling period
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delay(SampledStage):
+    """What is computed from one measurement acts some samples later; before that, nothing is injected.
+
+    Attributes
+    ----------
+    samples : int
+        0 … 100.
+    jitter : int
+        Largest number of further samples, drawn anew at every sample, each equally likely, 0 … 100. What has acted
+        once is not followed by anything older.
+    seed : int
+        Of the jitter, not negative.
+    part : float
+        Share of a sampling period by which it acts later still, at least 0 and below 1.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    name: ClassVar[str] = "delay"
+    place: ClassVar[int] = 1
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(
+            name="delay",
+            unit="s",
+            help="Time that the computation takes, such as '2 ms'.",
+            default=0.0,
+        ),
+        Option(
+            name="jitter",
+            unit="",
+            help="Most further steps that a delay takes, drawn anew at every sample: 1 for 1 or 2 ms at --delay '1 ms' "
+            "and steps of 1 ms.",
+        ),
+    )
+
+    samples: int
+    jitter: int = 0
+    seed: int = 0
+    part: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("samples of a delay", self.samples), ("jitter", self.jitter)):
+            if not isinstance(value, int) or not 0 <= value <= MOST_SAMPLES:
+                raise ParameterError(f"{name} must be a whole number, 0 to {MOST_SAMPLES}. Received {value!r}.")
+        if not 0 <= self.part < 1:
+            raise ParameterError(f"part of a delay must be at least 0 and below 1. Received {self.part!r}.")
+        Measurement(seed=self.seed)
+
+    @classmethod
+    def asked(cls, step: float, *, delay: float, jitter: int | None = None) -> Self:  # type: ignore[override]
+        """See `Stage.asked`.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if not 0 <= delay <= MOST_SAMPLES * step:
+            raise ParameterError(
+                f"delay must be 0 to {MOST_SAMPLES} sampling periods of {step:g} s. Received {delay:g} s. "
+                "Change the delay or the step."
+            )
+        part, whole = math.modf(delay / step + _SAME)
+        return cls(samples=int(whole), jitter=jitter or 0, part=part - _SAME if part > 2 * _SAME else 0.0)
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Nothing asked for yet [Pa], oldest first; with jitter the age of what acts [samples] and the generator."""
+        queue = (0.0,) * (self.samples + self.jitter)
+        return (*queue, float(self.samples), *generator(self.seed)) if self.jitter else queue
+
+    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+        """Pressure of the queue that is as old as the delay; see `SampledStage.apply`."""
+        longest = self.samples + self.jitter
+        queue = [*memory[:longest], pressure]
+        if not self.jitter:
+            return queue[0], queue[1:]
+        age, *state = memory[longest:]
+        state, drawn = uniform(state)
+        age = ca.fmin(age + 1, self.samples + ca.floor((self.jitter + 1) * drawn))
+        acting = queue[0]
+        for samples in range(longest):
+            acting = ca.if_else(age == samples, queue[longest - samples], acting)
+        return acting, [*queue[1:], age, *state]
+
+
+# ----------------------------------------------------------------------
+# Finite resolution of a converter.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantisation(SampledStage):
+    """Rounds to the nearest multiple of a quantum, halves upward.
+
+    Attributes
+    ----------
+    quantum : float
+        [Pa], positive.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    name: ClassVar[str] = "quantisation"
+    place: ClassVar[int] = 2
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(name="quantum", unit="Pa", help="Resolution of the pressure, such as '1 kPa'."),
+    )
+
+    quantum: float
+
+    def __post_init__(self) -> None:
+        require_positive(quantum=self.quantum)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The quantum [Pa]."""
+        return (float(self.quantum),)
+
+    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+        """Nearest multiple; see `SampledStage.apply`."""
+        (quantum,) = numbers
+        return quantum * ca.floor(pressure / quantum + 0.5), memory
+
+
+# ----------------------------------------------------------------------
+# Fastest change of pressure that the pump can make.
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateLimit(SampledStage):
+    """Limits the change from one sample to the next, from zero at the start.
+
+    Attributes
+    ----------
+    rate : float
+        [Pa/s], positive.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    name: ClassVar[str] = "rate-limit"
+    limits: ClassVar[bool] = True
+    place: ClassVar[int] = 4
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(name="rate_limit", unit="Pa/s", help="Fastest change of the pressure, such as '1 MPa/s'."),
+    )
+
+    rate: float
+
+    def __post_init__(self) -> None:
+        require_positive(rate=self.rate)
+
+    @classmethod
+    def asked(cls, step: float, *, rate_limit: float) -> Self:  # type: ignore[override]
+        """See `Stage.asked`."""
+        return cls(rate=rate_limit)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The limit [Pa/s]."""
+        return (float(self.rate),)
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Pressure held before the start [Pa]."""
+        return (0.0,)
+
+    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+        """Pressure that can be reached; see `SampledStage.apply`."""
+        (rate,), (held,) = numbers, memory
+        reached = held + ca.fmin(ca.fmax(pressure - held, -rate * step), rate * step)
+        return reached, [reached]
+
+
+# ----------------------------------------------------------------------
+# Largest and smallest pressure that the pump can hold.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saturation(SampledStage):
+    """Cuts the pressure off at two bounds (ERRATA 23).
+
+    Attributes
+    ----------
+    lowest, highest : float
+        [Pa]; zero, the pressure before injection, must lie between them.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    name: ClassVar[str] = "saturation"
+    limits: ClassVar[bool] = True
+    place: ClassVar[int] = 3
+    options: ClassVar[tuple[Option, ...]] = (
+        Option(
+            name="saturation",
+            unit="Pa",
+            help="Largest pressure, such as '20 MPa', and largest withdrawal unless that is given.",
+        ),
+        Option(name="withdrawal", unit="Pa", help="Largest decrease of the pressure; 0 for a pump that only injects."),
+    )
+
+    lowest: float
+    highest: float
+
+    def __post_init__(self) -> None:
+        finite = math.isfinite(self.lowest) and math.isfinite(self.highest)
+        if not (finite and self.lowest <= 0 <= self.highest and self.lowest < self.highest):
+            raise ParameterError(
+                "lowest and highest pressure must be finite, with 0 between them. "
+                f"Received {self.lowest!r} Pa and {self.highest!r} Pa."
+            )
+
+    @classmethod
+    def asked(cls, step: float, *, saturation: float, withdrawal: float | None) -> Self:  # type: ignore[override]
+        """See `Stage.asked`."""
+        return cls(lowest=0.0 - (saturation if withdrawal is None else withdrawal), highest=saturation)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The bounds [Pa]."""
+        return float(self.lowest), float(self.highest)
+
+    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+        """Pressure within the bounds; see `SampledStage.apply`."""
+        lowest, highest = numbers
+        return ca.fmin(ca.fmax(pressure, lowest), highest), memory

@@ -1,0 +1,104 @@
+"""A control law as sampled schemes read it: expressions in the signals of one sample, with their numbers set apart."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.laws import Controller, Signals
+from quakedesign.laws.sampled_controller import integral_symbols
+from quakedesign.symbolic.casadi_printer import to_casadi
+
+Values = dict[sp.Symbol, Any]
+
+slip, rate = sp.symbols("slip rate", real=True)
+slip_error, rate_error = sp.symbols("slip_error rate_error", real=True)
+acceleration = sp.Symbol("reference_acceleration", real=True)
+next_reference, next_reference_rate = sp.symbols("next_reference next_reference_rate", real=True)
+held = sp.Symbol("held", real=True)
+step = sp.Symbol("T_s", positive=True)
+authority = sp.Symbol("B_0", positive=True)
+
+
+def values(expressions: tuple[sp.Expr, ...], known: Values) -> list[Any]:
+    """Expressions as CasADi SX."""
+    return to_casadi(list(expressions), known)
+
+
+@dataclass(frozen=True)
+class DiscreteLaw:
+    """Pressure and integral states of a law, in the symbols of this module.
+
+    Attributes
+    ----------
+    pressure : Expr
+        p [Pa].
+    rates : tuple of Expr
+        ξ' of every integral state.
+    integrals : tuple of Symbol
+        ξ.
+    """
+
+    pressure: sp.Expr
+    rates: tuple[sp.Expr, ...]
+    integrals: tuple[sp.Symbol, ...]
+
+    @classmethod
+    def of(cls, controller: Controller | None, constant_pressure: float) -> "DiscreteLaw":
+        """Law of a controller, through its public expressions, or a constant pressure [Pa]."""
+        integrals = integral_symbols(controller)
+        if controller is None:
+            return cls(sp.Float(constant_pressure), (), ())
+        signals = Signals(
+            slip=slip,
+            slip_rate=rate,
+            slip_error=slip_error,
+            slip_rate_error=rate_error,
+            integrals=integrals,
+            reference_acceleration=acceleration,
+        )
+        return cls(sp.sympify(controller.pressure(signals)), tuple(controller.integral_rates(signals)), integrals)
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """Expressions whose numbers are symbols, so that laws with other gains share machine code.
+
+    Attributes
+    ----------
+    expressions : tuple of Expr
+    numbers : tuple of Symbol
+        Positive ones: signs stay in the expressions.
+    values : tuple of float
+        What the symbols stand for.
+    """
+
+    expressions: tuple[sp.Expr, ...]
+    numbers: tuple[sp.Symbol, ...]
+    values: tuple[float, ...]
+
+    @classmethod
+    def of(cls, expressions: tuple[sp.Expr, ...]) -> "Lifted":
+        """Replace every number but 0, ±1 and exponents."""
+        found: dict[sp.Expr, sp.Symbol] = {}
+        lifted = tuple(_lift(sp.sympify(expression), found) for expression in expressions)
+        return cls(lifted, tuple(found.values()), tuple(float(number.evalf(30)) for number in found))
+
+
+def _lift(node: Any, found: dict[sp.Expr, sp.Symbol]) -> Any:
+    if node.is_number:
+        if node in (0, 1, -1):
+            return node
+        return sp.sign(node) * found.setdefault(abs(node), sp.Symbol(f"number_{len(found)}", positive=True))
+    if node.is_Add or node.is_Mul:
+        numbers = node.func(*(arg for arg in node.args if arg.is_number))
+        rest = sorted((arg for arg in node.args if not arg.is_number), key=_structure)
+        return node.func(_lift(numbers, found), *(_lift(arg, found) for arg in rest))
+    if not node.args:
+        return node
+    return node.func(_lift(node.args[0], found), *node.args[1:])
+
+
+def _structure(node: sp.Expr) -> Any:
+    """Key for sorting that does not depend on a factor of the node, so that names do not depend on values."""
+    return sp.default_sort_key(node.as_independent(*node.free_symbols, as_Add=False)[1])

@@ -1,0 +1,275 @@
+"""Where a certificate speaks about a fault although the control itself moves the matched perturbation (ERRATA 16).
+
+Two ways to split h, both rigorous:
+
+- *whole*: all of h(t, e) is in e3, so |h'| ≤ L̄ must hold with the part that the errors and the control cause.
+- *split*: only h(t, 0) is in e3, so |h'| ≤ L̄ is needed along the reference alone. The rest w = h(t, e) − h(t, 0) is
+  bounded by g1|e1| + g2|e2| and must leave V' negative (`Robustness`). The control does not enter.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.exact import LowerBound, UpperBound, end_of
+from quakedesign.fault import Fault
+from quakedesign.laws import SlidingMode
+from quakedesign.lyapunov.exact.certificate import Certificate
+from quakedesign.lyapunov.exact.fault_bounds import (
+    Errors,
+    coefficient_range,
+    known_ranges,
+    largest_matched_rate,
+    largest_sensitivities,
+    rate_expression,
+    sensitivity_expressions,
+    stage,
+)
+from quakedesign.lyapunov.exact.robustness import LevelSets, Robustness
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.enclosure import ball, upper_bound
+
+_STEPS = (-640, 160)
+"""Range of n in V^{1/m} = (1 + (n mod 8)/8)·2^{n div 8} that is searched."""
+
+_PIECES = 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Domain:
+    """Largest level set found on which the premises of a certificate prove themselves.
+
+    Attributes
+    ----------
+    level : float
+        Of V for the base gains; 0 when there is none.
+    slip_error, slip_rate_error : UpperBound
+        Bounds on |e1| [m] and |e2| [m/s] on it; not every such pair lies in it.
+    start_slip_error, start_slip_rate_error, start_perturbation : LowerBound
+        Initial |e1| [m], |e2| [m/s] or |e3| [m/s²] that it admits, each while the other two are zero. For x = 0 and
+        ξ = 0 the initial e3 is h(0).
+    method : str
+        ``"whole"`` or ``"split"``, which part of h is in e3.
+    limited_by : str
+        Cause that keeps it from being larger: the largest part that grows with the errors; of an empty one the largest
+        part that is there without them.
+    feedforward : str
+        Name of the feed-forward of the law.
+    """
+
+    level: float
+    slip_error: UpperBound
+    slip_rate_error: UpperBound
+    start_slip_error: LowerBound
+    start_slip_rate_error: LowerBound
+    start_perturbation: LowerBound
+    method: str
+    limited_by: str
+    feedforward: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI."""
+        return {name: float(v) if isinstance(v, Fraction) else v for name, v in asdict(self).items()}
+
+
+@dataclass(frozen=True)
+class DomainProblem:
+    """Which level sets of a certificate hold on a fault under a law.
+
+    Attributes
+    ----------
+    fault : Fault
+    controller : SlidingMode
+    certificate : Certificate
+        For the base gains, with bounds of all states.
+    robustness : Robustness or None
+        None: only the method ``"whole"`` is available.
+    """
+
+    fault: Fault
+    controller: SlidingMode
+    certificate: Certificate
+    robustness: Robustness | None
+
+    @cached_property
+    def sets(self) -> LevelSets:
+        """Level sets in metres and seconds."""
+        return LevelSets(self.certificate, self.controller.scale, self.controller.loop_field())
+
+    @property
+    def allowed(self) -> Fraction:
+        """L̄ for the scaled gains [unit of ν per s]."""
+        return certified_lipschitz(self.certificate) * self.controller.scale
+
+    def along_reference(self) -> Fraction:
+        """Bound on |h'| with zero errors [unit of ν per s]."""
+        return self._rate(Errors())
+
+    def whole(self, level: Fraction, pieces: int = _PIECES) -> Fraction:
+        """|h'|/L̄ on {V ≤ level}, errors and control included; at most 1 where the certificate speaks."""
+        return self._rate(self.sets.errors(level), pieces=pieces) / self.allowed
+
+    def holds_whole(self, level: Fraction) -> bool:
+        """Whether `whole` is below 1; what it is, is not asked."""
+        return self._rate(self.sets.errors(level), pieces=_PIECES, limit=self.allowed) < self.allowed
+
+    def split(self, level: Fraction, errors: Errors | None = None) -> dict[str, Fraction] | None:
+        """Shares of the decrease of V that the errors' part of h takes on {V ≤ level}, by error.
+
+        The certificate speaks where they add up to less than 1. None where nothing bounds them. The sensitivities of h
+        are those for the errors of the level, or for other errors.
+        """
+        known = self.robustness
+        if known is None or self.along_reference() > self.allowed:
+            return None
+        bounds = errors or self.sets.errors(level)
+        still = Errors(slip=bounds.slip, rate=bounds.rate)
+        g1, g2 = largest_sensitivities(self.fault, self.controller.divisor, still, **self._added)
+        return {
+            "slip": known.slip * g1 * _root(level, known.slip_power),
+            "rate": known.rate * g2 * _root(level, known.rate_power),
+        }
+
+    @property
+    def _added(self) -> dict[str, Any]:
+        return {"feedforward": self.controller.feedforward}
+
+    def _rate(self, errors: Errors, **options: Any) -> Fraction:
+        return largest_matched_rate(self.fault, self.controller.divisor, errors, **options, **self._added)
+
+
+def certified_lipschitz(certificate: Certificate) -> Fraction:
+    """L̄ of the base gains: the smaller end of the range of d = h'."""
+    low, high = certificate.loop.uncertain["d"]
+    return min(-low, high)
+
+
+def certified_domain(question: DomainProblem) -> Domain:
+    """Largest level set on which one of the two methods proves itself, rigorous but not sharp (steps of an eighth).
+
+    It is empty where β leaves its certified range, or h' its bound with the errors zero.
+    """
+    low_beta, high_beta = coefficient_range(question.fault, question.controller.divisor)
+    certified = question.certificate.loop.uncertain["beta"]
+    if low_beta < certified[0] or high_beta > certified[1]:
+        return _domain(question, Fraction(0), "", "the control coefficient β, which leaves its certified range")
+
+    def whole(step: int) -> bool:
+        return question.holds_whole(_level(step, question.sets.degree))
+
+    split = _largest_split(question)
+    low = _STEPS[0] if split is None else split
+    best = _largest(whole, low, _STEPS[1]) if whole(low) else None
+    if best is not None and (split is None or best > split):
+        level = _level(best, question.sets.degree)
+        return _domain(question, level, "whole", _whole_limit(question, question.sets.errors(level)))
+    if split is not None:
+        level = _level(split, question.sets.degree)
+        return _domain(question, level, "split", _split_limit(question, level))
+    return _domain(question, Fraction(0), "", _whole_limit(question, Errors()))
+
+
+def _largest(holds: Callable[[int], bool], low: int, high: int) -> int:
+    """Largest step that holds, given that the low one does."""
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def _largest_split(question: DomainProblem) -> int | None:
+    """Largest step on which `split` proves itself: a guess with the sensitivities at rest, then downwards."""
+    degree = question.sets.degree
+
+    def holds(step: int, errors: Errors | None = None) -> bool:
+        parts = question.split(_level(step, degree), errors)
+        return parts is not None and sum(parts.values()) < 1
+
+    low, high = _STEPS
+    if not holds(low):
+        return None
+    guess = _largest(lambda step: holds(step, Errors()), low, high)
+    above, stride = guess, 1
+    while not holds(guess):
+        above, guess, stride = guess, max(low, guess - stride), 2 * stride
+    return _largest(holds, guess, above)
+
+
+def _level(step: int, degree: Fraction) -> Fraction:
+    """((1 + (n mod 8)/8)·2^{n div 8})^m, m rounded to a whole number."""
+    whole, part = divmod(step, 8)
+    return ((1 + Fraction(part, 8)) * Fraction(2) ** whole) ** round(degree)
+
+
+def _domain(question: DomainProblem, level: Fraction, method: str, limit: str) -> Domain:
+    errors = question.sets.errors(level)
+    first, second, *_, last = question.sets.starts(level)
+    return Domain(
+        level=float(level),
+        slip_error=UpperBound(errors.slip),
+        slip_rate_error=UpperBound(errors.rate),
+        start_slip_error=LowerBound(first),
+        start_slip_rate_error=LowerBound(second),
+        start_perturbation=LowerBound(last),
+        method=method,
+        limited_by=limit,
+        feedforward=question.controller.feedforward.name,
+    )
+
+
+_FROM_ERRORS = {
+    "the control itself, through viscosity and rate weakening (e2')": (plant.acceleration_error,),
+    "the slip-rate error, through spring and weakening friction": (plant.e2, plant.e1),
+}
+_GIVEN = {"the disturbance": (plant.phi, plant.phi_t), "the moving reference": (stage,)}
+
+
+def _whole_limit(question: DomainProblem, errors: Errors) -> str:
+    """Which part of h' is largest, of those that the errors cause or, where there are none, of those that are given.
+
+    For each cause the symbols of all others are set to zero.
+    """
+    expression = rate_expression(question.fault, question.controller.divisor, question.controller.feedforward)
+    box = known_ranges(question.fault) | errors.ranges()
+    every = _FROM_ERRORS | _GIVEN
+
+    def alone(cause: str) -> Fraction:
+        others = {s: sp.Integer(0) for other, group in every.items() if other != cause for s in group}
+        return upper_bound(expression.xreplace(others), box, pieces=_PIECES)
+
+    return max(_GIVEN if errors == Errors() else _FROM_ERRORS, key=alone)
+
+
+_ERRORS = {
+    "slip": ("the slip error", plant.slip_slope, "the spring"),
+    "rate": ("the slip-rate error", plant.rate_slope, "viscosity"),
+}
+
+
+def _split_limit(question: DomainProblem, level: Fraction) -> str:
+    """Which error takes most of the decrease, and through what."""
+    parts = question.split(level) or {}
+    error = max(parts, key=lambda name: parts[name])
+    name, slope, rest = _ERRORS[error]
+    fault, controller = question.fault, question.controller
+    expressions = sensitivity_expressions(fault, controller.divisor, controller.feedforward)
+    expression = dict(zip(_ERRORS, expressions, strict=True))[error]
+    box = known_ranges(fault) | question.sets.errors(level).ranges()
+    straight = expression.xreplace({slope: sp.Integer(0)})
+    calm = straight.xreplace(dict.fromkeys((plant.phi_1, plant.phi_2), sp.Integer(0)))
+    less = "" if controller.feedforward.name == "none" else " less its feed-forward"
+    causes = {
+        f"{rest}{less}": calm,
+        "friction": expression - straight,
+        "the growth of the disturbance": straight - calm,
+    }
+    return f"{name}, through {max(causes, key=lambda cause: upper_bound(causes[cause], box, pieces=_PIECES))}"
+
+
+def _root(level: Fraction, power: Fraction) -> Fraction:
+    """Upper bound of level^power."""
+    return end_of((ball(level, level) ** ball(power, power)).upper())

@@ -1,0 +1,382 @@
+"""Rigorous bounds of a fault: matched perturbation, control coefficient, sectors, pressure.
+
+All bounds hold over the uncertainty box and are computed in ball arithmetic. Chapters: bounds of the
+matched perturbation h and its rate, with and without feed-forward; sectors and equilibrium pressures
+about any constant reference (ERRATA 6 to 12).
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, lru_cache
+from itertools import product
+
+import sympy as sp
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import end_of, fraction_of, rational, to_sympy
+from quakedesign.fault import Fault
+from quakedesign.laws.feed_forward import NONE, FeedForward
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.enclosure import enclose, upper_bound
+from quakedesign.symbolic.friction_bounds import friction_bounds
+
+# ----------------------------------------------------------------------
+# What the matched perturbation h of a fault asks for, with and without feed-forward. Ball arithmetic only.
+
+Range = tuple[Fraction, Fraction]
+
+stage = sp.Symbol("s", nonnegative=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Errors:
+    """Bounds on |e1| [m], |e2| [m/s] and |e2'| [m/s²]."""
+
+    slip: Fraction = Fraction(0)
+    rate: Fraction = Fraction(0)
+    acceleration: Fraction = Fraction(0)
+
+    def ranges(self) -> dict[sp.Symbol, Range]:
+        """Symmetric ranges by symbol."""
+        parts = {plant.e1: self.slip, plant.e2: self.rate, plant.acceleration_error: self.acceleration}
+        return {symbol: (-v, v) for symbol, v in parts.items()}
+
+
+def friction_range(fault: Fault) -> Range:
+    """μ_res and μ_max [-], exact, confirmed by enclosure of the law."""
+    bounds = friction_bounds(fault.friction)
+    return bounds.least, bounds.most
+
+
+def plant_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
+    """Ranges of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] over the uncertainty box; σ'_n [Pa] is known."""
+    values = {symbol: fraction_of(v) for symbol, v in plant.plant_values(fault).items()}
+    widths = {plant.k_hat: fault.box.stiffness, plant.eta_hat: fault.box.damping, plant.N_hat: fault.box.authority}
+    return {s: (v * (1 - widths.get(s, 0)), v * (1 + widths.get(s, 0))) for s, v in values.items()}
+
+
+def least_authority(fault: Fault) -> Fraction:
+    """μ_res·N̂_min [m²/kg], the divisor of designed gains and the b of the e-LQR (ERRATA 9)."""
+    return friction_range(fault)[0] * plant_ranges(fault)[plant.N_hat][0]
+
+
+def coefficient_range(fault: Fault, divisor: Fraction) -> Range:
+    """Range of β = μN̂/divisor [-] (eq. Bounds)."""
+    low, high = friction_range(fault)
+    N_low, N_high = plant_ranges(fault)[plant.N_hat]
+    return low * N_low / divisor, high * N_high / divisor
+
+
+@lru_cache(maxsize=16)
+def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> sp.Expr:
+    """h' along a solution [unit of ν per s], in what `known_ranges` and the errors bound."""
+    bending, flat = plant.matched_rate_in_parts()
+    moved = (plant.r3, plant.r2, plant.r1, plant.phi_t, plant.acceleration_error, plant.e2)
+    flat = sp.expand(flat + _feedforward_rate(feedforward))
+    return _with_known(bending + sp.collect(flat, moved), fault, divisor)
+
+
+def _feedforward_rate(feedforward: FeedForward) -> sp.Expr:
+    """Time derivative of the feed-forward along a solution, by the chain rule."""
+    x1, x2, push = sp.symbols("x1 x2 push", real=True)
+    rates = {x1: plant.e2 + plant.r1, x2: plant.acceleration_error + plant.r2, push: plant.r3}
+    added = feedforward.acceleration(x1, x2, push)
+    return sum((added.diff(signal) * rate for signal, rate in rates.items()), start=sp.Integer(0))
+
+
+@lru_cache(maxsize=16)
+def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> tuple[sp.Expr, sp.Expr]:
+    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time; along a chord where friction has no derivative.
+
+    They bound the part of h that the errors cause: |h(t, e) − h(t, 0)| ≤ g1|e1| + g2|e2| with the largest
+    absolute values g1, g2 between 0 and e.
+    """
+    added = feedforward.acceleration(plant.e1, plant.e2, sp.Integer(0))
+    slip, still, rate, calm = plant.sensitivities()
+    expressions = (slip + (still + added.diff(plant.e1)), rate + (calm + added.diff(plant.e2)))
+    first, second = (_with_known(expression, fault, divisor) for expression in expressions)
+    return first, second
+
+
+def _with_known(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Expr:
+    """Insert μ*, the divisor, the reference, and the growth of the disturbance where its value stands."""
+    static = static_friction(fault)
+    grown = plant.phi_1 * (plant.e1 + plant.r0) + plant.phi_2 * (plant.e2 + plant.r1)
+    known = {
+        plant.mu_star: sp.Rational(static.numerator, static.denominator),
+        plant.divisor: sp.Rational(divisor.numerator, divisor.denominator),
+    }
+    return expression.xreplace({plant.phi: plant.phi + grown}).xreplace(known | _reference_values(fault))
+
+
+@lru_cache(maxsize=16)
+def _reference_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
+    """r and its three derivatives [m, m/s, …] as polynomials of the stage t/t_op."""
+    t_op = sp.Rational(str(rational(fault.reference.operation_time)))
+    r = fault.reference.slip(stage * t_op)
+    names = (plant.r0, plant.r1, plant.r2, plant.r3)
+    return {name: sp.factor(sp.expand(r).diff(stage, n) / t_op**n) for n, name in enumerate(names)}
+
+
+def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
+    """Ranges of all that h' and its sensitivities depend on, but the errors: friction in its bounds and slopes."""
+    friction, disturbance = friction_bounds(fault.friction), fault.disturbance
+    value, change = fault.disturbance_bounds
+    growth = rational(disturbance.slip_growth), rational(disturbance.rate_growth)
+    return plant_ranges(fault) | {
+        stage: (Fraction(0), Fraction(1)),
+        plant.friction_value: friction_range(fault),
+        plant.slip_slope: (-friction.slip_slope, Fraction(0) if friction.weakens else friction.slip_slope),
+        plant.rate_slope: (-friction.rate_slope, friction.rate_slope),
+        plant.phi: (-value, value),
+        plant.phi_t: (-change, change),
+        plant.phi_1: (growth[0], growth[0]),
+        plant.phi_2: (growth[1], growth[1]),
+    }
+
+
+def static_friction(fault: Fault) -> Fraction:
+    """μ* [-], friction at rest where the fault starts, exact or rounded."""
+    start = sp.nsimplify(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)), rational=True)
+    return fraction_of(start) if start.is_Rational else rational(str(sp.N(start, 50)))
+
+
+@lru_cache(maxsize=256)
+def largest_matched_rate(
+    fault: Fault,
+    divisor: Fraction,
+    errors: Errors,
+    *,
+    pieces: int = 120,
+    feedforward: FeedForward = NONE,
+    limit: Fraction | None = None,
+) -> Fraction:
+    """Rigorous bound on |h'| [unit of ν per s] over the uncertainty box, the reference and the disturbance class.
+
+    Friction may be any function within its bounds and slope bounds; one that weakens with slip, where its law does. The
+    disturbance may be any function of the preset's amplitude and rate of change.
+
+    Parameters
+    ----------
+    fault : Fault
+    divisor : Fraction
+        μ0N̂0 [m²/kg].
+    errors : Errors
+        Ranges of e1 [m], e2 [m/s], e2' [m/s²].
+    pieces : int
+        Largest number of subdivisions; fewer give a larger bound.
+    feedforward : FeedForward
+        What the law adds to ν, and so to h.
+    limit : Fraction, optional
+        As in `upper_bound`, where it is asked only whether the bound is below that [unit of ν per s].
+    """
+    expression = rate_expression(fault, divisor, feedforward)
+    return upper_bound(expression, known_ranges(fault) | errors.ranges(), pieces=pieces, limit=limit)
+
+
+@lru_cache(maxsize=256)
+def largest_sensitivities(
+    fault: Fault, divisor: Fraction, errors: Errors, *, pieces: int = 60, feedforward: FeedForward = NONE
+) -> tuple[Fraction, Fraction]:
+    """Rigorous bounds g1 on |∂h/∂e1| [1/s²] and g2 on |∂h/∂e2| [1/s], as `largest_matched_rate`."""
+    box = known_ranges(fault) | errors.ranges()
+    first, second = sensitivity_expressions(fault, divisor, feedforward)
+    return upper_bound(first, box, pieces=pieces), upper_bound(second, box, pieces=pieces)
+
+
+def initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
+    """Bound on |h| at t = 0, x = 0: the disturbance over β, friction at its static value; no feed-forward there."""
+    static, least = static_friction(fault), plant_ranges(fault)[plant.N_hat][0]
+    return fault.disturbance_bounds[0] * divisor / (static * least)
+
+
+# ----------------------------------------------------------------------
+# Sectors and pressures of a fault about any constant reference, over its uncertainty box (ERRATA 6 to 12).
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sectors:
+    """Chords of everything that depends on the state, about the equilibrium of any constant reference.
+
+    x2' = s·x1 − w·x2 + β·b·p with all three anywhere in their ranges, at every time.
+
+    Attributes
+    ----------
+    authority : Fraction
+        b = μ_res·N̂_min [m²/kg] (ERRATA 9).
+    beta : (Fraction, Fraction)
+        Range of μN̂/b [-].
+    slip : (Fraction, Fraction)
+        Range of s [1/s²]: friction's weakening (and strengthening, unless the law only weakens), spring, growth of the
+        disturbance.
+    rate : (Fraction, Fraction)
+        Range of w [1/s]: damping, friction's slope in slip rate (ERRATA 10), growth of the disturbance.
+    row_bounds : (Fraction, Fraction)
+        g1 [Pa/m] and g2 [Pa·s/m] with |h| ≤ g1|x1| + g2|x2| about the nominal k̂, η̂ (ERRATA 6, 7).
+    largest_effective_stress : Fraction
+        max |σ' − p*| [Pa] over the constant references up to the target slip (ERRATA 8).
+    """
+
+    authority: Fraction
+    beta: Range
+    slip: Range
+    rate: Range
+    row_bounds: Range
+    largest_effective_stress: Fraction
+
+    def __post_init__(self) -> None:
+        if not all(low <= high for low, high in self.ranges().values()):
+            raise ParameterError(f"ranges must be ordered. Received {self.beta}, {self.slip}, {self.rate}.")
+
+    def vertices(self) -> list[tuple[Fraction, Fraction, Fraction]]:
+        """Different corners (β, s, w) of the ranges."""
+        return list(dict.fromkeys(product(self.beta, self.slip, self.rate)))
+
+    def ranges(self) -> dict[str, Range]:
+        """Ranges by the names of the e-LQR's loop field."""
+        return {"beta": self.beta, "s": self.slip, "w": self.rate}
+
+
+def sectors(fault: Fault) -> Sectors:
+    """Sector bounds of a fault over its uncertainty box, exact or rounded outwards."""
+    ranges, b = plant_ranges(fault), least_authority(fault)
+    friction, disturbance = friction_bounds(fault.friction), fault.disturbance
+    stress, positive = effective_stress(fault)
+    load = ranges[plant.N_hat][1] * stress
+    slip_chord = load * friction.slip_slope
+    rate_chord = load * friction.rate_slope
+    slip_growth, rate_growth = (rational(g) for g in (disturbance.slip_growth, disturbance.rate_growth))
+    k, eta = ranges[plant.k_hat], ranges[plant.eta_hat]
+    one_sided = positive and friction.weakens
+    slip = ((Fraction(0) if one_sided else -slip_chord) - k[1] + slip_growth, slip_chord - k[0] + slip_growth)
+    rate = (eta[0] - rate_chord - rate_growth, eta[1] + rate_chord - rate_growth)
+    nominal = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
+    return Sectors(
+        authority=b,
+        beta=coefficient_range(fault, b),
+        slip=slip,
+        rate=rate,
+        row_bounds=(
+            max(abs(s + nominal[plant.k_hat]) for s in slip) / b,
+            max(abs(w - nominal[plant.eta_hat]) for w in rate) / b,
+        ),
+        largest_effective_stress=stress,
+    )
+
+
+def effective_stress(fault: Fault) -> tuple[Fraction, bool]:
+    """Rigorous bound on |σ' − p*(r0)| [Pa] for 0 ≤ r0 ≤ target slip, and whether σ' − p* stays positive.
+
+    p* balances friction, spring and the disturbance's growth at rest at r0 (ERRATA 8); friction there is anything that
+    the box allows.
+    """
+    ranges, start = plant_ranges(fault), to_sympy(static_friction(fault))
+    known = {_growth: to_sympy(rational(fault.disturbance.slip_growth)), _drift: 0, plant.mu_star: start}
+    numerator = sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r)
+    target = rational(fault.reference.target_slip)
+    least = sp.Max(
+        to_sympy(friction_range(fault)[0]), start - to_sympy(friction_bounds(fault.friction).slip_slope) * _r
+    )
+    box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)} | {_r: (Fraction(0), target)}
+    stress = upper_bound(numerator / least, box, pieces=400)
+    lowest = numerator.subs(_r, to_sympy(target)).subs(
+        {
+            plant.k_hat: to_sympy(box[plant.k_hat][1]),
+            plant.N_hat: to_sympy(box[plant.N_hat][0]),
+            plant.sigma: to_sympy(box[plant.sigma][0]),
+        }
+    )
+    return stress, bool(lowest > 0)
+
+
+def rest_pressure(
+    fault: Fault, slip: Range, *, nominal: bool = False, drift: Fraction = Fraction(0), pieces: int = 64
+) -> Range:
+    """Rigorous enclosure of the pressure p* [Pa] that holds the fault at rest at a constant reference (ERRATA 8).
+
+    Ball arithmetic on pieces of the range of references.
+
+    Parameters
+    ----------
+    fault : Fault
+    slip : (Fraction, Fraction)
+        Range of the reference r0 [m], not negative.
+    nominal : bool
+        The fault's own friction law and parameters; without, any friction and any parameters of the box.
+    drift : Fraction
+        Largest k̂v∞t [m/s²].
+    pieces : int
+        Into which the range is cut.
+
+    Raises
+    ------
+    ParameterError
+        When no finite enclosure is found.
+    """
+    expression, box = _rest(fault, nominal)
+    box = box | {_drift: (Fraction(0), drift)}
+    step, ends = (slip[1] - slip[0]) / pieces, list[Fraction]()
+    for n in range(pieces if step else 1):
+        part = (slip[0] + n * step, slip[0] + (n + 1) * step)
+        pressures = enclose(expression, box | {_r: part, _mu: _friction_at(fault, part)})
+        if not pressures.is_finite():
+            raise ParameterError("no finite pressure at rest was found. Positive friction is expected. Narrow the box.")
+        ends += [end_of(pressures.lower()), end_of(pressures.upper())]
+    return min(ends), max(ends)
+
+
+@lru_cache(maxsize=64)
+def equilibrium_pressure(fault: Fault, slip: Fraction) -> Range:
+    """Rigorous range of the pressure [Pa] that holds the nominal fault at rest at references from 0 to a slip [m].
+
+    Without the part of the disturbance that depends on time alone. Each end is within 1e-4 of the range of what is
+    attained.
+
+    Raises
+    ------
+    ParameterError
+        When no finite enclosure is found.
+    """
+    box = {_r: (Fraction(0), slip)}
+    expression = _rest(fault, nominal=True)[0].subs(_drift, 0)
+    low, high = rest_pressure(fault, box[_r], nominal=True)
+    above = upper_bound(expression - to_sympy(low), box, tolerance=_FINE)
+    below = upper_bound(to_sympy(high) - expression, box, tolerance=_FINE)
+    return high - below, low + above
+
+
+_FINE = Fraction(1, 10**4)
+_r = sp.Symbol("r_0", nonnegative=True)
+_mu = sp.Symbol("mu", positive=True)
+_growth = sp.Symbol("phi_1", real=True)
+_drift = sp.Symbol("drift", nonnegative=True)
+
+
+@cache
+def _net_stress() -> sp.Expr:
+    """σ' − p* at rest at r0 with friction μ, a disturbance that grows with slip, and a drift k̂v∞t."""
+    balance = plant.shifted_acceleration().replace(plant.disturbance, lambda x, *_: _growth * x + _drift)
+    balance = balance.replace(plant.mu, lambda *_: _mu).subs({plant.x1: _r, plant.x2: 0})
+    balance = sp.expand(balance)  # linear in p
+    return sp.expand(plant.sigma + balance.coeff(plant.p, 0) / balance.coeff(plant.p))
+
+
+def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]:
+    """p* in symbols, written so that few of them repeat, and their ranges."""
+    known = {
+        _growth: to_sympy(rational(fault.disturbance.slip_growth)),
+        plant.mu_star: to_sympy(static_friction(fault)),
+    }
+    expression = plant.sigma - sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r) / _mu  # μ once
+    ranges = plant_ranges(fault)
+    if not nominal:
+        return expression, {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)}
+    law = fault.friction.exact()
+    return expression.subs(plant.plant_values(fault)).subs(_mu, law.coefficient(_r, sp.Integer(0))), {}
+
+
+def _friction_at(fault: Fault, slip: Range) -> Range:
+    """Friction at rest at a slip, anywhere between its bounds and its slope bound from the static value."""
+    friction, start = friction_bounds(fault.friction), static_friction(fault)
+    most = friction.slip_slope * slip[1]
+    return max(friction.least, start - most), min(friction.most, start + most)

@@ -1,0 +1,444 @@
+"""Premises under which a certificate applies to a given fault, reference and disturbance.
+
+Chapters: premise as a value; premises of sliding modes, in ball arithmetic; sector premises of linear
+feedback (ERRATA 6 to 12); test whether constants and ranges of a certificate cover those of a fault;
+recognition of the loop of a file independently of the names of its states.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import sympy as sp
+
+from quakedesign.errors import CertificateError
+from quakedesign.exact import Enclosure, LowerBound, UpperBound, float_above, rational
+from quakedesign.fault import Fault
+from quakedesign.laws import Controller, SlidingMode
+from quakedesign.laws.feed_forward import FEED_FORWARDS, FeedForward, feed_forward
+from quakedesign.lyapunov.exact.certificate import Certificate
+from quakedesign.lyapunov.exact.claim import Loop, require
+from quakedesign.lyapunov.exact.domain import Domain, DomainProblem, certified_domain, certified_lipschitz
+from quakedesign.lyapunov.exact.fault_bounds import (
+    Errors,
+    Range,
+    coefficient_range,
+    friction_range,
+    initial_perturbation,
+    largest_matched_rate,
+    least_authority,
+    plant_ranges,
+    rest_pressure,
+    sectors,
+)
+from quakedesign.lyapunov.exact.loop_expressions import sympy_field
+from quakedesign.lyapunov.exact.robustness import LevelSets, robustness
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.homogeneity import relative_degree
+
+# ----------------------------------------------------------------------
+# One condition under which a certificate speaks about a given loop.
+
+_MOST_DIGITS = 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Premise:
+    """One condition under which a certificate speaks about a given loop.
+
+    Attributes
+    ----------
+    name : str
+    required : UpperBound
+        What the loop asks for, in `unit`; a rigorous upper bound unless `measured`.
+    certified : LowerBound
+        What the certificate covers, in `unit`.
+    unit : str
+    proved : bool
+        False if `certified` is only a limit that no certificate can exceed; the premise then never holds.
+    measured : bool
+        True if `required` was read off a simulation.
+    note : str
+        What the number assumes.
+    """
+
+    name: str
+    required: Fraction | float
+    certified: Fraction | float
+    unit: str
+    measured: bool = False
+    proved: bool = True
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "required", _bound(UpperBound, self.required))
+        object.__setattr__(self, "certified", _bound(LowerBound, self.certified))
+
+    @property
+    def ratio(self) -> Fraction | float | None:
+        """required/certified [-], an `UpperBound`; None where nothing is certified and something is required."""
+        if self.certified == 0:
+            return UpperBound(0) if self.required == 0 else None
+        return _bound(UpperBound, self.required / self.certified)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the ratio is at most 1 and a certificate exists."""
+        return self.proved and self.ratio is not None and self.ratio <= 1
+
+    @property
+    def sides(self) -> tuple[str, str]:
+        """Texts of what is required, rounded up, and certified, rounded down, with the unit; of one number, said so."""
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        if self.required == self.certified != 0:
+            return f"at most {self.required:.4g}{unit}", "the same number"
+        for digits in range(4, _MOST_DIGITS):  # as many as it takes to see that what holds does
+            required, certified = (f"{side:.{digits}g}" for side in (self.required, self.certified))
+            if not self.holds or Fraction(required) <= Fraction(certified):
+                return f"{required}{unit}", f"{certified}{unit}"
+        return f"{self.required:.4g}{unit}", "no less"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys of DESIGN.md and the unit; None for what is infinite."""
+        return {
+            "name": self.name,
+            "required": _finite(self.required),
+            "certified": _finite(self.certified),
+            "ratio": _finite(self.ratio),
+            "holds": self.holds,
+            "unit": self.unit,
+            "measured": self.measured,
+            "note": self.note,
+        }
+
+
+def _bound(kind: type[UpperBound] | type[LowerBound], value: Fraction | float) -> Fraction | float:
+    """Bound on a number; one that is not finite, as of a run that diverges, stays as it is."""
+    return value if isinstance(value, float) and not math.isfinite(value) else kind(value)
+
+
+def _finite(value: Fraction | float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
+# ----------------------------------------------------------------------
+# What a certificate needs, against what a given fault, reference and disturbance ask for. Ball arithmetic only.
+
+__all__ = [
+    "Domain",
+    "Errors",
+    "LevelSets",
+    "Premise",
+    "Range",
+    "Variant",
+    "certified_lipschitz",
+    "coefficient_range",
+    "control_coefficient",
+    "feedforward_variants",
+    "friction_range",
+    "largest_matched_rate",
+    "least_authority",
+    "matched_rate_premise",
+    "plant_ranges",
+    "sliding_mode_premises",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """What is certified of the same gains with one feed-forward.
+
+    Attributes
+    ----------
+    feedforward : FeedForward
+    premises : tuple of Premise
+    domain : Domain or None
+        None where the certificate has no bounds of its states, or there is none.
+    """
+
+    feedforward: FeedForward
+    premises: tuple[Premise, ...]
+    domain: Domain | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; exact coefficients as texts."""
+        return {
+            "feedforward": self.feedforward.name,
+            "coefficients": {name: str(v) for name, v in self.feedforward.coefficients.items()},
+            "premises": [p.to_dict() for p in self.premises],
+            "domain": self.domain.to_dict() if self.domain else None,
+        }
+
+
+def sliding_mode_premises(
+    fault: Fault, controller: SlidingMode, certificate: Certificate | None
+) -> tuple[list[Premise], Domain | None]:
+    """Premises that can be decided without a run, and the certified domain.
+
+    `along_reference` takes the errors as zero. `level_set` takes the level set of V that holds the start x = 0, ξ = 0
+    for every disturbance of the class, and the errors' own part of h on it, by the better of two methods (`Domain`).
+
+    Raises
+    ------
+    CertificateError
+        When the certificate is about other gains.
+    """
+    (only,) = _variants(fault, controller, certificate, [controller.feedforward])
+    return list(only.premises), only.domain
+
+
+def feedforward_variants(fault: Fault, controller: SlidingMode, certificate: Certificate | None) -> tuple[Variant, ...]:
+    """The same gains and certificate with every named feed-forward, the controller's own first.
+
+    Raises
+    ------
+    CertificateError
+        When the certificate is about other gains.
+    """
+    known = [feed_forward(name, fault, controller.divisor) for name in FEED_FORWARDS]
+    return _variants(fault, controller, certificate, dict.fromkeys([controller.feedforward, *known]))
+
+
+def _variants(
+    fault: Fault, controller: SlidingMode, certificate: Certificate | None, choices: Iterable[FeedForward]
+) -> tuple[Variant, ...]:
+    laws = [controller.with_feedforward(choice) for choice in choices]
+    if certificate is None or certificate.refutation is not None:
+        premises = [_along_reference(fault, law, None) for law in laws]
+        return tuple(
+            Variant(feedforward=law.feedforward, premises=(premise,), domain=None)
+            for law, premise in zip(laws, premises, strict=True)
+        )
+    require(
+        certificate.loop.law == controller.name and dict(certificate.loop.gains) == dict(controller.gains),
+        "the certificate is about other gains than the controller's.",
+    )
+    bounded = all(f"bound_{state}" in certificate.claims for state in certificate.loop.states)
+    known = robustness(certificate, controller.loop_field()) if bounded else None
+    return tuple(_variant(DomainProblem(fault, law, certificate, known), bounded=bounded) for law in laws)
+
+
+def _variant(question: DomainProblem, *, bounded: bool) -> Variant:
+    fault, law, certificate = question.fault, question.controller, question.certificate
+    premises = [
+        control_coefficient(fault, law.divisor, certificate.loop.uncertain["beta"]),
+        _along_reference(fault, law, certified_lipschitz(certificate)),
+    ]
+    if bounded:
+        premises.append(_level_set(question))
+    domain = certified_domain(question) if bounded else None
+    return Variant(feedforward=law.feedforward, premises=tuple(premises), domain=domain)
+
+
+def control_coefficient(fault: Fault, divisor: Fraction, certified: Range) -> Premise:
+    """β inside the certified range; the ratio is the larger of b_M/β_M and β_m/b_m."""
+    low, high = coefficient_range(fault, divisor)
+    worst = max(high / certified[1], certified[0] / low)
+    return Premise(
+        name="control_coefficient",
+        required=worst * certified[1],
+        certified=certified[1],
+        unit="-",
+        note=f"β from {Enclosure.of(low, high):.6g}; certified from {UpperBound(certified[0]):.6g}",
+    )
+
+
+def matched_rate_premise(
+    fault: Fault, controller: SlidingMode, name: str, errors: Errors, certified: Fraction | None, note: str
+) -> Premise:
+    """|h'| ≤ L̄ while the errors stay within bounds; without a certificate against the limit of the gains."""
+    required = largest_matched_rate(fault, controller.divisor, errors, feedforward=controller.feedforward)
+    against = controller.lipschitz_limit if certified is None else certified * controller.scale
+    note += _with(controller)
+    return Premise(
+        name=name,
+        required=required,
+        certified=against,
+        unit="m/s^3",
+        proved=certified is not None,
+        note=note if certified is not None else note + "; no certificate: compared with the limit that no V can exceed",
+    )
+
+
+def _along_reference(fault: Fault, controller: SlidingMode, certified: Fraction | None) -> Premise:
+    note = "rigorous over the uncertainty box and the disturbance class, errors zero"
+    return matched_rate_premise(fault, controller, "along_reference", Errors(), certified, note)
+
+
+def _level_set(question: DomainProblem) -> Premise:
+    """Either |h'| ≤ L̄ with the errors' part, or the errors' part against the decrease of V: whichever is closer."""
+    fault, law = question.fault, question.controller
+    level = question.sets.level(initial_perturbation(fault, law.divisor))
+    errors = question.sets.errors(level)
+    start = f"rigorous on the level set of V that holds the start: |e1| <= {UpperBound(errors.slip):.2g} m, "
+    start += f"|e2| <= {UpperBound(errors.rate):.2g} m/s"
+    parts, rate = question.split(level), question.whole(level)
+    share = sum(parts.values(), Fraction(0)) if parts else None
+    if share is None or rate <= share:
+        return matched_rate_premise(fault, law, "level_set", errors, certified_lipschitz(question.certificate), start)
+    return Premise(
+        name="level_set",
+        required=share,
+        certified=1.0,
+        unit="-",
+        note=start
+        + "; share of the decrease of V that the errors' part of h takes, along_reference holding"
+        + _with(law),
+    )
+
+
+def _with(controller: SlidingMode) -> str:
+    """What the law adds to ν, for a note."""
+    name = controller.feedforward.name
+    return "" if name == "none" else f"; with {name} feed-forward"
+
+
+# ----------------------------------------------------------------------
+# What the linear feedback's certificate needs of a fault: sectors about any constant reference (ERRATA 6 to 12).
+
+
+def linear_premises(fault: Fault, controller: Controller, certificate: Certificate | None) -> list[Premise]:
+    """Premises of the linear feedback: sectors inside the certified ones; constant reference; vanishing disturbance.
+
+    The certificate speaks about constant references and disturbances that vanish at the equilibrium. The last two
+    premises say by how much a task leaves that (ERRATA 8, 11): errors then stay bounded, as certified peaks say.
+
+    Raises
+    ------
+    CertificateError
+        When the certificate is about other gains.
+    """
+    needed = sectors(fault)
+    proved = certificate is not None
+    ranges = certificate.loop.uncertain if certificate is not None else needed.ranges()
+    if certificate is not None:
+        require(
+            certificate.loop.law == controller.name
+            and dict(certificate.loop.gains) == dict(controller.gains)
+            and certificate.loop.constants.get("b") == needed.authority,
+            "the certificate is about other gains, or another fault.",
+        )
+    inside = ranges["s"][0] <= needed.slip[0] and ranges["w"][0] <= needed.rate[0] <= needed.rate[1] <= ranges["w"][1]
+    peak_rate = Fraction(15, 8) * rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
+    return [
+        Premise(
+            name="control_coefficient",
+            required=needed.beta[1],
+            certified=ranges["beta"][1],
+            unit="-",
+            proved=proved and ranges["beta"][0] <= needed.beta[0],
+        ),
+        Premise(
+            name="friction_slope",
+            required=needed.slip[1],
+            certified=ranges["s"][1],
+            unit="1/s^2",
+            proved=proved and inside,
+            note=f"net chord in slip; effective stress up to {UpperBound(needed.largest_effective_stress):.4g} Pa",
+        ),
+        Premise(
+            name="constant_reference",
+            required=peak_rate,
+            certified=0.0,
+            unit="m/s",
+            note="certified about constant references; for a moving one see the certified peaks",
+        ),
+        Premise(
+            name="vanishing_disturbance",
+            required=float_above(fault.disturbance_bounds[0]),
+            certified=0.0,
+            unit="m/s^2",
+            note="for one that does not vanish see the certified peaks",
+        ),
+        *_limits_premise(fault, controller),
+    ]
+
+
+def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
+    """Whether the pressure at rest stays inside the limits of the law, for every constant reference and plant."""
+    limits = getattr(controller, "limits", None)
+    if limits is None:
+        return []
+    low, high = rest_pressure(fault, (Fraction(0), rational(fault.reference.target_slip)))
+    worst = max((low, limits.lowest), (high, limits.highest), key=lambda pair: pair[0] / pair[1])
+    return [
+        Premise(
+            name="pressure_at_rest",
+            required=abs(worst[0]),
+            certified=abs(worst[1]),
+            unit="Pa",
+            note="inside the limits of the law; the proof is about deviations that do not reach them",
+        )
+    ]
+
+
+# ----------------------------------------------------------------------
+# What a field is about, whatever a file calls its states: only what is derived counts.
+
+_CONTROL = "beta"
+
+
+@cache
+def slip_degree() -> int | None:
+    """Number of derivatives of the slip until the pressure appears, derived from the force balance."""
+    return relative_degree(plant.x1, {plant.x1: plant.x2, plant.x2: plant.shifted_acceleration()}, plant.p)
+
+
+def require_degree_of_slip(loop: Loop) -> None:
+    """Refuse a loop whose control acts on another derivative of its first state than the pressure on that of the slip.
+
+    Raises
+    ------
+    CertificateError
+    """
+    first, *_ = loop.states
+    control = loop.symbols.get(_CONTROL, sp.Dummy())
+    degree = relative_degree(loop.symbols[first], sympy_field(loop), control)
+    if degree != slip_degree():
+        raise CertificateError(
+            f"{loop.law} acts on derivative {degree} of its first state, the pressure on derivative {slip_degree()} of "
+            "the slip: the certificate is about another plant than a fault"
+        )
+
+
+# ----------------------------------------------------------------------
+# Whether a certificate is about a fault: its constants and ranges cover those of the fault.
+
+
+def covers(certificate: Certificate, fault: Fault) -> list[str]:
+    """Refuse a certificate whose constants or ranges do not cover a fault (designed gains, divisor μ_res·N̂_min).
+
+    A sliding mode's certificate is about the base gains; the scale λ that the fault needs is said.
+
+    Returns
+    -------
+    list of str
+        What is covered, in lines.
+
+    Raises
+    ------
+    CertificateError
+    """
+    require_degree_of_slip(certificate.loop)
+    loop, said = certificate.loop, [f'covers {certificate.loop.law} on "{fault.name}", box {fault.box.name}']
+    if loop.domain == "reals":
+        needed = sectors(fault)
+        if loop.constants != {"b": needed.authority}:
+            raise CertificateError(f"the control authority is not that of {fault.name}")
+        ranges = needed.ranges()
+    else:
+        divisor = least_authority(fault)
+        ranges = {"beta": coefficient_range(fault, divisor)}
+        zero = Errors(slip=Fraction(0), rate=Fraction(0), acceleration=Fraction(0))
+        if certified_lipschitz(certificate) <= 0:
+            raise CertificateError("the certified range of d = h' must hold 0 inside to cover a fault")
+        rate = largest_matched_rate(fault, divisor, zero)
+        least = UpperBound(rate / certified_lipschitz(certificate))
+        said.append(f"|h'| <= {UpperBound(rate):.4g} m/s^3 along the reference needs a scale of at least {least:.4g}")
+    for name, (low, high) in ranges.items():
+        if not loop.uncertain[name][0] <= low <= high <= loop.uncertain[name][1]:
+            raise CertificateError(f"the certified range of {name} does not cover {fault.name}")
+    return said

@@ -1,0 +1,812 @@
+"""Joint improvement of gains and Lyapunov function by path-following.
+
+Bilinear inequalities are linearised about the current gains and V (Hassibi, How and Boyd, American
+Control Conference 1999). Chapters: linearised programme, decay rate as a convex programme, scaling
+exponents of the gains, state and objective of the search, trust region. All numbers are floating point;
+nothing is proved here.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any, ClassVar
+
+import numpy as np
+import sympy as sp
+from scipy.optimize import nnls
+
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.exact import fraction_of
+from quakedesign.laws import Subject
+from quakedesign.lyapunov.exact.certificate import Certificate
+from quakedesign.lyapunov.exact.claim import Loop, root_enclosure
+from quakedesign.lyapunov.exact.loop_expressions import unit_ranges
+from quakedesign.lyapunov.exact.obligations import Obligation, Obligations, obligation_degree, power_sum, statement_of
+from quakedesign.lyapunov.search.parametric_forms import FormRow, Kin, float_rows, values_of
+from quakedesign.lyapunov.search.search import (
+    balance,
+    exponents_of,
+    find_certificate,
+    lifted_scale,
+    normal,
+    scaled,
+    sum_of,
+)
+from quakedesign.sos import Polynomial
+from quakedesign.sos.solve.joint import DecisionBounds, Demand, JointProgram, joint_program
+from quakedesign.symbolic.term_expressions import signed_monomials
+from quakedesign.symbolic.terms import Term
+
+# ----------------------------------------------------------------------
+# One set of gains and its neighbourhood as polynomials, affine in the coefficients of V and in changes of the gains.
+#
+# Floating point throughout: for a search, which proves nothing.
+
+Form = dict[tuple[int, ...], Any]
+"""Polynomial with floats."""
+_GRID = 1 << 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """A rate κ to prove, by −w^{m−n}V̇ ≥ κ((n/m)V + (1 − n/m)w^m), which is linear in V and implies V̇ ≤ −κV^{n/m}.
+
+    By Young's inequality V^{n/m} ≤ (n/m)V/w^{m−n} + (1 − n/m)w^n for every w > 0, an equality at w = V^{1/m}; an error
+    ε of w costs a share of order ε².
+
+    Attributes
+    ----------
+    rate : float
+        κ > 0.
+    degrees : (int, int)
+        m and n, of V and V̇.
+    forms : mapping of str to polynomial
+        w on every cell of the states, by its signs: linear with coefficients > 0.
+    """
+
+    rate: float
+    degrees: tuple[int, int]
+    forms: Mapping[str, Form]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Neighbourhood:
+    """Demands on a_j and on shares of given changes of the gains.
+
+    Attributes
+    ----------
+    monomials, sizes
+        V = Σ a_j·monomial_j/size_j.
+    program : JointProgram
+        For the demands.
+    demands : tuple of Demand
+        Parts: those of a_j, then those of the changes, with V as it is now.
+    fixed : tuple of Polynomial
+        Parts without a decision.
+    """
+
+    monomials: tuple[Term, ...]
+    sizes: tuple[Fraction, ...]
+    program: JointProgram
+    demands: tuple[Demand, ...]
+    fixed: tuple[Form, ...]
+
+    def function(self, decision: Sequence[float]) -> tuple[Term, ...]:
+        """V of a decision, to 2^−40 in the scaled variables."""
+        return sum_of(self.monomials, self.sizes, decision[: len(self.monomials)], _GRID)
+
+
+def neighbourhood(
+    loop: Loop,
+    degree: int,
+    scale: tuple[Fraction, ...],
+    *,
+    pace: Pace | None = None,
+    lyapunov: tuple[Term, ...] = (),
+    changed: Sequence[Loop] = (),
+) -> Neighbourhood:
+    """Demands V > 0 and V̇ < 0 (or the faster decrease of a pace) around one set of gains.
+
+    Parameters
+    ----------
+    loop : Loop
+    degree : int
+        Of V.
+    scale : tuple of Fraction
+        Of the variables.
+    pace : Pace, optional
+    lyapunov : tuple of Term
+        V as it is now, which the changes act on.
+    changed : sequence of Loop
+        The loop with one gain changed each; its difference to `loop` is one part, exact where the field is affine in
+        the gain. Conditions on cells are kept as they are, so that a search must look again at the gains it finds.
+    """
+    monomials = signed_monomials(loop.states, degree, loop.domain)
+    sizes = tuple(Fraction(_power(scale, exponents_of(term, loop.states))) for term in monomials)
+    kin = Kin(loop, degree)
+    now = {(t.parameters, t.factors): float(t.coefficient) for t in lyapunov}
+    present = [now.get((t.parameters, t.factors), 0.0) for t in monomials]
+    values = values_of(loop)
+    others = [values_of(other) for other in changed]
+    demands, fixed = [], []
+    for row, template, whole in _templates(kin, scale, pace is not None):
+        parts = [_faster(row, j, values, pace, 1 / float(size)) for j, size in enumerate(sizes)]
+        moves = [_moved(row, present, values, other, pace) for other in others]
+        rest = _rest(row, pace)
+        grown = [{e: c * float(_power(whole, e)) for e, c in p.items()} for p in (*parts, *moves, rest)]
+        size = max((abs(c) for p in grown[:-1] for c in p.values()), default=1.0)
+        *grown, rest = [{e: c / size for e, c in p.items()} for p in grown]
+        power = sum(next(iter(template.polynomial)))
+        margin = power_sum(len(loop.states), power, len(whole))
+        demands.append(Demand(template=template, parts=grown, margin=margin))
+        fixed.append(rest)
+    program = _program(kin, scale, pace is not None, len(changed))
+    return Neighbourhood(monomials=monomials, sizes=sizes, program=program, demands=tuple(demands), fixed=tuple(fixed))
+
+
+def _power(base: Sequence[Any], exponents: Sequence[int]) -> Any:
+    return math.prod(b**e for b, e in zip(base, exponents, strict=True) if e)
+
+
+def _columns(
+    row: FormRow, j: int | None, values: Mapping[str, float], weights: Sequence[float] = ()
+) -> tuple[Form, Form]:
+    """V and −V̇ of one monomial, or of all with weights."""
+    columns: tuple[Form, Form] = ({}, {})
+    for total, parts in zip(columns, (row.function, row.fall), strict=True):
+        for k, e, names, c in parts:
+            if j is None or k == j:
+                value = c * (weights[k] if j is None else 1.0) * math.prod(values[n] for n in names)
+                total[e] = total.get(e, 0.0) + value
+    return columns
+
+
+def _faster(
+    row: FormRow, j: int | None, values: Mapping[str, float], pace: Pace | None, factor: float, weights: Any = ()
+) -> Form:
+    """Part of a row that V decides: V, −V̇, or −w^{m−n}V̇ − κ(n/m)V."""
+    function, fall = _columns(row, j, values, weights)
+    if not row.fall:
+        form = function
+    elif pace is None:
+        form = fall
+    else:
+        m, n = pace.degrees
+        size = len(row.fall[0][1])
+        form = fall
+        for _ in range(m - n):
+            form = _times(form, _wide(pace.forms[row.cell], size))
+        for e, c in _wide(function, size).items():
+            form[e] = form.get(e, 0.0) - pace.rate * n / m * c
+    return {e: c * factor for e, c in form.items()}
+
+
+def _moved(row: FormRow, present: Sequence[float], values: Any, other: Any, pace: Pace | None) -> Form:
+    """What changed numbers add to a row for V as it is."""
+    before = _faster(row, None, values, pace, 1.0, present)
+    after = _faster(row, None, other, pace, 1.0, present)
+    return {e: after.get(e, 0.0) - before.get(e, 0.0) for e in {**before, **after}}
+
+
+def _rest(row: FormRow, pace: Pace | None) -> Form:
+    """Part of a row without V: −κ(1 − n/m)w^m."""
+    if pace is None or not row.fall:
+        return {}
+    m, n = pace.degrees
+    form = _wide(pace.forms[row.cell], len(row.fall[0][1]))
+    found = form
+    for _ in range(m - 1):
+        found = _times(found, form)
+    return {e: -pace.rate * (m - n) / m * c for e, c in found.items()}
+
+
+def _wide(form: Form, size: int) -> Form:
+    return {(*e, *(0,) * (size - len(e))): c for e, c in form.items()}
+
+
+def _times(left: Form, right: Form) -> Form:
+    product: Form = {}
+    for e, c in left.items():
+        for f, d in right.items():
+            key = tuple(map(sum, zip(e, f, strict=True)))
+            product[key] = product.get(key, 0.0) + c * d
+    return product
+
+
+@lru_cache(maxsize=32)
+def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> Any:
+    """Every row with its set and monomials in scaled variables, and the scale of all of these."""
+    templates = []
+    loop = kin.loop
+    for row in float_rows(kin):
+        whole = lifted_scale(row.equalities, scale)
+        parts = row.fall or row.function
+        degree = sum(parts[0][1])
+        support = dict.fromkeys(e for _, e, _, _ in parts)
+        if row.fall and paced:
+            power, size = sum(row.function[0][1]), len(parts[0][1])
+            unit = dict.fromkeys((tuple(int(i == j) for j in range(size)) for i in range(len(loop.states))), 1.0)
+            form = dict(unit)
+            for _ in range(power - 1):
+                form = _times(form, unit)
+            support, degree = (
+                {**{e: None for e in _raised(support, unit, power - degree)}, **dict.fromkeys(form)},
+                power,
+            )
+        margin = power_sum(len(loop.states), degree, len(whole))
+        conditions = (tuple(normal(p, whole) for p in group) for group in (row.equalities, row.inequalities))
+        one = Obligation("", dict.fromkeys((*support, *margin), Fraction(1)), *conditions)
+        templates.append((row, statement_of(one, loop.domain), whole))
+    return tuple(templates)
+
+
+def _raised(support: Any, unit: Form, times: int) -> Any:
+    """Monomials of a product with a linear form to a power."""
+    form = dict.fromkeys(support, 1.0)
+    for _ in range(times):
+        form = _times(form, unit)
+    return form
+
+
+@lru_cache(maxsize=32)
+def _program(kin: Kin, scale: tuple[Fraction, ...], paced: bool, changes: int) -> JointProgram:
+    loop, degree = kin.loop, kin.structure.degree
+    count = len(signed_monomials(loop.states, degree, loop.domain)) + changes
+    return JointProgram(
+        [Demand(template=t, parts=[{}] * count, margin={}) for _, t, _ in _templates(kin, scale, paced)]
+    )
+
+
+# ----------------------------------------------------------------------
+# How fast V̇ ≤ −κV^{n/m} settles a loop, and the linear forms w ≈ V^{1/m} that make the search for κ a programme.
+
+_POINTS, _SEED = 400, 5
+
+
+def box(loop: Loop, units: Mapping[str, sp.Expr]) -> tuple[float, ...]:
+    """Largest u_i where all errors are at most L̄ in size, for x_i = ±u_i^{r_i}.
+
+    Parameters
+    ----------
+    loop : Loop
+    units : mapping of str to Expr
+        Error that one unit of a state stands for, see `LoopField.units`.
+    """
+    bound, known = loop.uncertain["d"][1], unit_ranges(loop, units)
+    return tuple(float(bound / known[state][0]) ** (1 / weight) for state, weight in loop.states.items())
+
+
+def on_box(lyapunov: Sequence[Term], states: Mapping[str, int], sizes: Sequence[float]) -> float:
+    """Σ |α_j|·|monomial_j| at the far corner of a box: V is at most that within."""
+    return sum(abs(float(term.coefficient)) * _at(exponents_of(term, states), sizes) for term in lyapunov)
+
+
+def _at(exponents: Sequence[int], sizes: Sequence[float]) -> float:
+    value = 1.0
+    for size, e in zip(sizes, exponents, strict=True):
+        value *= size**e
+    return value
+
+
+def rounded(lyapunov: Sequence[Term], bits: int, divisor: float = 1.0) -> tuple[Term, ...]:
+    """V divided by a number, every coefficient with so many binary digits."""
+    terms = []
+    for term in lyapunov:
+        value = float(term.coefficient) / divisor
+        grid = Fraction(2) ** (bits - math.floor(math.log2(abs(value))))
+        terms.append(Term(round(Fraction(value) * grid) / grid, term.parameters, term.factors))
+    return tuple(terms)
+
+
+def degrees_of(obligations: Obligations) -> tuple[int, int]:
+    """m and n, of V and V̇."""
+    m = obligation_degree([p for _, p in obligations.function()], "V")
+    return m, obligation_degree([one.polynomial for _, one in obligations.decrease("")], "V̇")
+
+
+def pace_of(loop: Loop, lyapunov: tuple[Term, ...], speed: float, power: int) -> Pace:
+    """Pace at which a V ≤ 1 of a degree settles within T = 1/speed, κ = speed·m/(m−n); for loops that settle, n < m.
+
+    w is fitted to V^{1/m} on every cell for a V nearby, of whatever degree.
+    """
+    obligations = Obligations(loop, lyapunov)
+    m, n = degrees_of(obligations)
+    forms = {cell.name: _form(obligations.potential(cell.signs), m) for cell in obligations.sign_cells()}
+    return Pace(rate=speed * power / (m - n), degrees=(power, power + n - m), forms=forms)
+
+
+def least_margins(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> tuple[float, float]:
+    """Largest t with V ≥ tΣu_i^m and t with −V̇ ≥ tΣu_i^n that the solver finds, not above what the cone allows."""
+    obligations = Obligations(loop, lyapunov)
+    function = [Obligation(name, p) for name, p in obligations.function()]
+    decrease = [one for _, one in obligations.decrease("")]
+    positive, falling = (
+        min(_margin(one, loop, scale) for one in {one.key: one for one in part}.values())
+        for part in (function, decrease)
+    )
+    return positive, falling
+
+
+def _margin(one: Obligation, loop: Loop, scale: Sequence[Fraction]) -> float:
+    whole = lifted_scale(one.equalities, scale)
+    moved = scaled(one.polynomial, whole)
+    size = max(map(abs, moved.values()))
+    power = obligation_degree([one.polynomial], "a form")
+    margin = power_sum(len(loop.states), power, len(whole))
+    conditions = (tuple(scaled(p, whole) for p in group) for group in (one.equalities, one.inequalities))
+    support = Obligation("", dict.fromkeys((*moved, *margin), Fraction(1)), *conditions)
+    parts = [{e: c / size for e, c in moved.items()}]
+    demand = Demand(template=statement_of(support, loop.domain), parts=parts, margin=margin)
+    proposal = joint_program([demand]).solve([demand])
+    return 0.0 if proposal is None else max(0.0, proposal.margin) * float(size * min(1 / r**power for r in scale))
+
+
+def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
+    """Smallest −V̇/V^{n/m} over sampled points: an estimate of κ from above."""
+    obligations = Obligations(loop, lyapunov)
+    m = obligation_degree([p for _, p in obligations.function()], "V")
+    found = [np.inf]
+    for cell, one in obligations.decrease(""):
+        potential = obligations.potential(cell.signs)
+        points = _points(potential, m)
+        values = np.maximum(_values(potential, points), 1e-300)
+        whole, kept = _lifted(points, one)
+        rates = _values(one.polynomial, whole) / values ** (obligation_degree([one.polynomial], "V̇") / m)
+        found.append(float(rates[kept].min(initial=np.inf)))
+    return min(found)
+
+
+def _lifted(points: Any, one: Obligation) -> Any:
+    """Points with the variables of nested powers, and which of them are in the cell."""
+    kept = np.full(len(points), True)
+    for equality in one.equalities:
+        position = points.shape[1]
+        power = max(e[position] for e in equality)
+        zero = np.zeros((len(points), max(len(e) for e in equality) - position))
+        (sign,) = (float(c) for e, c in equality.items() if e[position])
+        value = -sign * _values(equality, np.hstack([points, zero]))
+        kept &= value >= 0
+        points = np.hstack([points, np.maximum(value, 0)[:, None] ** (1 / power)])
+    for inequality in one.inequalities:
+        kept &= _values(inequality, points) >= 0
+    return points, kept
+
+
+def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
+    """Linear form with coefficients ≥ 0 next to the m-th root of a form, in the mean of the squared shares."""
+    points = _points(potential, m)
+    wanted = np.maximum(_values(potential, points), 1e-300) ** (1 / m)
+    coefficients, _ = nnls(points / wanted[:, None], np.ones(len(points)))
+    least = 1e-3 * coefficients.max()
+    size = len(coefficients)
+    return {tuple(int(i == j) for j in range(size)): max(float(c), least) for i, c in enumerate(coefficients)}
+
+
+def _points(potential: Polynomial, m: int) -> Any:
+    """Directions spread over a cell (k × n), every variable in the unit in which V is one on its axis."""
+    size = len(next(iter(potential)))
+    corners = [abs(float(potential.get(tuple(m * (i == j) for j in range(size)), 0))) for i in range(size)]
+    units = np.array([c ** (-1 / m) if c > 0 else 1.0 for c in corners])
+    rng = np.random.default_rng(_SEED)
+    return rng.dirichlet(np.full(size, 0.5), _POINTS) * units
+
+
+def _values(polynomial: Polynomial, points: Any) -> Any:
+    exponents = np.array(list(polynomial), dtype=float)
+    coefficients = np.array([float(c) for c in polynomial.values()])
+    return np.prod(points[:, None, :] ** exponents[None, :, :], axis=2) @ coefficients
+
+
+# ----------------------------------------------------------------------
+# How gains change when a loop is stretched: exponents that its terms leave no choice about.
+
+
+def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fraction]:
+    """Exponents p with which gains k → s^p·k and states x → s^q·x undo a stretch of the uncertain parameters.
+
+    Every term of a rate must grow like its state, and every term of a nested argument like the others. With d → s·d
+    this is the λ-scaling of a sliding mode (⅔, ½, 1, 1 for the 2-CTA), so that k/L̄^p is a set of gains for L̄ = 1.
+
+    Parameters
+    ----------
+    loop : Loop
+        Its numbers do not matter.
+    sizes : mapping of str to int
+        Exponent of s in every uncertain parameter that grows, such as ``{"d": 1}``.
+
+    Returns
+    -------
+    dict of str to Fraction
+        Of every gain and every state.
+
+    Raises
+    ------
+    ParameterError
+        When the terms do not determine the exponents.
+    """
+    names = (*loop.gains, *loop.states, *loop.lifts)
+    unknown = {name: sp.Dummy(name) for name in names}
+    known = {name: sp.Integer(sizes.get(name, 0)) for name in (*loop.uncertain, *loop.constants)}
+    known |= {root: unknown[of] / 2 for root, (of, _) in loop.roots.items()}
+
+    def size(term: Term) -> sp.Expr:
+        powers = [unknown[name] * sp.Rational(e.numerator, e.denominator) for name, e, _ in term.factors]
+        return sum([*({**unknown, **known}[p] for p in term.parameters), *powers], start=sp.Integer(0))
+
+    parts = {**loop.field, **loop.lifts}
+    equations = [size(term) - unknown[name] for name, terms in parts.items() for term in terms]
+    solution = next(iter(sp.linsolve(equations, *unknown.values())), ())
+    if not solution or not all(v.is_Rational for v in solution):
+        raise ParameterError(
+            f"the terms of {loop.law} must determine how its gains scale. Received {solution or 'a contradiction'}. "
+            "Leave out gains without effect."
+        )
+    exponents = {name: fraction_of(v) for name, v in zip(unknown, solution, strict=True)}
+    return {name: exponents[name] for name in (*loop.gains, *loop.states)}
+
+
+def scaled_norm(loop: Loop, exponents: Mapping[str, Fraction]) -> float:
+    """‖(k_i/L̄^{p_i})‖₂ of a loop's gains; no λ changes it. L̄ is the upper end of d."""
+    bound = float(loop.uncertain["d"][1])
+    return float(sum((float(k) / bound ** float(exponents[name])) ** 2 for name, k in loop.gains.items()) ** 0.5)
+
+
+# ----------------------------------------------------------------------
+# What a search for gains knows: its setting, the states that it passes, and what makes one better than another.
+
+MARGIN, FAINT = 1e-6, 1e-9
+_ROOM = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathSetting:
+    """What does not change during a search.
+
+    Attributes
+    ----------
+    objective : Objective
+    exponents : mapping of str to Fraction
+        Of gains and states, see `stretch_exponents`.
+    degree : int
+        Of V.
+    units : mapping of str to Expr
+        See `LoopField.units`.
+    least : float
+        Margin that counts; a search over gains steers clear of the edge of what a solver can tell.
+    """
+
+    objective: "Objective"
+    exponents: Mapping[str, Fraction]
+    degree: int
+    units: Mapping[str, sp.Expr] = field(default_factory=dict)
+    least: float = MARGIN
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """Gains with a V that a solver believes in.
+
+    Attributes
+    ----------
+    loop : Loop
+        With the ranges that the level asks for.
+    level : float
+        Of the objective.
+    lyapunov : tuple of Term
+    margin : float
+    """
+
+    loop: Loop
+    level: float
+    lyapunov: tuple[Term, ...]
+    margin: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Objective(ABC):
+    """One way in which gains can be better than others.
+
+    Attributes
+    ----------
+    bound : float, optional
+        Largest ‖k_i/L̄^{p_i}‖₂ allowed.
+    """
+
+    name: ClassVar[str]
+    unit: ClassVar[str]
+    meaning: ClassVar[str]
+    larger: ClassVar[bool] = True
+    bounded: ClassVar[bool] = True
+    paced: ClassVar[bool] = False
+
+    bound: float | None = None
+
+    def better(self, level: float, other: float) -> bool:
+        """Whether a level is better than another one."""
+        return level > other if self.larger else level < other
+
+    def improved(self, level: float, share: float) -> float:
+        """Level that is better by a share."""
+        return level * (1 + share if self.larger else 1 - share)
+
+    def at(self, loop: Loop, level: float) -> Loop:
+        """Loop with the ranges that a level asks for."""
+        return loop
+
+    def speed(self, level: float) -> float | None:
+        """1/T that a level asks for, see `pace_of`."""
+        return None
+
+    def norm_bound(self, level: float) -> float | None:
+        """Bound on the norm of the gains."""
+        return self.bound
+
+    def kept(self, gains: Mapping[str, float], loop: Loop, exponents: Mapping[str, Fraction]) -> dict[str, float]:
+        """Gains drawn back to the bound on their norm, if they are beyond."""
+        scale = float(loop.uncertain["d"][1])
+        norm = sum((k / scale ** float(exponents[name])) ** 2 for name, k in gains.items()) ** 0.5
+        factor = 1.0 if self.bound is None else min(1.0, self.bound * (1 - _ROOM) / norm)
+        return {name: k * factor for name, k in gains.items()}
+
+    def reached(self, level: float, loop: Loop, exponents: Mapping[str, Fraction]) -> float:
+        """Level of gains that a step for a level has led to."""
+        return level
+
+    @abstractmethod
+    def start(self, setting: PathSetting, loop: Loop) -> State | None:
+        """First state at given gains; None where the search has nothing to begin with."""
+
+    def proved(self, setting: PathSetting, state: State, subject: Subject) -> Certificate | None:
+        """Exact certificate at the gains of a state, or None."""
+        return find_certificate(state.loop, setting.degree, subject=subject)
+
+    def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
+        """Proof of given gains by another way than a climb, to be beaten by that if V is paced; None without one."""
+        return None
+
+    @abstractmethod
+    def figure(self, certificate: Certificate, setting: PathSetting) -> float:
+        """What a certificate proves, in terms of the objective."""
+
+
+# ----------------------------------------------------------------------
+# Gains and V improved together: steps along the bilinear inequalities, each looked at again at the gains it finds.
+#
+# At gains k0 with V0 the products of changes of V and of k are left out, so that V and k move in one programme with
+# the
+# largest margin (the path-following of Hassibi, How and Boyd, American Control Conference 1999). What a step finds
+# counts
+# only after a programme with these gains fixed has a margin too. Nothing here is proved.
+
+_ROUNDS = 100  # programmes of steps to solve at most
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrustRegion:
+    """How far the bilinear products that a step leaves out are trusted; a step is a share by which the level improves.
+
+    Attributes
+    ----------
+    initial : float
+        First share. What a step leaves out is of second order, about (`gains` times the share)²: a tenth of what is
+        kept.
+    largest : float
+        Share at which what is left out is as large as what is kept.
+    least : float
+        Share below which the search centres instead: gains are rounded to four digits, ten of which it is.
+    grow, shrink : float
+        What the share is multiplied by after a step that was found, and divided by after one that was not: up slowly
+        and down fast, since a programme that fails takes as long as one that succeeds.
+    gains : float
+        Largest change of a gain over the share: a level asks for changes of several gains larger than its own.
+    again : float
+        Share after centring, below the initial one, which had failed.
+    worthwhile : float
+        Share by which the level must have improved since the last centring for another: three of the least steps.
+    margin : float
+        Factor by which centring must raise the margin; less leaves no room for a step, and the search ends.
+    under_root : float
+        Largest change of a gain under a root over the gain, so that the root stays real.
+    """
+
+    initial: float = 0.1
+    largest: float = 0.35
+    least: float = 1e-3
+    grow: float = 1.5
+    shrink: float = 3.0
+    gains: float = 3.0
+    again: float = 0.03
+    worthwhile: float = 3e-3
+    margin: float = 1.2
+    under_root: float = 0.5
+
+    def longer(self, share: float) -> float:
+        """Share after a step that was found."""
+        return min(self.largest, self.grow * share)
+
+
+TRUST = TrustRegion()
+
+
+def with_gains(loop: Loop, gains: Mapping[str, Fraction]) -> Loop:
+    """Loop with other gains and the roots that belong to them."""
+    known = {**loop.constants, **gains}
+    roots = {name: (of, root_enclosure(known[of])) for name, (of, _) in loop.roots.items()}
+    return replace(loop, gains=dict(gains), roots=roots)
+
+
+def short(loop: Loop, gains: Mapping[str, float]) -> dict[str, Fraction]:
+    """Gains with four digits; those under a root as squares of numbers with four digits, so that the root is exact."""
+    rooted = {of for of, _ in loop.roots.values()}
+    return {name: _digits(math.sqrt(max(k, 0.0))) ** 2 if name in rooted else _digits(k) for name, k in gains.items()}
+
+
+def _digits(number: float) -> Fraction:
+    return Fraction(f"{number:.4g}")
+
+
+def climb(setting: PathSetting, state: State, *, free: bool = True, until: float | None = None) -> Any:
+    """States in the order in which they were found, each better than the one before; the given one first.
+
+    Parameters
+    ----------
+    setting : PathSetting
+    state : State
+    free : bool
+        Whether the gains may move.
+    until : float, optional
+        Level at which to stop.
+
+    Returns
+    -------
+    list of State
+    """
+    states, share, centred = [state], TRUST.initial, None
+    objective = setting.objective
+    for _ in range(_ROUNDS):
+        if until is not None and not objective.better(until, state.level):
+            break
+        if share < TRUST.least:
+            worthwhile = centred is None or objective.better(state.level, objective.improved(centred, TRUST.worthwhile))
+            found = _step(setting, state, 0.0) if free and worthwhile else None
+            if found is None or found.margin < TRUST.margin * state.margin:
+                break
+            state, share, centred = found, TRUST.again, found.level
+            continue
+        found = _step(setting, state, share) if free else _level(setting, state, share)
+        if found is None:
+            share /= TRUST.shrink
+            continue
+        state, share = found, TRUST.longer(share)
+        if objective.better(state.level, states[-1].level):
+            states.append(state)
+    return states
+
+
+def _level(setting: PathSetting, state: State, share: float) -> State | None:
+    """The same gains at a better level."""
+    level = setting.objective.improved(state.level, share)
+    level = setting.objective.reached(level, state.loop, setting.exponents)
+    return look(setting, state.loop, level, state.lyapunov, state.level)
+
+
+def _step(setting: PathSetting, state: State, share: float) -> State | None:
+    """State that is better by a share; for the share zero, one about as good with the largest margin."""
+    objective = setting.objective
+    level = objective.improved(state.level, share)
+    loop = objective.at(state.loop, level)
+    changes = _changes(setting, loop, TRUST.gains * (share or TRUST.again))
+    base = [float(k) for k in loop.gains.values()]
+    changed = [with_gains(loop, g) for g in changes.values()]
+    sizes = [float(changes[name][name] - loop.gains[name]) for name in changes]
+    around = _around(setting, loop, level, state.lyapunov, changed)
+    if around is None:
+        return None
+    limits = _limits(setting, loop, level, around, dict(zip(changes, sizes, strict=True)))
+    proposal = around.program.solve(around.demands, around.fixed, limits)
+    if proposal is None:
+        return None
+    chosen = dict(zip(loop.gains, base, strict=True))
+    first = len(around.monomials)
+    for name, size, x in zip(changes, sizes, proposal.decision[first : first + len(sizes)], strict=True):
+        chosen[name] += size * x
+    moved = with_gains(loop, short(loop, objective.kept(chosen, loop, setting.exponents)))
+    beyond = state.level if share else None
+    return look(setting, moved, objective.reached(level, moved, setting.exponents), state.lyapunov, beyond)
+
+
+def _changes(setting: PathSetting, loop: Loop, trust: float) -> dict[str, dict[str, Fraction]]:
+    """For every gain that may move, the gains with this one larger; none that is zero moves."""
+    norm = scaled_norm(loop, setting.exponents)
+    bound = float(loop.uncertain["d"][1])
+    rooted = {of for of, _ in loop.roots.values()}
+    changes = {}
+    for name, k in loop.gains.items():
+        unit = bound ** float(setting.exponents[name])
+        step = trust * math.sqrt(abs(float(k)) * norm * unit)
+        step = min(step, TRUST.under_root * float(k)) if name in rooted else step
+        larger = short(loop, {name: float(k) + step})
+        if k and larger[name] != k:
+            changes[name] = {**loop.gains, **larger}
+    return changes
+
+
+def _around(
+    setting: PathSetting, loop: Loop, level: float, lyapunov: tuple[Term, ...], changed: Sequence[Loop] = ()
+) -> Neighbourhood | None:
+    speed = setting.objective.speed(level)
+    try:
+        pace = pace_of(loop, lyapunov, speed, setting.degree) if speed else None
+        return neighbourhood(loop, setting.degree, balance(loop), pace=pace, lyapunov=lyapunov, changed=changed)
+    except (CertificateError, ValueError):
+        return None
+
+
+def _limits(
+    setting: PathSetting, loop: Loop, level: float, around: Neighbourhood, sizes: Mapping[str, float]
+) -> DecisionBounds:
+    """|a_j| and shares of the changes at most one, the norm of the gains as the objective asks."""
+    count = len(around.monomials)
+    bound = setting.objective.norm_bound(level)
+    rows, bounds = [], []
+    if bound is not None and sizes:
+        norm = scaled_norm(loop, setting.exponents)
+        unit = float(loop.uncertain["d"][1])
+        slopes = [float(loop.gains[n]) / unit ** (2 * float(setting.exponents[n])) / norm * s for n, s in sizes.items()]
+        rows.append([*[0.0] * count, *slopes])
+        bounds.append(bound - norm)
+    return DecisionBounds(
+        radii=[1.0] * (count + len(sizes)), rows=rows, bounds=bounds, shares=_shares(setting, loop, around)
+    )
+
+
+def _shares(setting: PathSetting, loop: Loop, around: Neighbourhood) -> list[float]:
+    """Largest size of every a_j-th part of V on the box, where a rate is asked for: then V ≤ 1 there."""
+    if not setting.objective.paced:
+        return []
+    sizes = box(loop, setting.units)
+    shares = [on_box((term,), loop.states, sizes) for term in around.monomials]
+    return [share / float(size) for size, share in zip(around.sizes, shares, strict=True)]
+
+
+def look(
+    setting: PathSetting,
+    loop: Loop,
+    level: float,
+    lyapunov: tuple[Term, ...] = (),
+    beyond: float | None = None,
+    least: float | None = None,
+) -> State | None:
+    """State at fixed gains and level with the largest margin; None without one, or where it is no better than `beyond`.
+
+    Parameters
+    ----------
+    setting : PathSetting
+    loop : Loop
+    level : float
+    lyapunov : tuple of Term
+        V of a state nearby; only a rate needs it.
+    beyond : float, optional
+    least : float, optional
+        Margin that counts; that of the setting unless given.
+
+    Returns
+    -------
+    State or None
+    """
+    objective = setting.objective
+    if beyond is not None and not objective.better(level, beyond):
+        return None
+    loop = objective.at(loop, level)
+    around = _around(setting, loop, level, lyapunov)
+    if around is None:
+        return None
+    limits = _limits(setting, loop, level, around, {})
+    proposal = around.program.solve(around.demands, around.fixed, limits)
+    if proposal is None or not proposal.margin > (setting.least if least is None else least):
+        return None
+    function = around.function(proposal.decision)
+    return State(loop=loop, level=level, lyapunov=function, margin=proposal.margin)

@@ -1,0 +1,613 @@
+"""Synthesis of gains with a proof: problem, objectives, and the search.
+
+Objectives: smallest scaled norm, largest decay rate, largest range of β. Gains without a proof are never
+returned.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import partial
+from itertools import islice
+from typing import ClassVar
+
+import numpy as np
+
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.fault.model import MOST_WORKERS, require_count
+from quakedesign.laws import Subject, family, model_of
+from quakedesign.lyapunov.exact.certificate import Certificate
+from quakedesign.lyapunov.exact.claim import Loop
+from quakedesign.lyapunov.exact.obligations import Obligations
+from quakedesign.lyapunov.gains.path_following import (
+    FAINT,
+    Objective,
+    PathSetting,
+    State,
+    box,
+    climb,
+    degrees_of,
+    fastest,
+    least_margins,
+    look,
+    on_box,
+    rounded,
+    scaled_norm,
+    short,
+    stretch_exponents,
+    with_gains,
+)
+from quakedesign.lyapunov.search.certify import Number, closed_loop, largest_gain_range
+from quakedesign.lyapunov.search.search import (
+    GIVE_AWAY,
+    balance,
+    below,
+    bounds_of,
+    candidate_degrees,
+    finish,
+    with_largest_decay,
+)
+from quakedesign.lyapunov.search.settling import fastest_settling
+from quakedesign.parallel import Crew, Here, crew_or_here
+from quakedesign.sos.solve.conic import handing_back
+
+# ----------------------------------------------------------------------
+# What gains can be best in: an order of levels, what a level asks of a loop, the proof and the figure at the end.
+
+_HALVINGS = 8
+_BITS = (16, 24, 34)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmallestNorm(Objective):
+    """Smallest ‖k_i/L̄^{p_i}‖₂, p_i from homogeneity: (k1L̄^{−2/3}, k2L̄^{−1/2}, k3/L̄, k4/L̄) for the 2-CTA."""
+
+    name: ClassVar[str] = "norm"
+    unit: ClassVar[str] = "-"
+    meaning: ClassVar[str] = "norm of the gains, scaled to a bound of one on |h'|"
+    larger: ClassVar[bool] = False
+    bounded: ClassVar[bool] = False
+
+    def norm_bound(self, level: float) -> float | None:
+        """The level itself."""
+        return level
+
+    def reached(self, level: float, loop: Loop, exponents: Mapping[str, Fraction]) -> float:
+        """Norm of the gains."""
+        return scaled_norm(loop, exponents)
+
+    def start(self, setting: PathSetting, loop: Loop) -> State | None:
+        """State at the gains."""
+        return look(setting, loop, scaled_norm(loop, setting.exponents), least=FAINT)
+
+    def figure(self, certificate: Certificate, setting: PathSetting) -> float:
+        """Norm of the gains."""
+        return scaled_norm(certificate.loop, setting.exponents)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LargestDecay(Objective):
+    """Largest κ in V̇ ≤ −κV^{n/m}, told as one over the settling time T = m/((m−n)κ)·C^{(m−n)/m} that it certifies.
+
+    T holds for all starts |e_i| ≤ L̄, where V ≤ C. κ alone would compare neither two V, which may be multiplied by any
+    number, nor two degrees m; T does. No λ changes it.
+    """
+
+    name: ClassVar[str] = "decay"
+    unit: ClassVar[str] = "1/s"
+    meaning: ClassVar[str] = "one over the certified settling time from where every error is at most the bound on |h'|"
+    paced: ClassVar[bool] = True
+
+    def speed(self, level: float) -> float | None:
+        """The level itself."""
+        return level
+
+    def start(self, setting: PathSetting, loop: Loop) -> State | None:
+        """State at half of what a V without a rate seems to reach, or less."""
+        first = look(replace(setting, objective=SmallestNorm()), loop, scaled_norm(loop, setting.exponents))
+        if first is None:
+            return None
+        largest = on_box(first.lyapunov, loop.states, box(loop, setting.units))
+        function = rounded(first.lyapunov, _BITS[-1], largest)
+        m, n = degrees_of(Obligations(loop, function))
+        speed = fastest(loop, function) * (m - n) / m
+        for _ in range(_HALVINGS):
+            speed /= 2
+            state = look(setting, loop, speed, function)
+            if state is not None:
+                return state
+        return None
+
+    def proved(self, setting: PathSetting, state: State, subject: Subject) -> Certificate | None:
+        """Certificate with V of the state and the largest κ that the solver finds for it."""
+        scale = balance(state.loop)
+        for bits in _BITS:
+            function = rounded(state.lyapunov, bits)
+            positive, decrease = (GIVE_AWAY * below(t) for t in least_margins(state.loop, function, scale))
+            if not (positive > 0 and decrease > 0):
+                continue
+            claims = {"positive": positive, "decrease": decrease, **bounds_of(state.loop, function, scale)}
+            plain = finish(state.loop, function, claims, subject)
+            certificate = plain and with_largest_decay(plain, scale, subject)
+            if certificate:
+                return certificate
+        return None
+
+    def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
+        """Certificate with the V of the largest margins, which is the better one where the forms w fit badly."""
+        bound, beta = loop.uncertain["d"][1], loop.uncertain.get("beta", (Fraction(1), Fraction(1)))
+        gains = tuple(loop.gains.values())
+        settling = fastest_settling(subject, gains, lipschitz=bound, gain_range=beta, start=bound, degrees=degrees)
+        return settling[0] if settling else None
+
+    def figure(self, certificate: Certificate, setting: PathSetting) -> float:
+        """1/T = κ·(m−n)/m·C^{−(m−n)/m} with V ≤ C where |e_i| ≤ L̄, rounded down."""
+        loop = certificate.loop
+        m, n = degrees_of(Obligations(loop, certificate.lyapunov))
+        share = (m - n) / m
+        largest = on_box(certificate.lyapunov, loop.states, box(loop, setting.units))
+        return float(certificate.claims["decay"]) * share * float(largest**-share) * (1 - 1e-12)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LargestRange(Objective):
+    """Largest ρ for β ∈ [b/ρ, bρ] around the geometric middle b of the range asked for."""
+
+    name: ClassVar[str] = "beta"
+    unit: ClassVar[str] = "-"
+    meaning: ClassVar[str] = "ratio of the ends of the range of β to its geometric middle"
+
+    middle: Fraction = Fraction(1)
+    first: float = 1.01
+
+    def at(self, loop: Loop, level: float) -> Loop:
+        """Loop with the range of the level."""
+        ratio = Fraction(f"{level:.6g}")
+        ends = (self.middle / ratio, self.middle * ratio)
+        return replace(loop, uncertain={**loop.uncertain, "beta": ends})
+
+    def start(self, setting: PathSetting, loop: Loop) -> State | None:
+        """State with the range asked for, or a hundredth to either side."""
+        return look(setting, loop, self.first, least=FAINT)
+
+    def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
+        """Certificate of the largest range to four digits, in one number along which the programme is affine."""
+        gains, bound = tuple(loop.gains.values()), loop.uncertain["d"][1]
+        reach = largest_gain_range(
+            subject, gains, lipschitz=bound, nominal=self.middle, symmetric=True, degrees=tuple(degrees)
+        )
+        return reach.certificate if reach.value is not None else None
+
+    def figure(self, certificate: Certificate, setting: PathSetting) -> float:
+        """ρ, rounded down."""
+        low, high = certificate.loop.uncertain["beta"]
+        return float(float(high / low) ** 0.5) * (1 - 1e-15)
+
+
+_KNOWN: dict[str, type[Objective]] = {o.name: o for o in (SmallestNorm, LargestDecay, LargestRange)}
+OBJECTIVES = tuple(_KNOWN)
+
+
+def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
+    """Objective of a name for the ranges of a loop.
+
+    Raises
+    ------
+    UnknownNameError
+    ParameterError
+        For a bound that is missing or not positive, or a loop that is not uncertain in what the objective is about.
+    """
+    require_known(name, _KNOWN, "objective", UnknownNameError)
+    chosen = _KNOWN[name]
+    if chosen.bounded and not (bound is not None and bound > 0):
+        raise ParameterError(f"the objective {name} needs a positive bound on the norm. Received {bound}. Give one.")
+    make = partial(chosen, bound=bound if chosen.bounded else None)
+    if chosen is not LargestRange:
+        return make()
+    if "beta" not in loop.uncertain:
+        raise ParameterError(f"the objective {name} needs a loop with an uncertain beta. Received {loop.law}.")
+    low, high = loop.uncertain["beta"]
+    middle = low if low == high else Fraction(f"{float(low * high) ** 0.5:.6g}")
+    return LargestRange(
+        bound=bound, middle=middle, first=max(1.01, float(max(high / middle, middle / low)) * (1 + 1e-6))
+    )
+
+
+# ----------------------------------------------------------------------
+# What is asked of a synthesis of gains, and where its search begins.
+
+_SPREAD, _WIDTH = 0.4, 3.0
+_HIGHEST = 12  # beyond, one programme takes minutes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisProblem:
+    """What is asked of a synthesis, read and checked.
+
+    Attributes
+    ----------
+    subject : str, type of Law or LoopField
+    loop : Loop
+        With gains of one.
+    setting : PathSetting
+        With the lowest degree.
+    degrees : tuple of int
+    known : tuple of Loop
+        With gains from the literature, scaled to the same ranges.
+    """
+
+    subject: Subject
+    loop: Loop
+    setting: PathSetting
+    degrees: tuple[int, ...]
+    known: tuple[Loop, ...]
+
+
+def question(
+    subject: Subject,
+    objective: str,
+    *,
+    lipschitz: Number,
+    gain_range: tuple[Number, Number],
+    bound: float | None = None,
+    degrees: Iterable[int] | None = None,
+) -> SynthesisProblem:
+    """Read what is asked; see `synthesise`.
+
+    Raises
+    ------
+    ParameterError, UnknownNameError
+        As `synthesise`.
+    """
+    name, model = model_of(subject)
+    loop = closed_loop(subject, (1,) * len(model.gains), lipschitz=lipschitz, gain_range=gain_range)
+    if not ("d" in loop.uncertain and loop.uncertain["d"][1] > 0):
+        raise ParameterError(f"synthesis needs a positive bound on |d|. Received lipschitz = {lipschitz}.")
+    exponents = stretch_exponents(loop, {"d": 1})
+    known = tuple(with_gains(loop, gains) for gains in _literature(name, loop, exponents))
+    if bound is None and known:
+        bound = min(scaled_norm(one, exponents) for one in known)
+    chosen = tuple(degrees) if degrees is not None else candidate_degrees(loop)[:2]
+    lowest = candidate_degrees(loop)[0]
+    if not chosen or not all(lowest <= m <= _HIGHEST for m in chosen):
+        raise ParameterError(f"the degree of V must be from {lowest} to {_HIGHEST}. Received {list(chosen)}.")
+    setting = PathSetting(
+        objective=objective_for(objective, loop, bound),
+        exponents=exponents,
+        units={str(state): unit for state, unit in model.units.items()},
+        degree=chosen[0],
+    )
+    return SynthesisProblem(subject=subject, loop=loop, setting=setting, degrees=chosen, known=known)
+
+
+def _literature(name: str, loop: Loop, exponents: Mapping[str, Fraction]) -> list[dict[str, Fraction]]:
+    """Gains that are known for a law, scaled to the loop's L̄ and to the least β."""
+    try:
+        sets = [one for one in family(name) if one.literature]
+    except UnknownNameError:
+        return []
+    return [
+        _scaled(loop, {n: float(k) for n, k in one.law.gains.items()}, float(one.lipschitz), exponents) for one in sets
+    ]
+
+
+def _scaled(
+    loop: Loop, gains: Mapping[str, float], bound: float, exponents: Mapping[str, Fraction]
+) -> dict[str, Fraction]:
+    """Gains for |d| ≤ bound and β = 1 carried over to the loop's ranges, with four digits."""
+    beta = float(loop.uncertain["beta"][0]) if "beta" in loop.uncertain else 1.0
+    of_beta = stretch_exponents(loop, {"beta": 1})
+    ratio = float(loop.uncertain["d"][1]) / bound
+    moved = {n: k * ratio ** float(exponents[n]) * beta ** float(of_beta[n]) for n, k in gains.items()}
+    return short(loop, moved)
+
+
+def begin_with(asked: SynthesisProblem, seed: int) -> Iterator[Loop]:
+    """Gains from the literature, the nearest to the bound on the norm first, then random ones around them.
+
+    Random ones of any size where there are none in the literature.
+    """
+    yield from sorted(asked.known, key=lambda one: _beyond(asked.setting, one))
+    loop, rng = asked.loop, np.random.default_rng(seed)
+    while True:
+        near = asked.known[int(rng.integers(len(asked.known)))].gains if asked.known else {}
+        spread = rng.normal(0, _SPREAD, len(loop.gains)) if near else rng.uniform(0, _WIDTH, len(loop.gains))
+        factors = dict(zip(loop.gains, np.exp(spread).tolist(), strict=True))
+        if near:
+            yield with_gains(loop, short(loop, {n: float(k) * factors[n] for n, k in near.items()}))
+        else:
+            yield with_gains(loop, _scaled(loop, factors, 1.0, asked.setting.exponents))
+
+
+def _beyond(setting: PathSetting, loop: Loop) -> tuple[bool, float]:
+    """Order of gains: those within the bound on the norm before those beyond, the nearest to it first."""
+    bound, norm = setting.objective.bound, scaled_norm(loop, setting.exponents)
+    return (False, 0.0) if bound is None else (norm > bound * (1 + 1e-9), abs(bound - norm))
+
+
+# ----------------------------------------------------------------------
+# Gains and Lyapunov function found together for an objective; gains without a proof are never returned.
+
+_STRETCHES = (1.0, 1.5, 4.0)
+_DRAWS = 12
+_MOST_STARTS = 10_000
+_TRIES, _FEW = 6, 2
+_INSIDE = 0.98
+_SHARES = (1.0, 0.9, 0.7)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparedGains:
+    """What gains from elsewhere reach in the same objective.
+
+    Attributes
+    ----------
+    gains : mapping of str to Fraction
+        Scaled to the same L̄ and β.
+    value : float or None
+        Proved; None where no proof was found.
+    norm : float
+        ‖k_i/L̄^{p_i}‖₂.
+    ratio : float or None
+        By which factor the gains found are better.
+    certificate : Certificate or None
+        Of the value, V being the best that was found for these gains.
+    """
+
+    gains: Mapping[str, Fraction]
+    value: float | None
+    norm: float
+    ratio: float | None
+    certificate: Certificate | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Synthesis:
+    """Gains with a proof, and how good they are.
+
+    Attributes
+    ----------
+    law, objective, unit : str
+    gains : mapping of str to Fraction
+    certificate : Certificate
+        Checked in exact arithmetic.
+    value : float
+        In terms of the objective: what the certificate proves, rounded down where more is better; for `sampled` what
+        was measured.
+    norm : float
+        ‖k_i/L̄^{p_i}‖₂ of the gains.
+    compared : tuple of ComparedGains
+        Gains from the literature, where there are any for the law.
+    """
+
+    law: str
+    objective: str
+    unit: str
+    gains: Mapping[str, Fraction]
+    certificate: Certificate
+    value: float
+    norm: float
+    compared: tuple[ComparedGains, ...] = field(default=())
+
+
+def synthesise(
+    subject: Subject,
+    objective: str = "norm",
+    *,
+    lipschitz: Number = 1,
+    gain_range: tuple[Number, Number] = (1, 1),
+    bound: float | None = None,
+    degrees: Iterable[int] | None = None,
+    starts: int = 4,
+    seed: int = 0,
+    workers: int = 1,
+    scheduler: str | None = None,
+    executor: Executor | None = None,
+    compare: bool = True,
+) -> Synthesis | None:
+    """Find gains with a proof that are best in one respect.
+
+    Several starts climb with a V of the lowest degree; the best goes on with the higher ones.
+
+    Parameters
+    ----------
+    subject : str, type of Law or LoopField
+        As for `certify`.
+    objective : str
+        ``"norm"``: smallest norm of the gains. ``"decay"``: fastest certified decay. ``"beta"``: widest certified range
+        of β around the middle of `gain_range`. See `quakedesign.lyapunov.gains.synthesise`.
+    lipschitz : number or text
+        L̄ > 0.
+    gain_range : tuple of two
+    bound : float, optional
+        Largest ‖k_i/L̄^{p_i}‖₂, for all objectives but ``"norm"``; the smallest of the gains known from the literature
+        unless given.
+    degrees : iterable of int, optional
+        Of V; the two lowest of `candidate_degrees` unless given. Higher ones find better gains and take longer.
+    starts : int
+        The gains from the literature come first, then random ones.
+    seed : int
+        Of the random starts; the answer is the same for the same seed, however many workers.
+    workers : int
+        Processes; 1 computes in this one.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler that is used instead.
+    executor : Executor, optional
+        Any other executor of `concurrent.futures` that is used instead.
+    compare : bool
+        Whether to ask the same question about the gains from the literature.
+
+    Returns
+    -------
+    Synthesis or None
+        None when no gains were proved.
+
+    Raises
+    ------
+    ParameterError
+        For input out of range, a bound that is missing, or a law whose gains do not scale.
+    UnknownNameError
+        For an unknown law or objective.
+    SimulationError
+        When the workers cannot be reached, or do not live.
+    """
+    asked = question(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
+    require_count(_MOST_STARTS, starts=starts)
+    require_count(MOST_WORKERS, workers=workers)
+    first = list(islice(begin_with(asked, seed), starts * _DRAWS))
+    with Here() if handing_back() else crew_or_here(workers, scheduler, executor) as crew:
+        best = _best(asked, _climbed(asked.setting, first, starts, crew))
+    mine = _synthesis(asked, *best) if best else None
+    return _beside(asked, mine) if compare else mine
+
+
+def _synthesis(asked: SynthesisProblem, certificate: Certificate, value: float) -> Synthesis:
+    return Synthesis(
+        law=asked.loop.law,
+        objective=asked.setting.objective.name,
+        unit=asked.setting.objective.unit,
+        gains=dict(certificate.loop.gains),
+        certificate=certificate,
+        value=value,
+        norm=scaled_norm(certificate.loop, asked.setting.exponents),
+    )
+
+
+def _beside(asked: SynthesisProblem, mine: Synthesis | None) -> Synthesis | None:
+    """Gains found beside known ones, which take their place where they are better within the same bound on the norm."""
+    objective = asked.setting.objective
+    compared = [given(asked, one) for one in asked.known]
+    for one in compared:
+        if one.certificate is None or one.value is None or one.norm > (objective.bound or one.norm) * (1 + 1e-9):
+            continue
+        if not _covers(one.certificate.loop, asked.loop):
+            continue
+        if mine is None or objective.better(one.value, mine.value):
+            mine = _synthesis(asked, one.certificate, one.value)
+    if mine is None:
+        return None
+    best = mine.value
+    ratios = [one.value and (best / one.value if objective.larger else one.value / best) for one in compared]
+    return replace(mine, compared=tuple(replace(c, ratio=r) for c, r in zip(compared, ratios, strict=True)))
+
+
+def _covers(proved: Loop, wanted: Loop) -> bool:
+    """Whether a proof is about all ranges that were asked for."""
+    return all(
+        proved.uncertain[name][0] <= low and high <= proved.uncertain[name][1]
+        for name, (low, high) in wanted.uncertain.items()
+    )
+
+
+def _climbed(setting: PathSetting, first: Sequence[Loop], wanted: int, crew: Crew) -> list[list[State]]:
+    """Climbs from as many starts as wanted, of those that can begin; in the order of the starts."""
+    done: list[list[State]] = []
+    for at in range(0, len(first), crew.width):
+        climbs = dict(crew.answers(attempt, [(setting, loop) for loop in first[at : at + crew.width]]))
+        done += [climbs[place] for place in sorted(climbs) if climbs[place]]
+        if len(done) >= wanted:
+            break
+    return done[:wanted]
+
+
+def attempt(setting: PathSetting, loop: Loop) -> list[State]:
+    """States of a climb from some gains, or from the same stretched; empty where there is no beginning.
+
+    As far as the gains go by themselves, then with the gains moving.
+    """
+    begin = next(filter(None, (_begin(setting, _stretched(setting, loop, s)) for s in _STRETCHES)), None)
+    if begin is None:
+        return []
+    fixed = climb(setting, begin, free=False)
+    return [*fixed, *climb(setting, fixed[-1])]
+
+
+def _begin(setting: PathSetting, loop: Loop) -> State | None:
+    """State that meets the bound on the norm, after a climb for the norm alone where the gains exceed it."""
+    bound = setting.objective.bound
+    if bound is not None and scaled_norm(loop, setting.exponents) > bound * (1 + 1e-9):
+        smaller = replace(setting, objective=SmallestNorm())
+        state = smaller.objective.start(smaller, loop)
+        reached = climb(smaller, state, until=_INSIDE * bound) if state else []
+        if not reached or reached[-1].level > bound:
+            return None
+        loop = reached[-1].loop
+    return setting.objective.start(setting, loop)
+
+
+def _stretched(setting: PathSetting, loop: Loop, factor: float) -> Loop:
+    """Loop with the gains for a larger L̄."""
+    if factor == 1:
+        return loop
+    gains = {n: float(k) * factor ** float(setting.exponents[n]) for n, k in loop.gains.items()}
+    return with_gains(loop, short(loop, gains))
+
+
+def _best(asked: SynthesisProblem, climbs: Sequence[Sequence[State]]) -> tuple[Certificate, float] | None:
+    """Best proof, the best climb going on with higher degrees."""
+    best = _in_order(asked.setting, climbs)
+    stages = [(asked.setting, best)]
+    for degree in asked.degrees[1:] if best else ():
+        higher = replace(asked.setting, degree=degree)
+        begin = next(filter(None, (_carried(higher, state) for state in best[:_TRIES])), None)
+        if begin is not None:
+            best = _in_order(higher, [climb(higher, begin)])
+            stages.append((higher, best))
+    proofs = list(filter(None, (_proved(at, states, asked.subject) for at, states in stages)))
+    pick = max if asked.setting.objective.larger else min
+    return pick(proofs, key=lambda item: item[1], default=None)
+
+
+def _carried(higher: PathSetting, state: State) -> State | None:
+    """State of a lower degree looked at with a higher one, at its level or a lower one."""
+    objective = higher.objective
+    levels = [objective.reached(state.level * share, state.loop, higher.exponents) for share in _SHARES]
+    states = (look(higher, state.loop, level, state.lyapunov, least=FAINT) for level in dict.fromkeys(levels))
+    return next(filter(None, states), None)
+
+
+def _in_order(setting: PathSetting, climbs: Sequence[Sequence[State]]) -> list[State]:
+    """Best state first."""
+    states = [state for states in climbs for state in states]
+    return sorted(states, key=lambda s: s.level, reverse=setting.objective.larger)
+
+
+def _proved(
+    setting: PathSetting, states: Sequence[State], subject: Subject, tries: int = _TRIES
+) -> tuple[Certificate, float] | None:
+    """Proof of one of the best states, each try twice as far down the order."""
+    for k in range(tries):
+        if (1 << k) - 1 >= len(states):
+            break
+        certificate = setting.objective.proved(setting, states[(1 << k) - 1], subject)
+        if certificate is not None:
+            return certificate, setting.objective.figure(certificate, setting)
+    return None
+
+
+def given(asked: SynthesisProblem, loop: Loop) -> ComparedGains:
+    """The same question about given gains, whatever their norm, with V of every degree; its ratio is left open.
+
+    Parameters
+    ----------
+    asked : SynthesisProblem
+    loop : Loop
+        With the gains.
+    """
+    objective = replace(asked.setting.objective, bound=None)
+    setting = replace(asked.setting, objective=objective, least=FAINT)
+    shorter = objective.given(loop, asked.degrees, asked.subject)
+    found = [(shorter, objective.figure(shorter, setting))] if shorter else []
+    for degree in asked.degrees if objective.paced or not shorter else ():
+        at = replace(setting, degree=degree)
+        begin = objective.start(at, loop)
+        states = _in_order(at, [climb(at, begin, free=False)]) if begin else []
+        states = [s for s in states if all(objective.better(s.level, value) for _, value in found)]
+        reached = _proved(at, states, asked.subject, _FEW if found else _TRIES)
+        found += [reached] if reached else []
+        if found and not objective.bounded:  # then V does not matter
+            break
+    certificate, value = (max if objective.larger else min)(found, key=lambda item: item[1], default=(None, None))
+    norm = scaled_norm(loop, asked.setting.exponents)
+    return ComparedGains(gains=dict(loop.gains), value=value, norm=norm, ratio=None, certificate=certificate)

@@ -1,0 +1,485 @@
+"""Map of certified gains over a grid of two gains.
+
+One compiled problem screens the grid in worker processes; the edges and a sample of points are proved
+exactly.
+"""
+
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import pairwise
+from math import log10
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.exact import rational
+from quakedesign.fault.model import MOST_WORKERS, require_count
+from quakedesign.laws import Subject
+from quakedesign.lyapunov.exact.certificate_files import certificate_text
+from quakedesign.lyapunov.exact.claim import Loop, root_enclosure
+from quakedesign.lyapunov.maps.sweep import CLEAR, Frame, Path, Sweep, prove
+from quakedesign.lyapunov.search.certify import Number, closed_loop, necessary_limit
+from quakedesign.lyapunov.search.search import candidate_degrees
+from quakedesign.parallel import Crew, Here, crew_or_here
+from quakedesign.sos.solve.conic import handing_back
+
+# ----------------------------------------------------------------------
+# Who computes the points of a map: what is asked at each, and workers that keep their compiled sweeps.
+
+Place = tuple[int, int]
+_FAST = 1e-8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """What a map is about.
+
+    Attributes
+    ----------
+    subject : str, type of Law or LoopField
+    loop : Loop
+        With the base gains.
+    over : tuple of two str
+        Gains that vary.
+    axes : tuple of two tuples of Fraction
+        Their values.
+    levels : tuple of Fraction
+        L̄, rising.
+    degree : int
+        Of V.
+    """
+
+    subject: Subject
+    loop: Loop
+    over: tuple[str, str]
+    axes: tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
+    levels: tuple[Fraction, ...]
+    degree: int
+
+    def at(self, place: Place, level: int) -> Loop:
+        """Loop at a point, for the bound of a level (from 1)."""
+        gains = {**self.loop.gains, **{n: axis[i] for n, axis, i in zip(self.over, self.axes, place, strict=True)}}
+        roots = {name: (of, root_enclosure(gains[of])) for name, (of, _) in self.loop.roots.items()}
+        bound = self.levels[level - 1]
+        return replace(self.loop, gains=gains, roots=roots, uncertain={**self.loop.uncertain, "d": (-bound, bound)})
+
+    @property
+    def rows(self) -> list[list[Place]]:
+        """All points in rows along a gain that keeps the structure of the loop, if one does."""
+        nested = {name for terms in self.loop.lifts.values() for term in terms for name in term.parameters}
+        first, second = (range(len(axis)) for axis in self.axes)
+        if self.over[0] in nested:
+            return [[(i, j) for j in second] for i in first]
+        return [[(i, j) for i in first] for j in second]
+
+
+class Screener:
+    """Compiled sweeps of one sheet, one for every structure that its points have."""
+
+    def __init__(self, sheet: Sheet) -> None:
+        self.sheet = sheet
+        self._sweeps: list[Sweep] = []
+        self._paths: dict[tuple[Sweep, tuple[Fraction, ...]], Path] = {}
+        self._followed: dict[Sweep, Path] = {}
+        self._answered = 0
+
+    def row(self, places: Sequence[Place]) -> tuple[list[tuple[Place, Fraction | None, int]], int]:
+        """Limit and number of levels found at every point, beginning each at the level of its neighbour; and solves."""
+        found, start, before = [], len(self.sheet.levels), self._solves()
+        self._followed.clear()
+        for place in places:
+            limit, start = self._reached(place, max(start, 1))
+            found.append((place, limit, start))
+        return found, self._solves() - before
+
+    def _reached(self, place: Place, start: int) -> tuple[Fraction | None, int]:
+        limit = necessary_limit(self.sheet.at(place, 1), self.sheet.subject)
+        possible = [k for k, bound in enumerate(self.sheet.levels, 1) if limit is None or bound < limit]
+        low, high = 0, len(possible)
+        level = min(start, high)
+        while low < high:
+            if self._found(place, level):
+                low = level
+            else:
+                high = level - 1
+            level = low + 1 if low >= start else high
+        return limit, low
+
+    def _found(self, place: Place, level: int) -> bool:
+        loop = self.sheet.at(place, level)
+        sweep = self._sweep(loop)
+        if sweep is None:
+            return False
+        answer = None if handing_back() else self._follow(sweep, loop)
+        return _solved(sweep, loop) if answer is None else answer
+
+    def _follow(self, sweep: Sweep, loop: Loop) -> bool | None:
+        """Answer from the neighbours in the row, in the units of the first of them; None where that gives none."""
+        path = self._followed.get(sweep) or self._path(sweep, sweep.frame(loop))
+        answer = path.found(loop)
+        if answer is None:
+            self._followed.pop(sweep, None)
+        else:
+            self._followed[sweep] = path
+            self._answered += 1
+        return answer
+
+    def _path(self, sweep: Sweep, frame: Frame) -> Path:
+        """Path without neighbours."""
+        known = sweep, frame.scale
+        if known not in self._paths:
+            self._paths[known] = Path(sweep, frame)
+        return self._paths[known].begin(frame)
+
+    def proof(self, place: Place, level: int) -> tuple[Place, int, str | None, int]:
+        """Text of a certificate of a point at a level, or None; and solves."""
+        before, loop = self._solves(), self.sheet.at(place, level)
+        sweep = self._sweep(loop)
+        answer = None if sweep is None else sweep.solve(loop, anew=True)
+        certificate = None
+        if sweep is not None and answer is not None and answer.found:
+            certificate = prove(sweep, loop, answer, self.sheet.subject)
+        return place, level, certificate_text(certificate) if certificate else None, self._solves() - before
+
+    def _sweep(self, loop: Loop) -> Sweep | None:
+        known = next((s for s in self._sweeps if s.covers(loop)), None)
+        if known is None:
+            try:
+                known = Sweep(loop, self.sheet.degree)
+            except CertificateError:
+                return None
+            self._sweeps.append(known)
+        return known
+
+    def _solves(self) -> int:
+        return self._answered + sum(s.solves for s in self._sweeps)
+
+
+def _solved(sweep: Sweep, loop: Loop) -> bool:
+    answer = sweep.solve(loop, accuracy=_FAST)
+    if answer is not None and abs(answer.margin) < CLEAR:
+        answer = sweep.solve(loop)
+    return answer is not None and answer.found
+
+
+class Screeners:
+    """Screeners of a sheet, wherever a crew computes.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    crew : Crew
+    """
+
+    def __init__(self, sheet: Sheet, crew: Crew) -> None:
+        self._sheet, self._crew = sheet, crew
+
+    def answers(self, question: str, arguments: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
+        """Answers of one method of `Screener` to many arguments, in any order.
+
+        Raises
+        ------
+        SimulationError
+            When processes die again and again; one that was killed from outside is replaced.
+        """
+        asked = [(self._sheet, question, one) for one in arguments]
+        return (answer for _, answer in self._crew.answers(_answer, asked))
+
+
+class _Kept(threading.local):
+    """Screener of the last sheet that a thread was asked about: compiled sweeps have one place for their parameters."""
+
+    screener: Screener | None = None
+
+
+_kept = _Kept()
+
+
+def _answer(sheet: Sheet, question: str, arguments: tuple[Any, ...]) -> Any:
+    if _kept.screener is None or _kept.screener.sheet != sheet:
+        _kept.screener = Screener(sheet)
+    return getattr(_kept.screener, question)(*arguments)
+
+
+# ----------------------------------------------------------------------
+# Where two gains are certified: a grid screened with one compiled problem, its edges and a sample proved exactly.
+
+SHARES = tuple(Fraction(s, 100) for s in (25, 50, 75, 90, 99))
+"""Levels of L̄ as shares of the necessary limit of the base gains, unless levels are given."""
+_NEIGHBOURS = ((1, 0), (-1, 0), (0, 1), (0, -1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainMap:
+    """Largest level of L̄ at every point of a grid of two gains, as screened and as proved.
+
+    Attributes
+    ----------
+    sheet : Sheet
+        What was asked: law, gains, axes, levels.
+    limits : mapping of (i, j) to Fraction or None
+        Necessary limit of L̄.
+    screened : mapping of (i, j) to int
+        Number of levels at which the search in floating point finds a Lyapunov function; proves nothing.
+    proved : mapping of (i, j) to int
+        Number of levels that a certificate, checked in exact arithmetic, covers; only for points that were tried.
+    edges : frozenset of (i, j)
+        Points with a neighbour of a lower level; all of them were tried.
+    certificates : mapping of (i, j) to str
+        Text of the certificate for the highest level proved.
+    solves : int
+    seconds : mapping of str to float
+        Of ``"screening"`` and ``"proving"``.
+    """
+
+    sheet: Sheet
+    limits: Mapping[Place, Fraction | None]
+    screened: Mapping[Place, int]
+    proved: Mapping[Place, int]
+    edges: frozenset[Place]
+    certificates: Mapping[Place, str]
+    solves: int
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def role(self, place: Place) -> str:
+        """``"edge"``, ``"interior"`` (drawn at random) or nothing for a point that was only screened."""
+        if place in self.edges:
+            return "edge"
+        return "interior" if place in self.proved else ""
+
+    def counts(self, level: int) -> dict[str, int]:
+        """Points screened and proved at a level (from 1), and among them those on its own edge."""
+        inside = {p for p, reached in self.screened.items() if reached >= level}
+        edge = {p for p in inside if _at_edge(p, inside, self.sheet)}
+        proved = {p for p, reached in self.proved.items() if reached >= level}
+        return {"screened": len(inside), "proved": len(proved), "edge": len(edge), "edge_proved": len(edge & proved)}
+
+
+def gain_map(
+    subject: Subject,
+    gains: tuple[Number, ...],
+    over: tuple[str, str],
+    *,
+    ranges: Sequence[tuple[Number, Number]] | None = None,
+    points: int = 100,
+    levels: Sequence[Number] | None = None,
+    gain_range: tuple[Number, Number] = (1, 1),
+    degree: int | None = None,
+    interior: int = 200,
+    seed: int = 0,
+    workers: int = 2,
+    scheduler: str | None = None,
+    executor: Executor | None = None,
+    tell: Callable[[str, float], None] = lambda _what, _done: None,
+) -> GainMap:
+    """Certified region over two gains, at one or more levels of L̄.
+
+    Every point is screened. All points at the edge of a level, and `interior` random points inside, are then proved
+    exactly; where no proof can be finished the point counts as screened only, and its neighbours are tried for it.
+
+    Parameters
+    ----------
+    subject : str, type of Law or LoopField
+        See `certify`.
+    gains : tuple of number or text
+        Values of the gains that do not vary, in the order of the law.
+    over : tuple of two str
+        Names of the gains that vary.
+    ranges : sequence of two pairs, optional
+        Ends of both axes; a quarter to four times the base gain unless given. Positive ranges are divided in equal
+        ratios.
+    points : int
+        Along each axis.
+    levels : sequence of number or text, optional
+        L̄; the shares `SHARES` of the necessary limit of the base gains unless given.
+    gain_range : tuple of two
+        b_m and b_M [-].
+    degree : int, optional
+        Of V; the lowest that clearly finds the base gains at the lowest level unless given.
+    interior : int
+        Number of points inside to prove.
+    seed : int
+        Of their choice.
+    workers : int
+        Number of processes; 1 computes in this one. No digit depends on who computes.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler that is used instead.
+    executor : Executor, optional
+        Any other executor of `concurrent.futures` that is used instead.
+    tell : callable
+        Progress.
+
+    Returns
+    -------
+    GainMap
+
+    Raises
+    ------
+    ParameterError, UnknownNameError, CertificateError
+        For unknown gains, empty ranges or levels, and as `certify`.
+    SimulationError
+        When the workers cannot be reached, or do not live.
+    """
+    require_count(MOST_WORKERS, workers=workers)
+    sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
+    with Here() if handing_back() else crew_or_here(workers, scheduler, executor) as crew:
+        began, screeners = perf_counter(), Screeners(sheet, crew)
+        limits, screened, solves = _screen(sheet, screeners, tell)
+        middle = perf_counter()
+        proved, texts, edges, more = _prove(sheet, screeners, dict(screened), interior, seed, tell)
+        ended = perf_counter()
+    return GainMap(
+        sheet=sheet,
+        limits=limits,
+        screened=screened,
+        proved=proved,
+        edges=edges,
+        certificates=texts,
+        solves=solves + more,
+        seconds={"screening": middle - began, "proving": ended - middle},
+    )
+
+
+def _sheet(
+    subject: Subject,
+    gains: tuple[Number, ...],
+    over: tuple[str, str],
+    ranges: Sequence[tuple[Number, Number]] | None,
+    points: int,
+    levels: Sequence[Number] | None,
+    gain_range: tuple[Number, Number],
+    degree: int | None,
+) -> Sheet:
+    loop = closed_loop(subject, gains, lipschitz=1, gain_range=gain_range)
+    if "d" not in loop.uncertain or len(set(over)) != 2 or not set(over) <= set(loop.gains):
+        raise ParameterError(
+            f"a map needs two different gains among {', '.join(loop.gains)}. Received {' '.join(over)}."
+        )
+    if points < 2:
+        raise ParameterError(f"a map needs at least two points along each axis. Received {points}.")
+    ends = ranges or [(loop.gains[name] / 4, loop.gains[name] * 4) for name in over]
+    first, second = (axis(low, high, points, f"range of {name}") for name, (low, high) in zip(over, ends, strict=True))
+    chosen = _levels(subject, loop, levels)
+    sheet = Sheet(subject=subject, loop=loop, over=over, axes=(first, second), levels=chosen, degree=degree or 0)
+    return sheet if degree else replace(sheet, degree=_lowest_degree(loop, chosen[0]))
+
+
+def axis(low: Number, high: Number, points: int, what: str = "range") -> tuple[Fraction, ...]:
+    """Values from low to high: decimals of four or more digits, in equal ratios where both ends are positive.
+
+    Raises
+    ------
+    ParameterError
+        When the range is empty.
+    """
+    first, last = rational(low, what), rational(high, what)
+    if not first < last:
+        raise ParameterError(f"{what} must rise. Received {low} to {high}.")
+    shares = [i / (points - 1) for i in range(1, points - 1)]
+    a, b = float(first), float(last)
+    inner = [a * (b / a) ** s if first > 0 else a + (b - a) * s for s in shares]
+    digits = 3 + max(0, round(log10(points)) - 1)
+    values = (first, *(Fraction(f"{v:.{digits}e}") for v in inner), last)
+    if any(u >= v for u, v in pairwise(values)):
+        raise ParameterError(
+            f"{what} is too narrow for {points} points. Received {low} to {high}. Ask for fewer points."
+        )
+    return values
+
+
+def _levels(subject: Subject, loop: Loop, levels: Sequence[Number] | None) -> tuple[Fraction, ...]:
+    if levels is not None:
+        ordered = tuple(sorted({rational(v, "lipschitz") for v in levels}))
+        if not ordered or ordered[0] < 0:
+            raise ParameterError(f"lipschitz must not be negative. Received {', '.join(map(str, levels)) or 'none'}.")
+        return ordered
+    limit = necessary_limit(loop, subject)
+    if not limit:
+        raise ParameterError("levels of L̄ are needed, since the base gains give no limit. Give --lipschitz.")
+    return tuple(share * limit for share in SHARES)
+
+
+def _lowest_degree(loop: Loop, bound: Fraction) -> int:
+    """First degree that finds the base gains with a clear margin, or the first of all."""
+    asked, degrees = replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), candidate_degrees(loop)
+    for degree in degrees:
+        answer = Sweep(asked, degree).solve(asked)
+        if answer is not None and answer.margin > CLEAR:
+            return degree
+    return degrees[0]
+
+
+def _screen(
+    sheet: Sheet, screeners: Screeners, tell: Callable[[str, float], None]
+) -> tuple[dict[Place, Fraction | None], dict[Place, int], int]:
+    """Limit and screened level of every point, and solves."""
+    limits: dict[Place, Fraction | None] = {}
+    screened: dict[Place, int] = {}
+    rows, solves = sheet.rows, 0
+    tell(f"screening 0 of {sum(map(len, rows))} points", 0.0)
+    for found, more in screeners.answers("row", ((row,) for row in rows)):
+        solves += more
+        for place, limit, reached in found:
+            limits[place], screened[place] = limit, reached
+        tell(f"screening {len(screened)} of {sum(map(len, rows))} points", len(screened) / sum(map(len, rows)))
+    return limits, screened, solves
+
+
+def _prove(
+    sheet: Sheet,
+    screeners: Screeners,
+    reached: dict[Place, int],
+    interior: int,
+    seed: int,
+    tell: Callable[[str, float], None],
+) -> tuple[dict[Place, int], dict[Place, str], frozenset[Place], int]:
+    """Proved level of the points at edges and of random ones, certificates, edges, and solves.
+
+    Levels are taken from the highest down. A point that cannot be proved leaves its level, which moves the edge.
+    """
+    proved: dict[Place, int] = {}
+    texts: dict[Place, str] = {}
+    edges: set[Place] = set()
+    solves = 0
+
+    def run(asked: list[tuple[Place, int]], what: str) -> None:
+        nonlocal solves
+        for done, (place, level, text, more) in enumerate(screeners.answers("proof", asked), 1):
+            solves += more
+            if text is None:
+                reached[place] = level - 1
+                proved.setdefault(place, 0)
+            else:
+                proved[place], texts[place] = level, text
+            tell(f"proving {what}: {done} of {len(asked)}", done / len(asked))
+
+    for level in range(len(sheet.levels), 0, -1):
+        while True:
+            inside = {p for p, k in reached.items() if k >= level}
+            edge = {p for p in inside if _at_edge(p, inside, sheet)}
+            edges |= edge
+            asked = [(p, level) for p in sorted(edge) if proved.get(p, 0) < level]
+            if not asked:
+                break
+            run(asked, f"the edge at L̄ = {float(sheet.levels[level - 1]):.4g}")
+    run(_drawn(reached, proved, interior, seed), "points inside")
+    return proved, texts, frozenset(edges), solves
+
+
+def _drawn(reached: Mapping[Place, int], proved: Mapping[Place, int], count: int, seed: int) -> list[tuple[Place, int]]:
+    """Random points that were not tried yet, each with its own level."""
+    inside = sorted(p for p, k in reached.items() if k and p not in proved)
+    chosen = np.random.default_rng(seed).permutation(len(inside))[:count]
+    return [(inside[i], reached[inside[i]]) for i in sorted(chosen.tolist())]
+
+
+def _at_edge(place: Place, inside: set[Place], sheet: Sheet) -> bool:
+    """Whether a neighbour on the grid is not inside."""
+    sizes = tuple(len(axis) for axis in sheet.axes)
+    around = ((place[0] + a, place[1] + b) for a, b in _NEIGHBOURS)
+    return any(0 <= i < sizes[0] and 0 <= j < sizes[1] and (i, j) not in inside for i, j in around)

@@ -1,0 +1,683 @@
+"""Sweeps of one law over many gains: one compiled conic programme with parameters.
+
+Chapters: the programme in cvxpy; V and −V̇ as functions of gains and ranges; a central path that follows
+the margin from point to point with two-sided bounds. A sweep screens in floating point; `prove` finishes
+a point exactly.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import groupby
+from math import factorial, prod
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import null_space
+
+from quakedesign.errors import CertificateError
+from quakedesign.laws import Subject
+from quakedesign.lyapunov.exact.certificate import Certificate
+from quakedesign.lyapunov.exact.claim import Loop
+from quakedesign.lyapunov.exact.obligations import Obligation, statement_of
+from quakedesign.lyapunov.search.parametric_forms import FormRow, ends_of, rows_of, values_of
+from quakedesign.lyapunov.search.search import Family, balance, exponents_of, finished, lifted_scale, normal
+from quakedesign.sos.exact.polynomial import monomial
+from quakedesign.sos.exact.polynomial_statement import Statement
+from quakedesign.sos.solve.conic import Compiled, in_cones
+from quakedesign.sos.solve.joint import Proposal, shape_of
+from quakedesign.sos.solve.moment import MomentProgram, pairs
+from quakedesign.symbolic.term_expressions import signed_monomials
+from quakedesign.symbolic.terms import Term
+
+# ----------------------------------------------------------------------
+# The programme of a sweep in cvxpy: stated and compiled once, its numbers replaced between points.
+
+
+class Cones:
+    """Minimise μ subject to Σ L(N) = 1, Σ L(P_j) = μ·mean(V_j) for every j, and L ≥ 0 on the cone of every row.
+
+    The multipliers of the equations are the margin and a_j.
+
+    Parameters
+    ----------
+    rows : sequence of FormRow
+    loop : Loop
+    monomials : sequence of Term
+        V_j.
+    scale : tuple of Fraction
+        Of the states; the conditions of the rows are in these units.
+    """
+
+    def __init__(
+        self, rows: Sequence[FormRow], loop: Loop, monomials: Sequence[Term], scale: Sequence[Fraction]
+    ) -> None:
+        import cvxpy as cp
+
+        shapes = self.shapes = [shape_of(_template(row, loop, scale)) for row in rows]
+        starts = np.cumsum([0, *(len(s.keys) for s in shapes)])
+        placed = list(zip(rows, shapes, starts, strict=False))
+        self.columns = np.array([start + shape.index[e] for row, shape, start in placed for _, e, _, _ in row.parts])
+        self.parts = np.array([j for row in rows for j, _, _, _ in row.parts])
+        count, size = len(monomials), int(starts[-1])
+        places, self.slots = np.unique(self.columns * count + self.parts, return_inverse=True)
+        each, ones = np.arange(len(places)), np.ones(len(places))
+        chosen = sparse.csr_array((ones, (each, places // count)), shape=(len(places), size))
+        summed = sparse.csr_array((ones, (places % count, each)), shape=(count, len(places)))
+        self._numbers = cp.Parameter(len(places), name="numbers")
+        self._moments, level = cp.Variable(size, name="moments"), cp.Variable(name="level")
+        self.margin = np.concatenate([shape.vector(row.margin) for row, shape, _ in placed])
+        self.means = np.array(means(monomials, loop.states))
+        self._unit = self.margin @ self._moments == 1
+        sums = summed @ cp.multiply(self._numbers, chosen @ self._moments)
+        self._link = sums - level * self.means == 0
+        constraints = [self._unit, self._link, *in_cones(shapes, self._moments)]
+        self.compiled = Compiled(cp.Problem(cp.Minimize(level), constraints))
+
+    def table(self, parts: Any) -> Any:
+        """What every moment (row) is multiplied by in ΣL(N) and in every ΣL(P_j) (columns)."""
+        count = len(self.means)
+        values = np.bincount(self.columns * count + self.parts, parts, minlength=len(self.margin) * count)
+        return np.column_stack([self.margin, values.reshape(-1, count)])
+
+    def solve(self, parts: Any, accuracy: float, *, anew: bool = False) -> tuple[float, Any, Any] | None:
+        """Margin, a_j and L for the values of all parts, in the order of the rows; None if the solver fails twice."""
+        self._numbers.value = np.bincount(self.slots, parts)
+        if not self.compiled.solve(accuracy, anew=anew) and not self.compiled.solve(accuracy):
+            return None
+        return -float(self._unit.dual_value), self._link.dual_value, self._moments.value
+
+
+def means(monomials: Sequence[Term], weights: Mapping[str, int]) -> list[float]:
+    """Mean of every V_j over all cells and Σu_i = 1, that of u^m being one; zero where signs alternate."""
+    means = []
+    for term in monomials:
+        even = all(kind == "a" for _, _, kind in term.factors)
+        powers = exponents_of(term, weights)
+        means.append(prod(map(factorial, powers)) / factorial(sum(powers)) if even else 0.0)
+    return means
+
+
+def _template(row: FormRow, loop: Loop, scale: Sequence[Fraction]) -> Statement:
+    """Set and monomials of a row, in scaled variables."""
+    whole = lifted_scale(row.equalities, scale)
+    support = dict.fromkeys([*(e for _, e, _, _ in row.parts), *row.margin], Fraction(1))
+    conditions = (tuple(normal(p, whole) for p in group) for group in (row.equalities, row.inequalities))
+    return statement_of(Obligation("", support, *conditions), loop.domain)
+
+
+# ----------------------------------------------------------------------
+# One law compiled for many gains: V and −V̇ as functions of gains and ranges, one structure for all points.
+#
+# V = Σ a_j V_j with the monomials of one degree. At every point the programme is
+#
+#     maximise t  subject to  V − t·N_m  and  −V̇ − t·N_n  in the cone on every cell and vertex,  mean of V = 1,
+#
+# so that t goes on below zero beyond the largest disturbance, and its derivatives in gains and bounds follow from the
+# multipliers. All numbers are floating point: a sweep screens, it proves nothing.
+
+ACCURACY = 1e-10
+"""What the solver is asked for unless told."""
+SURE = 5e-10
+"""Margins above this count as found; the solver's answers are about as accurate as that."""
+CLEAR = 1e-6
+"""Margins above this decide what is chosen once for many points, such as a degree, on every processor alike: kernels of
+linear algebra move margins near zero by up to 2e-9."""
+_TOO_FAR = "the gains are too far apart for a search in floating point."
+_KEPT = 64  # scales whose numbers are kept
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """Units in which a point is solved, so that its numbers are about one.
+
+    Attributes
+    ----------
+    scale : tuple of Fraction
+        Powers of two, u_i = scale_i·ũ_i.
+    pace : float
+        What −V̇ is divided by.
+    """
+
+    scale: tuple[Fraction, ...]
+    pace: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Screened:
+    """Floating-point answer at one point; proves nothing.
+
+    Attributes
+    ----------
+    margin : float
+        Largest t.
+    decision : list of float
+        a_j, in the units of the frame.
+    frame : Frame
+    slopes : mapping of str to float
+        Derivative of the margin in every number that V̇ depends on, by the names of `rows_of`.
+    """
+
+    margin: float
+    decision: list[float]
+    frame: Frame
+    slopes: Mapping[str, float]
+
+    @property
+    def found(self) -> bool:
+        """Whether the search finds a Lyapunov function of the family."""
+        return self.margin > SURE
+
+
+class Sweep:
+    """Screening of one law and one degree of V at many gains and ranges.
+
+    Parameters
+    ----------
+    loop : Loop
+        Any point of the sweep. Which ranges are points, and the parameters inside nested powers, are the same at all.
+    degree : int
+        Of V.
+
+    Raises
+    ------
+    CertificateError
+        When there are no candidates of this degree, or the law has parts that certificates do not know.
+    """
+
+    def __init__(self, loop: Loop, degree: int) -> None:
+        self.loop, self.degree = loop, degree
+        self.monomials = signed_monomials(loop.states, degree, loop.domain)
+        self.rows = rows_of(loop, self.monomials) if self.monomials else ()
+        if not any(row.rate for row in self.rows):
+            raise CertificateError(f"there are no Lyapunov functions of degree {degree} to try for {loop.law}.")
+        self.products = sorted({names for row in self.rows for _, _, names, _ in row.parts})
+        order = {names: i for i, names in enumerate(self.products)}
+        parts = [part for row in self.rows for part in row.parts]
+        coefficients = [Fraction(c) for *_, c in parts]
+        self.parts = np.array([j for j, *_ in parts])
+        self.places = np.array([order[names] for _, _, names, _ in parts])
+        self.rate = np.array([row.rate for row in self.rows for _ in row.parts])
+        self.exponents = _exponents(coefficients)
+        self.mantissas = np.array(
+            [float(c / Fraction(2) ** int(n)) for c, n in zip(coefficients, self.exponents, strict=True)]
+        )
+        self.solves = 0
+        self.solver_seconds = 0.0
+        self._numbers: dict[tuple[Fraction, ...], _Numbers] = {}
+
+    def covers(self, loop: Loop) -> bool:
+        """Whether a point has the structure of this sweep."""
+        return ends_of(loop) == ends_of(self.loop) and _nested(loop) == _nested(self.loop)
+
+    def frame(self, loop: Loop) -> Frame:
+        """Units that suit one point."""
+        scale = balance(loop)
+        return Frame(scale=scale, pace=self._in_units(scale).pace(self._features(values_of(loop))))
+
+    def solve(
+        self, loop: Loop, frame: Frame | None = None, accuracy: float = ACCURACY, *, anew: bool = False
+    ) -> Screened | None:
+        """Largest margin at one point; None if the solver fails.
+
+        Parameters
+        ----------
+        loop : Loop
+        frame : Frame, optional
+            Units; those of the point unless given. Margins in different units share their sign only.
+        accuracy : float
+            That the solver is asked for.
+        anew : bool
+            Whether no digit may depend on what was solved before.
+
+        Raises
+        ------
+        ValueError
+            When the point has another structure.
+        CertificateError
+            When its numbers are too far apart for floating point.
+        """
+        if not self.covers(loop):
+            raise ValueError("the point has another structure. Compile a sweep for it.")
+        values, units = values_of(loop), frame or self.frame(loop)
+        solution = self._in_units(units.scale).solve(self._features(values), units.pace, accuracy, anew=anew)
+        self.solves += 1
+        if solution is None:
+            return None
+        margin, decision, per_product, seconds = solution
+        self.solver_seconds += seconds
+        slopes = self._slopes(values, per_product)
+        return Screened(margin=margin, decision=decision, frame=units, slopes=slopes)
+
+    def family(self, frame: Frame) -> Family:
+        """Lyapunov functions in the units of a frame."""
+        return Family(
+            monomials=self.monomials,
+            sizes=self._in_units(frame.scale).sizes,
+            demands=(),
+            pace=Fraction(frame.pace),
+            fallen=max(sum(e) for row in self.rows if row.rate for e in row.margin),
+        )
+
+    def cones(self, frame: Frame) -> Cones:
+        """The programme in the units of a frame."""
+        return self._in_units(frame.scale).cones
+
+    def parts_at(self, loop: Loop, frame: Frame) -> Any:
+        """Values of all parts at a point, as `Cones` takes them."""
+        features = self._features(values_of(loop))
+        numbers = self._in_units(frame.scale)
+        return numbers.weights(frame.pace) * features[numbers.products]
+
+    def _in_units(self, scale: tuple[Fraction, ...]) -> "_Numbers":
+        if scale not in self._numbers:
+            free = self._numbers and not any(row.equalities or row.inequalities for row in self.rows)
+            known = next(iter(self._numbers.values())).cones if free else None
+            if len(self._numbers) >= _KEPT:
+                self._numbers.pop(next(iter(self._numbers)))
+            try:
+                self._numbers[scale] = _Numbers(self, scale, known)
+            except OverflowError:
+                raise CertificateError(_TOO_FAR) from None
+        return self._numbers[scale]
+
+    def _features(self, values: Mapping[str, float]) -> Any:
+        """Value of every product of names."""
+        return np.array([_product(values, names) for names in self.products])
+
+    def _slopes(self, values: Mapping[str, float], per_product: Any) -> dict[str, float]:
+        """Derivative of the margin in every name, from that in every product."""
+        slopes = {name: 0.0 for names in self.products for name in names}
+        for names, slope in zip(self.products, per_product.tolist(), strict=True):
+            for i, name in enumerate(names):
+                slopes[name] += slope * _product(values, (*names[:i], *names[i + 1 :]))
+        return slopes
+
+
+def prove(sweep: Sweep, loop: Loop, answer: Screened, subject: Subject | None = None) -> Certificate | None:
+    """Certificate of a screened point, checked in exact arithmetic; None when none could be finished."""
+    family, proposal = sweep.family(answer.frame), Proposal(answer.decision, answer.margin)
+    return finished(loop, family, proposal, answer.frame.scale, subject)
+
+
+class _Numbers:
+    """The coefficients of a sweep in the units of one scale; without conditions all scales share a programme."""
+
+    def __init__(self, sweep: Sweep, scale: tuple[Fraction, ...], cones: Cones | None) -> None:
+        self.cones = cones or Cones(sweep.rows, sweep.loop, sweep.monomials, scale)
+        self.sizes = tuple(monomial(scale, exponents_of(t, sweep.loop.states)) for t in sweep.monomials)
+        self.products, self.rate = sweep.places, sweep.rate
+        moved = [
+            np.array([part[1] for part in row.parts]) @ _exponents(lifted_scale(row.equalities, scale))
+            for row in sweep.rows
+        ]
+        grown = sweep.exponents + np.concatenate(moved) - _exponents(self.sizes)[sweep.parts]
+        with np.errstate(over="ignore"):
+            self.coefficients = np.ldexp(sweep.mantissas, grown)
+        if not np.isfinite(self.coefficients).all():
+            raise OverflowError
+
+    def pace(self, features: Any) -> float:
+        """Largest coefficient of all −V̇_j."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            merged = np.bincount(self.cones.slots[self.rate], (self.coefficients * features[self.products])[self.rate])
+        if not np.isfinite(merged).all():
+            raise CertificateError(_TOO_FAR)
+        return float(np.abs(merged).max(initial=0.0)) or 1.0
+
+    def weights(self, pace: float) -> Any:
+        """What the products are multiplied by in every part."""
+        return np.where(self.rate, self.coefficients / pace, self.coefficients)
+
+    def solve(
+        self, features: Any, pace: float, accuracy: float, *, anew: bool
+    ) -> tuple[float, list[float], Any, float] | None:
+        """Margin, decision, derivative of the margin in every product, and seconds; None if the solver fails."""
+        weights = self.weights(pace)
+        solution = self.cones.solve(weights * features[self.products], accuracy, anew=anew)
+        if solution is None:
+            return None
+        margin, decision, moments = solution
+        shares = weights * decision[self.cones.parts] * moments[self.cones.columns]
+        per_product = np.bincount(self.products, shares, minlength=len(features))
+        return margin, decision.tolist(), per_product, self.cones.compiled.solver_seconds
+
+
+def _exponents(values: Sequence[Fraction]) -> Any:
+    """n of 2^n within a factor of two, exact where the values are powers of two: numbers of any size have one."""
+    return np.array([v.numerator.bit_length() - v.denominator.bit_length() for v in values])
+
+
+def _product(values: Mapping[str, float], names: tuple[str, ...]) -> float:
+    product = 1.0
+    for name in names:
+        product *= values[name]
+    return product
+
+
+def _nested(loop: Loop) -> list[tuple[Fraction, ...]]:
+    """Gains and constants inside nested powers, which shape the cells; those of terms that vanish do not."""
+    known = loop.parameters | {name: loop.parameters[of] for name, (of, _) in loop.roots.items()}
+    terms = [term for terms in loop.lifts.values() for term in terms]
+    values = [tuple(known[name] for name in term.parameters) for term in terms]
+    return [v if all(v) else (Fraction(0),) for v in values]
+
+
+# ----------------------------------------------------------------------
+# Whether Lyapunov functions are found, followed from one point of a sweep to the next by bounds of their margin.
+#
+# The programme of a sweep (`parametric_cones`) has a centre for every τ > 0, where μ/τ − Σ log det S is least over
+# the
+# functionals L, with S = L(b bᵀ) of all blocks. Newton's step towards it bounds the margin from both sides:
+#
+# - where S + ΔS ≻ 0, the moved functional satisfies all equations, so that no margin is above its μ;
+# - where S − ΔS ≻ 0, the multipliers t and a_j of the equations and the Gram matrices Z = τ·S⁻¹(S − ΔS)S⁻¹ satisfy
+#   Σ a_j P_j − t·N = Σ bᵀZb, so that the margin t is reached.
+#
+# Only the sign is asked for: the first bound that has one ends the search, some steps after the neighbour's centre.
+# All
+# numbers are floating point: a path screens, it proves nothing.
+
+_FIRST = 1e-3  # τ, margins being far smaller
+_NEAR, _FAR = 0.9, 2.0  # sizes of a step that ends near a centre, and of one from a place that is of no use
+_REACH = 1.3  # size that a smaller τ may give a step, estimated from above
+_APART = 0.3  # ratio of τ of centres that are kept
+_MOST = 60
+_ROUNDS = 5
+_ROOM = 10.0  # a bound counts where it is that many times what its equations are missed by
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Functionals of all kinds of rows, about the centre of one τ."""
+
+    tau: float
+    functionals: Sequence[Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Step:
+    """Newton's step towards the centre of one τ.
+
+    Attributes
+    ----------
+    tau : float
+    moves, multipliers, bound
+        ΔL, those of the equations over τ, and μ.
+    least, most : float
+        Eigenvalues of ΔS beside S.
+    missed : float
+        By how much the equations are missed at most, for rounding errors.
+    """
+
+    tau: float
+    moves: Sequence[Any]
+    multipliers: Any
+    bound: float
+    least: float
+    most: float
+    missed: float
+
+    @property
+    def size(self) -> float:
+        """Below one where both bounds hold."""
+        return max(-self.least, self.most)
+
+    @property
+    def found(self) -> bool | None:
+        """Whether the margin is above `SURE`; None where the bounds do not tell."""
+        if self.most < 1 and -self.tau * self.multipliers[0] > max(SURE, _ROOM * self.missed):
+            return True
+        return False if self.least > -1 and self.bound < -_ROOM * self.missed else None
+
+
+class Path:
+    """Answers at points of one sweep after each other, quick where they are near each other.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    frame : Frame
+        Units of all points.
+    """
+
+    def __init__(self, sweep: Sweep, frame: Frame) -> None:
+        self.sweep, self.frame = sweep, frame
+        cones = sweep.cones(frame)
+        widths = [len(shape.keys) for shape in cones.shapes]
+        starts = np.cumsum([0, *widths[:-1]])
+        rows = sorted(zip(cones.shapes, starts, strict=True), key=lambda row: _kind(row[0]))
+        self._kinds = [_Rows(list(alike)) for _, alike in groupby(rows, key=lambda row: _kind(row[0]))]
+        self._means = np.append(0.0, cones.means)
+        begun = [kind.interior(cones.margin) / len(rows) for kind in self._kinds]
+        self._places = [_Place(_FIRST, begun)]
+
+    def begin(self, frame: Frame) -> "Path":
+        """Forget all neighbours, so that no answer depends on them; units of the same scale."""
+        self.frame = frame
+        del self._places[1:]
+        return self
+
+    def found(self, loop: Loop) -> bool | None:
+        """Whether there is a Lyapunov function with a margin above `SURE`; None where that was not decided."""
+        table = self.sweep.cones(self.frame).table(self.sweep.parts_at(loop, self.frame))
+        tables = [kind.of(table) for kind in self._kinds]
+        place, at_neighbour = self._places[-1], True
+        for _ in range(_MOST):
+            try:
+                newton = _Newton(self._kinds, tables, self._means, place)
+                step = newton.step()
+                if step.found is None and step.size < _NEAR:
+                    step = newton.further(step)
+            except np.linalg.LinAlgError:
+                step = None
+            if step is not None and step.found is not None:
+                return step.found
+            if at_neighbour and len(self._places) > 1 and (step is None or step.size > _FAR):
+                self._places.pop()
+                place = self._places[-1]
+                continue
+            if step is None:
+                return None
+            place, at_neighbour = self._moved(place, step), False
+        return None
+
+    def _moved(self, place: _Place, step: _Step) -> _Place:
+        """Where a step leads, or nine tenths of the way to the border; kept in the place of smaller τ if centred."""
+        share = min(1.0, 0.9 / step.size)
+        moved = _Place(step.tau, [f + share * d for f, d in zip(place.functionals, step.moves, strict=True)])
+        if step.size < _NEAR:
+            known = [one for one in self._places[1:] if one.tau > step.tau]
+            if len(known) > 1 and known[-2].tau * _APART < step.tau:
+                known.pop()
+            self._places[1:] = [*known, moved]
+        return moved
+
+
+class _Newton:
+    """Newton's equations at one place: H·ΔL + Cλ = a, Σ CᵀΔL − Δμ·means = b, meansᵀλ = c.
+
+    Parameters
+    ----------
+    kinds : sequence of _Rows
+    tables : sequence of array
+        C, of every kind of rows.
+    means : array
+    place : _Place
+
+    Raises
+    ------
+    LinAlgError
+        Where a functional is not inside its cone.
+    """
+
+    def __init__(self, kinds: "Sequence[_Rows]", tables: Sequence[Any], means: Any, place: _Place) -> None:
+        self._kinds, self._tables, self._means, self._place = kinds, tables, means, place
+        self._forms = [kind.beside(f) for kind, f in zip(kinds, place.functionals, strict=True)]
+        self._squares = [one @ one.transpose(0, 2, 1) for one in self._forms]
+        slopes = [one @ kind.unit for kind, one in zip(kinds, self._forms, strict=True)]
+        sides = [np.dstack(pair) for pair in zip(tables, slopes, strict=True)]
+        solved = [np.linalg.solve(*pair) for pair in zip(self._squares, sides, strict=True)]
+        self._solved, self._free = [one[..., :-1] for one in solved], [one[..., -1] for one in solved]
+        self._system = np.zeros((len(means) + 1, len(means) + 1))
+        self._system[:-1, :-1] = sum(map(_sum, tables, self._solved))
+        self._system[:-1, -1] = self._system[-1, :-1] = means
+
+    def _solve(self, free: Sequence[Any], rest: Any, slope: float) -> tuple[list[Any], Any, float]:
+        """ΔL, λ and Δμ, from H⁻¹a."""
+        side = np.append(sum(map(_sum, self._tables, free)) - rest, slope)
+        answer = np.linalg.solve(self._system, side)
+        moves = [one - solved @ answer[:-1] for one, solved in zip(free, self._solved, strict=True)]
+        return moves, answer[:-1], float(answer[-1])
+
+    def _changes(self, moves: Sequence[Any]) -> list[Any]:
+        """ΔS beside S."""
+        return [(move[:, None] @ one)[:, 0] for move, one in zip(moves, self._forms, strict=True)]
+
+    def _ends(self, changes: Sequence[Any]) -> tuple[float, float]:
+        ends = [end for kind, change in zip(self._kinds, changes, strict=True) for end in kind.ends(change)]
+        return min(ends), max(ends)
+
+    def step(self) -> _Step:
+        """Step towards the centre of the τ of the place."""
+        rest = self._rest(self._place.functionals, 0.0)
+        return self._refined(self._place.tau, *self._solve(self._free, rest, 1 / self._place.tau))
+
+    def further(self, step: _Step) -> _Step:
+        """Step towards the centre of a smaller τ that is small enough, from one for the τ of the place."""
+        moves, multipliers, bound = self._solve([0.0 * one for one in step.moves], 0.0 * self._means, 1.0)
+        more = (_REACH - step.size) / max(map(_longest, self._kinds, self._changes(moves)))
+        return self._refined(
+            1 / (1 / step.tau + more),
+            [one + more * other for one, other in zip(step.moves, moves, strict=True)],
+            step.multipliers + more * multipliers,
+            step.bound + more * bound,
+        )
+
+    def _rest(self, functionals: Sequence[Any], bound: float) -> Any:
+        """By how much the equations of the functionals are missed."""
+        rest = bound * self._means - sum(map(_sum, self._tables, functionals))
+        rest[0] += 1.0
+        return rest
+
+    def _refined(self, tau: float, moves: Sequence[Any], multipliers: Any, bound: float) -> _Step:
+        """Step whose equations hold as well as its bounds need."""
+        for _ in range(_ROUNDS):
+            changes = self._changes(moves)
+            falls = [
+                (one @ (kind.unit - change)[..., None])[..., 0] - table @ multipliers
+                for kind, one, change, table in zip(self._kinds, self._forms, changes, self._tables, strict=True)
+            ]
+            rest = self._rest([f + d for f, d in zip(self._place.functionals, moves, strict=True)], bound)
+            missed = max(np.abs(rest).max(), tau * max(np.abs(fall).max() for fall in falls))
+            if missed * _ROOM < min(abs(bound), tau * abs(multipliers[0])):
+                break
+            free = [np.linalg.solve(h, fall[..., None])[..., 0] for h, fall in zip(self._squares, falls, strict=True)]
+            more, further, higher = self._solve(free, rest, 1 / tau - self._means @ multipliers)
+            moves = [move + one for move, one in zip(moves, more, strict=True)]
+            multipliers, bound = multipliers + further, bound + higher
+        least, most = self._ends(changes)
+        return _Step(
+            tau=tau, moves=moves, multipliers=multipliers, bound=bound, least=least, most=most, missed=float(missed)
+        )
+
+
+def _kind(shape: MomentProgram) -> tuple[Any, ...]:
+    return len(shape.keys), shape.relation_count, tuple(block.size for block in shape.blocks)
+
+
+def _sum(tables: Any, vectors: Any) -> Any:
+    """Σ over rows and unknowns."""
+    return np.tensordot(tables, vectors, axes=((0, 1), (0, 1)))
+
+
+class _Rows:
+    """Rows whose programmes have one shape, in coordinates in which the relations hold.
+
+    Parameters
+    ----------
+    rows : sequence of (MomentProgram, int)
+        Shapes, and where their moments begin among those of all.
+    """
+
+    def __init__(self, rows: Sequence[tuple[MomentProgram, int]]) -> None:
+        self._shapes = [shape for shape, _ in rows]
+        shape = self._shapes[0]
+        self._places = np.array([start + np.arange(len(shape.keys)) for _, start in rows])
+        self._bases = np.array([_solutions(one) for one in self._shapes])
+        sizes = np.array([block.size for block in shape.blocks])
+        ends = np.cumsum(sizes * (sizes + 1) // 2)
+        triangles = [one.triangles() @ basis for one, basis in zip(self._shapes, self._bases, strict=True)]
+        self._blocks = [
+            np.array([[_matrices(t[end - s * (s + 1) // 2 : end], s) for end in ends[sizes == s]] for t in triangles])
+            for s in np.unique(sizes).tolist()
+        ]
+        self._corners = [_corners(block.shape[2]) for block in self._blocks]
+        counts = [block.shape[1] for block in self._blocks]
+        units = [
+            one for (i, j, _), count in zip(self._corners, counts, strict=True) for one in [(i == j) * 1.0] * count
+        ]
+        self.unit = np.concatenate(units)
+        self.firsts = np.cumsum([0, *map(len, units[:-1])])
+
+    def of(self, table: Any) -> Any:
+        """What all moments are multiplied by in the equations, in the coordinates of every row."""
+        return self._bases.transpose(0, 2, 1) @ table[self._places]
+
+    def interior(self, margin: Any) -> Any:
+        """Functional of every row inside its cone, with L(N) = 1."""
+        centres = (one.alone().solve({}) for one in self._shapes)
+        nothing = np.full(self._places.shape[1], np.nan)  # outside of every cone
+        values = np.array([nothing if c is None else list(c.functional.values()) for c in centres])
+        sized = values / (values * margin[self._places]).sum(axis=1)[:, None]
+        return (self._bases.transpose(0, 2, 1) @ sized[..., None])[..., 0]
+
+    def beside(self, functional: Any) -> Any:
+        """F⁻¹ S_i F⁻ᵀ of all unknowns i, with F Fᵀ = S = Σ_i L_i S_i: scaled triangles (rows × unknowns × ·)."""
+        found = []
+        for block, (upper, lower, factors) in zip(self._blocks, self._corners, strict=True):
+            rows, count, size, unknowns = block.shape[:4]
+            whole = (block.transpose(0, 1, 2, 4, 3) @ functional[:, None, None, :, None])[..., 0]
+            inverse = np.linalg.inv(np.linalg.cholesky(whole))
+            half = (inverse @ block.reshape(rows, count, size, -1)).reshape(block.shape).transpose(0, 1, 4, 3, 2)
+            both = (inverse @ half.reshape(rows, count, size, -1)).reshape(block.shape)
+            triangles = both.transpose(0, 3, 1, 2, 4)[..., upper, lower] * factors
+            found.append(triangles.reshape(rows, unknowns, -1))
+        return np.concatenate(found, axis=2)
+
+    def ends(self, triangles: Any) -> tuple[float, float]:
+        """Smallest and largest eigenvalue of all matrices."""
+        found, start = [], 0
+        for block, (upper, lower, factors) in zip(self._blocks, self._corners, strict=True):
+            rows, count, size = block.shape[:3]
+            stop = start + count * len(upper)
+            full = np.empty((rows, count, size, size))
+            full[..., lower, upper] = triangles[:, start:stop].reshape(rows, count, -1) / factors
+            found.append(np.linalg.eigvalsh(full))
+            start = stop
+        return min(float(np.min(e)) for e in found), max(float(np.max(e)) for e in found)
+
+
+def _longest(kind: _Rows, triangles: Any) -> float:
+    """Largest norm of a matrix, at least its largest eigenvalue."""
+    return float(np.sqrt(np.add.reduceat(triangles**2, kind.firsts, axis=1).max()))
+
+
+def _corners(size: int) -> tuple[Any, Any, Any]:
+    """Rows and columns of an upper triangle, and what makes its length that of the matrix."""
+    rows, columns = pairs(size)
+    return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
+
+
+def _solutions(shape: MomentProgram) -> Any:
+    """Basis of the functionals that vanish on the relations, orthonormal."""
+    return null_space(shape.relations().toarray()) if shape.relation_count else np.eye(len(shape.keys))
+
+
+def _matrices(triangle: Any, size: int) -> Any:
+    """Matrices (size × unknowns × size) with an upper triangle, column by column."""
+    rows, columns = pairs(size)
+    full = np.zeros((size, triangle.shape[1], size))
+    full[rows, :, columns] = full[columns, :, rows] = triangle
+    return full

@@ -1,0 +1,638 @@
+"""Verdict on given gains of a homogeneous law, and the proved limits of these gains.
+
+The limits are the largest disturbance bound, the largest range of β, and the decay rate. Each is located
+by Newton's rule on the margin of the conic programme, kept inside a bracket.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from time import perf_counter
+
+import sympy as sp
+
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.exact import rational, to_sympy
+from quakedesign.laws import LoopField, Subject, law, model_of
+from quakedesign.lyapunov.exact.certificate import Certificate, decided_once
+from quakedesign.lyapunov.exact.claim import Loop, Verdict, loop_of
+from quakedesign.lyapunov.maps.sweep import SURE, Screened, Sweep, prove
+from quakedesign.lyapunov.search.falsification import escape
+from quakedesign.lyapunov.search.search import candidate_degrees, find_certificate, refute
+from quakedesign.symbolic.terms import Term
+from quakedesign.symbolic.terms import value as coefficient
+
+# ----------------------------------------------------------------------
+# The verdict on given gains of any homogeneous law, of the package or of a user's own.
+
+Number = str | float | Fraction
+
+
+def certify(
+    subject: Subject,
+    gains: tuple[Number, ...],
+    *,
+    lipschitz: Number,
+    gain_range: tuple[Number, Number] = (1, 1),
+) -> tuple[Verdict, Certificate | None]:
+    """Decide whether gains make the origin stable for |d| ≤ lipschitz and all β of a range.
+
+    Globally asymptotically, and in finite time where the field has a negative degree.
+
+    Parameters
+    ----------
+    subject : str, type of Law or LoopField
+        Name of a law of the package, a class of the user's own, or a bare closed loop; uncertain in ``beta`` and ``d``
+        or one of them. A certificate for one from outside the package is checked again with ``check(subject)``.
+    gains : tuple of number or text
+        Exact: decimals, exponents or p/q; order of the law.
+    lipschitz : number or text
+        L̄ [unit of ν per s], not negative.
+    gain_range : tuple of two
+        b_m and b_M [-], positive.
+
+    Returns
+    -------
+    verdict : Verdict
+    certificate : Certificate or None
+        Proof or counterexample; None when undecided.
+
+    Raises
+    ------
+    ParameterError
+        For gains or ranges that are no numbers, a range that is empty or not positive, a law with other uncertainty, or
+        one that is not homogeneous in its weights.
+    CertificateError
+        For a law with parts that certificates do not know, such as a squared uncertain parameter.
+    UnknownNameError
+        For the name of an unknown law.
+    """
+    loop = closed_loop(subject, gains, lipschitz=lipschitz, gain_range=gain_range)
+    certificate = refute(loop, subject) or proof(loop, subject)
+    return (decided_once(certificate, subject), certificate) if certificate else (Verdict.UNDECIDED, None)
+
+
+def proof(loop: Loop, subject: Subject) -> Certificate | None:
+    """Proof of a loop without a counterexample, or None."""
+    return find_certificate(loop, subject=subject) or _swept(loop, subject)
+
+
+def _swept(loop: Loop, subject: Subject) -> Certificate | None:
+    """What the search along a line would find here; its V has a fixed mean, which serves better at the edges."""
+    for degree in candidate_degrees(loop):
+        try:
+            sweep = Sweep(loop, degree)
+            answer = sweep.solve(loop)
+        except CertificateError:  # no candidates of this degree, or numbers too far apart
+            continue
+        if answer is not None and answer.found:
+            certificate = prove(sweep, loop, answer, subject)
+            if certificate is not None:
+                return certificate
+    return None
+
+
+def closed_loop(
+    subject: Subject, gains: tuple[Number, ...], *, lipschitz: Number, gain_range: tuple[Number, Number] = (1, 1)
+) -> Loop:
+    """Loop with exact gains for |d| ≤ lipschitz and all β of a range.
+
+    Raises
+    ------
+    ParameterError, UnknownNameError
+        As `certify`.
+    CertificateError
+        When the law has parts that certificates do not know.
+    """
+    name, model = model_of(subject)
+    exact = exact_gains(subject, gains)
+    if {str(symbol) for symbol in model.gains} != set(exact):
+        raise ParameterError(
+            f"the loop of {name} must have the gains of the law, {', '.join(exact)}. "
+            f"Received {', '.join(map(str, model.gains))}."
+        )
+    ranges = _ranges(name, model, lipschitz, gain_range)
+    _require_declared(model, {gain: (value, value) for gain, value in exact.items()} | ranges)
+    loop = loop_of(name, model, gains=exact, uncertain=ranges)
+    _require_homogeneous(loop)
+    return loop
+
+
+def _require_declared(model: LoopField, ranges: Mapping[str, tuple[Fraction, Fraction]]) -> None:
+    """Refuse numbers that a symbol's declaration excludes: SymPy has simplified the field by it."""
+    inside: dict[sp.Symbol, set[sp.Expr]] = {}
+    for symbol in (*model.gains, *model.uncertain):
+        low, high = ranges[str(symbol)]
+        inside[symbol] = {to_sympy(v) for v in (low, high, min(max(low, Fraction(0)), high))}
+        if low < high:
+            inside[symbol].add(to_sympy(low) + to_sympy(high - low) / sp.sqrt(2))
+    inside |= {root: {sp.sqrt(to_sympy(ranges[str(of)][0]))} for root, of in model.roots.items() if of in inside}
+    for symbol, values in inside.items():
+        for kind, declared in symbol.assumptions0.items():
+            wrong = [v for v in values if getattr(v, f"is_{kind}") != declared]
+            if wrong:
+                raise ParameterError(
+                    f"{symbol} is declared {'' if declared else 'not '}{kind} in the loop. Received {wrong[0]}. "
+                    "Declare it with real=True only."
+                )
+
+
+def _require_homogeneous(loop: Loop) -> None:
+    """Refuse a field or an argument of a nested power with terms of different degrees in the weights of the loop."""
+    weights: dict[str, Fraction] = {state: Fraction(weight) for state, weight in loop.states.items()}
+    for lift, terms in loop.lifts.items():
+        degrees = _degrees(loop, terms, weights)
+        _require_one({m: f"{t} in a nested power" for m, t in degrees.items()}, loop)
+        weights[lift] = next(iter(degrees), Fraction(1))
+    found: dict[Fraction, str] = {}
+    for state, terms in loop.field.items():
+        found |= {m - loop.states[state]: f"{t} in {state}'" for m, t in _degrees(loop, terms, weights).items()}
+    _require_one(found, loop)
+
+
+def _degrees(loop: Loop, terms: tuple[Term, ...], weights: Mapping[str, Fraction]) -> dict[Fraction, str]:
+    """Degrees of the terms that do not vanish, each with the factors of one such term."""
+    zero = {name for name, v in loop.parameters.items() if not v}
+    zero |= {name for name, ends in loop.ranges.items() if not any(ends)}
+    live = (t for t in terms if not zero & set(t.parameters))
+    return {
+        sum((a * weights[x] for x, a, _ in t.factors), Fraction(0)): "·".join(
+            (*t.parameters, *(f"{x}^{a}" for x, a, _ in t.factors)) or ("1",)
+        )
+        for t in live
+    }
+
+
+def _require_one(degrees: Mapping[Fraction, str], loop: Loop) -> None:
+    if len(degrees) > 1:
+        (m, first), (n, second), *_ = degrees.items()
+        raise ParameterError(
+            f"a certificate needs a loop of one degree in the weights {dict(loop.states)}. Received degree {m} of "
+            f"{first} and {n} of {second}. Other weights may do: quakedesign.symbolic.homogeneity.weights_for."
+        )
+
+
+def exact_gains(subject: Subject, gains: tuple[Number, ...]) -> dict[str, Fraction]:
+    """Gains by name, exact, in the order of the law.
+
+    Raises
+    ------
+    ParameterError
+        When their number is wrong, or the law refuses them.
+    """
+    if not isinstance(subject, LoopField):
+        chosen = law(subject) if isinstance(subject, str) else subject
+        return dict(chosen.from_values(tuple(gains)).gains)
+    names = [str(symbol) for symbol in subject.gains]
+    if len(gains) != len(names):
+        raise ParameterError(f"the loop needs {len(names)} gains ({', '.join(names)}). Received {len(gains)}.")
+    return {name: rational(v, f"gain {name}") for name, v in zip(names, gains, strict=True)}
+
+
+def _ranges(
+    name: str, model: LoopField, lipschitz: Number, gain_range: tuple[Number, Number]
+) -> dict[str, tuple[Fraction, Fraction]]:
+    bound = rational(lipschitz, "lipschitz")
+    low, high = (rational(v, "gain_range") for v in gain_range)
+    if bound < 0 or not 0 < low <= high:
+        raise ParameterError(
+            f"lipschitz must not be negative and gain_range must be 0 < b_m <= b_M. Received {bound}, [{low}, {high}]."
+        )
+    known = {"beta": (low, high), "d": (-bound, bound)}
+    unknown = [*(str(u) for u in model.uncertain if str(u) not in known), *map(str, model.constants)]
+    if unknown or model.domain != "cells":
+        raise ParameterError(
+            "a Lipschitz bound applies to sliding-mode laws, uncertain in beta and d. "
+            f"Received {name!r} with {', '.join(unknown) or 'a polynomial loop'}."
+        )
+    return {str(u): known[str(u)] for u in model.uncertain}
+
+
+# ----------------------------------------------------------------------
+# The last number for which a search succeeds, from margins and their slopes, in as few solves as possible.
+
+TOLERANCE = Fraction(1, 10_000)
+"""Relative width of a bracket: the search succeeds at x and not at x(1 + TOLERANCE)."""
+_BELOW, _ABOVE = TOLERANCE / 2, TOLERANCE / 5  # where the ends of the bracket are wanted
+_MOST = 40
+_STRIDE = 8
+_BELIEVED = 6  # questions; after them tangents are no longer believed alone
+_NEAR = 3 * TOLERANCE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bracket:
+    """Where the search succeeds, and where it does not.
+
+    Attributes
+    ----------
+    low : Fraction or None
+        Largest number at which it succeeded.
+    high : Fraction or None
+        Smallest number at which it did not; None where none was tried, as a limit makes it needless.
+    best : Screened or None
+        Answer at `low`.
+    asked : int
+        How often it was told something.
+    """
+
+    low: Fraction | None = None
+    high: Fraction | None = None
+    best: Screened | None = None
+    asked: int = 0
+
+    def closed(self, limit: Fraction | None) -> bool:
+        """Whether `low` is within the tolerance of `high` or of a limit."""
+        ends = [end for end in (self.high, limit) if end is not None]
+        return self.low is not None and any(end <= self.low * (1 + TOLERANCE) for end in ends)
+
+    def told(self, x: Fraction, answer: Screened | None) -> "Bracket":
+        """The bracket after one more answer."""
+        if answer is not None and answer.found:
+            return Bracket(low=x, high=self.high, best=answer, asked=self.asked + 1)
+        return Bracket(low=self.low, high=x, best=self.best, asked=self.asked + 1)
+
+
+def last_success(
+    ask: Callable[[Fraction], tuple[Screened | None, float]],
+    first: Fraction,
+    *,
+    floor: Fraction = Fraction(0),
+    limit: Fraction | None = None,
+    most: Fraction | None = None,
+    only_above: bool = False,
+) -> Bracket:
+    """Bracket around the last number at which a search succeeds, by Newton's rule kept inside what is known.
+
+    Parameters
+    ----------
+    ask : callable
+        Answer at a number, and the slope of its margin there.
+    first : Fraction
+        Where to begin; the floor is a good place where nothing is known.
+    floor : Fraction
+        Smallest number that makes sense.
+    limit : Fraction, optional
+        No search can succeed there or beyond, so none is made.
+    most : Fraction, optional
+        Success there is enough.
+    only_above : bool
+        Stop where the search does not succeed at `first`.
+
+    Returns
+    -------
+    Bracket
+        Without `low` when the search does not even succeed at the floor.
+    """
+    bracket, x = Bracket(), first
+    for _ in range(_MOST):
+        answer, slope = ask(x)
+        bracket = bracket.told(x, answer)
+        enough = most is not None and bracket.low is not None and bracket.low >= most
+        if bracket.closed(limit) or enough or bracket.high == floor or (only_above and bracket.low is None):
+            break
+        x = max(floor, _short(_next(bracket, x, _root(x, answer, slope), floor, limit)))
+    return bracket
+
+
+def _root(x: Fraction, answer: Screened | None, slope: float) -> Fraction | None:
+    """Where the tangent says that the search just succeeds; None where there is none."""
+    if answer is None or not slope < 0:
+        return None
+    return Fraction(float(x) - (answer.margin - SURE) / slope)
+
+
+def _next(bracket: Bracket, x: Fraction, root: Fraction | None, floor: Fraction, limit: Fraction | None) -> Fraction:
+    """Number to ask about: near the tangent's root, on the side that is still open; else halfway."""
+    low, high = bracket.low, bracket.high
+    astray = root is None or root <= floor or bracket.asked > _BELIEVED
+    if low is None and bracket.asked > 1 and astray:
+        return floor
+    ceiling = None if limit is None else first_below(limit)
+    middle = _middle(x, low, high, floor, ceiling)
+    if root is None or (bracket.asked > _BELIEVED and bracket.asked % 3 == 0):
+        return middle
+    near = abs(root - x) < _NEAR * x
+    guess = root * (1 - _BELOW) if not near or x == high else root * (1 + _ABOVE)
+    if x > floor:
+        guess = min(guess, floor + (x - floor) * _STRIDE)
+    if ceiling is not None:
+        guess = min(guess, ceiling)
+    bottom = low if low is not None else (floor + x) / 2
+    return guess if bottom < guess and (high is None or guess < high) else middle
+
+
+def _middle(
+    x: Fraction, low: Fraction | None, high: Fraction | None, floor: Fraction, ceiling: Fraction | None
+) -> Fraction:
+    if high is None:
+        doubled = 2 * x - floor if x > floor else x + 1
+        return doubled if ceiling is None else min(doubled, ceiling)
+    return ((floor if low is None else low) + high) / 2
+
+
+def first_below(limit: Fraction) -> Fraction:
+    """Number so near to a limit that the search need not go on if it succeeds there."""
+    return limit * (1 - _BELOW - _ABOVE)
+
+
+def _short(x: Fraction) -> Fraction:
+    """Nearest decimal of eight digits."""
+    return Fraction(f"{float(x):.7e}")
+
+
+# ----------------------------------------------------------------------
+# How far given gains reach: the largest disturbance, range of β or decay that is proved, and what limits it.
+
+_STEPS_BACK = (Fraction(0), TOLERANCE / 4, TOLERANCE / 2, 10 * TOLERANCE, 100 * TOLERANCE)
+_FAR = Fraction(10) ** 12
+_WIDE = 10**6  # a range of β that is wide enough
+_HAIR = Fraction(1, 10**9)  # so that a range of β has two ends even where it is asked to be a point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CertifiedLimit:
+    """How far gains reach in one number, with the proof.
+
+    Attributes
+    ----------
+    quantity : str
+        ``"lipschitz"``, ``"beta"`` (upper end b_M) or ``"beta-factor"`` (range [b/f, b·f]).
+    value : Fraction or None
+        Proved exactly; None where the search finds nothing at all.
+    beyond : Fraction or None
+        Smallest number at which the search found nothing, at most value·(1 + 1e-4) unless a proof could not be
+        finished; None where `limit` is as near, or where there seems to be no end.
+    limit : Fraction or None
+        No Lyapunov function exists there, of whatever kind; None where none is known.
+    degrees : tuple of int
+        Degrees of V that were tried, all sums of squares on cells without multiplier.
+    degree : int or None
+        That of the certificate.
+    certificate : Certificate or None
+        Proof for the value; where there is none, the exact counterexample, if one is known.
+    counterexample : str
+        What speaks against the gains where nothing is found, see `against`; else ``"none"``.
+    solves : int
+    seconds : float
+    """
+
+    quantity: str
+    value: Fraction | None
+    beyond: Fraction | None
+    limit: Fraction | None
+    degrees: tuple[int, ...]
+    degree: int | None
+    certificate: Certificate | None
+    counterexample: str
+    solves: int
+    seconds: float
+
+    @property
+    def sharp(self) -> bool:
+        """Whether the value is the largest of its family to four digits, or within 1e-4 of the limit."""
+        ends = [end for end in (self.beyond, self.limit) if end is not None]
+        return self.value is not None and any(end <= self.value * (1 + TOLERANCE) for end in ends)
+
+    def smallest_scale(self, lipschitz: Number) -> Fraction | None:
+        """Smallest λ for which the scaled gains are proved for a needed bound L̄: needed/value; None without a proof.
+
+        Raises
+        ------
+        ParameterError
+            When the bound is not positive, or this is the reach in another quantity.
+        """
+        needed = rational(lipschitz, "lipschitz")
+        if needed <= 0 or self.quantity != "lipschitz":
+            raise ParameterError(f"a scale needs the reach in lipschitz and a positive bound. Received {needed}.")
+        return needed / self.value if self.value else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """Loops along one number x ≥ floor, and the derivative of every name of a sweep in x."""
+
+    quantity: str
+    at: Callable[[Fraction], Loop]
+    direction: Callable[[float], dict[str, float]]
+    floor: Fraction
+    first: Fraction
+    limit: Fraction | None
+    most: Fraction | None = None
+
+
+def largest_lipschitz(
+    subject: Subject,
+    gains: tuple[Number, ...],
+    *,
+    gain_range: tuple[Number, Number] = (1, 1),
+    degrees: int | Iterable[int] | None = None,
+) -> CertifiedLimit:
+    """Largest L̄ for which the gains are proved for all |d| ≤ L̄ and all β of a range.
+
+    Parameters
+    ----------
+    subject : str, type of Law or LoopField
+        See `certify`.
+    gains : tuple of number or text
+    gain_range : tuple of two
+        b_m and b_M [-].
+    degrees : int or iterable of int, optional
+        Degrees of V to try; those that `certify` tries unless given.
+
+    Returns
+    -------
+    CertifiedLimit
+
+    Raises
+    ------
+    ParameterError, UnknownNameError
+        As `certify`.
+    CertificateError
+        When the law has parts that certificates do not know.
+    """
+    began = perf_counter()
+    base = closed_loop(subject, gains, lipschitz=1, gain_range=gain_range)
+    _needs(base, "d", "largest L̄")
+    limit = necessary_limit(base, subject)
+
+    def at(x: Fraction) -> Loop:
+        return replace(base, uncertain={**base.uncertain, "d": (-x, x)})
+
+    first = _reachable(base) if limit is None else first_below(limit)
+    line = _Line("lipschitz", at, lambda x: {"d": 1.0}, Fraction(0), first, limit)
+    return _reach(line, subject, _chosen(degrees, base), began)
+
+
+def largest_gain_range(
+    subject: Subject,
+    gains: tuple[Number, ...],
+    *,
+    lipschitz: Number,
+    nominal: Number = 1,
+    symmetric: bool = False,
+    degrees: int | Iterable[int] | None = None,
+) -> CertifiedLimit:
+    """Largest range of β for which the gains are proved for all |d| ≤ lipschitz.
+
+    Parameters
+    ----------
+    subject, gains, degrees
+        See `largest_lipschitz`.
+    lipschitz : number or text
+    nominal : number or text
+        b: the lower end of the range, or its middle.
+    symmetric : bool
+        Ask for the largest f with range [b/f, b·f] instead of the largest b_M with [b, b_M].
+
+    Returns
+    -------
+    CertifiedLimit
+        Its value is b_M, or f.
+
+    Raises
+    ------
+    ParameterError, UnknownNameError, CertificateError
+        As `largest_lipschitz`.
+    """
+    began = perf_counter()
+    base = closed_loop(subject, gains, lipschitz=lipschitz, gain_range=(nominal, nominal))
+    _needs(base, "beta", "largest range of β")
+    middle = rational(nominal, "nominal")
+    b = float(middle)
+
+    floor = Fraction(1) if symmetric else middle
+
+    def at(x: Fraction) -> Loop:
+        x = max(x, floor * (1 + _HAIR))
+        ends = (middle / x, middle * x) if symmetric else (middle, x)
+        return replace(base, uncertain={**base.uncertain, "beta": ends})
+
+    def direction(x: float) -> dict[str, float]:
+        return {"beta+": b, "beta-": -b / x**2} if symmetric else {"beta+": 1.0}
+
+    line = _Line(
+        "beta-factor" if symmetric else "beta", at, direction, floor, Fraction(11, 10) * floor, None, _WIDE * floor
+    )
+    return _reach(line, subject, _chosen(degrees, base), began)
+
+
+def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
+    """Bound on |d| from which on nothing can be proved of these gains, known from the law or a refuting equilibrium."""
+    chosen = None if isinstance(subject, LoopField) else law(subject) if isinstance(subject, str) else subject
+    limit = chosen(gains=dict(loop.gains)).lipschitz_limit if chosen is not None else None
+    limits = [] if limit is None else [max(Fraction(0), limit)]
+    for bound in (Fraction(0), max(_FAR, 4 * _reachable(loop))):
+        held = refute(replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), subject)
+        if held is not None and held.refutation is not None:
+            limits.append(abs(held.refutation.parameters["d"]))
+    return min(limits, default=None)
+
+
+def against(loop: Loop, refuted: Certificate | None) -> str:
+    """What speaks against a loop without a proof, of which a counterexample is known or none.
+
+    ``"exact"`` for an equilibrium away from the origin, ``"simulated"`` for a run that grows, else ``"none"``.
+    """
+    if refuted is not None:
+        return "exact"
+    return "simulated" if escape(loop) is not None else "none"
+
+
+def _reach(line: _Line, subject: Subject, degrees: tuple[int, ...], began: float) -> CertifiedLimit:
+    value: Fraction | None = None
+    beyond: Fraction | None = None
+    degree: int | None = None
+    certificate: Certificate | None = None
+    solves = 0
+    for tried in degrees if line.limit != 0 else ():
+        search = _Search(line, subject, tried)
+        bracket = search.above(value)
+        proof = search.proved(bracket) if bracket.low is not None else None
+        solves += search.sweep.solves
+        if proof is not None:
+            (value, certificate), degree = proof, tried
+        beyond = max((end for end in (beyond, bracket.high) if end is not None), default=None)
+        if value is not None and line.limit is not None and line.limit <= value * (1 + TOLERANCE):
+            beyond = None
+            break
+    kind = "none"
+    if certificate is None:
+        loop = line.at(line.floor)
+        certificate = refute(loop, subject)
+        kind = against(loop, certificate)
+    return CertifiedLimit(
+        quantity=line.quantity,
+        value=value,
+        beyond=beyond,
+        limit=line.limit,
+        degrees=degrees,
+        degree=degree,
+        certificate=certificate,
+        counterexample=kind,
+        solves=solves,
+        seconds=perf_counter() - began,
+    )
+
+
+class _Search:
+    """The search along a line with one degree of V."""
+
+    def __init__(self, line: _Line, subject: Subject, degree: int) -> None:
+        self.line, self.subject = line, subject
+        reference = line.at(line.limit or line.first)
+        self.sweep = Sweep(reference, degree)
+        self.frame = self.sweep.frame(reference)
+
+    def ask(self, x: Fraction) -> tuple[Screened | None, float]:
+        """Answer at x, and the slope of its margin."""
+        answer = self.sweep.solve(self.line.at(x), self.frame)
+        if answer is None:
+            return None, 0.0
+        return answer, sum(answer.slopes.get(n, 0.0) * step for n, step in self.line.direction(float(x)).items())
+
+    def above(self, value: Fraction | None) -> Bracket:
+        """Bracket, with `low` only where it exceeds what is proved."""
+        first = self.line.first if value is None else value * (1 + TOLERANCE * Fraction(9, 10))
+        return last_success(
+            self.ask,
+            first,
+            floor=self.line.floor,
+            limit=self.line.limit,
+            most=self.line.most,
+            only_above=value is not None,
+        )
+
+    def proved(self, bracket: Bracket) -> tuple[Fraction, Certificate] | None:
+        """Number at or below that of a bracket, and its certificate."""
+        assert bracket.low is not None
+        answer = bracket.best
+        for step in _STEPS_BACK:
+            x = max(self.line.floor, bracket.low * (1 - step))
+            answer = answer if x == bracket.low else self.ask(x)[0]
+            if answer is not None and answer.found:
+                certificate = prove(self.sweep, self.line.at(x), answer, self.subject)
+                if certificate is not None:
+                    return x, certificate
+        return None
+
+
+def _chosen(degrees: int | Iterable[int] | None, loop: Loop) -> tuple[int, ...]:
+    if degrees is None:
+        return candidate_degrees(loop)
+    return (degrees,) if isinstance(degrees, int) else tuple(degrees)
+
+
+def _reachable(loop: Loop) -> Fraction:
+    """Half of what all other terms of the rates that d acts on amount to."""
+    rates = [terms for terms in loop.field.values() if any("d" in t.parameters for t in terms)]
+    ends = {name: max(map(abs, range_)) for name, range_ in loop.ranges.items()}
+    known = {**loop.parameters, **ends}
+    return (
+        sum((abs(coefficient(t, known)) for terms in rates for t in terms if "d" not in t.parameters), Fraction(0)) / 2
+    )
+
+
+def _needs(loop: Loop, name: str, what: str) -> None:
+    if name not in loop.uncertain:
+        raise ParameterError(f"the {what} needs a law that is uncertain in {name}. Received {loop.law!r}.")

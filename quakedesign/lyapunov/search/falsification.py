@@ -1,0 +1,147 @@
+"""Runs against a homogeneous loop without a proof: disturbances under which its state grows. Measured, not proved."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+
+from quakedesign.lyapunov.exact.claim import Loop
+from quakedesign.symbolic.terms import Term
+
+_STARTS = 6
+_GROWTH = 1.0  # e-foldings worth a second look
+_AGAIN = 1.4  # so many times more in twice the time with half the steps, or it was chatter, or passes
+_UNCOUNTED = 0.25  # share of a run at its beginning
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Escape:
+    """A run that grows without end, since the loop is homogeneous; floating point.
+
+    Attributes
+    ----------
+    growth : float
+        e-foldings of Σ|x_i|^{1/r_i} over the run.
+    strategy : str
+        What the uncertain parameters follow.
+    """
+
+    growth: float
+    strategy: str
+
+
+def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
+    """Run that grows for parameters that jump between their ends, at two step sizes alike; None if none is found.
+
+    Every uncertain parameter follows a sign: of a state or its rate where it must change with the state's sign, of a
+    product of two where it must not.
+
+    Parameters
+    ----------
+    loop : Loop
+    steps : int
+        Of the first runs; every step moves the state by at most 1/200 of its size.
+    """
+    field = _FloatField(loop)
+    plays = list(product(*(_choices(loop, name) for name in loop.uncertain)))
+    coarse = field.growths(plays, steps, 1 / 200)
+    for i in sorted(range(len(plays)), key=lambda i: -coarse[i])[:3]:
+        if coarse[i] < _GROWTH:
+            break
+        fine = field.growths(plays[i : i + 1], 4 * steps, 1 / 400)[0]
+        if fine > _AGAIN * coarse[i]:
+            told = (f"{name} follows {play}" for name, play in zip(loop.uncertain, plays[i], strict=True))
+            return Escape(growth=float(fine), strategy=", ".join(told))
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class _Play:
+    """The sign that a parameter follows: that of a product of states and of rates at the middle of all ranges."""
+
+    names: tuple[str, ...]
+    sign: int
+
+    def __str__(self) -> str:
+        return ("" if self.sign > 0 else "-") + "·".join(self.names)
+
+
+def _choices(loop: Loop, name: str) -> list[_Play]:
+    low, high = loop.uncertain[name]
+    rates = {state: f"{state}'" for state in loop.states}
+    products: list[tuple[str, ...]]
+    if _is_even(loop, name):
+        products = [*rates.items(), *combinations(loop.states, 2)]
+    else:
+        products = [(one,) for pair in rates.items() for one in pair]
+    everything = [_Play(names, sign) for names in products for sign in (1, -1)]
+    return everything if low < high else everything[:1]
+
+
+def _is_even(loop: Loop, name: str) -> bool:
+    """Whether the loop is odd in its states when the parameter stays as it is."""
+    terms = (term for rates in loop.field.values() for term in rates if name in term.parameters)
+    return all(sum(kind == "s" for _, _, kind in term.factors) % 2 == 1 for term in terms)
+
+
+class _FloatField:
+    """The field of a loop in floating point, for many columns of states and parameters at once."""
+
+    def __init__(self, loop: Loop) -> None:
+        self.loop, self.states = loop, list(loop.states)
+        self.weights = np.array(list(loop.states.values()), dtype=float)[:, None]
+
+    def rates(self, x: Any, parameters: Mapping[str, Any]) -> Any:
+        """x' for states of shape (n, columns)."""
+        known = dict(zip(self.states, x, strict=True))
+        for lift, terms in self.loop.lifts.items():
+            known[lift] = self._sum(terms, known, parameters)
+        columns = [self._sum(terms, known, parameters) + np.zeros(x.shape[1]) for terms in self.loop.field.values()]
+        return np.array(columns)
+
+    def _sum(self, terms: Sequence[Term], known: Mapping[str, Any], parameters: Mapping[str, Any]) -> Any:
+        total: Any = 0.0
+        for term in terms:
+            part: Any = float(term.coefficient)
+            for name in term.parameters:
+                part = part * parameters[name]
+            for state, exponent, kind in term.factors:
+                size = np.abs(known[state]) ** float(exponent) if exponent else 1.0
+                part = part * size * (np.sign(known[state]) if kind == "s" else 1.0)
+            total = total + part
+        return total
+
+    def growths(self, plays: Sequence[tuple[_Play, ...]], steps: int, pace: float) -> Any:
+        """Largest growth in e-foldings of every play over all starts, the beginning of the run left out."""
+        x = np.tile(np.random.default_rng(0).normal(size=(len(self.states), _STARTS)), len(plays))
+        middle, ends = self._parameters()
+        growth = np.zeros(x.shape[1])
+        followed = {name: self._followed([play[i] for play in plays]) for i, name in enumerate(self.loop.uncertain)}
+        columns = np.arange(x.shape[1])
+        for step in range(steps):
+            size = (np.abs(x) ** (1 / self.weights)).sum(axis=0)
+            x = x / size**self.weights
+            growth += np.log(size) if step > steps * _UNCOUNTED else 0.0
+            signs = np.sign(np.concatenate([x, self.rates(x, middle), np.ones((1, x.shape[1]))]))
+            chosen = dict(middle)
+            for name, (low, high) in ends.items():
+                first, second, sign = followed[name]
+                chosen[name] = np.where(signs[first, columns] * signs[second, columns] * sign > 0, high, low)
+            speed = self.rates(x, chosen)
+            x = x + pace * speed / np.abs(speed).max(axis=0)
+        return growth.reshape(len(plays), _STARTS).max(axis=1)
+
+    def _followed(self, plays: Sequence[_Play]) -> tuple[Any, Any, Any]:
+        """Rows of the two signs that every column multiplies, in states, rates and a one; and the sign before them."""
+        rows = {name: i for i, name in enumerate((*self.states, *(f"{s}'" for s in self.states), ""))}
+        pairs = np.array([[rows[name] for name in (*play.names, "")[:2]] for play in plays])
+        return (*np.repeat(pairs, _STARTS, axis=0).T, np.repeat([play.sign for play in plays], _STARTS))
+
+    def _parameters(self) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
+        """All numbers with ranges at their middle, and the ends of the ranges."""
+        ends = {name: (float(low), float(high)) for name, (low, high) in self.loop.uncertain.items()}
+        middle = {name: float(v) for name, v in self.loop.parameters.items()}
+        middle |= {name: middle[of] ** 0.5 for name, (of, _) in self.loop.roots.items()}
+        return middle | {name: (low + high) / 2 for name, (low, high) in ends.items()}, ends

@@ -1,0 +1,244 @@
+"""Exact proofs that a whole family holds no Lyapunov function: points and weights at which every one of them fails."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+from scipy.optimize import linprog
+
+from quakedesign.errors import CertificateError
+from quakedesign.exact import fraction_of
+from quakedesign.lyapunov.exact.claim import Loop
+from quakedesign.lyapunov.exact.obligations import Obligation, Obligations
+from quakedesign.lyapunov.search.search import balance, exponents_of
+from quakedesign.sos import Polynomial
+from quakedesign.sos.exact.polynomial import monomial
+from quakedesign.symbolic.term_expressions import signed_monomials
+from quakedesign.symbolic.terms import Term
+
+_GRID = 4096  # denominator of the points, before they are scaled by powers of two
+_ROUNDS, _FIRST, _MORE = 12, 40, 400
+_SURE = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Atom:
+    """One point of one obligation.
+
+    Attributes
+    ----------
+    obligation : str
+        Name, as in a certificate.
+    point : tuple of Fraction
+        u ≥ 0 in the variables of the states, not all zero.
+    weight : Fraction
+        Positive.
+    """
+
+    obligation: str
+    point: tuple[Fraction, ...]
+    weight: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dual:
+    """Σ weight·P_o(point) = 0 for V and −V̇ of every V of a family, so that none has P_o > 0 at all these points.
+
+    The family are all sums of even C¹ signed monomials of one degree (`signed_monomials`). That excludes positivity
+    itself, not only sums of squares of some level.
+
+    Attributes
+    ----------
+    loop : Loop
+    degree : int
+        Of V.
+    atoms : tuple of Atom
+    """
+
+    loop: Loop
+    degree: int
+    atoms: tuple[Atom, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether it proves what it says, decided anew in exact arithmetic."""
+        if not _sharp(self.loop):
+            return False
+        monomials = signed_monomials(self.loop.states, self.degree, self.loop.domain)
+        rows = {row[0].name: row for row in _rows(self.loop, monomials)}
+        totals = [Fraction(0)] * len(monomials)
+        for atom in self.atoms:
+            row = rows.get(atom.obligation)
+            inside = len(atom.point) == len(self.loop.states) and min(atom.point) >= 0 and any(atom.point)
+            if row is None or not inside or atom.weight <= 0 or not _admits(row[0], atom.point):
+                return False
+            totals = [t + atom.weight * v for t, v in zip(totals, _values(row, atom.point), strict=True)]
+        return bool(self.atoms and monomials) and not any(totals)
+
+
+def dual(loop: Loop, degree: int) -> Dual | None:
+    """Exact proof that no V of a degree serves a loop, or None when none is found.
+
+    None says nothing. None also for nested powers of positive exponents, whose cells hold few rational points, and for
+    roots of gains that are irrational: no end of their enclosure is a value that the loop takes.
+
+    Parameters
+    ----------
+    loop : Loop
+        On `cells`.
+    degree : int
+        Of V in the weights of the loop.
+    """
+    monomials = signed_monomials(loop.states, degree, loop.domain)
+    try:
+        rows = list(_rows(loop, monomials)) if monomials else []
+    except CertificateError:
+        return None
+    if not rows or not _sharp(loop) or any(row[0].equalities for row in rows):
+        return None
+    return _PointSearch(loop, degree, monomials, rows).result()
+
+
+def _sharp(loop: Loop) -> bool:
+    """Whether the loop takes every vertex of its ranges."""
+    return all(low == high for _, (low, high) in loop.roots.values())
+
+
+def _rows(loop: Loop, monomials: Sequence[Term]) -> Iterator[tuple[Obligation, ...]]:
+    """V_j, then −V̇_j of all monomials on every different cell and vertex."""
+    columns = [Obligations(loop, (term,)) for term in monomials]
+    functions = zip(*([Obligation(n, p) for n, p in c.function()] for c in columns), strict=True)
+    rates = zip(*([one for _, one in c.decrease("decrease")] for c in columns), strict=True)
+    known = set()
+    for row in (*functions, *rates):
+        key = tuple(one.key for one in row)
+        if key not in known:
+            known.add(key)
+            yield row
+
+
+def _values(row: Sequence[Obligation], point: Sequence[Fraction]) -> list[Fraction]:
+    return [_value(one.polynomial, point) for one in row]
+
+
+def _value(polynomial: Polynomial, point: Sequence[Fraction]) -> Fraction:
+    return sum((c * monomial(point, e) for e, c in polynomial.items()), Fraction(0))
+
+
+def _admits(one: Obligation, point: Sequence[Fraction]) -> bool:
+    """Whether points inside the cell lie about this one, by continuity; where a condition is zero, they may not."""
+    return not one.equalities and all(_value(g, point) > 0 for g in one.inequalities)
+
+
+class _PointSearch:
+    """Points at which a linear programme over V fails, collected until it has no solution."""
+
+    def __init__(
+        self, loop: Loop, degree: int, monomials: Sequence[Term], rows: Sequence[tuple[Obligation, ...]]
+    ) -> None:
+        self.loop, self.degree, self.rows = loop, degree, rows
+        self.scale = balance(loop)
+        self.sizes = [monomial(self.scale, exponents_of(t, loop.states)) for t in monomials]
+        self.random = np.random.default_rng(0)
+        self.places: list[tuple[int, tuple[Fraction, ...]]] = []
+        self.lines: list[list[float]] = []
+
+    def result(self) -> Dual | None:
+        for row in range(len(self.rows)):
+            for _ in range(_FIRST):
+                self.add(row, self.draw())
+        for _ in range(_ROUNDS):
+            margin, decision = self.best()
+            if margin <= _SURE:
+                return self.exact()
+            if not self.refine(decision):
+                return None
+        return None
+
+    def add(self, row: int, point: tuple[Fraction, ...]) -> None:
+        if _admits(self.rows[row][0], point):
+            line = self.line(row, point)
+            if any(line):
+                self.places.append((row, point))
+                self.lines.append(line)
+
+    def draw(self) -> tuple[Fraction, ...]:
+        """Point in the scaled variables, some of them on faces."""
+        count = len(self.scale)
+        parts = self.random.exponential(size=count) * 2.0 ** self.random.uniform(-5, 0, size=count)
+        parts *= self.random.random(count) > 0.15
+        if not parts.any():
+            parts[int(self.random.integers(count))] = 1.0
+        return self.rounded(parts)
+
+    def near(self, point: Sequence[Fraction]) -> tuple[Fraction, ...]:
+        """Point next to another one, on the same faces."""
+        parts = [float(p / s) for p, s in zip(point, self.scale, strict=True)]
+        return self.rounded(parts * 2.0 ** self.random.normal(scale=0.2, size=len(parts)))
+
+    def rounded(self, parts: Any) -> tuple[Fraction, ...]:
+        whole = [round(_GRID * float(p / parts.max())) for p in parts]
+        return tuple(s * Fraction(n, _GRID) for s, n in zip(self.scale, whole, strict=True))
+
+    def line(self, row: int, point: Sequence[Fraction]) -> list[float]:
+        """Values of all V_j or −V̇_j at a point, V_j divided by their sizes, the largest about one."""
+        values = [v / s for v, s in zip(_values(self.rows[row], point), self.sizes, strict=True)]
+        largest = max(map(abs, values)) or Fraction(1)
+        return [float(v / largest) for v in values]
+
+    def best(self) -> tuple[float, Any]:
+        """Largest margin t with line·a ≥ t on all lines and |a_j| ≤ 1, and a."""
+        A = np.hstack([-np.array(self.lines), np.ones((len(self.lines), 1))])
+        count = A.shape[1] - 1
+        cost = [*[0.0] * count, -1.0]
+        solution = linprog(cost, A_ub=A, b_ub=np.zeros(len(A)), bounds=[(-1, 1)] * count + [(0, 1)], method="highs")
+        return (float(solution.x[-1]), solution.x[:-1]) if solution.status == 0 else (1.0, np.zeros(count))
+
+    def refine(self, decision: Any) -> bool:
+        """Add the worst of many new points; False where none is worse than those at hand."""
+        known = len(self.lines)
+        tight = np.argsort(np.array(self.lines) @ decision)[: 2 * len(decision)]
+        for i in range(_MORE):
+            if i % 2:
+                self.add(int(self.random.integers(len(self.rows))), self.draw())
+            else:
+                row, point = self.places[int(self.random.choice(tight))]
+                self.add(row, self.near(point))
+        values = np.array(self.lines[known:]) @ decision
+        kept = [known + int(i) for i in np.argsort(values)[: _MORE // 4] if values[i] < _SURE]
+        self.places[known:] = [self.places[i] for i in kept]
+        self.lines[known:] = [self.lines[i] for i in kept]
+        return bool(kept)
+
+    def exact(self) -> Dual | None:
+        """Weights of a basic solution, solved for exactly."""
+        A = np.vstack([np.array(self.lines).T, np.ones(len(self.lines))])
+        b = np.array([*[0.0] * (len(A) - 1), 1.0])
+        solution = linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=b, bounds=(0, None), method="highs-ds")
+        if solution.status != 0:
+            return None
+        chosen = [self.places[i] for i in np.flatnonzero(solution.x > _SURE)]
+        weights = _null_vector([_values(self.rows[row], point) for row, point in chosen])
+        if weights is None:
+            return None
+        atoms = tuple(
+            Atom(obligation=self.rows[row][0].name, point=point, weight=w)
+            for (row, point), w in zip(chosen, weights, strict=True)
+        )
+        answer = Dual(loop=self.loop, degree=self.degree, atoms=atoms)
+        return answer if answer.holds else None
+
+
+def _null_vector(rows: Sequence[Sequence[Fraction]]) -> list[Fraction] | None:
+    """Positive w with Σ w_i row_i = 0, where it is unique up to its size."""
+    entries = [[fmpq(v.numerator, v.denominator) for v in column] for column in zip(*rows, strict=True)]
+    reduced, rank = fmpq_mat(entries).rref()
+    if rank != len(rows) - 1:
+        return None
+    free = next(j for j in range(len(rows)) if j >= rank or reduced[j, j] != 1)
+    vector = [-fraction_of(reduced[i, free]) for i in range(rank)]
+    vector.insert(free, Fraction(1))
+    return vector if min(vector) > 0 else None

@@ -1,0 +1,185 @@
+"""Forms V and −V̇ on cells and vertices, with gains and ranges as parameters.
+
+The second chapter evaluates them in floating point and caches them for all loops of one structure.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from itertools import product
+from typing import Any
+
+from quakedesign.lyapunov.exact.claim import Loop
+from quakedesign.lyapunov.exact.obligations import Obligations, power_sum
+from quakedesign.sos import Polynomial
+from quakedesign.symbolic.term_expressions import signed_monomials
+from quakedesign.symbolic.terms import Term, cell_polynomial
+
+# ----------------------------------------------------------------------
+# V_j and −V̇_j on every different cell and vertex, with gains and ranges left as names.
+
+Part = tuple[int, tuple[int, ...], tuple[str, ...], Fraction | float]
+"""j, exponents, names multiplied, coefficient."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FormRow:
+    """V, or −V̇ beside V, on one cell (and vertex): a form Σ_j a_j P_j that must be non-negative there.
+
+    Attributes
+    ----------
+    cell : str
+        Signs of the states.
+    function, fall : tuple of Part
+        Terms of all V_j, and of all −V̇_j; the latter is empty for the row of V itself.
+    equalities, inequalities : tuple of Polynomial
+        Conditions on the variables, besides u ≥ 0.
+    """
+
+    cell: str
+    function: tuple[Part, ...]
+    fall: tuple[Part, ...] = ()
+    equalities: tuple[Polynomial, ...] = ()
+    inequalities: tuple[Polynomial, ...] = ()
+
+    @property
+    def rate(self) -> bool:
+        """Whether P_j is −V̇_j; else V_j."""
+        return bool(self.fall)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Terms of all P_j."""
+        return self.fall or self.function
+
+    @property
+    def margin(self) -> Polynomial:
+        """N = Σ u_i^n over the states, n the degree of the form."""
+        states, width = (len(parts[0][1]) for parts in (self.function, self.parts))
+        return power_sum(states, max(sum(e) for _, e, _, _ in self.parts), width)
+
+
+def ends_of(loop: Loop) -> dict[str, tuple[tuple[str, int], ...]]:
+    """Ends of every range: ±name where it is [−x, x], name where it is a point, else name- and name+."""
+    ends: dict[str, tuple[tuple[str, int], ...]] = {}
+    for name, (low, high) in loop.uncertain.items():
+        if low == -high:
+            ends[name] = ((name, -1), (name, 1))
+        else:
+            ends[name] = ((name, 1),) if low == high else ((f"{name}-", 1), (f"{name}+", 1))
+    return ends
+
+
+def values_of(loop: Loop) -> dict[str, float]:
+    """Numbers that the names stand for, roots included (their enclosures are narrow)."""
+    values = {name: float(v) for name, v in loop.parameters.items()}
+    for name, (of, _) in loop.roots.items():
+        values[name] = values[of] ** 0.5
+    for name, (low, high) in loop.uncertain.items():
+        values |= {name: float(high), f"{name}-": float(low), f"{name}+": float(high)}
+    return values
+
+
+def rows_of(loop: Loop, monomials: Sequence[Term], *, beside: bool = False) -> tuple[FormRow, ...]:
+    """Every different form of V, then of −V̇; two that differ in the V beside them alone are one unless told.
+
+    Raises
+    ------
+    CertificateError
+        When the law has nested powers that certificates do not know.
+    """
+    columns = [Obligations(loop, (term,)) for term in monomials]
+    rows: dict[tuple[Any, ...], FormRow] = {}
+    for row in (*_functions(columns), *_falls(loop, columns)):
+        conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
+        rows.setdefault((row.rate, row.parts, row.function if beside else (), conditions), row)
+    return tuple(rows.values())
+
+
+def _functions(columns: Sequence[Obligations]) -> Iterator[FormRow]:
+    for cell in columns[0].sign_cells():
+        yield FormRow(cell=cell.name, function=_potential(columns, cell.signs))
+
+
+def _potential(columns: Sequence[Obligations], signs: Mapping[str, int]) -> tuple[Part, ...]:
+    return tuple(sorted((j, e, (), c) for j, column in enumerate(columns) for e, c in column.potential(signs).items()))
+
+
+def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[FormRow]:
+    first, ends = columns[0], ends_of(loop)
+    weights = {**loop.states, **first.lift_degrees}
+    kept = [i for i, name in enumerate(weights) if name in loop.states or name in first.with_variable]
+    terms = [(j, term) for j, column in enumerate(columns) for term in column.derivative]
+    for cell in first.cells:
+        plain = [(j, term.parameters, *_single(term, weights, cell.signs)) for j, term in terms]
+        function = _potential(columns, cell.signs)
+        word = "".join("+" if cell.signs[s] > 0 else "-" for s in loop.states)
+        for choice in product(*ends.values()):
+            vertex = dict(zip(ends, choice, strict=True))
+            total: dict[tuple[Any, ...], Fraction] = {}
+            for j, names, exponents, coefficient in plain:
+                chosen = [vertex.get(name, (name, 1)) for name in names]
+                key = (j, tuple(exponents[i] for i in kept), tuple(sorted(name for name, _ in chosen)))
+                sign = math.prod(factor for _, factor in chosen)
+                total[key] = total.get(key, Fraction(0)) - coefficient * sign
+            parts = tuple(sorted((*key, c) for key, c in total.items() if c))
+            if parts:
+                yield FormRow(
+                    cell=word, function=function, fall=parts, equalities=cell.equalities, inequalities=cell.inequalities
+                )
+
+
+def _single(term: Term, weights: Mapping[str, int], signs: Mapping[str, int]) -> tuple[tuple[int, ...], Fraction]:
+    """Exponents and coefficient of one term on a cell, its parameters left out."""
+    found = cell_polynomial((Term(term.coefficient, (), term.factors),), weights, signs, {})
+    return next(iter(found.items()))
+
+
+# ----------------------------------------------------------------------
+# V and −V̇ on every different cell and vertex in floats, kept for all loops of one structure.
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """All of a loop that the rows depend on, to tell whether they can be used again."""
+
+    loop: tuple[Any, ...]
+    inside: tuple[tuple[str, Fraction], ...]
+    points: tuple[tuple[str, bool, bool], ...]
+    degree: int
+
+    @classmethod
+    def of(cls, loop: Loop, degree: int) -> "Structure":
+        """Structure of a loop and a degree of V; numbers count only inside nested powers."""
+        names = {p for terms in loop.lifts.values() for term in terms for p in term.parameters}
+        known = {**loop.parameters, **{name: low for name, (low, _) in loop.ranges.items()}}
+        fixed = (loop.law, tuple(loop.states.items()), tuple(loop.field.items()), tuple(loop.lifts.items()))
+        inside = tuple(sorted((name, known[name]) for name in names))
+        return cls(fixed, inside, tuple((n, a == b, a == -b) for n, (a, b) in loop.ranges.items()), degree)
+
+
+class Kin:
+    """A loop, the same as any other one of its structure."""
+
+    def __init__(self, loop: Loop, degree: int) -> None:
+        self.loop, self.structure = loop, Structure.of(loop, degree)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Kin) and self.structure == other.structure
+
+    def __hash__(self) -> int:
+        return hash(self.structure)
+
+
+@lru_cache(maxsize=32)
+def float_rows(kin: Kin) -> tuple[FormRow, ...]:
+    """Every different row of the monomials of V, each −V̇ with the V beside it."""
+    monomials = signed_monomials(kin.loop.states, kin.structure.degree, kin.loop.domain)
+    rows = rows_of(kin.loop, monomials, beside=True)
+    return tuple(replace(row, function=_floats(row.function), fall=_floats(row.fall)) for row in rows)
+
+
+def _floats(parts: Iterable[Part]) -> tuple[Part, ...]:
+    return tuple((j, e, names, float(c)) for j, e, names, c in parts)

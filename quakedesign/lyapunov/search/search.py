@@ -1,0 +1,567 @@
+"""Search for a Lyapunov function of given gains, finished by an exact certificate.
+
+One pipeline for every law: candidates, scaling by powers of two, conic programme, claims with a margin,
+and rounding to exact witnesses. Further chapters: quadratic functions in floating point, and cached
+results of the presets; a cached certificate counts only after its exact check.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from fractions import Fraction
+from functools import wraps
+from hashlib import sha256
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+from quakedesign.cache import in_use, search_once
+from quakedesign.errors import CertificateError, WorkError
+from quakedesign.exact import nearest
+from quakedesign.files import write_whole
+from quakedesign.laws import LoopField, Subject, law
+from quakedesign.laws.loop_field import lowest_degree
+from quakedesign.lyapunov.exact.certificate import Certificate, decided_once, parse_certificate
+from quakedesign.lyapunov.exact.certificate_files import certificate_text
+from quakedesign.lyapunov.exact.claim import Equilibrium, Loop, Verdict, Witness
+from quakedesign.lyapunov.exact.obligations import (
+    Obligation,
+    Obligations,
+    claimed,
+    different,
+    obligation_degree,
+    power_sum,
+    statement_of,
+    width,
+    with_decay,
+)
+from quakedesign.sos import Polynomial
+from quakedesign.sos.exact.polynomial import constant, monomial, product
+from quakedesign.sos.exact.proofs import Square, SumOfSquares
+from quakedesign.sos.solve.conic import handing_back
+from quakedesign.sos.solve.decide import strict_proof
+from quakedesign.sos.solve.joint import Demand, Proposal, joint_program
+from quakedesign.symbolic.term_expressions import signed_monomials
+from quakedesign.symbolic.terms import Factor, Term
+
+# ----------------------------------------------------------------------
+# From a Lyapunov function and its claims to a certificate: an exact witness for every obligation.
+
+_LEVELS = (0, 1, 2)
+DECAY_LEVEL = 2
+
+
+def finish(
+    loop: Loop,
+    lyapunov: tuple[Term, ...],
+    claims: Mapping[str, Fraction],
+    subject: Subject | None = None,
+) -> Certificate | None:
+    """Find exact witnesses for every obligation of a given V; None when one is missing."""
+    witnesses: dict[str, Witness] = {}
+    try:
+        for one in different(claimed(loop, lyapunov, claims)):
+            witness = witness_of(one, loop.domain)
+            if witness is None:
+                return None
+            witnesses[one.name] = witness
+        certificate = Certificate(loop=loop, lyapunov=lyapunov, claims=dict(claims), witnesses=witnesses)
+        readable = parse_certificate(certificate_text(certificate)) == certificate
+        return certificate if readable and decided_once(certificate, subject) is Verdict.PROVED else None
+    except (CertificateError, WorkError):
+        return None
+
+
+def witness_of(one: Obligation, domain: str) -> Witness | None:
+    """Exact witness of one obligation, with the lowest power of the sum of all variables that works as multiplier."""
+    size = width(one)
+    if not one.polynomial:
+        empty: tuple[dict[Any, Any], ...] = tuple({} for _ in one.equalities)
+        return Witness(multiplier=constant(size), cofactors=empty, conditions=len(one.inequalities))
+    first = DECAY_LEVEL if one.name.startswith("decay") else 0
+    for level in range(first, first + len(_LEVELS)) if domain == "cells" else (0,):
+        multiplier = power_of_sum(size, level)
+        proof = strict_proof(statement_of(one, domain, multiplier))
+        if proof is not None:
+            return Witness(
+                multiplier=multiplier,
+                squares=_ordered(proof, size),
+                cofactors=proof.cofactors,
+                conditions=len(one.inequalities),
+            )
+    return None
+
+
+def power_of_sum(size: int, power: int) -> dict[tuple[int, ...], Fraction]:
+    """(Σ u_i)^power."""
+    total = {tuple(int(i == j) for j in range(size)): Fraction(1) for i in range(size)}
+    return product(size, [total] * power)
+
+
+def _ordered(proof: SumOfSquares, size: int) -> tuple[Square, ...]:
+    """Squares without a condition first, then by condition, as in the file."""
+    return tuple(sorted(proof.squares, key=lambda s: max((i - size + 1 for i in s.product), default=0)))
+
+
+# ----------------------------------------------------------------------
+# Powers of two that make a loop's numbers about one before a solver sees them.
+
+
+def balance(loop: Loop) -> tuple[Fraction, ...]:
+    """Powers of two 2^n_i that make the terms of every state's rate about equally large, for u_i = 2^n_i·ũ_i.
+
+    Least squares on the logarithms; the first state keeps its scale. A nested power counts as that of each of its
+    terms.
+    """
+    states = tuple(loop.states)
+    rows, sides = [], []
+    for terms in loop.field.values():
+        plain = [one for term in terms for one in _without_lifts(term, loop)]
+        entries = [_logarithm(term, loop, states) for term in plain if term.factors and _size(term, loop)]
+        for (e, c), (f, d) in pairwise(entries):
+            if max(e) and max(f):
+                rows.append([a - b for a, b in zip(e, f, strict=True)])
+                sides.append(d - c)
+    if len(states) == 1 or not rows:
+        return (Fraction(1),) * len(states)
+    solution, *_ = np.linalg.lstsq(np.array(rows)[:, 1:], np.array(sides), rcond=None)
+    return (Fraction(1), *(Fraction(2) ** round(float(n)) for n in solution))
+
+
+def _without_lifts(term: Term, loop: Loop) -> Iterator[Term]:
+    """The term with its nested power replaced by the power of each of its arguments' terms, sizes left out."""
+    lift = next((f for f in term.factors if f[0] in loop.lifts), None)
+    if lift is None:
+        yield term
+        return
+    for inner in loop.lifts[lift[0]]:
+        if inner.factors and _size(inner, loop):
+            powers: dict[str, Fraction] = {}
+            for name, exponent, _ in (*(f for f in term.factors if f != lift), *inner.factors):
+                share = exponent * lift[1] if (name, exponent, _) in inner.factors else exponent
+                powers[name] = powers.get(name, Fraction(0)) + share
+            factors: tuple[Factor, ...] = tuple((name, e, "a") for name, e in powers.items() if e)
+            yield from _without_lifts(Term(term.coefficient, term.parameters, factors), loop)
+
+
+def _logarithm(term: Term, loop: Loop, states: Sequence[str]) -> tuple[list[float], float]:
+    exponents = [0.0] * len(states)
+    for state, exponent, _ in term.factors:
+        exponents[states.index(state)] = float(exponent * loop.states[state])
+    return exponents, math.log2(_size(term, loop))
+
+
+def _size(term: Term, loop: Loop) -> Fraction:
+    size = Fraction(abs(term.coefficient))
+    for name in term.parameters:
+        ends = loop.ranges.get(name) or (loop.parameters[name],) * 2
+        size *= max(abs(ends[0]), abs(ends[1]))
+    return size
+
+
+def lifted_scale(equalities: Sequence[Polynomial], scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """Scale of all variables, given that of the first ones: each equality t·w^n = P fixes that of its w in turn."""
+    scales = list(scale)
+    for equality in equalities:
+        position = len(scales)
+        power = max(e[position] for e in equality)
+        sizes = [abs(c) * monomial(scales, e[:position]) for e, c in equality.items() if not any(e[position:])]
+        largest = max(sizes, default=Fraction(1))
+        exponent = (math.log2(largest.numerator) - math.log2(largest.denominator)) / power
+        scales.append(Fraction(2) ** round(exponent))
+    return tuple(scales)
+
+
+def below(number: float) -> Fraction:
+    """Positive number rounded down to about three digits, as a short rational; zero stays zero."""
+    if not number > 0 or not math.isfinite(number):
+        return Fraction(0)
+    shift = Fraction(2) ** (9 - math.floor(math.log2(number)))
+    return Fraction(math.floor(Fraction(number) * shift)) / shift
+
+
+def scaled(polynomial: Polynomial, scale: Sequence[Fraction], factor: Fraction = Fraction(1)) -> Polynomial:
+    """factor · P(scale ∘ ũ)."""
+    return {e: c * factor * monomial(scale, e) for e, c in polynomial.items()}
+
+
+def normal(polynomial: Polynomial, scale: Sequence[Fraction]) -> Polynomial:
+    """P(scale ∘ ũ) over its largest coefficient."""
+    moved = scaled(polynomial, scale)
+    size = max(abs(c) for c in moved.values())
+    return {e: c / size for e, c in moved.items()}
+
+
+def exponents_of(term: Term, weights: Mapping[str, int]) -> tuple[int, ...]:
+    """Exponents of a monomial of V in the cell variables of the states."""
+    powers = {state: exponent * weights[state] for state, exponent, _ in term.factors}
+    return tuple(int(powers.get(state, 0)) for state in weights)
+
+
+# ----------------------------------------------------------------------
+# Quadratic Lyapunov functions as matrices, in floating point: proposals, no proofs.
+
+
+def quadratic_terms(states: Sequence[str], coefficient: Callable[[int, int], Fraction]) -> tuple[Term, ...]:
+    """Σ c_ij·x_i·x_j over i ≤ j as terms, without zeros."""
+    squares = ((left, Fraction(2), "a") for left in states)
+    return tuple(
+        Term(value, (), (square,) if i == j else ((left, Fraction(1), "s"), (right, Fraction(1), "s")))
+        for i, (left, square) in enumerate(zip(states, squares, strict=True))
+        for j, right in enumerate(states)
+        if i <= j and (value := coefficient(i, j))
+    )
+
+
+def quadratic_matrix(loop: Loop, lyapunov: tuple[Term, ...]) -> Any:
+    """Matrix of a quadratic V, as floats (n × n)."""
+    return _matrix(next(iter(Obligations(loop, lyapunov).function()))[1], len(loop.states))
+
+
+def _matrix(polynomial: Polynomial, size: int) -> Any:
+    full = np.zeros((size, size))
+    for exponents, c in polynomial.items():
+        i, *rest = [k for k, e in enumerate(exponents) for _ in range(e)]
+        full[i, rest[0]] += float(c) / 2
+        full[rest[0], i] += float(c) / 2
+    return full
+
+
+def quadratic_margin(loop: Loop, lyapunov: tuple[Term, ...]) -> Fraction:
+    """Lower bound on the smallest eigenvalue of a quadratic V, 1/trace of the inverse; a proposal, not a proof."""
+    V = quadratic_matrix(loop, lyapunov)
+    scale = 1 / np.sqrt(np.abs(np.diag(V)))
+    inverse = np.linalg.inv(scale[:, None] * V * scale[None, :]) * scale[:, None] * scale[None, :]
+    return below(float(1 / np.trace(inverse)))
+
+
+def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
+    """Largest a with V' ≤ −2aV at every vertex, for a quadratic V; floating point, may be negative."""
+    obligations = Obligations(loop, lyapunov)
+    size = len(loop.states)
+    V = quadratic_matrix(loop, lyapunov)
+    diagonal = np.diag(1 / np.sqrt(np.abs(np.diag(V))))
+    try:
+        return min(
+            float(
+                eigh(diagonal @ _matrix(one.polynomial, size) @ diagonal, diagonal @ V @ diagonal, eigvals_only=True)[0]
+            )
+            / 2
+            for _, one in obligations.decrease("rate")
+        )
+    except np.linalg.LinAlgError:
+        return -1.0
+
+
+# ----------------------------------------------------------------------
+# How much is claimed of a Lyapunov function: margins, decay rate and bounds, with room to spare for exact proofs.
+
+GIVE_AWAY = Fraction(1, 2)
+_DECAY_SHARE = 0.99
+
+
+def claims_of(loop: Loop, lyapunov: tuple[Term, ...], margins: tuple[Fraction, Fraction]) -> dict[str, Fraction]:
+    """Claims with room to spare: half of the margins, and on the reals 99 % of the decay rate of V."""
+    if loop.domain == "cells":
+        return {"positive": margins[0] * GIVE_AWAY, "decrease": margins[1] * GIVE_AWAY}
+    return {"positive": margins[0] * GIVE_AWAY, "rate": below(0.99 * quadratic_rate(loop, lyapunov))}
+
+
+def bounds_of(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> dict[str, Fraction]:
+    """Claims V ≥ γ u_x^m for every state, 10 % below the largest γ that the solver finds."""
+    function = [p for _, p in Obligations(loop, lyapunov).function()]
+    m, size = obligation_degree(function, "V"), len(loop.states)
+    different = list({tuple(sorted(p.items())): p for p in function}.values())
+    claims = {}
+    for i, state in enumerate(loop.states):
+        corner = {tuple(m * (j == i) for j in range(size)): Fraction(1)}
+        obligations = [Obligation(state, p) for p in different]
+        gamma = below(0.9 * min(_largest(one, corner, loop.domain, scale, 0) for one in obligations))
+        if gamma > 0:
+            claims[f"bound_{state}"] = gamma
+    return claims
+
+
+def with_largest_decay(
+    certificate: Certificate, scale: Sequence[Fraction], subject: Subject | None = None
+) -> Certificate | None:
+    """The same certificate with V̇ ≤ −κV^{n/m} claimed, κ 1 % below the largest that the solver finds; None if none."""
+    loop, lyapunov = certificate.loop, certificate.lyapunov
+    obligations = Obligations(loop, lyapunov)
+    m = obligation_degree([p for _, p in obligations.function()], "V")
+    decrease = list(obligations.decrease("decrease"))
+    n = obligation_degree([one.polynomial for _, one in decrease], "V̇")
+    largest = float("inf")
+    for bare in different(with_decay(obligations, cell, one, Fraction(0), m, n) for cell, one in decrease):
+        power = {(*(0,) * (width(bare) - 1), n): Fraction(1)}
+        largest = min(largest, _largest(bare, power, loop.domain, scale, DECAY_LEVEL))
+    kappa = below(_DECAY_SHARE * largest)
+    if kappa <= 0:
+        return None
+    return finish(loop, lyapunov, {**certificate.claims, "decay": kappa}, subject)
+
+
+def _largest(
+    one: Obligation,
+    direction: Mapping[Any, Any],
+    domain: str,
+    scale: Sequence[Fraction],
+    level: int,
+) -> float:
+    """Largest g for which the solver finds P − g·direction in the cone, 0 if it finds none; proves nothing."""
+    whole = lifted_scale(one.equalities, scale)
+    size = max(abs(c) for c in scaled(one.polynomial, whole).values())
+    moved = Obligation(
+        one.name,
+        scaled(one.polynomial, whole, 1 / size),
+        tuple(scaled(h, whole) for h in one.equalities),
+        tuple(scaled(g, whole) for g in one.inequalities),
+    )
+    (corner,) = direction
+    unit = whole[next(i for i, x in enumerate(corner) if x)] ** sum(corner) / size
+    support = dict.fromkeys((*moved.polynomial, corner), Fraction(1))
+    kind = Obligation(one.name, support, moved.equalities, moved.inequalities)
+    template = statement_of(kind, domain, power_of_sum(len(whole), level))
+    demand = Demand(template=template, parts=(moved.polynomial,), margin=direction)
+    proposal = joint_program([demand]).solve([demand])
+    return 0.0 if proposal is None else max(0.0, proposal.margin) / float(unit)
+
+
+# ----------------------------------------------------------------------
+# Searches that every comparison of the presets asks for again, with what they have found: it is decided anew.
+#
+# The folder `found` has a certificate for each such question, or ``null`` where nothing was found, by a digest of the
+# question; what else was searched for on this machine is in `quakedesign.cache`. A certificate counts after its exact
+# check only, so that a wrong file costs time and proves nothing.
+
+FOLDER = Path(__file__).parent / "found"
+_NOTHING = "null\n"
+
+Search = Callable[[Loop, int, Subject | None], Certificate | None]
+
+
+def kept(search: Search) -> Search:
+    """Take what a search has found before from the folder; search where it has nothing that holds."""
+
+    @wraps(search)
+    def known(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
+        path, found = place(loop, degree), list[Certificate | None]()
+
+        def searched() -> str:
+            found.append(search(loop, degree, subject))
+            return _NOTHING if found[0] is None else certificate_text(found[0])
+
+        if path.exists():
+            text = path.read_text(encoding="utf-8")
+        elif handing_back() or not in_use():
+            return search(loop, degree, subject)
+        else:
+            text = search_once(searched, "lyapunov", loop, degree)
+        if found:
+            return found[0]
+        if text == _NOTHING:
+            return None
+        try:
+            certificate = parse_certificate(text)
+            if certificate.loop == loop and decided_once(certificate, subject) is Verdict.PROVED:
+                return certificate
+        except (CertificateError, WorkError):
+            pass
+        return search(loop, degree, subject)
+
+    return known
+
+
+def place(loop: Loop, degree: int) -> Path:
+    """File of a question: a loop with all its numbers, and the degree of V."""
+    asked = repr([degree, *((field.name, getattr(loop, field.name)) for field in fields(loop))])
+    return FOLDER / f"{loop.law}_{sha256(asked.encode()).hexdigest()[:16]}.json"
+
+
+def keep(loop: Loop, degree: int, certificate: Certificate | None) -> None:
+    """Write what a search has found."""
+    write_whole(place(loop, degree), _NOTHING if certificate is None else certificate_text(certificate))
+
+
+# ----------------------------------------------------------------------
+# Search for a Lyapunov function of given gains, finished in exact arithmetic. One pipeline for every law.
+
+_WORTH_A_PROOF = 1e-9
+"""Margins above this are worth a proof in exact arithmetic, which decides."""
+_DIGITS = (1 << 14, 1 << 20, 1 << 30)
+_HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # beyond, rounding errors or seconds of search outweigh what is gained
+
+
+def candidate_degrees(loop: Loop) -> tuple[int, ...]:
+    """Degrees of V to try in turn: the lowest that couples the heaviest states, then even ones up to 8, in 2-D 10."""
+    lowest = lowest_degree(loop.states.values(), loop.domain)
+    if loop.domain == "reals":
+        return (lowest,)
+    highest = _HIGHEST_IN_THE_PLANE if len(loop.states) <= 2 else _HIGHEST_DEGREE
+    return (lowest, *(m for m in range(lowest + 1, highest + 1) if m % 2 == 0))
+
+
+def find_certificate(
+    loop: Loop, degrees: int | Iterable[int] | None = None, *, subject: Subject | None = None
+) -> Certificate | None:
+    """Lyapunov function with an exact proof, or None when the search finds none.
+
+    Parameters
+    ----------
+    loop : Loop
+    degrees : int or iterable of int, optional
+        Of V in the weights of the loop, tried in turn; `candidate_degrees` unless given.
+    subject : str, type of Law or LoopField, optional
+        What the loop is one of; needed for a law from outside the package.
+
+    Returns
+    -------
+    Certificate or None
+        Already checked in exact arithmetic. None says nothing about the loop.
+    """
+    if degrees is None:
+        degrees = candidate_degrees(loop)
+    chosen = (degrees,) if isinstance(degrees, int) else degrees
+    return next(filter(None, (_of_degree(loop, degree, subject) for degree in chosen)), None)
+
+
+@kept
+def _of_degree(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
+    scale = balance(loop)
+    family = family_of(loop, degree, scale)
+    if family is None:
+        return None
+    proposal = joint_program(family.demands).solve(family.demands)
+    if proposal is None or not proposal.margin > _WORTH_A_PROOF:
+        return None
+    return finished(loop, family, proposal, scale, subject)
+
+
+def finished(
+    loop: Loop, family: "Family", proposal: Proposal, scale: Sequence[Fraction], subject: Subject | None = None
+) -> Certificate | None:
+    """Certificate from a proposal of a family in scaled variables, with the shortest rounding that has a proof.
+
+    Roundings that are coarser than the margin are not tried.
+    """
+    degree = sum(exponents_of(family.monomials[0], loop.states))
+    for digits in [d for d in _DIGITS if d * proposal.margin > 1] or _DIGITS[-1:]:
+        lyapunov = family.function(proposal.decision, digits)
+        margins = (
+            below(proposal.margin * float(min(1 / r**degree for r in scale))),
+            below(proposal.margin * float(family.pace * min(1 / r**family.fallen for r in scale))),
+        )
+        claims = claims_of(loop, lyapunov, margins) | bounds_of(loop, lyapunov, scale)
+        certificate = finish(loop, lyapunov, claims, subject)
+        if certificate is not None:
+            return certificate
+    return None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Family:
+    """Lyapunov functions Σ a_j V_j with the monomials of one degree, as demands on a_j.
+
+    Attributes
+    ----------
+    monomials : tuple of Term
+        V_j·size_j.
+    sizes : tuple of Fraction
+        What a monomial is divided by, so that all are about one in the scaled variables.
+    demands : tuple of Demand
+        V and −V̇ on every different cell and vertex, scaled.
+    pace : Fraction
+        What −V̇ was divided by.
+    fallen : int
+        Degree of V̇.
+    """
+
+    monomials: tuple[Term, ...]
+    sizes: tuple[Fraction, ...]
+    demands: tuple[Demand, ...]
+    pace: Fraction
+    fallen: int
+
+    def function(self, decision: Sequence[float], digits: int) -> tuple[Term, ...]:
+        """V with coefficients rounded to multiples of 1/digits in the scaled variables."""
+        return sum_of(self.monomials, self.sizes, decision, digits)
+
+
+def sum_of(
+    monomials: Sequence[Term], sizes: Sequence[Fraction], decision: Sequence[float], digits: int
+) -> tuple[Term, ...]:
+    """Σ a_j·monomial_j/size_j with every a_j rounded to a multiple of 1/digits."""
+    chosen = [nearest(a, digits) for a in decision]
+    return tuple(
+        Term(a / size, t.parameters, t.factors) for a, size, t in zip(chosen, sizes, monomials, strict=True) if a
+    )
+
+
+def family_of(loop: Loop, degree: int, scale: Sequence[Fraction]) -> Family | None:
+    """Demands of all Lyapunov functions of one degree; None where there are no candidates."""
+    monomials = signed_monomials(loop.states, degree, loop.domain)
+    sizes = tuple(monomial(scale, exponents_of(term, loop.states)) for term in monomials)
+    columns = [Obligations(loop, (term,)) for term in monomials]
+    function = _rows([[Obligation(name, p) for name, p in c.function()] for c in columns])
+    decrease = _rows([[one for _, one in c.decrease("")] for c in columns])
+    fallen = max((sum(e) for row in decrease for one in row for e in one.polynomial), default=0)
+    if not fallen or not function or not all(any(one.polynomial for one in row) for row in decrease):
+        return None
+    moved = [[_moved(one, scale, 1 / size) for one, size in zip(row, sizes, strict=True)] for row in decrease]
+    pace = max(abs(c) for row in moved for one in row for c in one.polynomial.values())
+    demands = [
+        *(
+            _demand([_moved(o, scale, 1 / s) for o, s in zip(row, sizes, strict=True)], loop, degree)
+            for row in function
+        ),
+        *(_demand([_moved(o, (), 1 / pace) for o in row], loop, fallen) for row in moved),
+    ]
+    return Family(monomials=monomials, sizes=sizes, demands=tuple(demands), pace=pace, fallen=fallen)
+
+
+def _rows(columns: list[list[Obligation]]) -> list[list[Obligation]]:
+    """Obligations (rows) without repetitions, each for every candidate."""
+    rows = {tuple(one.key for one in row): list(row) for row in zip(*columns, strict=True)}
+    return list(rows.values())
+
+
+def _moved(one: Obligation, scale: Sequence[Fraction], factor: Fraction) -> Obligation:
+    """Obligation in scaled variables, its polynomial times a factor; no scale leaves the variables."""
+    if not scale:
+        return Obligation(
+            one.name, {e: c * factor for e, c in one.polynomial.items()}, one.equalities, one.inequalities
+        )
+    whole = lifted_scale(one.equalities, scale)
+    return Obligation(
+        one.name,
+        scaled(one.polynomial, whole, factor),
+        tuple(normal(h, whole) for h in one.equalities),
+        tuple(normal(g, whole) for g in one.inequalities),
+    )
+
+
+def _demand(row: Sequence[Obligation], loop: Loop, power: int) -> Demand:
+    size = next(len(e) for one in row for p in (one.polynomial, *one.equalities) for e in p)
+    margin = power_sum(len(loop.states), power, size)
+    support = dict.fromkeys([*(e for one in row for e in one.polynomial), *margin], Fraction(1))
+    template = statement_of(Obligation("", support, row[0].equalities, row[0].inequalities), loop.domain)
+    return Demand(template=template, parts=[one.polynomial for one in row], margin=margin)
+
+
+def refute(loop: Loop, subject: Subject) -> Certificate | None:
+    """Counterexample suggested by the law, checked in exact arithmetic, or None; a bare loop suggests none."""
+    if isinstance(subject, LoopField):
+        return None
+    chosen = law(subject) if isinstance(subject, str) else subject
+    parts = chosen.counterexample(loop.gains, loop.uncertain)
+    if parts is None:
+        return None
+    certificate = Certificate(loop=loop, refutation=Equilibrium(**parts))
+    try:
+        certificate.check(subject)
+    except CertificateError:
+        return None
+    return certificate

@@ -1,0 +1,115 @@
+"""Comparisons that show themselves: as JSON, as figures, in a notebook."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from quakedesign.fault import Fault
+from quakedesign.loop import simulation_scheme
+from quakedesign.report.figures import figures
+from quakedesign.report.page import table_html
+from quakedesign.report.sentences import headline, remarks, said
+from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared, designs_of
+from quakedesign.studies.runs import StateRun
+from quakedesign.synthesis import Design
+
+
+class Comparison(Compared):
+    """Uncontrolled, published and designed on one fault, see `Compared`."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys of the command ``design`` in DESIGN.md."""
+        by_origin = {
+            o: {e.design.name: e.to_dict() | {"headline": headline(e), "remarks": remarks(e)} for e in self.of(o)}
+            for o in ("designed", "published")
+        }
+        run = self.uncontrolled
+        return {
+            "controllers": by_origin["designed"],
+            "published": by_origin["published"],
+            "uncontrolled": {
+                "outcome": run.outcome.to_dict(),
+                "metrics": run.metrics.to_dict(),
+                "events": dict(run.events),
+                "run": dict(run.provenance),
+                "cycle": run.cycle if isinstance(run, StateRun) else None,
+            },
+            "not_applicable": self.left_out,
+        }
+
+    def figures(self) -> dict[str, Any]:
+        """Matplotlib figures by name."""
+        return figures(self)
+
+    def __repr__(self) -> str:
+        return "\n".join((f"Comparison on {self.fault.name}:", *(f"  {e.label}: {said(e)}" for e in self.entries)))
+
+    def _repr_html_(self) -> str:
+        return table_html(self)
+
+
+def compare(
+    fault: Fault,
+    designs: Sequence[Design] = (),
+    *,
+    with_published: bool = True,
+    scheme: str | None = None,
+    published_scheme: str | None = None,
+    whole_task: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+) -> Comparison:
+    """Run all controllers of a fault over the whole task, step T_s; of a slow one with a state over 500 D_c/V.
+
+    Parameters
+    ----------
+    fault : Fault
+    designs : sequence of Design
+        Designed controllers; one without a controller is reported and not run.
+    with_published : bool
+        Add the paper's gains, where the fault has any, with their verdicts and premises; not beside designs that act
+        behind a delay, a lag or rock, which those do not know.
+    scheme, published_scheme : str
+        Of the runs of designed and of published gains, see `quakedesign.loop.schemes`; ``continuous``, as in the
+        paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed, as all
+        designs do that are not continuous.
+    whole_task : bool
+        Run all of a task of friction with a state, however slow.
+    progress : callable, optional
+        Called with what is being done and the fraction done [-].
+
+    Returns
+    -------
+    Comparison
+    """
+    schemes = {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}
+    tell = progress or (lambda _what, _done: None)
+    how: dict[str, Any] = {"with_published": with_published, "whole_task": whole_task, "schemes": schemes}
+    return Comparison(**vars(compared(fault, designs, tell, **how)))
+
+
+def designed_comparison(
+    fault: Fault,
+    names: Iterable[str],
+    tell: Callable[[str, float], None],
+    *,
+    options: Mapping[str, Any] | None = None,
+    whole_task: bool = False,
+    **schemes: Any,
+) -> Comparison:
+    """Comparison of a fault's designs of the named laws and the published gains.
+
+    Parameters
+    ----------
+    fault : Fault
+    names : iterable of str
+    tell : callable
+        Progress.
+    options : mapping, optional
+        Of `quakedesign.design`, such as ``objective`` and ``continuous``.
+    whole_task : bool
+        As of `compare`.
+    **schemes
+        ``scheme`` and ``published_scheme`` of `compare`.
+    """
+    for name in filter(None, schemes.values()):
+        simulation_scheme(name)
+    return compare(fault, designs_of(fault, names, tell, options), whole_task=whole_task, progress=tell, **schemes)

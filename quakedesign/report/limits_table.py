@@ -1,0 +1,157 @@
+"""Limits of a fault as lines, as a figure and as a folder."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+import numpy as np
+
+from quakedesign.exact import Bound, LowerBound, UpperBound, rational
+from quakedesign.files import whole_folder
+from quakedesign.guarantees import SlidingGuarantee
+from quakedesign.report.drawing import NATURAL, figure, finish, write_figures, write_results
+from quakedesign.studies import Limits
+from quakedesign.studies.performance_limits import SlidingLimits
+
+_FORBIDDEN, _HIDDEN, _PROVED = "#F3C6B2", "#F9E4DA", "#0072B2"
+
+
+def limits_lines(limits: Limits) -> list[str]:
+    """For people, within 80 columns."""
+    task = limits.fault
+    head = [
+        f"{task.name}: what no controller can do, beside what is proved of designs",
+        f"(box {task.box.name}, {limits.against}, T_s = {task.sampling_time:g} s)",
+        "",
+        f"{'':24}{'impossible':>20}{'proved':>16}",
+    ]
+    rows = [
+        f"{limit.title:24}{_beyond(limit.impossible_beyond, limit.unit):>20}"
+        f"{_shown(limit.proved_up_to, limit.unit):>16}"
+        for limit in limits.named().values()
+    ]
+    told = [*_meaning(limits), *_undecided(limits)]
+    return [*head, *rows, "", *(line for said in told for line in wrap(said, 80, subsequent_indent="  "))]
+
+
+def _meaning(limits: Limits) -> list[str]:
+    if isinstance(limits, SlidingLimits):
+        return _meaning_of_sliding(limits)
+    if limits.peak_slip_rate_error.impossible_beyond is None:
+        return ["without a disturbance no limit is known"]
+    within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
+    known = "even with slip, slip rate and disturbance known"
+    if limits.told.noisy:
+        known = f"told no more than {limits.told.words()}"
+    told = [
+        "impossible for every controller, linear or not, for some friction of the box and some disturbance of the "
+        "class amplitude, which may jump",
+        f"slip-rate error: {known} up to the sample, if the slip error stays "
+        f"{within}; slip rates may be negative, as in the guarantees",
+        "proved: of two designs, the one with the smaller slip-rate error; design prefers a smaller slip error unless "
+        "its objective is peak",
+    ]
+    if limits.largest_step.impossible_beyond is None:
+        return [*told, "the others: none is known, since friction's weakening alone does not make this fault unstable"]
+    return [
+        *told,
+        f"the others: withdrawal of at most {UpperBound(limits.withdrawal).quantity('Pa', 4)}, "
+        f"D = {float(limits.diffusivity):g} m^2/s; a constant push that begins after a sample makes the fault slip "
+        "until its friction is lost, even if the controller knows everything from the next sample on",
+    ]
+
+
+def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
+    told = [
+        "impossible for every controller, linear or not, with the nominal fault linearised about slow sliding along "
+        "its task, without inertia; of the fault itself it is true as far as that is",
+        "slip-rate error: even with slip, slip rate, state and stress known up to the sample; the stress may jump",
+    ]
+    if limits.rock:
+        holds = "IMPOSSIBLE for every controller, in the same sense" if limits.beyond else "not shown to be impossible"
+        told.append(f"the well that was asked about, L^2/D = {float(limits.rock):.4g} s: {holds}")
+    if limits.largest_step.impossible_beyond is None:
+        return [*told, "the others: none is known, since errors of this fault swing while they grow, or do not grow"]
+    return [
+        *told,
+        f"the others: pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference needs, "
+        f"D = {float(limits.diffusivity):g} m^2/s; a constant stress that begins after a sample makes errors grow "
+        "without bound, even if the controller knows everything from the next sample on",
+        "proved: nothing of a design"
+        if limits.guarantee is None
+        else f"proved: one design{_path(limits.guarantee)}, of the fault itself with inertia; pressure at the fault",
+    ]
+
+
+def _path(found: SlidingGuarantee) -> str:
+    """What the design that is proved stands behind."""
+    ways = {"a lag of": found.held.lag, "rock of L^2/D =": found.held.diffusion}
+    told = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]
+    return f" behind {' and '.join(told)}" if told else ""
+
+
+def _undecided(limits: Limits) -> list[str]:
+    """That neither side reaches the fault's own T_s, where it is so."""
+    step, own = limits.largest_step, rational(limits.fault.sampling_time)
+    proved = step.proved_up_to is not None and own <= step.proved_up_to
+    if proved or step.impossible_beyond is None or own > step.impossible_beyond:
+        return []
+    return [f"T_s = {limits.fault.sampling_time:g} s of this fault: neither proved of a design nor impossible"]
+
+
+def _beyond(bound: Bound | None, unit: str) -> str:
+    if bound is None:
+        return "-"
+    return f"{'below' if isinstance(bound, LowerBound) else 'above'} {bound.quantity(unit)}"
+
+
+def _shown(bound: Bound | None, unit: str) -> str:
+    return "-" if bound is None else bound.quantity(unit)
+
+
+def limits_figure(limits: Limits) -> Any:
+    """Slip-rate errors over T_s: impossible, proved, and the natural earthquake's slip rate.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    drawing, axes = figure(1, 4.2)
+    axis, natural = axes[0, 0], limits.natural_peak
+    axis.set(xscale="log", yscale="log", xlabel="T_s [s]", ylabel="slip-rate error [m/s]")
+    steps, peaks = np.array([(float(step), float(peak)) for step, peak in limits.smallest_peaks()]).reshape(-1, 2).T
+    if len(steps):
+        top = 3 * max(natural or 0.0, *peaks)
+        last = limits.largest_step.impossible_beyond
+        axis.fill_between(steps, peaks[0] / 3, peaks, color=_FORBIDDEN, lw=0, label="impossible for every controller")
+        if last is not None:
+            axis.axvspan(float(last), 2 * steps[-1], color=_FORBIDDEN, lw=0)
+        if limits.told.noisy:
+            exact = [float(peak) for _, peak in limits.smallest_peaks(told=False)]
+            axis.fill_between(
+                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"and for those told {limits.told.words()}"
+            )
+        axis.set(xlim=(steps[0], (1 if last is None else 2) * steps[-1]), ylim=(peaks[0] / 3, top))
+    if limits.achieved:
+        proved = [(float(step), float(error)) for step, error in limits.achieved]
+        axis.plot(*zip(*proved, strict=True), "o", color=_PROVED, label="proved of a designed controller")
+    if natural:
+        axis.axhline(natural, color=NATURAL, linestyle="--", linewidth=1, label="natural earthquake (slip rate)")
+    axis.axvline(limits.fault.sampling_time, color="#777777", linewidth=0.8, linestyle=":", label="T_s of the fault")
+    note = f"{limits.against.replace('^2', '²')}, box {limits.fault.box.name}"
+    return finish(drawing, f"{limits.fault.name}: what a held pressure can do", [], note, legend=axis)
+
+
+def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
+    """Write the figure ``limits`` and ``results.json`` into a folder that appears whole; return what the latter holds.
+
+    Raises
+    ------
+    OutputError
+    """
+    facts = limits.to_dict()
+    with whole_folder(folder) as partial:
+        write_figures(partial, {"limits": limits_figure(limits)}, formats)
+        write_results(partial, facts)
+    return facts

@@ -1,0 +1,95 @@
+"""Plain-text output of scaled gains and of exported controllers."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.studies.scaling import SCALED
+
+# ----------------------------------------------------------------------
+# Gains carried between faults, in lines for people.
+
+_THREE_DIGITS = 0.005
+
+
+def scale_lines(answer: Mapping[str, Any]) -> list[str]:
+    """The answer of `scale_answer` for people."""
+    factors = ", ".join(f"{SCALED[n][0]} = {_short(v)}" for n, v in answer["scale_factors"].items())
+    lines = [f"{answer['title']}: {answer['from']} → {answer['to']}"]
+    lines += _gain_lines(answer["source_gains"], answer["gains"], answer["published"], answer["exponents"])
+    if "divisor" in answer:
+        same = answer["divisor"] == answer["source_divisor"]
+        before = "" if same else f" (source: {_short(answer['source_divisor'])})"
+        lines.append(f"with λ = {_short(answer['scale'])} and divisor μ0N̂0 = {_short(answer['divisor'])} m²/kg{before}")
+    if _rounded(answer["published"]):
+        lines.append("where a printed gain is off, gains were rounded in print (ERRATA 25)")
+    if answer["unrounded"]:
+        more = answer["unrounded"]
+        lines.append("from the laboratory gains before they were rounded for print (ERRATA 25):")
+        lines += _gain_lines(more["source_gains"], more["gains"], more["published"], answer["exponents"])
+    lines.append(f"scale factors: {factors}")
+    return [*lines, *_similarity_lines(answer)]
+
+
+def _rounded(printed: Mapping[str, Any] | None) -> bool:
+    """True where printed gains differ, but by no more than rounding to three digits explains."""
+    off = [abs(e["deviation"]) for e in (printed or {}).values() if not e["agrees"] and e["deviation"] is not None]
+    return bool(off) and max(off) < _THREE_DIGITS
+
+
+def _gain_lines(
+    before: Mapping[str, str], after: Mapping[str, str], printed: Mapping[str, Any] | None, exponents: Mapping[str, str]
+) -> list[str]:
+    def comment(name: str) -> str:
+        if not printed:
+            return ""
+        entry = printed[name]
+        off = "" if entry["agrees"] or entry["deviation"] is None else f", off by {100 * abs(entry['deviation']):.2g} %"
+        return f"; printed {entry['printed']}{off}"
+
+    return [f"  {n} = {_short(after[n])} from {_short(before[n])} ({exponents[n]}{comment(n)})" for n in after]
+
+
+def _similarity_lines(answer: Mapping[str, Any]) -> list[str]:
+    percent = float(Fraction(answer["tolerance"])) * 100
+    far = [g for g in answer["differing"] if g["group"] in answer["violations"]]
+    if answer["similar"]:
+        if not answer["differing"]:
+            return ["similar exactly: every π-group has the same value"]
+        worst = max(abs(group["ratio"] - 1) for group in answer["differing"])
+        count = len(answer["differing"])
+        return [f"similar within {percent:g} %: {count} π-groups differ, by at most {100 * worst:.2g} %"]
+    lines = [
+        f"NOT similar within {percent:g} %: the two loops are no copies of each other, because these groups differ:"
+    ]
+    lines += [f"  {g['formula']}: {_short(g['source'])} and {_short(g['target'])}{_ratio(g)}" for g in far]
+    return lines + [f"  {name} is not the same quantity in both faults" for name in answer["unmatched"]]
+
+
+def _ratio(group: Mapping[str, Any]) -> str:
+    return "" if group["ratio"] is None else f", ratio {group['ratio']:.6g}"
+
+
+def _short(text: str) -> str:
+    return f"{float(Fraction(text)):.6g}"
+
+
+# ----------------------------------------------------------------------
+# What was exported, in lines for people.
+
+
+def export_lines(answer: dict[str, Any]) -> list[str]:
+    """The same for people."""
+    measured = ", ".join(f"{name} [{unit}]" for name, unit in answer["measurement"].items())
+    lines = [
+        *answer["remarks"],
+        f"written: {', '.join(answer['files'])}",
+        f"every {answer['step']:g} s: {measured} to pressure [Pa]",
+    ]
+    lines += [f"  {name}: {value}" for name, value in answer["facts"].items()]
+    lines += [
+        f"premise {p['name']} {'holds' if p['holds'] else 'FAILS'}: required {p['required']:.4g} {p['unit']}, "
+        f"given {p['certified']:.4g} {p['unit']}; {p['note']}"
+        for p in answer["premises"]
+    ]
+    return lines

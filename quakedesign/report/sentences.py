@@ -1,0 +1,566 @@
+"""Sentences of reports: scope of a proof, outcome of a run, margins and limits.
+
+Chapters: what a proof covers of loop and task; headline of a run; e-LQR margins and sampling; comparison;
+runs with friction state.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any
+
+from quakedesign.exact import LowerBound, UpperBound, rational
+from quakedesign.fault import Fault
+from quakedesign.guarantees import ContinuousPeaks, NoGuarantee
+from quakedesign.laws import control_laws
+from quakedesign.linear.robust_stability import Analysis
+from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.linear.verdict import LinearVerdict
+from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.domain import Domain
+from quakedesign.lyapunov.exact.premises import Premise, Variant
+from quakedesign.simulation import Trajectory
+from quakedesign.simulation.natural import waiting
+from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, Entry, pressure_extremes, shortfall
+from quakedesign.synthesis import Design
+from quakedesign.text import lasting
+
+if TYPE_CHECKING:
+    from quakedesign.guarantees import Guarantee, SlidingGuarantee
+    from quakedesign.studies.comparison import Run
+    from quakedesign.studies.runs import StateRun
+
+
+# ----------------------------------------------------------------------
+# How far a proof reaches: to the loop that ran and its task, or to which premise, and how far that fails.
+
+BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
+"""Premises of a linear law's stability that its certified peaks do without."""
+GRADES = (
+    "guaranteed: the slip rate that the loop as it ran never exceeds, and how far its slip stays from the reference; "
+    "proved for this loop and task: every premise holds in the run that is shown; proved, but …: what the proof does "
+    "not cover, and how many times over"
+)
+
+
+def grade(entry: "Entry") -> str:
+    """Verdict on one controller, and what of its loop and task the proof leaves out."""
+    if entry.guaranteed is not None:
+        other = f"{entry.design.other_step_first}; " if entry.design.other_step else ""
+        return f"{other}{_guaranteed(entry.guaranteed)}{_unmet(entry)}"
+    if entry.design.verdict is not Verdict.PROVED:
+        return str(entry.design.verdict)
+    missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _held(entry)
+    reach = f"proved, but {'; '.join(missing)}" if missing else "proved for this loop and task"
+    return f"{reach}; UNSTABLE if p is held over T_s" if _unstable_if_held(entry) else reach
+
+
+def _guaranteed(found: "Guarantee | SlidingGuarantee") -> str:
+    return f"guaranteed: slip rate <= {found.peak_slip_rate:.3g} m/s, slip error <= {found.claims.slip_error:.3g} m"
+
+
+def _unmet(entry: "Entry") -> str:
+    own = ("sampling_time",) * bool(entry.design.other_step)
+    failing = [_failing(p) for p in entry.design.conditions if not p.holds and p.name not in own]
+    return f", but {'; '.join(failing)}" if failing else ""
+
+
+def _unstable_if_held(entry: "Entry") -> bool:
+    """Whether a run with p acting at once hides what a sampled controller would do."""
+    if entry.run is None or entry.held is None:
+        return False
+    return entry.run.provenance["scheme"] == "continuous" and entry.held.runs.verdict is Verdict.REFUTED
+
+
+def _bounded(entry: "Entry", premise: Premise) -> bool:
+    return bool(entry.peaks) and premise.name in BOUNDED_BY_PEAKS
+
+
+def _failing(premise: Premise) -> str:
+    if premise.ratio is None or not premise.proved:
+        return f"{premise.name} fails (nothing is certified)"
+    return f"{premise.name} fails {premise.ratio:.3g}-fold"
+
+
+def _held(entry: "Entry") -> list[str]:
+    """What the way in which the run carries out the law takes from the proof."""
+    if entry.run is None:
+        return []
+    scheme, step = entry.run.provenance["scheme"], entry.run.provenance["step"]
+    if scheme == "continuous":
+        unstable = entry.growth_per_step is not None and entry.growth_per_step >= 1
+        return ["UNSTABLE at the step used"] if unstable else []
+    if entry.held is None or scheme != "explicit":
+        return [f"p is held ({scheme}), which is not covered"]
+    if entry.held.runs.verdict is Verdict.REFUTED:
+        return ["UNSTABLE with p held"]
+    used, longest = rational(step), entry.held.largest_step
+    if longest is None:
+        return ["p is held, and no T_s is proved"]
+    proved = used <= longest or (used == entry.held.step and entry.held.runs.verdict is Verdict.PROVED)
+    if not proved:
+        return [f"T_s is {UpperBound(used / longest):.3g} times the largest proved"]
+    return ["p is held: stability proved, errors without a bound"]
+
+
+# ----------------------------------------------------------------------
+# What is said of a run first: outcome, pressure, and whether that was what its task needs.
+
+_NEGLIGIBLE = 1e-6
+"""Of the larger end of a range of pressures: a smaller end is said to be zero."""
+OUTCOME_COLUMNS = ("outcome", "peak rate [m/s]", "of natural")
+
+
+def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
+    """Outcome of a run, and of one that is too short when its event would begin; its pressure, and why too little."""
+    extremes = pressure_extremes(run)
+    pressure = pressure_sentence(*extremes) if extremes else None
+    parts = [outcome_sentence(run), waiting_sentence(run, fault), pressure, shortfall(run, fault)]
+    return [part for part in parts if part]
+
+
+def outcome_sentence(run: Trajectory) -> str:
+    """Outcome of a run with its peak slip rate."""
+    outcome = run.outcome
+    if outcome.peak_slip_rate is None:
+        return f"{outcome.kind} at {run.events['diverged']:.4g} s"
+    over = f"; its numbers overflow at {run.events['diverged']:.4g} s" if "diverged" in run.events else ""
+    opened = f" at {run.events['opening']:.4g} s (p >= σ')" if outcome.kind == "opened" else ""
+    return f"{outcome.kind}{opened}: peak slip rate {outcome.peak_slip_rate:.3g} m/s, {_beside_natural(run)}{over}"
+
+
+def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
+    """When the event of a run without control would begin that ends before; None for other runs."""
+    event = waiting(run, fault)
+    if event is None:
+        return None
+    said = f"the fault is unstable, but its event has not begun at {run.time[-1]:.4g} s"
+    if event.onset is None:
+        return f"{said}: nothing has pushed it forward; without --duration it is nudged"
+    return f"{said}: growing by {event.growth:.3g} 1/s it would at about {event.onset:.3g} s"
+
+
+def outcome_cells(run: "Run | None") -> tuple[str, ...]:
+    """Texts under `OUTCOME_COLUMNS`; a dash means not applicable or not known."""
+    if run is None:
+        return ("–", "–", "–")
+    outcome = run.outcome
+    peak = "–" if outcome.peak_slip_rate is None else f"{outcome.peak_slip_rate:.2e}"
+    return outcome.kind, peak, "–" if outcome.share_of_natural is None else _percent(outcome.share_of_natural)
+
+
+def pressure_sentence(least: float, largest: float) -> str:
+    """Range of a pressure [Pa], and whether it is withdrawal or injection."""
+    nothing = _NEGLIGIBLE * max(abs(least), abs(largest))
+    shown = (value if abs(value) > nothing else 0.0 for value in (least, largest))
+    parts = [f"{value / 1e6 + 0.0:.3g} MPa{_way(value)}" for value in shown]
+    return f"pressure from {parts[0]} to {parts[1]}"
+
+
+def _way(pressure: float) -> str:
+    return " (withdrawal)" if pressure < 0 else " (injection)" if pressure > 0 else ""
+
+
+def _beside_natural(run: Trajectory) -> str:
+    share, natural = run.outcome.share_of_natural, run.criterion.natural_peak
+    if share is None or natural is None:
+        return "and the fault has no natural earthquake"
+    return f"{_percent(share)} of the natural earthquake's {natural:.3g} m/s"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"
+
+
+# ----------------------------------------------------------------------
+# What is said about an e-LQR: certified margins, sampling and peaks, in lines for people.
+
+
+def held_sentences(held: HeldLoop) -> list[str]:
+    """Whether the law that runs is stable when p is held over every step, and up to which step it is."""
+    over = f"if p is held over T_s = {float(held.step):.12g} s"
+    if held.runs.verdict is Verdict.REFUTED and held.runs.witness is not None:
+        return [f"UNSTABLE {over} ({_near(held.runs.witness)})", _proved_up_to(held)]
+    if held.runs.verdict is Verdict.UNDECIDED:
+        return [f"undecided {over}", _proved_up_to(held)]
+    course = "any course of the parameters, integrals summed over the samples"
+    return [f"stable {over}, proved for {course}", _proved_up_to(held)]
+
+
+def _proved_up_to(held: HeldLoop) -> str:
+    if held.largest_step is None:
+        return "no T_s is proved"
+    said = f"every T_s up to {held.largest_step:.4g} s is proved"
+    return said if held.refuted_step is None else f"{said}, {held.refuted_step:.15g} s is refuted, open in between"
+
+
+def peaks_sentence(peaks: Mapping[str, ContinuousPeaks | NoGuarantee]) -> str:
+    """How fast the fault can slip at most in continuous time, for every class of disturbances that was asked for."""
+    said = [
+        f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
+        + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
+        for name, proved in peaks.items()
+        if isinstance(proved, ContinuousPeaks)
+    ]
+    if not said:
+        reasons = {proved.reason for proved in peaks.values() if isinstance(proved, NoGuarantee)}
+        return "; ".join(["no bound on the slip rate is certified", *sorted(reasons)])
+    return "certified from rest, p acting at once: slip rate below " + ", ".join(said)
+
+
+def verdict_lines(judged: LinearVerdict) -> list[str]:
+    """Lines about a given K."""
+    fault, tests = judged.fault, judged.facts["tests"]
+    gains = " ".join(f"{float(k):.6g}" for k in judged.controller.gains.values())
+    optimal = {True: "yes", False: "no", None: "undecided"}[judged.facts["inverse_optimal"]]
+    lines = [
+        f'{judged.analysis.verdict}: elqr {gains} on "{fault.name}", box {fault.box.name}',
+        *(f"  {line}" for line in margin_lines(judged.analysis)),
+        f"  optimal for a Q that covers the uncertainty: {optimal} (the printed test: {tests['printed']['verdict']})",
+        f"  {'; '.join(held_sentences(judged.held))}",
+    ]
+    if judged.asked is None or judged.peaks is None:
+        return lines
+    return [*lines, f"  {peaks_sentence({judged.asked: judged.peaks})}"]
+
+
+def margin_lines(analysis: Analysis) -> list[str]:
+    """Decay rate and margins, each beside its limit; or a vertex that is not stable."""
+    lines, decay, slope, span = [], analysis.decay, analysis.slope, analysis.span
+    if analysis.unstable_at:
+        lines.append(f"not stable {_near(analysis.unstable_at)}")
+    if decay is not None:
+        lines.append(
+            f"decay rate {decay.certified:.4g} 1/s certified; that of the slowest vertex is {decay.limit:.4g} 1/s"
+        )
+    if slope is not None and slope.certified:
+        lines.append(f"friction-slope margin {slope.certified:.5g} certified; unstable from {slope.limit:.5g} on")
+    if span is not None:
+        end = f"unstable from {span.low_limit:.4g} on"
+        lines.append(f"beta down to {span.low:.4g} ({end}) or up to {span.high:.4g} is certified")
+    return lines
+
+
+def _near(vertex: Sequence[Fraction]) -> str:
+    """A corner of the box, nearly: its exact numbers are in the JSON facts."""
+    return "near β = {:.4g}, s = {:.4g} 1/s^2, w = {:.4g} 1/s".format(*map(float, vertex))
+
+
+# ----------------------------------------------------------------------
+# What is said of a comparison: outcome and verdict of every controller with what breaks it, domains, schemes.
+
+
+def guarantee_lines(entry: "Entry") -> list[str]:
+    """What is guaranteed of the loop as it runs, the worst found and what no controller can do; for designed laws."""
+    if entry.answer is None:
+        return []
+    asked = entry.design.details.get("reason") if entry.answer.proved else None
+    too_long = [f"{entry.design.other_step_first}: {asked}"] if asked else []
+    first, *rest = entry.answer.lines()
+    return [*too_long, f"guarantee: {first.removeprefix('proved: ')}", *rest, *_reach(entry)]
+
+
+def limit_lines(entry: "Entry") -> list[str]:
+    """Those of `guarantee_lines` that say what cannot be had: by no controller, and by designs of this kind."""
+    return [] if entry.answer is None else [*entry.answer.limit_lines(), *_reach(entry)]
+
+
+def _reach(entry: "Entry") -> list[str]:
+    """How long T_s and a delay may be for designs of the same kind, as far as the search of a design goes."""
+    certified = {p.name: p.certified for p in entry.design.premises if p.name in ("sampling_time", "delay")}
+    if not certified:
+        return []
+    step, delay = (LowerBound(Fraction(certified[name])) for name in ("sampling_time", "delay"))
+    law = entry.design.controller
+    own = f"at T_s = {law.sampling_time:.6g} s" if law and law.sampling_time else "at the fault's own T_s"
+    late = f"for delays up to at least {delay:.3g} s" if delay else "no delay was found with one"
+    return [f"designs have a guarantee for T_s up to at least {step:.3g} s, and {own} {late}"]
+
+
+def said(entry: "Entry") -> str:
+    """What is guaranteed, and the headline."""
+    return "; ".join([*guarantee_lines(entry)[:2], headline(entry)])
+
+
+_WHOLE = 1e-3  # of a task that a run may leave out, as the last sample has no period
+HEADLINE = 200
+"""Characters of a headline at most: two lines and a half of a terminal."""
+
+
+def headline(entry: "Entry") -> str:
+    """Outcome of the run, the verdict, and of the `sentences` that follow as many as `HEADLINE` characters hold."""
+    told = sentences(entry)
+    return "; ".join(told[: _fitting(told)])
+
+
+def remarks(entry: "Entry") -> list[str]:
+    """The `sentences` for which the headline has no place."""
+    told = sentences(entry)
+    return told[_fitting(told) :]
+
+
+def beside_guarantee(told: Sequence[str], entry: "Entry") -> list[str]:
+    """What is told of a controller, without a reason that its `guarantee_lines` have given."""
+    reason, said = entry.design.details.get("reason"), " ".join(guarantee_lines(entry))
+    given = bool(reason) and str(reason) in said
+    return [line for line in told if not (given and line.endswith(str(reason)))]
+
+
+def _fitting(told: Sequence[str]) -> int:
+    """How many sentences, joined, make a headline."""
+    lengths = accumulate(len(sentence) + len("; ") for sentence in told)
+    return max(1, sum(length <= HEADLINE + len("; ") for length in lengths))
+
+
+def sentences(entry: "Entry") -> list[str]:
+    """All that is said of a run and of its proof, what matters most first, without full stops."""
+    design = entry.design
+    if design.controller is None:
+        return _because(Verdict.UNDECIDED, design.details.get("reason", "no gains with a proof were found"))
+    outcome, *of_run = run_sentences(entry.run, design.fault) if entry.run else ("",)
+    assumed = [f"assumed: {what}" for what in filter(None, [design.details.get("assumed")])]
+    told = [outcome, *_verdict(design), *_step_verdict(entry), *_premises(entry), *of_run, *_bounds(entry), *assumed]
+    told += [part_of_task(entry.run, design.fault)] if entry.run else []
+    return [sentence for sentence in (*told, *_reversed(entry.run)) if sentence]
+
+
+def part_of_task(run: Trajectory, fault: Fault) -> str:
+    """How much of the task a run shows that does not show all of it; empty for one that ended of itself."""
+    task, last = fault.reference.operation_time, float(run.time[-1])
+    if last > (1 - _WHOLE) * task or not run.outcome.harmless:
+        return ""
+    return f"shown: the first {lasting(last)} of {lasting(task)}; --whole-task runs all of it"
+
+
+def _verdict(design: Design) -> list[str]:
+    """Of the loop that ran or in continuous time, with the reason where it is not positive."""
+    if design.verdict is Verdict.PROVED:
+        lasts = "for ever" if design.runs is None or isinstance(design.runs, NoGuarantee) else design.runs.lasts
+        return [f"proved for the loop that ran, {lasts}" if _sampled(design) else "proved in continuous time"]
+    unsaid = {Verdict.REFUTED: "a counterexample checks in exact arithmetic", Verdict.UNDECIDED: "no certificate"}
+    return _because(design.verdict, design.details.get("reason", unsaid[design.verdict]))
+
+
+def _because(verdict: Verdict, reason: str) -> list[str]:
+    """In one sentence where that leaves half of the headline to others."""
+    told = f"{verdict}: {reason}"
+    return [told] if len(told) <= HEADLINE // 2 else [str(verdict), reason]
+
+
+def _step_verdict(entry: "Entry") -> list[str]:
+    """Whether the step that ran, or that of the fault, is stable."""
+    told = []
+    if entry.growth_per_step is not None:
+        told.append(f"{'stable' if entry.growth_per_step < 1 else 'UNSTABLE'} at the step used")
+    if entry.held is not None:
+        own = entry.run is None or entry.run.provenance["scheme"] in (AS_IN_THE_PAPER, "explicit")
+        first, *others = held_sentences(entry.held)
+        told += [first if own else f"with scheme explicit {first}", *others]
+    return told
+
+
+def _premises(entry: "Entry") -> list[str]:
+    """Every premise that fails, and what the proof is about besides."""
+    design, told = entry.design, _broken(entry.design.conditions)
+    if design.verdict is Verdict.PROVED and design.conditions and all(p.holds for p in design.conditions):
+        told.append("every premise holds")
+    if _sampled(design):
+        told += ["its base gains are proved in continuous time too"] if design.certificate is not None else []
+    else:
+        told += _held_headline(entry.run)
+    if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
+        told.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
+    return told
+
+
+def _bounds(entry: "Entry") -> list[str]:
+    return [peaks_sentence(entry.peaks)] if entry.peaks else []
+
+
+def _sampled(design: Design) -> bool:
+    return design.controller is not None and design.controller.sampling_time is not None
+
+
+def domain_sentence(domain: Domain) -> str:
+    """Where the certificate speaks although the control itself moves h, and what limits it."""
+    which = (
+        "certified domain" if domain.feedforward == "none" else f"certified domain, {domain.feedforward} feed-forward"
+    )
+    if domain.level == 0:
+        return f"{which}: empty, because of {domain.limited_by or 'the control itself'} (ERRATA 16)"
+    return (
+        f"{which}: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s; it admits any one of "
+        f"|e1| <= {domain.start_slip_error:.2g} m, |e2| <= {domain.start_slip_rate_error:.2g} m/s, "
+        f"|h(0)| <= {domain.start_perturbation:.2g} m/s² at the start; limited by {domain.limited_by}"
+    )
+
+
+def feedforward_rows(variants: Iterable[Variant]) -> list[tuple[str, ...]]:
+    """One row a feed-forward under `FEEDFORWARD_COLUMNS`."""
+    found = []
+    for variant in variants:
+        ratios = {p.name: p.ratio for p in variant.premises}
+        values = [ratios.get("along_reference"), ratios.get("level_set")]
+        domain = variant.domain
+        values += [domain.slip_error, domain.slip_rate_error] if domain else [None, None]
+        found.append((variant.feedforward.name, *("–" if v is None else f"{v:.2g}" for v in values)))
+    return found
+
+
+FEEDFORWARD_COLUMNS = ("feed-forward", "along_reference", "level_set", "domain |e1| [m]", "domain |e2| [m/s]")
+"""The two premises are ratios required/certified; the gains are the same in every row."""
+
+
+def scheme_sentence(comparison: "Compared") -> str:
+    """How the pressure of the runs was computed."""
+    runs: dict[str, list[str]] = {}
+    for entry in comparison.entries:
+        if entry.run:
+            runs.setdefault(entry.run.provenance["scheme"], []).append(f"{entry.design.title} ({entry.origin})")
+    said = "; ".join(f"{scheme}: {', '.join(labels)}" for scheme, labels in runs.items()) or "none"
+    return (
+        f"Schemes: {said}. Continuous evaluates the law in every Runge–Kutta stage, all others hold p over a "
+        "step, which no certificate in continuous time covers"
+    )
+
+
+def _held_headline(run: Trajectory | None) -> list[str]:
+    """What the certificate in continuous time does not cover."""
+    scheme = run.provenance["scheme"] if run else AS_IN_THE_PAPER
+    return [] if scheme == AS_IN_THE_PAPER else [f"in this run p is held over every step, scheme {scheme}"]
+
+
+def _reversed(run: Trajectory | None) -> list[str]:
+    """Slip against the direction of the model."""
+    share = run.metrics.reverse_slip_fraction if run else None
+    return [f"the slip rate is negative, outside the model, in {100 * share:.3g} % of the steps"] if share else []
+
+
+def _holds(premises: Iterable[Any], name: str) -> bool:
+    return all(p.holds for p in premises if p.name == name)
+
+
+_SAID = {
+    "along_reference": "the reference and the disturbance alone leave the premise on |h'| {:.3g}-fold",
+    "level_set": "a start at an unknown phase of the disturbance is not certified ({:.3g}-fold)",
+    "on_trajectory": "this run leaves the premise on |h'| {:.3g}-fold",
+    "control_coefficient": "β leaves its certified range {:.3g}-fold",
+    "friction_slope": "the friction slope exceeds the certified sector {:.3g}-fold",
+    "sampling_time": (
+        "T_s of the fault is {:.3g} times the longest for which a guarantee was found, and this design samples faster"
+    ),
+    "constant_reference": "the reference moves, the certificate is about constant ones",
+    "vanishing_disturbance": "the disturbance does not vanish at the equilibrium, so a bounded error remains",
+}
+
+
+def _broken(premises: Iterable[Any]) -> list[str]:
+    return [
+        _SAID[p.name].format(p.ratio) for p in premises if not p.holds and (p.proved or p.name == "along_reference")
+    ]
+
+
+# ----------------------------------------------------------------------
+# What is said of a run of a fault whose friction has a state, free or held in slow sliding.
+
+_MOST_EVENTS = 8
+_LOCKED = 0.5  # of what it is loaded by: a fault that slips less stores the rest
+FASTEST_PLATE = 1e-8
+"""Rate of loading [m/s] that no plate has: 0.3 m a year."""
+_LABORATORY = 10.0  # length of a fault [m] below which what loads it is a machine
+
+
+def state_run_lines(answer: dict[str, Any]) -> list[str]:
+    """Lines for people, from `StateRun.to_dict`: outcome, cycle, events."""
+    outcome, cycle, events = answer["outcome"], answer["cycle"], answer["slip_events"]
+    least, largest = (p / 1e6 for p in answer["pressure"])
+    state = ", ".join(f"{name} = {value:.4g} s" for name, value in answer["start"]["state"].items())
+    lines = [
+        f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.3g} m/s (an earthquake from "
+        f"{outcome['earthquake_from']:.3g} m/s on), {len(events)} events in {lasting(answer['duration'])}, "
+        f"slip {answer['slip']:.4g} m",
+        f"loaded at {answer['loading_rate']:.4g} m/s; starts at {answer['start']['slip_rate']:.4g} m/s with {state}",
+        f"pressure from {least:.3g} MPa to {largest:.3g} MPa",
+    ]
+    if answer["resting"]:
+        lines.append("steady sliding is unstable here, but nothing disturbs it: start late, or give a pressure")
+    if outcome["kind"] == "creep" and answer["slip"] < _LOCKED * answer["loading_rate"] * answer["duration"]:
+        lines.append(
+            "it does not creep for good: it slips far less than it is loaded, and the run ends before what is stored "
+            "goes; the recurrence interval that design tells, or a longer --duration, shows the event"
+        )
+    if cycle["recurrence_interval"] is not None:
+        lines.append(f"recurrence interval {lasting(cycle['recurrence_interval'])}")
+    if cycle["slip"] is not None:
+        lines.append(f"slip of an event {cycle['slip']:.4g} m, magnitude {cycle['magnitude']:.2f}")
+    lines += [_event_line(number, event) for number, event in enumerate(events[:_MOST_EVENTS], start=1)]
+    if len(events) > _MOST_EVENTS:
+        lines.append(f"and {len(events) - _MOST_EVENTS} events more (--json has them all)")
+    lines.append(f"energy that the integration loses: {answer['energy']['relative_residual']:.2g} of the largest share")
+    return lines
+
+
+def cycle_sentence(run: "StateRun") -> str:
+    """What a fault whose friction has a state does without control, with its last complete event."""
+    if run.failed:
+        return f"Without control: unknown, since its cycle could not be computed ({run.failed.rstrip('.')})"
+    cycle, peak = run.cycle, f"slip rate up to {run.outcome.peak_slip_rate:.3g} m/s"
+    if not run.slip_events:
+        return f"Without control: the fault creeps, {peak}"
+    size = "" if cycle["magnitude"] is None else f" of magnitude {cycle['magnitude']:.2f}"
+    again = "" if cycle["recurrence_interval"] is None else f" every {lasting(cycle['recurrence_interval'])}"
+    return f"Without control: {run.outcome.kind}{size}{again}, {peak}, {_loading(run)}"
+
+
+def _loading(run: "StateRun") -> str:
+    """The rate of loading of a cycle, its plant, and that the rate may be one that nobody has chosen."""
+    moved = "with inertia" if run.provenance["plant"] == "smooth" else "quasi-dynamic"
+    loaded = f"loaded at {run.loading_rate:.3g} m/s ({moved})"
+    if run.loading_rate <= FASTEST_PLATE or run.fault.length < _LABORATORY:
+        return loaded
+    return (
+        f"{loaded}, FASTER than any plate: that is reference_rate of [friction]; for how often it breaks put in the "
+        "rate of the plates there, such as '1 nm/s' (30 mm a year)"
+    )
+
+
+def left_out_lines(comparison: "Compared") -> list[str]:
+    """Laws that are not for this fault, each reason once."""
+    named: dict[str, list[str]] = {}
+    for name, why in comparison.left_out.items():
+        named.setdefault(why, []).append(control_laws()[name].title)
+    return [f"Not designed, {', '.join(titles)}: {why}" for why, titles in named.items()]
+
+
+def proved_line(sentence: str | None, outside: list[str]) -> str:
+    """What is proved of the law of a run, and which options of the run the proof does not know; empty without one."""
+    if sentence is None:
+        return ""
+    return f"NOT proved of this run, by {', '.join(outside)}; without: {sentence}" if outside else f"proved: {sentence}"
+
+
+def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
+    """Lines for people, from `HeldRun.to_dict`: outcome, errors, pressure, and what is proved where that is known."""
+    outcome, found = answer["outcome"], answer["metrics"]
+    least, largest = (p / 1e6 for p in answer["pressure"])
+    path = "".join(f", through a {name.replace('_', ' ')}" for name in answer["stages"])
+    path += f", through a lag of {answer['lag']:.4g} s" if answer["lag"] else ""
+    path += f", through rock of L^2/D = {answer['diffusion']:.4g} s" if answer["diffusion"] else ""
+    shaken = f", under a shear stress of up to {answer['stress'] / 1e3:.4g} kPa" if answer["stress"] else ""
+    return [
+        f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.4g} m/s, the reference's is "
+        f"{answer['largest_reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
+        f"held over {answer['step']:.4g} s{path}{shaken}, for {lasting(answer['duration'])}; without control errors "
+        f"grow by {answer['growth_rate']:.3g} 1/s",
+        f"|ln(V/V_r)| at most {found['max_log_rate']:.3g}, slip error at most {found['max_slip_error']:.3g} m",
+        f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law asks for at most "
+        f"{found['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
+        proved_line((answer["guarantee"] or {}).get("sentence"), answer["outside"])
+        or "no guarantee: what is said was seen in this run",
+    ]
+
+
+def _event_line(number: int, event: dict[str, Any]) -> str:
+    nucleation = "" if event["nucleation"] is None else f"nucleation from {event['nucleation']:.6g} s, "
+    arrest = "not over at the end of the run" if event["arrest"] is None else f"arrest {event['arrest']:.6g} s"
+    return f"event {number}: {nucleation}onset {event['onset']:.6g} s, {arrest}, peak {event['peak_slip_rate']:.3g} m/s"

@@ -1,0 +1,210 @@
+"""Self-contained files that Rocq's compiler verifies: the library of ``proofs/rocq``, a statement and its proof."""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from quakedesign.errors import OutputError, UnsupportedError
+from quakedesign.files import made_folder, sole_writer, write_whole
+from quakedesign.lyapunov.exact.certificate_files import ATTRACTION, POLYNOMIAL, evidence_of, kind_of, read_json
+from quakedesign.lyapunov.exact.claim import Evidence, Witness
+from quakedesign.lyapunov.exact.obligations import claimed, different, statement_of
+from quakedesign.rocq import gallina
+from quakedesign.rocq.gallina import in_integers, multiplier_reason
+from quakedesign.rocq.loops import loop_theorems
+from quakedesign.sos.exact.attraction import LyapunovProof
+from quakedesign.sos.exact.attraction import read as read_attraction_file
+from quakedesign.sos.exact.polynomial import evaluate
+from quakedesign.sos.exact.polynomial_files import read as read_polynomial_file
+from quakedesign.sos.exact.polynomial_statement import Statement
+from quakedesign.sos.exact.proofs import Point, SumOfSquares
+
+_LIBRARY = ("squares.v", "positivity.v", "loops.v")
+_KINDS = "a certificate for coqc must be sos, negative or a proof for a closed loop or a region of attraction."
+_DATA = "(* " + "=" * 16 + " the certificate *)\n\nLocal Open Scope nat_scope.\n"
+
+
+def rocq_text(raw: Any) -> str:
+    """Text of the file for ``coqc``, from a parsed certificate file; the same for the same certificate.
+
+    Raises
+    ------
+    CertificateError
+        When the certificate breaks a rule of FORMAT.md.
+    UnsupportedError
+        For a kind that has no theorem in ``proofs/rocq``.
+    """
+    return "\n".join([*library(), _DATA, statement_text(raw)])
+
+
+def statement_text(raw: Any) -> str:
+    """Statement, data and theorem, without the library. Raises as `rocq_text`."""
+    written = {ATTRACTION: _attraction, POLYNOMIAL: _polynomial}.get(kind_of(raw), _loop)
+    return "\n".join(written(raw)) + "\n"
+
+
+def write_rocq(paths: Iterable[Path], folder: Path, *, force: bool = False) -> dict[Path, Path | str]:
+    """Write a file for ``coqc`` for every certificate file, whole or not at all.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        Certificate files that were checked.
+    folder : Path
+        Where to write NAME.v, every character of the certificate's name that Rocq does not take an underscore.
+    force : bool
+        Replace files that exist.
+
+    Returns
+    -------
+    dict of Path to Path or str
+        The file, or why there is none.
+
+    Raises
+    ------
+    OutputError
+        When a file exists or cannot be written, or two certificates have one name.
+    """
+    targets: dict[Path, Path] = {}
+    for path in paths:
+        target = folder / f"{module_name(path.stem)}.v"
+        if target in targets.values():
+            raise OutputError(f"files for coqc must differ in name. Received {target} twice. Write one by one.")
+        if target.exists() and not force:
+            raise OutputError(
+                f"file for coqc must be new. Received {target}, which exists. Give --force to replace it."
+            )
+        targets[path] = target
+    written: dict[Path, Path | str] = {}
+    for path, target in targets.items():
+        try:
+            text = rocq_text(read_json(path))
+        except UnsupportedError as error:
+            written[path] = str(error)
+            continue
+        with made_folder(folder), sole_writer(folder):
+            write_whole(target, text)
+        written[path] = target
+    return written
+
+
+def module_name(stem: str) -> str:
+    """Name that Rocq takes for a file."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", stem)
+    return name if name[:1].isalpha() else f"certificate_{name}"
+
+
+def library() -> list[str]:
+    """Text of the files of ``proofs/rocq``, in order.
+
+    Raises
+    ------
+    UnsupportedError
+        When they are missing.
+    """
+    package = Path(__file__).resolve().parents[1]
+    places = [base / "proofs" / "rocq" for base in (package, package.parent)]
+    for place in places:
+        if place.is_dir():
+            return [(place / name).read_text(encoding="utf-8") for name in _LIBRARY]
+    raise UnsupportedError(f"the Rocq library must be in {places[0]}. Found nothing. Install the package again.")
+
+
+def _polynomial(raw: Any) -> Iterator[str]:
+    asked, proof = read_polynomial_file(raw)
+    yield f"(* variables 0, 1, ...: {', '.join(asked.variables)} *)"
+    yield f"Definition asked : question := {gallina.question(asked)}."
+    if isinstance(proof, Point):
+        yield from _negative(asked, proof)
+    elif isinstance(proof, SumOfSquares):
+        yield from _nonnegative(asked, proof)
+    else:
+        raise UnsupportedError(f"{_KINDS} Received not-sos. Use check.py.")
+
+
+def _negative(asked: Statement, proof: Point) -> Iterator[str]:
+    yield f"Definition point : list Q := {gallina.listed(map(gallina.rational, proof.coordinates))}."
+    values = (evaluate(p, proof.coordinates) for p in (asked.polynomial, *asked.inequalities))
+    yield f"Definition values : list Q := {gallina.listed(map(gallina.rational, values))}."
+    yield gallina.accepted("negative asked point values")
+    yield (
+        "Theorem certificate :\n"
+        "  within (real_point point) asked /\\ (at_point (real_point point) (target asked) < 0)%R.\n"
+        "Proof. exact (negative_sound asked point values accepted). Qed.\nPrint Assumptions certificate."
+    )
+
+
+def _nonnegative(asked: Statement, proof: SumOfSquares) -> Iterator[str]:
+    why = multiplier_reason(asked, proof.multiplier)
+    yield f"Definition proof : witness := {gallina.witness(in_integers(asked, proof.squares, proof.cofactors))}."
+    yield f"Definition why : reason := {gallina.reason(why)}."
+    yield gallina.accepted("nonnegative asked proof why")
+    yield (
+        "Theorem certificate : forall x, within x asked -> (0 <= at_point x (target asked))%R.\n"
+        "Proof. exact (nonnegative_sound asked proof why accepted). Qed.\nPrint Assumptions certificate."
+    )
+
+
+def _attraction(raw: Any) -> Iterator[str]:
+    claim = read_attraction_file(raw)
+    if not isinstance(claim.proof, LyapunovProof):
+        raise UnsupportedError(f"{_KINDS} Received a point that refutes an attraction. Use check.py.")
+    yield f"(* variables 0, 1, ...: {', '.join(claim.variables)} *)"
+    yield "(* V, and minus its derivative where V is at most the level *)"
+    parts = ((claim.positive, claim.proof.positive), (claim.decrease, claim.proof.decrease))
+    for number, (asked, proof) in enumerate(parts):
+        why = f" ({gallina.reason(multiplier_reason(asked, proof.multiplier))})"
+        yield _part(asked, proof, "nonnegative", why).replace("@", str(number))
+    yield from _everywhere(range(len(parts)))
+
+
+def _everywhere(numbers: Sequence[int]) -> Iterator[str]:
+    """That all questions hold, each on its set."""
+    yield f"Definition questions : list question := {gallina.listed(f'asked_{n}' for n in numbers)}."
+    holds = "Forall (fun q => forall x, within x q -> (0 <= at_point x (target q))%R)"
+    yield f"Theorem certificate : {holds} questions.\nProof. exact ({_all(numbers)}). Qed."
+    yield "Print Assumptions certificate."
+
+
+def _all(numbers: Sequence[int]) -> str:
+    return f"{''.join(f'Forall_cons _ holds_{n} (' for n in numbers)}Forall_nil _{')' * len(numbers)}"
+
+
+def _part(asked: Statement, proof: SumOfSquares | Witness, check: str, tail: str = "") -> str:
+    """One question with its proof, with @ for its number."""
+    data = in_integers(asked, proof.squares, proof.cofactors)
+    return "\n".join(
+        [
+            f"Definition asked_@ : question := {gallina.question(asked)}.",
+            f"Definition proof_@ : witness := {gallina.witness(data)}.",
+            gallina.accepted(f"{check} asked_@ proof_@{tail}", "accepted_@"),
+            f"Definition holds_@ := {check}_sound asked_@ proof_@{tail} accepted_@.\n",
+        ]
+    )
+
+
+def _loop(raw: Any) -> Iterator[str]:
+    if isinstance(raw, dict) and ("kind" in raw or "refutation" in raw):
+        raise UnsupportedError(f"{_KINDS} Received a {raw.get('kind', 'refutation')}. Use check.py.")
+    evidence = evidence_of(raw)
+    names = []
+    for number, (name, text) in enumerate(_obligations(evidence)):
+        names.append(number)
+        yield f"(* {name} *)\n{text.replace('@', str(number))}"
+    if evidence.loop.domain == "reals":
+        yield from _everywhere(names)
+        return
+    yield f"Definition questions : list question := {gallina.listed(f'asked_{n}' for n in names)}."
+    yield f"Theorem certificate : all_hold questions.\nProof. exact ({_all(names)}). Qed."
+    yield from loop_theorems(evidence)
+
+
+def _obligations(evidence: Evidence) -> Iterator[tuple[str, str]]:
+    """Name of every obligation, and its question and proof with @ for its number."""
+    domain = evidence.loop.domain
+    for one in different(claimed(evidence.loop, evidence.lyapunov, evidence.claims)):
+        given = evidence.witnesses[one.name]
+        asked = statement_of(one, domain, given.multiplier)
+        how = ("nonnegative", " Terms") if domain == "reals" else ("on_cell",)
+        yield one.name, _part(asked, given, *how)

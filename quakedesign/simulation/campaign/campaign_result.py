@@ -1,0 +1,321 @@
+"""Result of a campaign: quantiles, worst samples, samples by index, and its figure."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.files import write_whole
+from quakedesign.simulation.campaign.problem import CampaignProblem, SampleResult
+from quakedesign.simulation.campaign.space import UNITS, Worst
+from quakedesign.simulation.recorder import EVENTS, StickMetrics
+from quakedesign.simulation.trajectory import KINDS, Outcome, Trajectory
+
+# ----------------------------------------------------------------------
+# The figure of a campaign.
+
+_DECADES = 30.0
+
+
+def figure(title: str, caption: str, shown: Mapping[str, tuple[Any, Mapping[float, float | None]]]) -> Any:
+    """Return a Figure with the share of samples below every value.
+
+    Parameters
+    ----------
+    title, caption : str
+    shown : mapping of str to tuple
+        Under what is shown, with its unit: values of the samples, nan where there is none, and quantiles to mark.
+    """
+    from matplotlib.figure import Figure
+
+    rows = max(1, -(-len(shown) // 3))
+    drawing = Figure(figsize=(10, 0.8 + 2.6 * rows), layout="constrained")
+    axes = drawing.subplots(rows, 3, sharey=True, squeeze=False).ravel()
+    for axis in axes[len(shown) :]:
+        axis.set_visible(False)
+    for axis, (name, (values, marks)) in zip(axes, shown.items(), strict=False):
+        _distribution(axis, name, values, marks)
+    drawing.suptitle(title)
+    drawing.supxlabel(caption, fontsize=7)
+    return drawing
+
+
+def _distribution(axis: Any, name: str, values: Any, marks: Mapping[float, float | None]) -> None:
+    known = values[~np.isnan(values)]
+    finite = np.sort(known[np.isfinite(known)])
+    axis.step(finite, np.arange(1, len(finite) + 1) / max(1, len(known)), where="post", color="#0072B2")
+    for level, value in marks.items():
+        if value is not None:
+            axis.axvline(value, color="grey", linestyle=":", linewidth=1)
+            side = {"ha": "right", "xytext": (-2, 2)} if level > 0.5 else {"ha": "left", "xytext": (2, 2)}
+            axis.annotate(
+                f"{level:.0%}".replace("%", " %"), (value, level), fontsize=7, textcoords="offset points", **side
+            )
+    if len(finite) and finite[0] > 0 and finite[-1] > _DECADES * finite[0]:
+        axis.set_xscale("log")
+    else:
+        axis.locator_params(axis="x", nbins=4)
+        axis.ticklabel_format(axis="x", scilimits=(-2, 4), useMathText=True)
+    axis.set_xlabel(name)
+    if axis.get_subplotspec().is_first_col():
+        axis.set_ylabel("share of samples [-]")
+    axis.set_ylim(0, 1.02)
+    axis.grid(visible=True, alpha=0.3)
+
+
+# ----------------------------------------------------------------------
+# What a campaign returns: quantiles, the worst samples, and every sample again by its index.
+
+LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+SHOWN = 5
+_DRAWN = (
+    "max_slip_error",
+    "max_slip_rate_error",
+    "peak_slip_rate",
+    "rms_pressure",
+    "max_pressure",
+    "pressure_total_variation",
+)
+_MARKED = (0.05, 0.5, 0.95)
+_LESS_IS_WORSE = frozenset({"min_pressure"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """A batch that could not be computed; a run that diverges is a result, not a failure.
+
+    Attributes
+    ----------
+    samples : tuple of str
+        Indices of its samples, those of the search as ``search-0``.
+    reason : str
+    """
+
+    samples: tuple[str, ...]
+    reason: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Campaign:
+    """Many runs of one closed loop.
+
+    Attributes
+    ----------
+    problem : CampaignProblem
+    results : tuple of SampleResult or None
+        By index; None for a sample of a batch that failed.
+    failures : tuple of Failure
+    resumed : int
+        Number of samples whose result was found in the folder.
+    search : Worst or None
+    seconds : float
+        Time that this call took [s].
+    """
+
+    problem: CampaignProblem = field(repr=False)
+    results: tuple[SampleResult | None, ...] = field(repr=False)
+    failures: tuple[Failure, ...] = ()
+    resumed: int = 0
+    search: Worst | None = None
+    seconds: float = 0.0
+
+    @cached_property
+    def metrics(self) -> tuple[str, ...]:
+        """Names of the metrics that the samples have."""
+        return metric_names([result for result in self.results if result])
+
+    def values(self, metric: str) -> "np.ndarray":
+        """One metric of all samples, shape (samples,): infinite for a diverged one, nan for one that failed.
+
+        Raises
+        ------
+        ParameterError
+            When the samples have no such metric.
+        """
+        require_metric(metric, self.metrics)
+        return np.array([math.nan if result is None else badness(result, metric) for result in self.results]) * (
+            -1 if metric in _LESS_IS_WORSE else 1
+        )
+
+    def quantiles(self, levels: Sequence[float] = LEVELS) -> dict[str, dict[str, float | None]]:
+        """Quantiles of every metric over the samples that did not fail, by level; None where they diverge.
+
+        A quantile is the value of a sample (inverse of the distribution function), and of `min_pressure`, where less is
+        worse, it is taken from above, so that high levels are bad throughout.
+        """
+        return {metric: self._quantiles(metric, levels) for metric in self.metrics}
+
+    def _quantiles(self, metric: str, levels: Sequence[float]) -> dict[str, float | None]:
+        way = -1 if metric in _LESS_IS_WORSE else 1
+        ordered = sorted(way * value for value in self.values(metric).tolist() if not math.isnan(value))
+        places = {level: min(len(ordered) - 1, max(0, math.ceil(level * len(ordered)) - 1)) for level in levels}
+        return {f"{level:g}": _finite(way * ordered[place]) for level, place in places.items()}
+
+    def worst(self, metric: str, count: int = SHOWN) -> list[int]:
+        """Indices of the worst samples by one metric, the worst first, diverged ones before all others."""
+        way = -1 if metric in _LESS_IS_WORSE else 1
+        known = [(-way * value, i) for i, value in enumerate(self.values(metric).tolist()) if not math.isnan(value)]
+        return [i for _, i in sorted(known)[:count]]
+
+    @cached_property
+    def events(self) -> dict[str, list[int]]:
+        """Indices of the samples in which something happened, by what."""
+        pairs = [(i, result) for i, result in enumerate(self.results) if result]
+        return {name: [i for i, result in pairs if name in result.events] for name in EVENTS}
+
+    @cached_property
+    def outcomes(self) -> tuple[Outcome | None, ...]:
+        """What every sample comes to, by index; None for a sample of a batch that failed."""
+        return tuple(self.problem.outcome(result) if result else None for result in self.results)
+
+    @cached_property
+    def kinds(self) -> dict[str, list[int]]:
+        """Indices of the samples by the kind of their outcome."""
+        pairs = [(i, outcome.kind) for i, outcome in enumerate(self.outcomes) if outcome]
+        return {kind: [i for i, own in pairs if own == kind] for kind in KINDS}
+
+    def trajectory(self, index: int | str, samples: int = 2000) -> Trajectory:
+        """Run one sample again, with about that many instants and the digits that it has in the campaign.
+
+        Parameters
+        ----------
+        index : int or str
+            Of the sample; ``"search-3"`` is one that the search looked at.
+        samples : int
+
+        Raises
+        ------
+        ParameterError
+            When there is no such sample.
+        """
+        if not isinstance(index, str):
+            return self.problem.trajectory(self.problem.sample(index), samples)
+        looked_at = self.search.looked_at if self.search else ()
+        number = index.removeprefix("search-")
+        if not (index.startswith("search-") and number.isdecimal() and int(number) < len(looked_at)):
+            raise ParameterError(
+                f"index must be a whole number, or search-0 … search-{len(looked_at) - 1}. Received {index!r}."
+            )
+        return self.problem.trajectory(looked_at[int(number)], samples)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON can hold: samples, outcomes, worst, quantiles, events, failures, search, resumed."""
+        return {
+            "samples": len(self.results),
+            "outcomes": {kind: {"count": len(found), "first": found[:SHOWN]} for kind, found in self.kinds.items()},
+            "worst": {metric: [self._told(i, metric) for i in self.worst(metric)] for metric in self.metrics},
+            "quantiles": self.quantiles(),
+            "events": {name: {"count": len(found), "first": found[:SHOWN]} for name, found in self.events.items()},
+            "failures": [{"samples": list(f.samples), "reason": f.reason} for f in self.failures],
+            "search": self._searched(),
+            "resumed": self.resumed,
+        }
+
+    def _told(self, index: int, metric: str) -> dict[str, Any]:
+        value = _finite(float(self.values(metric)[index]))
+        return {"index": index, "value": value, "sample": self.problem.sample(index).numbers}
+
+    def _searched(self) -> dict[str, Any] | None:
+        if self.search is None:
+            return None
+        return {
+            "metric": self.search.metric,
+            "value": _finite(self.search.value * (-1 if self.search.metric in _LESS_IS_WORSE else 1)),
+            "index": f"search-{self.search.index}",
+            "sample": self.search.sample.numbers,
+            "looked_at": len(self.search.looked_at),
+        }
+
+    def to_pandas(self) -> Any:
+        """Return a pandas DataFrame over the index: numbers that differ, and metrics, with units; nan where unknown."""
+        import pandas as pd
+
+        numbers = [self.problem.sample(i).numbers for i in range(len(self.results))]
+        columns: dict[str, Any] = {
+            f"{name} [{UNITS.get(name, '-')}]": [n[name] for n in numbers] for name in numbers[0]
+        }
+        columns["outcome [-]"] = [outcome.kind if outcome else None for outcome in self.outcomes]
+        columns |= {f"{m} [{StickMetrics.unit(m) or '-'}]": self.values(m) for m in self.metrics}
+        return pd.DataFrame(columns, index=pd.Index(range(len(numbers)), name="sample"))
+
+    def save(self, folder: str | Path, figures: Mapping[str, bytes] | None = None) -> None:
+        """Write ``results.json``, ``samples.csv`` and figures into a folder, each whole.
+
+        Parameters
+        ----------
+        folder : str or Path
+        figures : mapping of str to bytes, optional
+            Contents of files by name; ``distribution.png`` unless given.
+
+        Raises
+        ------
+        OutputError
+            When a file cannot be written.
+        """
+        text = json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n"
+        contents = {
+            "results.json": text,
+            "samples.csv": self.to_pandas().to_csv(),
+            **({"distribution.png": self._drawn()} if figures is None else figures),
+        }
+        for name, content in contents.items():
+            write_whole(Path(folder) / name, content)
+
+    def _drawn(self) -> bytes:
+        drawn = BytesIO()
+        self.plot().savefig(drawn, format="png", dpi=150, metadata={"Software": None})
+        return drawn.getvalue()
+
+    def plot(self) -> Any:
+        """Return a matplotlib Figure of the distribution of the metrics."""
+        problem, levels = self.problem, self.quantiles(_MARKED)
+        law = problem.controller.title if problem.controller else "no control"
+        diverged, count = len(self.events["diverged"]), len(self.results)
+        return figure(
+            f"{problem.fault.name}, {law}: {count} samples, {diverged} diverge",
+            f"scheme {problem.scheme.name}, step {problem.setting.step:g} s",
+            {
+                f"{name.replace('_', ' ')} [{StickMetrics.unit(name) or '-'}]": (
+                    self.values(name),
+                    {level: levels[name][f"{level:g}"] for level in _MARKED},
+                )
+                for name in _DRAWN
+                if name in self.metrics
+            },
+        )
+
+
+def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
+    """Names of the metrics that any of the results has, in order."""
+    return tuple(dict.fromkeys(name for result in results if not result.diverged for name in result.figures))
+
+
+def require_metric(metric: str, known: Sequence[str]) -> None:
+    """Refuse a metric that there is not.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not known:
+        raise ParameterError(f"metric must be one of none, as all diverge. Received {metric!r}.")
+    require_known(metric, known, "metric")
+
+
+def badness(result: SampleResult, metric: str) -> float:
+    """Value of a metric, or its negative where less is worse; infinite for a diverged sample, or one too large."""
+    if result.diverged or metric not in result.figures:
+        return math.inf
+    value = result.figures[metric]
+    return -value if metric in _LESS_IS_WORSE else value
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,1033 @@
+"""Compilation of CasADi functions to portable C with bitwise reproducible results.
+
+Chapters: elementary functions from IEEE 754 operations (errors below 1 ulp; other powers 1.5, tanh 2);
+instructions of a CasADi function; fixed C files; portable C operations; repeated steps in machine code
+where a compiler is available; many vectors at once, with inner loops for vectorisation.
+"""
+
+import ctypes
+import math
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cache, lru_cache
+from importlib.resources import files
+from itertools import groupby
+from pathlib import Path
+from string import Template
+from typing import Any, cast
+
+import casadi as ca
+
+from quakedesign import cache as disk_cache
+from quakedesign.errors import SimulationError
+from quakedesign.files import temporary_folder
+from quakedesign.loop.schemes.implicit import where_needed
+
+# ----------------------------------------------------------------------
+# Elementary functions of plain arithmetic: the same digits in every lane, on every processor, with any C library.
+#
+# Each is a straight line of sums, products, quotients, comparisons and choices, which IEEE 754 rounds in one way
+# only, on
+# exact powers of two (`two_to`) and exact parts of floats (`exponent_and_mantissa`, `near_cube_root`). They are
+# stated
+# once, as CasADi expressions; `quakedesign.simulation.compiled` puts them into functions,
+# `quakedesign.simulation.compiled` into C.
+# Errors are below one unit in the last place, those of cube roots below 0.65, of other powers (exponents up to 2)
+# below
+# one and a half, of the hyperbolic tangent below two. Zeros have no sign. The power ⅓ of floats is the cube root.
+
+_ROUNDER = 1.5 * 2.0**52  # sums with it have no digits behind the point
+_SPLITTER = 2.0**27 + 1
+_LEAST = 2.0**-1022  # with 53 digits
+THIRD = 1 / 3  # next to it
+_ROOT = float.fromhex("0x1.6a09e667f3bcdp+0")  # of 2
+_LN2 = Fraction(0xB17217F7D1CF79ABC9E3B39803F2F6AF40F343267298B62D8A0D175B8BAAFA2B, 2**256)  # of 77 digits
+_HALF_PI = Fraction(0x1921FB54442D18469898CC51701B839A252049C1114CF98E804177D4C76273644, 2**256)
+
+
+_in_bits = ContextVar("in_bits", default=False)
+
+
+@contextmanager
+def verbatim(*, bits: bool = False) -> Iterator[None]:
+    """While it lasts, CasADi keeps expressions as they are written: (x + y) − x stays, since it is not y.
+
+    With `bits`, expressions are for C, where `exponent_and_mantissa` and `near_cube_root` look at the bits: they are
+    log, log1p and sinh then.
+    """
+    before, token = ca.GlobalOptions.getSimplificationOnTheFly(), _in_bits.set(bits)
+    ca.GlobalOptions.setSimplificationOnTheFly(False)
+    try:
+        yield
+    finally:
+        ca.GlobalOptions.setSimplificationOnTheFly(before)
+        _in_bits.reset(token)
+
+
+def _pieces(number: Fraction, bits: int, count: int) -> list[float]:
+    """Floats of a number of leading bits each, and a last one, whose sum is a number."""
+    leading = []
+    for _ in range(count - 1):
+        unit = Fraction(2) ** (math.frexp(float(number))[1] - bits)
+        leading.append(math.floor(number / unit) * unit)
+        number -= leading[-1]
+    return [*map(float, leading), float(number)]
+
+
+def _economised(coefficients: list[Fraction], low: Fraction, high: Fraction, count: int) -> list[float]:
+    """As many coefficients as wanted of a polynomial next to a longer one on an interval (Lanczos 1938).
+
+    The highest power is taken off with the Chebyshev polynomial of its degree, which is nowhere large.
+    """
+    line = [-(high + low) / (high - low), 2 / (high - low)]
+    chebyshev = [[Fraction(1)], line]
+    while len(chebyshev) < len(coefficients):
+        before, last = chebyshev[-2:]
+        next_ = [Fraction(0)] * (len(last) + 1)
+        for i, value in enumerate(last):
+            next_[i] += 2 * line[0] * value
+            next_[i + 1] += 2 * line[1] * value
+        chebyshev.append([value - (before[i] if i < len(before) else 0) for i, value in enumerate(next_)])
+    while len(coefficients) > count:
+        share = coefficients[-1] / chebyshev[len(coefficients) - 1][-1]
+        coefficients = [c - share * t for c, t in zip(coefficients, chebyshev[len(coefficients) - 1], strict=True)][:-1]
+    return [float(c) for c in coefficients]
+
+
+_LN2_PIECES = _pieces(_LN2, 42, 2)
+_HALF_PI_PIECES = _pieces(_HALF_PI, 22, 4)
+_R, _Z, _S = Fraction(347, 1000), Fraction(617, 1000), Fraction(295, 10000)  # bounds of |r|, r² of sines, s² of log
+_EXP = _economised([Fraction(1, math.factorial(n)) for n in range(2, 18)], -_R, _R, 11)
+_SIN = _economised([Fraction((-1) ** n, math.factorial(2 * n + 1)) for n in range(1, 12)], Fraction(0), _Z, 7)
+_COS = _economised([Fraction((-1) ** n, math.factorial(2 * n)) for n in range(2, 12)], Fraction(0), _Z, 6)
+_ATANH = _economised([Fraction(2, 2 * n + 1) for n in range(1, 16)], Fraction(0), _S, 7)
+_LEFT = Fraction(955, 10000)  # of a number beside the cube of what is near its cube root
+_ROOT_BITS = 44693264  # two thirds of 1023·2¹⁶, less what makes `_LEFT` least
+_CUBE_ROOT = _economised(
+    [Fraction(math.prod(3 * k + 1 for k in range(n)), math.factorial(n) * 3**n) for n in range(1, 40)],
+    -_LEFT,
+    _LEFT,
+    12,
+)
+
+
+def two_to(exponent: Any) -> Any:
+    """2ⁿ for whole n, −1022 … 1023, without rounding."""
+    return ca.SX(2.0) ** exponent
+
+
+def choice(condition: Any, yes: Any, no: Any) -> Any:
+    """One of two values; the other may be no number."""
+    return ca.if_else(condition, yes, no)
+
+
+def rounded(x: Any) -> Any:
+    """Nearest whole number, the even one of two; for |x| < 2⁵¹."""
+    return (x + _ROUNDER) + -_ROUNDER
+
+
+def _polynomial(x: Any, coefficients: list[float]) -> Any:
+    """Values of lower and upper half, joined by a power of x, in turn: short chains (Estrin 1960)."""
+    powers, parts = x, [ca.SX(c) for c in coefficients]
+    while len(parts) > 1:
+        pairs = [parts[i] + parts[i + 1] * powers for i in range(0, len(parts) - 1, 2)]
+        parts, powers = pairs + parts[2 * len(pairs) :], powers * powers
+    return parts[0]
+
+
+def _sum(a: Any, b: Any) -> tuple[Any, Any]:
+    """Rounded sum and what is missing (Knuth's two-sum)."""
+    total = a + b
+    of_b = total - a
+    return total, (a - (total - of_b)) + (b - of_b)
+
+
+def _halves(x: Any) -> tuple[Any, Any]:
+    """26 leading bits, and the others (Veltkamp's splitting)."""
+    scaled = x * _SPLITTER
+    first = scaled - (scaled - x)
+    return first, x - first
+
+
+def _limited(x: Any, low: float, high: float) -> Any:
+    return choice(x < low, ca.SX(low), choice(x > high, ca.SX(high), x))
+
+
+def _scaled(x: Any, exponent: Any) -> Any:
+    """x·2ⁿ for |n| < 2000."""
+    half = rounded(exponent * 0.5)
+    return x * two_to(half) * two_to(exponent - half)
+
+
+def _grown(first: Any, r: Any, rest: Any) -> Any:
+    """First + e^(r + rest) − 1 for |r| ≤ ln2/2 and a small rest; |first| ≥ |r| or 0."""
+    tail = rest + r * r * _polynomial(r, _EXP)
+    total = first + r
+    return total + (((first - total) + r) + tail)
+
+
+def _by_ln2(x: Any) -> tuple[Any, Any, Any]:
+    """n, r and rest: x = n·ln2 + r + rest."""
+    whole = rounded(x * float(1 / _LN2))
+    rough, less = x - whole * _LN2_PIECES[0], whole * _LN2_PIECES[1]
+    r = rough - less
+    return whole, r, (rough - r) - less
+
+
+def exp(x: Any) -> Any:
+    """e^x."""
+    whole, r, rest = _by_ln2(_limited(x, -800, 800))
+    return _scaled(_grown(ca.SX(1.0), r, rest), whole)
+
+
+def expm1(x: Any) -> Any:
+    """e^x − 1."""
+    whole, r, rest = _by_ln2(_limited(x, -60, 710))
+    first = 1 - two_to(-choice(whole > 600, ca.SX(600.0), whole))
+    return (_grown(first, r, rest) * 2) * two_to(whole - 1)
+
+
+def _parted(x: Any) -> tuple[Any, Any]:
+    """n and m: x = m·2ⁿ with √½ ≤ m < √2, for positive finite x."""
+    small = x < _LEAST
+    x = x * choice(small, ca.SX(2.0**54), ca.SX(1.0))
+    whole, mantissa = exponent_and_mantissa(x)
+    return whole - choice(small, ca.SX(54.0), ca.SX(0.0)), mantissa
+
+
+def exponent_and_mantissa(x: Any) -> tuple[Any, Any]:
+    """As `_parted`, for x from 2⁻¹⁰²² on; exact, whatever the C library's logarithm has for last digits.
+
+    Of it only a whole number counts, that of a power of two below x; where it changes, either serves.
+    """
+    if _in_bits.get():
+        return ca.log(x), ca.log1p(x)
+    whole = rounded(ca.log(x) * float(1 / _LN2) - 0.4)
+    mantissa = (x * two_to(1 - whole)) * 0.5
+    high = mantissa >= _ROOT
+    return whole + high, mantissa * choice(high, ca.SX(0.5), ca.SX(1.0))
+
+
+def _logarithm(mantissa: Any) -> tuple[Any, Any, Any]:
+    """f = m − 1, and f²/2 and s(f²/2 + R) of log m = f − (f²/2 − s(f²/2 + R)), where s = f/(2 + f)."""
+    f = mantissa - 1
+    s, half = f / (2 + f), 0.5 * f * f
+    z = s * s
+    return f, half, s * (half + z * _polynomial(z, _ATANH))
+
+
+def log(x: Any) -> Any:
+    """Natural logarithm; no number below zero."""
+    whole, mantissa = _parted(x)
+    f, half, product = _logarithm(mantissa)
+    value = whole * _LN2_PIECES[0] - ((half - (product + whole * _LN2_PIECES[1])) - f)
+    return _at_the_ends(x, value, -math.inf, math.inf)
+
+
+def _at_the_ends(x: Any, value: Any, at_zero: float, at_infinity: float) -> Any:
+    """Value with that of zero and of infinity; no number where x is negative or none."""
+    proper = choice(x == 0, ca.SX(at_zero), choice(x < math.inf, value, ca.SX(at_infinity)))
+    return choice(x >= 0, proper, ca.SX(math.nan))
+
+
+def power(x: Any, a: Any) -> Any:
+    """x^a, the cube root where a is the float next to ⅓; for negative x no number unless a is whole."""
+    if not a.is_constant():
+        return choice(a == THIRD, cube_root(x), any_power(x, a))
+    if float(a) == round(float(a)):
+        return choice(x < 0, (-1.0) ** (float(a) % 2) * _power(-x, a), _power(x, a)) if a else ca.SX(1.0)
+    return cube_root(x) if float(a) == THIRD else _power(x, a)
+
+
+def near_cube_root(x: Any) -> Any:
+    """A number of 17 bits whose cube is within a tenth of x, from 2⁻¹⁰²² on.
+
+    The leading bits of a float, its exponent and 16 of its fraction as one whole number, are nearly its logarithm: a
+    third of them are nearly those of the cube root (Kahan 1991).
+    """
+    if _in_bits.get():
+        return ca.sinh(x)
+    whole, mantissa = exponent_and_mantissa(x)
+    low = mantissa < 1
+    fraction = (mantissa * choice(low, ca.SX(2.0), ca.SX(1.0)) - 1) * 2.0**16
+    bits = (whole - low + 1023) * 2.0**16 + rounded(fraction - (0.5 - 2.0**-37))
+    third = ((bits - 1) * THIRD + (2.0**52 + _ROOT_BITS)) - 2.0**52
+    exponent = rounded(third * 2.0**-16 - (0.5 - 2.0**-17))
+    return (1 + (third - exponent * 2.0**16) * 2.0**-16) * two_to(exponent - 1023)
+
+
+def cube_root(x: Any) -> Any:
+    """x^⅓; no number below zero.
+
+    With y near it, whose cube is exact, and z = (x − y³)/x it is y(1 − z)^(−⅓).
+    """
+    small = x < _LEAST
+    scaled = x * choice(small, ca.SX(2.0**54), ca.SX(1.0))
+    near = near_cube_root(scaled)
+    left = (scaled - near * near * near) * (1 / scaled)
+    near = near * choice(small, ca.SX(2.0**-18), ca.SX(1.0))
+    value = near + near * left * _polynomial(left, _CUBE_ROOT)
+    return choice(ca.logic_and(x > 0, x < math.inf), value, choice(x < 0, ca.SX(math.nan), x))
+
+
+def any_power(x: Any, a: Any) -> Any:
+    """Power with an exponent that is not known yet, but for that of a cube root."""
+    size = ca.fabs(a)
+    whole, even = (ca.logic_or(size >= 2.0**51, rounded(part) == part) for part in (a, 0.5 * a))
+    value = _power(choice(ca.logic_and(whole, x < 0), -x, x), a)
+    value = choice(ca.logic_and(x < 0, ca.logic_and(whole, ca.logic_not(even))), -value, value)
+    return choice(a == 0, ca.SX(1.0), choice(size >= 0, value, a))
+
+
+def _power(x: Any, a: Any) -> Any:
+    """x^a for x that are not negative; a·log x in whole powers of two and a small rest."""
+    whole, mantissa = _parted(x)
+    f, half, product = _logarithm(mantissa)
+    small = a * (f - (half - product))
+    first, second = _halves(a)
+    exponent = rounded(a * whole + small * float(1 / _LN2))
+    r = (first * whole - exponent) * float(_LN2) + (small + (second * whole) * float(_LN2))
+    value = _scaled(_grown(ca.SX(1.0), r, ca.SX(0.0)), exponent)
+    value = choice(ca.fabs(exponent) < 1200, value, choice(exponent > 0, ca.SX(math.inf), ca.SX(0.0)))
+    root = ca.sqrt(x)
+    return choice(ca.logic_and(x > 0, x < math.inf), value, choice(a > 0, root, 1 / root))
+
+
+def _by_half_pi(x: Any) -> tuple[Any, Any, Any]:
+    """Turns beside whole ones, −½, −¼, 0, ¼ or ½, and r and rest: x = nπ/2 + r + rest."""
+    x = x * (ca.fabs(x) < 2.0**52)
+    whole = rounded(x * float(1 / _HALF_PI))
+    first, second, third, fourth = (whole * piece for piece in _HALF_PI_PIECES)
+    rough, less = _sum((x - first) - second, -third)
+    r, rest = _sum(rough, less - fourth)
+    turns = 0.25 * whole
+    return turns - rounded(turns), r, rest
+
+
+def _sine_and_cosine(r: Any, rest: Any) -> tuple[Any, Any]:
+    z = r * r
+    half = 0.5 * z
+    nearly = 1 - half
+    sine = r + (rest * nearly + r * z * _polynomial(z, _SIN))
+    return sine, nearly + (((1 - nearly) - half) + (z * z * _polynomial(z, _COS) - r * rest))
+
+
+def sin(x: Any) -> Any:
+    """Sine; beyond |x| = 2³¹ that of an argument within one unit in the last place, beyond 2⁵² zero."""
+    turns, r, rest = _by_half_pi(x)
+    sine, cosine = _sine_and_cosine(r, rest)
+    size = ca.fabs(turns)
+    return choice(size == 0.25, 4 * turns * cosine, (1 - 4 * size) * sine)
+
+
+def cos(x: Any) -> Any:
+    """Cosine; of large arguments see `sin`."""
+    turns, r, rest = _by_half_pi(x)
+    sine, cosine = _sine_and_cosine(r, rest)
+    size = ca.fabs(turns)
+    return choice(size == 0.25, -4 * turns * sine, (1 - 4 * size) * cosine)
+
+
+def tanh(x: Any) -> Any:
+    """Hyperbolic tangent."""
+    grown = expm1(2 * _limited(ca.fabs(x), 0, 22))
+    return ca.sign(x) * (grown / (grown + 2))
+
+
+def fmax(x: Any, y: Any) -> Any:
+    """The larger of two numbers, or the one that is a number."""
+    return choice(ca.logic_or(x > y, ca.logic_not(y <= math.inf)), x, y)
+
+
+def fmin(x: Any, y: Any) -> Any:
+    """The smaller of two numbers, or the one that is a number."""
+    return choice(ca.logic_or(x < y, ca.logic_not(y <= math.inf)), x, y)
+
+
+def floor(x: Any) -> Any:
+    """Largest whole number that is not above x."""
+    size = ca.fabs(x)
+    near = (size + 2.0**52) + -(2.0**52)
+    near = choice(x < 0, -near, near)
+    return choice(size < 2.0**52, near - (near > x), x)
+
+
+FUNCTIONS: dict[int, Callable[..., Any]] = {
+    ca.OP_EXP: exp,
+    ca.OP_EXPM1: expm1,
+    ca.OP_LOG: log,
+    ca.OP_POW: power,
+    ca.OP_CONSTPOW: power,
+    ca.OP_SIN: sin,
+    ca.OP_COS: cos,
+    ca.OP_TANH: tanh,
+    ca.OP_FMAX: fmax,
+    ca.OP_FMIN: fmin,
+    ca.OP_FLOOR: floor,
+}
+"""What stands for CasADi's operations of these codes."""
+
+
+# ----------------------------------------------------------------------
+# The work of CasADi Functions of scalar operations, one instruction after the other, and what they call.
+
+_WRITTEN_OUT = 60
+"""Instructions of an elementary function, on the average of a step."""
+
+
+class NotPortableError(ValueError):
+    """Work that has no text in C here."""
+
+
+@dataclass(frozen=True)
+class Instruction:
+    """One step of a function's work.
+
+    Attributes
+    ----------
+    operation : int
+        CasADi's code.
+    taken : tuple of int
+        Places of the arguments; for an input its number and the entry.
+    given : tuple of int
+        Places of the results, −1 where none is wanted; for an output its number and the entry.
+    constant : float
+    """
+
+    operation: int
+    taken: tuple[int, ...]
+    given: tuple[int, ...]
+    constant: float
+
+
+def instructions(function: Any) -> Iterator[Instruction]:
+    """The work of a CasADi Function of scalar operations, in order."""
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        value = function.instruction_constant(k) if operation == ca.OP_CONST else 0.0
+        yield Instruction(operation, tuple(function.instruction_input(k)), tuple(function.instruction_output(k)), value)
+
+
+@dataclass(frozen=True)
+class Called:
+    """What one instruction of a function calls.
+
+    Attributes
+    ----------
+    function : casadi.Function
+        Of scalar operations, one vector in and one out.
+    times : int
+        How often, on its own result; 0: once if the first argument, which it does not take, is not zero, else its
+        result is 0.
+    """
+
+    function: Any
+    times: int
+
+    def __call__(self, function: Any, arguments: list[Any]) -> Any:
+        """Result (SX) with another function in the place of this one."""
+        if self.times:
+            return function.fold(self.times, {"never_inline": True})(ca.vertcat(*arguments))
+        return where_needed(function)(arguments[0], ca.vertcat(*arguments[1:]))
+
+
+def called(function: Any, work: Instruction) -> Called:
+    """What an instruction of a function calls.
+
+    Raises
+    ------
+    NotPortableError
+        When that is neither a repetition nor a branch, or cannot be told.
+    """
+    found = [f for f in function.find_functions(0) if f.nnz_in() == len(work.taken) and f.nnz_out() == len(work.given)]
+    name = found[0].name() if len(found) == 1 else ""
+    if name.startswith("fold_"):
+        inner = name.removeprefix("fold_")
+        return Called(found[0].find_function(inner), int(found[0].find_function(f"mapaccum_{inner}").size2_out(0)))
+    if name == "where_needed":
+        return Called(found[0].find_function("solved"), 0)
+    raise NotPortableError(f"a call in {function.name()} is neither a repetition nor a branch")
+
+
+def expanded(function: Any) -> Any:
+    """Function with the elementary functions written out, for CasADi's virtual machine."""
+    with verbatim():
+        return _expanded(function)
+
+
+def expanded_size(function: Any) -> int:
+    """About how many instructions a function has when it is expanded."""
+    operations = [function.instruction_id(k) for k in range(function.n_instructions())]
+    return len(operations) + _WRITTEN_OUT * sum(operation in FUNCTIONS for operation in operations)
+
+
+def _expanded(function: Any) -> Any:
+    inputs = [ca.SX.sym(f"i{n}", function.sparsity_in(n)) for n in range(function.n_in())]
+    results = [ca.SX(function.sparsity_out(n)) for n in range(function.n_out())]
+    values: dict[int, Any] = {}
+    for work in instructions(function):
+        if work.operation == ca.OP_INPUT:
+            values[work.given[0]] = inputs[work.taken[0]].nz[work.taken[1]]
+        elif work.operation == ca.OP_OUTPUT:
+            results[work.given[0]].nz[work.given[1]] = values[work.taken[0]]
+        elif work.operation == ca.OP_CALL:
+            call = called(function, work)
+            after = call(_expanded(call.function), [values[i] for i in work.taken])
+            values |= {place: after[i] for i, place in enumerate(work.given) if place >= 0}
+        else:
+            values[work.given[0]] = _operated(work, [values[i] for i in work.taken])
+    return ca.Function(function.name(), inputs, results, function.name_in(), function.name_out())
+
+
+def _operated(work: Instruction, arguments: list[Any]) -> Any:
+    if work.operation == ca.OP_CONST:
+        return ca.SX(work.constant)
+    if work.operation in FUNCTIONS:
+        return FUNCTIONS[work.operation](*arguments)
+    return (ca.SX.unary if len(arguments) == 1 else ca.SX.binary)(work.operation, *arguments)
+
+
+# ----------------------------------------------------------------------
+# The parts of generated C that never change stand in C files beside this one; their numbers are put in by name.
+
+
+@cache
+def _template(name: str) -> Template:
+    return Template(files("quakedesign.simulation").joinpath(name).read_text(encoding="utf-8"))
+
+
+def c_file(name: str, **numbers: object) -> str:
+    """Text of a C file with numbers in the place of ``${…}``."""
+    return _template(name).substitute(numbers)
+
+
+# ----------------------------------------------------------------------
+# Operations in C that have the same digits everywhere, the elementary functions among them.
+
+_ATOMIC = {
+    ca.OP_POW: "two_to",
+    ca.OP_CONSTPOW: "two_to",
+    ca.OP_LOG: "exponent_of",
+    ca.OP_LOG1P: "mantissa_of",
+    ca.OP_SINH: "near_cube_root",
+}
+_BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
+_COMPARED = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
+_JOINED = {ca.OP_AND: "&", ca.OP_OR: "|"}
+_WRITTEN = {
+    ca.OP_ASSIGN: "{0}",
+    ca.OP_NEG: "-{0}",
+    ca.OP_SQ: "{0} * {0}",
+    ca.OP_TWICE: "2 * {0}",
+    ca.OP_INV: "1 / {0}",
+    ca.OP_FABS: "fabs({0})",
+    ca.OP_SQRT: "sqrt({0})",
+    ca.OP_SIGN: "{0} < 0 ? -1.0 : {0} > 0 ? 1.0 : {0}",
+}
+_OF_THE_LIBRARY = {
+    ca.OP_FMOD: "fmod",
+    ca.OP_CEIL: "ceil",
+    ca.OP_TAN: "tan",
+    ca.OP_ATAN: "atan",
+    ca.OP_SINH: "sinh",
+    ca.OP_COSH: "cosh",
+    ca.OP_ASINH: "asinh",
+    ca.OP_LOG1P: "log1p",
+}
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value in C.
+
+    Attributes
+    ----------
+    text : str
+    true_or_false : bool
+    """
+
+    text: str
+    true_or_false: bool = False
+
+    @property
+    def number(self) -> str:
+        """As a double."""
+        return f"({self.text} ? 1.0 : 0.0)" if self.true_or_false else self.text
+
+    @property
+    def condition(self) -> str:
+        """As what is true or false."""
+        return self.text if self.true_or_false else f"({self.text} != 0)"
+
+
+def operation(code: int, arguments: Sequence[Value], named: Callable[[int], str | None]) -> Value:
+    """Result of an operation in C; `named` are the functions to call for operations, by code.
+
+    Raises
+    ------
+    NotPortableError
+    """
+    numbers = [argument.number for argument in arguments]
+    if name := named(code):
+        return Value(f"{name}({', '.join(numbers)})")
+    if code in _BINARY:
+        return Value(f"{numbers[0]} {_BINARY[code]} {numbers[1]}")
+    if code in _COMPARED:
+        return Value(f"{numbers[0]} {_COMPARED[code]} {numbers[1]}", True)
+    if code in _JOINED:
+        return Value(f"{arguments[0].condition} {_JOINED[code]} {arguments[1].condition}", True)
+    if code == ca.OP_NOT:
+        return Value(f"!{arguments[0].condition}", True)
+    if code == ca.OP_IF_ELSE_ZERO:
+        return Value(f"{arguments[0].condition} ? {numbers[1]} : 0.0")
+    if code in _WRITTEN:
+        return Value(_WRITTEN[code].format(*numbers))
+    raise NotPortableError(f"operation {code}")
+
+
+def constant(value: float) -> str:
+    """A float in C, to its last bit."""
+    if math.isnan(value):
+        return "NAN"
+    return f"({'-' if value < 0 else ''}INFINITY)" if math.isinf(value) else f"({value.hex()})"
+
+
+def portable_name(code: int) -> str | None:
+    """Name in C of an elementary function."""
+    return f"portable_{FUNCTIONS[code].__name__}" if code in FUNCTIONS else None
+
+
+def called_alone(code: int) -> str | None:
+    """Name in C of a function of the C library that is called for one number at a time."""
+    return _OF_THE_LIBRARY.get(code)
+
+
+@cache
+def elementary_c() -> str:
+    """The elementary functions in C, to be inlined."""
+    parts: list[Callable[..., Any]] = [*dict.fromkeys(FUNCTIONS.values()), cube_root, any_power]
+    written = "".join(_function_c(function) for function in parts if function is not power)
+    return c_file("portable.c") + written + c_file("power.c", third=constant(THIRD))
+
+
+def _function_c(function: Callable[..., Any]) -> str:
+    count = function.__code__.co_argcount
+    with verbatim(bits=True):
+        arguments = [ca.SX.sym(f"x{i}") for i in range(count)]
+        written = ca.Function("written", arguments, [ca.cse([function(*arguments)])[0]])
+    lines, values, end = list[str](), dict[int, Value](), ""
+    for number, work in enumerate(instructions(written)):
+        if work.operation == ca.OP_OUTPUT:
+            end = values[work.taken[0]].number
+            continue
+        if work.operation == ca.OP_INPUT:
+            values[work.given[0]] = Value(f"x{work.taken[0]}")
+            continue
+        arguments_ = [values[i] for i in work.taken]
+        if work.operation in (ca.OP_POW, ca.OP_CONSTPOW):
+            arguments_ = arguments_[1:]
+        values[work.given[0]] = declared(lines, number, work, arguments_, _ATOMIC.get)
+    head = ", ".join(f"double x{i}" for i in range(count))
+    body = "\n".join(f"  {line}" for line in lines)
+    return f"\nPORTABLE double portable_{function.__name__}({head}) {{\n{body}\n  return {end};\n}}\n"
+
+
+def declared(
+    lines: list[str], number: int, work: Instruction, arguments: Sequence[Value], named: Callable[[int], str | None]
+) -> Value:
+    """Value of an instruction, computed by a line that is added."""
+    if work.operation == ca.OP_CONST:
+        return Value(constant(work.constant))
+    made = operation(work.operation, arguments, named)
+    name = f"{'b' if made.true_or_false else 'v'}{number}"
+    lines.append(f"const {'_Bool' if made.true_or_false else 'double'} {name} = {made.text};")
+    return replace(made, text=name)
+
+
+@cache
+def in_place_of_the_library() -> str:
+    """Text before C of CasADi, which then calls the portable functions in place of those of the C library."""
+    names = {FUNCTIONS[code].__name__: code for code in FUNCTIONS if code != ca.OP_POW}
+    called = {"power": "pow"}
+    replaced = "".join(f"#define {called.get(name, name)} portable_{name}\n" for name in names)
+    return elementary_c() + "\n" + replaced + "\n"
+
+
+# ----------------------------------------------------------------------
+# The step function repeated, in machine code where a C compiler is at hand.
+
+FLAGS = (
+    *("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
+    *("-fPIC", "-fvisibility=hidden", "-shared"),  # what is not hidden is never inlined
+)
+"""None of them changes a digit."""
+RADIX = 64
+LEVELS = 3
+_LONGEST_COMPILATION = 120
+_WORTH = 100_000_000
+"""Instructions of a whole run from which on a compiler, which takes some 0.3 s, saves time."""
+
+
+STEP = "quakedesign_step"
+"""Name of a step function: in a library that is loaded, that of a function of the C library would be taken for it."""
+
+MachineCode = Callable[[Any, int], int]
+
+
+@dataclass(frozen=True)
+class Backend:
+    """What advances a vector.
+
+    Attributes
+    ----------
+    functions : tuple of casadi.Function
+        That advance it by 1, 64 and 4096 steps, one input and one output each; none beside machine code.
+    name : str
+        ``"compiled"`` or ``"virtual-machine"``.
+    reason : str
+        The compiler, or why there is none.
+    machine_code : callable, optional
+        Advances the floats at a pointer by a number of steps; not 0 if it fails.
+    """
+
+    functions: tuple[Any, ...]
+    name: str
+    reason: str
+    machine_code: MachineCode | None = None
+
+
+def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
+    """Backend of a step function; both kinds give the same digits.
+
+    Parameters
+    ----------
+    step : casadi.Function
+        One vector in, one vector of the same length out; called `STEP`.
+    compiled : bool or None
+        Whether to compile; None: if the run is long enough to be worth it, and a compiler is found and works.
+    steps : int
+        Number of steps of the run.
+
+    Raises
+    ------
+    SimulationError
+        When compilation was asked for and is not possible.
+    """
+    if compiled is False:
+        return _virtual_machine(step, "asked for")
+    if compiled is None and steps * expanded_size(step) < _WORTH:
+        return _virtual_machine(step, "the run is shorter than a compilation")
+    try:
+        command = compiler()
+        return Backend((), "compiled", " ".join((*command, *FLAGS)), _compile(_source(step), command))
+    except (OSError, subprocess.SubprocessError) as error:
+        reason = _reason(error)
+        if compiled:
+            raise SimulationError(
+                f"a compiled loop needs a C compiler. {reason}. Install one, set CC, or use compiled=None."
+            ) from None
+        return _virtual_machine(step, reason)
+
+
+def _virtual_machine(step: Any, reason: str) -> Backend:
+    return Backend(ladder(expanded(step)), "virtual-machine", reason)
+
+
+def ladder(step: Any) -> tuple[Any, ...]:
+    """Functions for 1, RADIX, RADIX² … steps; each calls the one below, so that the code stays small."""
+    rungs = [step]
+    for level in range(1, LEVELS):
+        start = ca.MX.sym("z", step.size1_in(0))
+        end = start
+        for _ in range(RADIX):
+            end = rungs[-1](end)
+        rungs.append(ca.Function(f"steps_{RADIX**level}", [start], [end]))
+    return tuple(rungs)
+
+
+def _source(step: Any) -> str:
+    generator = ca.CodeGenerator("steps.c")
+    generator.add(step)
+    sizes = {
+        "step": step.name(),
+        "size": step.size1_in(0),
+        "work": max(1, step.sz_w()),
+        "integers": max(1, step.sz_iw()),
+        "arguments": step.sz_arg(),
+        "results": step.sz_res(),
+    }
+    return in_place_of_the_library() + str(generator.dump()) + c_file("steps.c", **sizes)
+
+
+def compiler() -> tuple[str, ...]:
+    """Command of the C compiler: CC, or the first of cc, gcc and clang.
+
+    Raises
+    ------
+    FileNotFoundError
+        When there is none, or CC cannot be read.
+    """
+    try:
+        wanted = shlex.split(os.environ.get("CC", ""))
+    except ValueError as error:
+        raise FileNotFoundError(f"CC must be a command: {error}") from None
+    for command in [wanted] if wanted else [["cc"], ["gcc"], ["clang"]]:
+        path = shutil.which(command[0])
+        if path:
+            return path, *command[1:]
+    raise FileNotFoundError("no C compiler: neither CC nor cc, gcc or clang was found")
+
+
+@lru_cache(maxsize=32)
+def _compile(text: str, command: tuple[str, ...]) -> MachineCode:
+    """Load the loop of a C source; the library stays in memory when its file is gone."""
+    asked = text.encode(), repr((*command, *FLAGS, *_identity(command[0]))).encode()
+    with temporary_folder() as folder:
+        library = folder / "kept.so"
+        if (content := disk_cache.recall("code", *asked)) is not None:
+            library.write_bytes(content)
+        else:
+            library = shared_library(text, folder, command)
+            disk_cache.keep("code", library.read_bytes(), *asked)
+        advance: Any = ctypes.CDLL(str(library)).advance
+    advance.argtypes, advance.restype = [ctypes.c_void_p, ctypes.c_longlong], ctypes.c_int
+    return cast(MachineCode, advance)
+
+
+def compilation() -> str:
+    """How a compiled run is compiled: command and flags, and which compiler that is; empty without one."""
+    try:
+        command = compiler()
+        return repr((*command, *FLAGS, *_identity(command[0])))
+    except OSError:
+        return ""
+
+
+def _identity(program: str) -> tuple[str, int, int]:
+    """Where a program lies, its size and when it changed last: another compiler has another one."""
+    path = Path(program).resolve()
+    told = path.stat()
+    return str(path), told.st_size, told.st_mtime_ns
+
+
+def shared_library(text: str, folder: Path, command: tuple[str, ...], flags: tuple[str, ...] = ()) -> Path:
+    """Compile a C source into a shared library in a folder, with more flags where there are some.
+
+    Raises
+    ------
+    OSError, SubprocessError
+        When the compiler does not work.
+    """
+    written, library = folder / "steps.c", folder / "steps.so"
+    written.write_text(text, encoding="utf-8")
+    _run([*command, *FLAGS, *flags, str(written), "-o", str(library), "-lm"], folder)
+    return library
+
+
+def _run(call: list[str], folder: Path) -> None:
+    """Run a compiler to its end; whatever else ends it ends those that it has started, and its files lie in a folder.
+
+    Raises
+    ------
+    OSError, SubprocessError
+    """
+    where, pipe = os.environ | {"TMPDIR": str(folder)}, subprocess.PIPE
+    with subprocess.Popen(
+        call, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, env=where, start_new_session=True
+    ) as process:
+        try:
+            said = process.communicate(timeout=_LONGEST_COMPILATION)
+        except BaseException:
+            _kill_all(process)
+            raise
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, call, *said)
+
+
+def _kill_all(process: "subprocess.Popen[bytes]") -> None:
+    if hasattr(os, "killpg"):
+        os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, subprocess.CalledProcessError):
+        said = error.stderr.decode(errors="replace").strip().splitlines()
+        return f"the C compiler failed: {said[0] if said else f'exit code {error.returncode}'}"
+    return (str(error) or type(error).__name__).splitlines()[0]
+
+
+# ----------------------------------------------------------------------
+# Many vectors stepped at once: C whose innermost loops run over lanes, for the compiler to vectorise.
+
+LANES = 16
+LANE_FLAGS = ("-fno-tree-pre", "-fno-thread-jumps")
+"""What lets a compiler choose between values instead of branching; none of it changes a digit."""
+_WIDE = {"__AVX512F__": ("-mavx512f", "-mprefer-vector-width=512"), "__AVX2__": ("-mavx2",)}
+_LONGEST_QUESTION = 10
+
+
+@lru_cache(maxsize=4)
+def processor_flags(command: tuple[str, ...]) -> tuple[str, ...]:
+    """Flags of a compiler for the widest vectors of this processor; none where it cannot tell."""
+    question = [*command, "-march=native", "-dM", "-E", "-x", "c", "-"]
+    try:
+        told = subprocess.run(question, input="", capture_output=True, text=True, timeout=_LONGEST_QUESTION, check=True)
+    except (OSError, subprocess.SubprocessError, UnicodeError):
+        return ()
+    macros = told.stdout.split()
+    return next((flags for macro, flags in _WIDE.items() if macro in macros), ())
+
+
+def lanes_c(step: Any, diverged: int) -> str:
+    """C text with ``advance_samples``, which moves vectors that lie side by side on until they diverge.
+
+    Parameters
+    ----------
+    step : casadi.Function
+        One vector in, the next one out.
+    diverged : int
+        Index of the time of divergence.
+
+    Raises
+    ------
+    NotPortableError
+        For operations that have no text in C here.
+    """
+    parts = [elementary_c()]
+    _add_body(parts, step, "one_step")
+    loop = c_file("lanes.c", size=step.size1_in(0), diverged=diverged)
+    return c_file("lanes.h", lanes=LANES) + "".join(parts) + loop
+
+
+def _add_body(parts: list[str], function: Any, name: str) -> None:
+    """Function in C that maps the vectors of all lanes in place, after those that it calls."""
+    body = _Body(function, name)
+    for number, call in body.called.items():
+        _add_body(parts, call.function, f"{name}_{number}")
+    lines = "\n".join(f"  {line}" for line in body.lines())
+    size = function.size1_in(0)
+    parts.append(f"\nPORTABLE void {name}(double z[{size}][LANES]) {{\n{lines}\n}}\n")
+
+
+Place = tuple[int, int]
+"""Number of a task, and of its result."""
+
+
+@dataclass(frozen=True)
+class _Task:
+    """An instruction, and where its arguments come from."""
+
+    number: int
+    work: Instruction
+    sources: tuple[Place, ...]
+
+    @property
+    def kind(self) -> int:
+        """Number of a loop that is over before what must not stand in it: a call, or a function of the C library."""
+        return self.number if self.work.operation == ca.OP_CALL else -1 - bool(called_alone(self.work.operation))
+
+
+def _tasks(work: Iterable[Instruction]) -> list[_Task]:
+    """What is done, in order, the results of all at the end."""
+    at: dict[int, Place] = {}
+    tasks = list[_Task]()
+    for number, one in enumerate(work):
+        taken = () if one.operation == ca.OP_INPUT else one.taken
+        tasks.append(_Task(number, one, tuple(at[place] for place in taken)))
+        if one.operation != ca.OP_OUTPUT:
+            at |= {place: (number, i) for i, place in enumerate(one.given)}
+    return sorted(tasks, key=lambda task: task.work.operation == ca.OP_OUTPUT)
+
+
+class _Body:
+    """The work of a function as loops over lanes: one, but for what must not stand in a loop with others."""
+
+    def __init__(self, function: Any, name: str) -> None:
+        self._name = name
+        self.tasks = _tasks(instructions(function))
+        calls = (task for task in self.tasks if task.work.operation == ca.OP_CALL)
+        self.called = {task.number: called(function, task.work) for task in calls}
+        self._loops = [list(tasks) for _, tasks in groupby(self.tasks, key=lambda task: task.kind)]
+        self._by_number = {task.number: task for task in self.tasks}
+        loop_of = {task.number: i for i, tasks in enumerate(self._loops) for task in tasks}
+        used = {(place, task.number) for task in self.tasks for place in task.sources}
+        crossing = {place for place, user in used if loop_of[place[0]] != loop_of[user] and not self._at_hand(place)}
+        self._kept = {place: f"kept[{i}][lane]" for i, place in enumerate(sorted(crossing))}
+
+    def _at_hand(self, place: Place) -> bool:
+        return self._by_number[place[0]].work.operation in (ca.OP_INPUT, ca.OP_CONST)
+
+    def lines(self) -> Iterator[str]:
+        """Text of the body."""
+        yield "int lane;"
+        if self._kept:
+            yield f"double kept[{len(self._kept)}][LANES];"
+        for tasks in self._loops:
+            yield from self._call(tasks[0]) if tasks[0].work.operation == ca.OP_CALL else self._loop(tasks)
+
+    def _call(self, task: _Task) -> Iterator[str]:
+        call, lines = self.called[task.number], list[str]()
+        given = [self._value(place, {}, lines).number for place in task.sources]
+        first, again = not call.times, f"{self._name}_{task.number}(vector)"
+        lines += [f"needed[lane] = {given[0]} != 0;"] * first
+        lines += [f"vector[{i}][lane] = {text};" for i, text in enumerate(given[first:])]
+        results = [(self._kept.get((task.number, i)), i) for i in range(len(task.work.given))]
+        chosen = "needed[lane] ? vector[{0}][lane] : 0.0" if first else "vector[{0}][lane]"
+        yield "{"
+        yield f"double vector[{len(given) - first}][LANES];"
+        yield "int needed[LANES], any = 0;" if first else "int times;"
+        yield from _over_lanes(lines)
+        if first:
+            yield "for (lane = 0; lane < LANES; ++lane) any |= needed[lane];"
+            yield f"if (any) {again};"
+        else:
+            yield f"for (times = 0; times < {call.times}; ++times) {again};"
+        yield from _over_lanes([f"{kept} = {chosen.format(i)};" for kept, i in results if kept])
+        yield "}"
+
+    def _loop(self, tasks: list[_Task]) -> Iterator[str]:
+        lines, ends, values = list[str](), list[str](), dict[Place, Value]()
+        for task in tasks:
+            work, place = task.work, (task.number, 0)
+            if work.operation == ca.OP_INPUT:
+                continue
+            taken = [self._value(source, values, lines) for source in task.sources]
+            if work.operation == ca.OP_OUTPUT:
+                ends.append(f"z[{work.given[1]}][lane] = {taken[0].number};")
+                continue
+            values[place] = declared(lines, task.number, work, taken, _named)
+            if place in self._kept:
+                lines.append(f"{self._kept[place]} = {values[place].number};")
+        yield from _over_lanes([*lines, *ends])
+
+    def _value(self, place: Place, values: dict[Place, Value], lines: list[str]) -> Value:
+        """A result of this loop, or one of another that is read once."""
+        if place not in values:
+            work = self._by_number[place[0]].work
+            if work.operation == ca.OP_CONST:
+                return Value(constant(work.constant))
+            name = f"v{place[0]}_{place[1]}"
+            source = f"z[{work.taken[1]}][lane]" if work.operation == ca.OP_INPUT else self._kept[place]
+            lines.append(f"const double {name} = {source};")
+            values[place] = Value(name)
+        return values[place]
+
+
+def _named(code: int) -> str | None:
+    return portable_name(code) or called_alone(code)
+
+
+def _over_lanes(lines: list[str]) -> Iterator[str]:
+    yield "for (lane = 0; lane < LANES; ++lane) {"
+    yield from (f"  {line}" for line in lines)
+    yield "}"

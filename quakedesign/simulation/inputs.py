@@ -1,0 +1,257 @@
+"""User-defined inputs of a run: perturbation as text, and prescribed fluid pressure.
+
+The perturbation is an acceleration [m/s²]; the pressure [Pa] is piecewise linear in time and may have
+steps.
+"""
+
+import ast
+import csv
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from quakedesign.errors import ParameterError, UnitError
+from quakedesign.exact import rational
+from quakedesign.fault.model import is_finite
+from quakedesign.fault.units import si_value
+from quakedesign.files import read_text
+from quakedesign.simulation.closed_loop import SYMBOLS
+from quakedesign.text import shown
+
+# ----------------------------------------------------------------------
+# A perturbation φ_e of the user's, written as text.
+
+FUNCTIONS = ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "atan", "Abs", "Min", "Max", "sign")
+MOST_NODES = 300
+MOST_BITS = 1024  # of an exact power
+
+
+def perturbation(text: str) -> "sp.Expr":
+    """Perturbation φ̂_e [m/s²] from text such as ``"3e-4*sin(0.69*time) + 1e-6*slip"``.
+
+    The text is parsed, not executed; its numbers are exact.
+
+    Parameters
+    ----------
+    text : str
+        Numbers, ``pi``, ``slip`` [m], ``slip_rate`` [m/s], ``time`` [s], + - * / **, and the functions of `FUNCTIONS`.
+
+    Returns
+    -------
+    Expr
+        As `quakedesign.simulation.Load` takes it.
+
+    Raises
+    ------
+    ParameterError
+        For anything else, or a value that is not a real number.
+    """
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise _refusal(text, text) from None
+    if sum(1 for _ in ast.walk(tree)) > MOST_NODES:
+        raise ParameterError(f"a perturbation must be short, {MOST_NODES} terms at most. Received more. Shorten it.")
+    expression = _value(tree.body, text.strip())
+    if not _real(expression):
+        raise _refusal(text, text)
+    return expression
+
+
+def _real(expression: Any) -> bool:
+    """Whether every number in an expression is real and finite."""
+    return all(part.is_real and part.is_finite for part in sp.preorder_traversal(expression) if part.is_number)
+
+
+def _value(node: ast.expr, text: str) -> Any:
+    """SymPy expression of one node."""
+    match node:
+        case ast.Constant(value=int() | float()) if not isinstance(node.value, bool):
+            return sp.Rational(str(rational(ast.get_source_segment(text, node) or "", "perturbation")))
+        case ast.Name(id="pi"):
+            return sp.pi
+        case ast.Name(id=name) if name in SYMBOLS:
+            return sp.Symbol(name, real=True)
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=inner):
+            return _value(inner, text) * (-1 if isinstance(node.op, ast.USub) else 1)
+        case ast.BinOp(left=left, op=operation, right=right) if type(operation) in _OPERATIONS:
+            return _OPERATIONS[type(operation)](_value(left, text), _value(right, text), text)
+        case ast.Call(func=ast.Name(id=name), args=[_, *_] as arguments, keywords=[]) if name in FUNCTIONS:
+            if len(arguments) > 1 and name not in ("Min", "Max"):
+                raise _refusal(text, f"{name} of {len(arguments)} arguments")
+            return getattr(sp, name)(*(_value(argument, text) for argument in arguments))
+    raise _refusal(text, ast.get_source_segment(text, node) or text)
+
+
+def _power(base: Any, exponent: Any, text: str) -> Any:
+    digits = max(base.p.bit_length(), base.q.bit_length()) if base.is_Rational else 1
+    if not (exponent.is_Rational and abs(exponent) * digits <= MOST_BITS):
+        raise _refusal(text, f"the exponent {str(exponent)[:40]}")
+    return base**exponent
+
+
+def _quotient(numerator: Any, denominator: Any, text: str) -> Any:
+    if denominator == 0:
+        raise _refusal(text, "a division by zero")
+    return numerator / denominator
+
+
+_OPERATIONS: dict[type[ast.operator], Callable[[Any, Any, str], Any]] = {
+    ast.Add: lambda a, b, _: a + b,
+    ast.Sub: lambda a, b, _: a - b,
+    ast.Mult: lambda a, b, _: a * b,
+    ast.Div: _quotient,
+    ast.Pow: _power,
+}
+
+
+def _refusal(text: str, part: str) -> ParameterError:
+    inside = f" in {text!r}" if part != text else ""
+    return ParameterError(
+        f"a perturbation consists of numbers, pi, {', '.join(SYMBOLS)}, + - * / ** with numbers as exponents, and "
+        f"{', '.join(FUNCTIONS)}, and is real. Received {part!r}{inside}."
+    )
+
+
+# ----------------------------------------------------------------------
+# A fluid pressure that is prescribed over time: straight lines between instants, and steps.
+
+MOST_POINTS = 4096
+_LARGEST_FILE = 1 << 20
+_COLUMNS = ("time", "pressure")
+_UNITS = {"time": "s", "pressure": "Pa"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressureCourse:
+    """Pressure p(t): held before the first instant and after the last, linear between, a step where one stands twice.
+
+    Attributes
+    ----------
+    times : tuple of float
+        [s], never descending, the same one at most twice.
+    pressures : tuple of float
+        [Pa], one for each.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    times: tuple[float, ...]
+    pressures: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not 0 < len(self.times) == len(self.pressures) <= MOST_POINTS:
+            raise ParameterError(
+                f"a course of pressure must have 1 to {MOST_POINTS} instants, each with a pressure. "
+                f"Received {len(self.times)} and {len(self.pressures)}. Leave out those on a straight line."
+            )
+        if not all(map(is_finite, (*self.times, *self.pressures))):
+            raise ParameterError("times [s] and pressures [Pa] must be finite. Received others. Check the numbers.")
+        thrice = any(late <= early for early, late in zip(self.times, self.times[2:], strict=False))
+        if thrice or any(late < early for early, late in pairwise(self.times)):
+            raise ParameterError(
+                "times of a course of pressure must not descend, and stand twice only where it steps. "
+                f"Received {shown(list(self.times))} s. Sort them."
+            )
+
+    @classmethod
+    def constant(cls, pressure: float) -> "PressureCourse":
+        """The same pressure [Pa] at all times."""
+        return cls(times=(0.0,), pressures=(pressure,))
+
+    @property
+    def largest(self) -> float:
+        """[Pa]."""
+        return max(self.pressures)
+
+    def before(self, time: float) -> float:
+        """Pressure [Pa] that a time [s] is reached with."""
+        return self._at(time, int(np.searchsorted(self.times, time, side="left")))
+
+    def after(self, time: float) -> float:
+        """Pressure [Pa] that a time [s] is left with."""
+        return self._at(time, int(np.searchsorted(self.times, time, side="right")))
+
+    def sampled(self, time: "np.ndarray") -> "np.ndarray":
+        """Pressures [Pa] at ascending times [s]; of a time that stands twice the one before and the one after."""
+        twice = np.append(np.diff(time) == 0, False)
+        return np.array([self.before(t) if early else self.after(t) for t, early in zip(time, twice, strict=True)])
+
+    def _at(self, time: float, following: int) -> float:
+        if following in (0, len(self.times)):
+            return self.pressures[min(following, len(self.times) - 1)]
+        (start, end), (low, high) = (row[following - 1 : following + 1] for row in (self.times, self.pressures))
+        return low + (high - low) * (time - start) / (end - start)
+
+
+def pressure_course(text: str) -> PressureCourse:
+    """Course from a quantity such as ``"5 MPa"``, instants, or the path of a CSV file.
+
+    Parameters
+    ----------
+    text : str
+        A constant; or instants as ``"0 s: 0 MPa, 1 day: 0 MPa, 1 day: 5 MPa, 9 day: 2 MPa"``, linear between, a step
+        where one stands twice; or a path that ends in ``.csv``, its first row ``time [s],pressure [MPa]`` or with
+        other units.
+
+    Raises
+    ------
+    ParameterError, UnitError
+    """
+    if Path(text).suffix.lower() == ".csv":
+        rows = list(_rows(text))
+    elif ":" in text:
+        rows = [_instant(part) for part in text.split(",")]
+    else:
+        return PressureCourse.constant(_number(text, "pressure"))
+    times, pressures = zip(*rows, strict=True) if rows else ((), ())
+    return PressureCourse(times=tuple(times), pressures=tuple(pressures))
+
+
+def _number(text: str, name: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return si_value(text.strip(), _UNITS[name], name)
+
+
+def _instant(part: str) -> tuple[float, float]:
+    time, colon, pressure = part.partition(":")
+    if not colon:
+        raise ParameterError(
+            f"an instant of a course of pressure must be written 'time: pressure'. Received {shown(part)}. "
+            "Write for example '1 day: 5 MPa'."
+        )
+    return _number(time, "time"), _number(pressure, "pressure")
+
+
+def _rows(path: str) -> Iterator[tuple[float, float]]:
+    text = read_text(path, "course of pressure", largest=_LARGEST_FILE, refusal=ParameterError)
+    head, *rows = [row for row in csv.reader(text.splitlines()) if row] or [[]]
+    units = [_unit_of(name, column) for name, column in zip(_COLUMNS, (*head, "", ""), strict=False)]
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(_COLUMNS):
+            raise ParameterError(f"{path}, row {number} must have a time and a pressure. Received {shown(row)}.")
+        time, pressure = (
+            si_value(f"{value.strip()} {unit}", _UNITS[name], f"{path}, row {number}: {name}")
+            for value, unit, name in zip(row, units, _COLUMNS, strict=True)
+        )
+        yield time, pressure
+
+
+def _unit_of(name: str, column: str) -> str:
+    """Unit in a column's head such as ``pressure [MPa]``."""
+    word, bracket, unit = column.strip().partition("[")
+    if word.strip().lower() != name or not bracket or not unit.endswith("]"):
+        raise UnitError(
+            f"a course of pressure must have the columns 'time [s]' and 'pressure [Pa]', in this order, with any units "
+            f"of these dimensions. Received {shown(column)}. Name the columns in the first row."
+        )
+    return unit[:-1]

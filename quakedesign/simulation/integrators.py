@@ -1,0 +1,354 @@
+"""Integrators by name: fixed-step Runge–Kutta, and adaptive CVODES and IDAS.
+
+Fixed step: Dormand–Prince (order 5) and classic Runge–Kutta. Adaptive: backward differentiation formulas
+of SUNDIALS through CasADi. The last chapter tests whether a fixed step is short enough for a linear loop.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from fractions import Fraction as F
+from functools import cache
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from quakedesign.arguments import check_arguments
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.text import nearest_name
+
+# ----------------------------------------------------------------------
+# What every fixed-step integrator offers, and the explicit Runge–Kutta family.
+
+if TYPE_CHECKING:
+    pass
+
+
+class Integrator(ABC):
+    """One step of a fixed length.
+
+    Attributes
+    ----------
+    name : str
+    source : str
+    order : int
+        Order of convergence on smooth problems.
+    """
+
+    name: ClassVar[str]
+    source: ClassVar[str]
+    order: ClassVar[int]
+
+    @classmethod
+    @abstractmethod
+    def advance(cls, field: Callable[[float, Any], Any], state: Any, step: float) -> Any:
+        """State after one step.
+
+        Parameters
+        ----------
+        field : callable
+            Time derivative of the state [1/s of its unit], given how much of the step has passed
+            [-, 0 to 1] and the state.
+        state : SX, float or ndarray
+        step : float
+            [s].
+        """
+
+
+class RungeKutta(Integrator):
+    """An explicit Runge–Kutta method.
+
+    Attributes
+    ----------
+    nodes : tuple of Fraction
+    matrix : tuple of tuple of Fraction
+        Row i holds the shares of the stages before i.
+    weights : tuple of Fraction
+    """
+
+    nodes: ClassVar[tuple[Fraction, ...]]
+    matrix: ClassVar[tuple[tuple[Fraction, ...], ...]]
+    weights: ClassVar[tuple[Fraction, ...]]
+
+    @classmethod
+    def advance(cls, field: Callable[[float, Any], Any], state: Any, step: float) -> Any:
+        """State after one step; see `Integrator.advance`."""
+        stages: list[Any] = []
+        for node, row in zip(cls.nodes, cls.matrix, strict=True):
+            stages.append(field(float(node), cls._moved(state, row, stages, step)))
+        return cls._moved(state, cls.weights, stages, step)
+
+    @staticmethod
+    def _moved(state: Any, shares: tuple[Fraction, ...], stages: list[Any], step: float) -> Any:
+        parts = [float(share) * stage for share, stage in zip(shares, stages, strict=True) if share]
+        return state + step * sum(parts[1:], start=parts[0]) if parts else state
+
+
+# ----------------------------------------------------------------------
+# Dormand and Prince's method of fifth order with a fixed step.
+
+
+class DormandPrince(RungeKutta):
+    """Fifth-order weights of the 5(4) pair, six stages, as Simulink's ode5."""
+
+    name: ClassVar[str] = "dormand-prince"
+    source: ClassVar[str] = "Dormand and Prince (1980), J. Comput. Appl. Math. 6, 19"
+    order: ClassVar[int] = 5
+
+    nodes = (F(0), F(1, 5), F(3, 10), F(4, 5), F(8, 9), F(1))
+    matrix = (
+        (),
+        (F(1, 5),),
+        (F(3, 40), F(9, 40)),
+        (F(44, 45), F(-56, 15), F(32, 9)),
+        (F(19372, 6561), F(-25360, 2187), F(64448, 6561), F(-212, 729)),
+        (F(9017, 3168), F(-355, 33), F(46732, 5247), F(49, 176), F(-5103, 18656)),
+    )
+    weights = (F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84))
+
+
+# ----------------------------------------------------------------------
+# The classic Runge–Kutta method.
+
+
+class ClassicRungeKutta(RungeKutta):
+    """Fourth order with four stages."""
+
+    name: ClassVar[str] = "rk4"
+    source: ClassVar[str] = "Kutta (1901), Z. Math. Phys. 46, 435"
+    order: ClassVar[int] = 4
+
+    nodes = (F(0), F(1, 2), F(1, 2), F(1))
+    matrix = ((), (F(1, 2),), (F(0), F(1, 2)), (F(0), F(0), F(1)))
+    weights = (F(1, 6), F(1, 3), F(1, 3), F(1, 6))
+
+
+# ----------------------------------------------------------------------
+# What every integrator with a step of its own choice offers: solvers of the SUNDIALS family through CasADi.
+
+TIGHTEST = 1e-13
+LOOSEST = 1e-3
+FLOOR = 1e-4
+_MOST_STEPS = 20000  # between two instants that are asked for
+_ITERATION_ERROR = 1e-3  # share of the tolerance; the usual 0.33 lets the slip of stiff earthquakes drift by a percent
+
+
+class StoppedError(RuntimeError):
+    """The solver could not go on; the run that asked for it says where."""
+
+
+class AdaptiveIntegrator(ABC):
+    """A solver of smooth, possibly stiff problems that meets a tolerance and answers at any instants.
+
+    Discontinuities are not located: CasADi's events are not used, so that a discontinuous field is the caller's to
+    refuse.
+
+    Attributes
+    ----------
+    name : str
+        Also that of CasADi's plugin.
+    source : str
+    """
+
+    name: ClassVar[str]
+    source: ClassVar[str]
+
+    @classmethod
+    def flow(
+        cls,
+        rates: Any,
+        scales: "Sequence[float] | np.ndarray",
+        shares: "Sequence[float] | np.ndarray",
+        *,
+        rtol: float,
+        quadratures: int = 0,
+    ) -> "Flow":
+        """Solver over one interval, built once and used for any start and length.
+
+        Parameters
+        ----------
+        rates : casadi.Function
+            (t [s], y, parameters) → dy/dt, and what is to be integrated along with it where there is any.
+        scales : sequence of float
+            Size of each variable; its error counts absolutely below `FLOOR` of that.
+        shares : sequence of float
+            Ascending instants in (0, 1], as shares of the interval, at which values are wanted.
+        rtol : float
+            Tolerance of one step relative to a variable, 1e-13 … 1e-3.
+        quadratures : int
+            How many integrals the second output of `rates` holds; they take no part in the choice of the step.
+
+        Raises
+        ------
+        ParameterError
+            For another tolerance.
+        """
+        require_tolerance(rtol)
+        size, count = rates.size1_in(1), rates.size1_in(2)
+        start, length = ca.SX.sym("start"), ca.SX.sym("length")
+        parameters, y, share = ca.SX.sym("parameters", count), ca.SX.sym("y", size), ca.SX.sym("share")
+        sizes = ca.DM(np.asarray(scales, dtype=float))
+        found = rates(start + share * length, y * sizes, parameters)
+        field, *more = found if isinstance(found, tuple | list) else (found,)
+        problem = {"x": y, "t": share, "p": ca.vertcat(start, length, parameters), "ode": length * field / sizes}
+        if quadratures:
+            problem["quad"] = length * more[0]
+        options = {
+            "reltol": rtol,
+            "abstol": rtol * FLOOR,
+            "max_num_steps": _MOST_STEPS,
+            "nonlin_conv_coeff": _ITERATION_ERROR,
+            "disable_internal_warnings": True,
+            "show_eval_warnings": False,  # of trial steps that are too long, and rejected for it
+        }
+        solver = ca.integrator("flow", cls.name, problem, 0.0, [float(s) for s in shares], options)
+        return Flow(solver, np.asarray(scales, dtype=float))
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Solution over intervals of one subdivision.
+
+    Attributes
+    ----------
+    solver : casadi.Function
+    scales : ndarray
+    """
+
+    solver: Any
+    scales: "np.ndarray"
+
+    def follow(
+        self, time: float, length: float, y: "np.ndarray", parameters: Sequence[float] = ()
+    ) -> "tuple[np.ndarray, np.ndarray]":
+        """Values and integrals at the instants of an interval that starts at a time [s] and has a length [s].
+
+        Returns
+        -------
+        tuple of ndarray
+            Shapes (variables, instants) and (integrals, instants); the latter since the start of the interval.
+
+        Raises
+        ------
+        StoppedError
+            When the tolerance cannot be met, or a value is not finite.
+        """
+        try:
+            found = self.solver(x0=y / self.scales, p=[time, length, *parameters])
+        except RuntimeError as error:
+            raise StoppedError(_reason(str(error))) from None
+        values, integrals = found["xf"].full() * self.scales[:, None], found["qf"].full()
+        if not (np.all(np.isfinite(values)) and np.all(np.isfinite(integrals))):
+            raise StoppedError("a value is not finite")
+        return values, integrals
+
+
+def require_tolerance(rtol: float) -> None:
+    """Refuse a tolerance that no solver meets or that means nothing.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not TIGHTEST <= rtol <= LOOSEST:
+        raise ParameterError(f"rtol must be between {TIGHTEST} and {LOOSEST}. Received {rtol!r}.")
+
+
+def _reason(text: str) -> str:
+    """Name of the solver's own message, as in ``CV_TOO_MUCH_WORK``."""
+    quoted = text.split('"')
+    return quoted[1] if len(quoted) > 2 else text.strip().splitlines()[-1]
+
+
+# ----------------------------------------------------------------------
+# Integrators by name: with a fixed step, or with one of their own choice.
+
+__all__ = ["AdaptiveIntegrator", "Integrator", "adaptive_integrators", "any_integrator", "integrator", "integrators"]
+
+
+@cache
+def integrators() -> dict[str, type[Integrator]]:
+    """Every integrator with a fixed step, by name."""
+    return {kind.name: kind for kind in (DormandPrince, ClassicRungeKutta)}
+
+
+@cache
+def adaptive_integrators() -> dict[str, type[AdaptiveIntegrator]]:
+    """Every integrator with a step of its own choice, by name."""
+    return {kind.name: kind for kind in (Cvodes, Idas)}
+
+
+def integrator(name: str) -> type[Integrator]:
+    """Integrator with a fixed step of a given name.
+
+    Raises
+    ------
+    ParameterError
+        When there is none.
+    """
+    require_known(name, sorted(integrators()), "method")
+    return integrators()[name]
+
+
+def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
+    """Integrator of a given name, of either kind.
+
+    Raises
+    ------
+    ParameterError
+        When there is none.
+    """
+    known = integrators() | adaptive_integrators()
+    if name not in known:
+        raise ParameterError(
+            f"method must be one of {', '.join(sorted(integrators()))} (fixed step) or "
+            f"{', '.join(sorted(adaptive_integrators()))} (to a tolerance, smooth loops). Received {name!r}."
+            f"{nearest_name(name, known)}"
+        )
+    return known[name]
+
+
+check_arguments(__name__)
+
+
+# ----------------------------------------------------------------------
+# Backward differentiation formulas of variable order and step.
+
+
+class Cvodes(AdaptiveIntegrator):
+    """Orders 1 to 5, Newton's iteration with the exact Jacobian."""
+
+    name: ClassVar[str] = "cvodes"
+    source: ClassVar[str] = (
+        "Cohen and Hindmarsh (1996), Comput. Phys. 10, 138; Hindmarsh et al. (2005), ACM TOMS 31, 363"
+    )
+
+
+# ----------------------------------------------------------------------
+# Backward differentiation formulas with fixed leading coefficient, for implicit equations.
+
+
+class Idas(AdaptiveIntegrator):
+    """Orders 1 to 5 on 0 = f − y', a family of formulas other than that of `Cvodes`."""
+
+    name: ClassVar[str] = "idas"
+    source: ClassVar[str] = "Hindmarsh et al. (2005), ACM TOMS 31, 363; Brenan, Campbell and Petzold (1996), SIAM"
+
+
+# ----------------------------------------------------------------------
+# Whether a fixed step is short enough for a linear loop.
+
+
+def amplification(poles: Iterable[complex], step: float, method: str = "dormand-prince") -> float:
+    """Growth per step of the fastest growing mode [-] for poles [1/s] and a step [s]; below 1 is stable.
+
+    For the scheme ``continuous``, where the law is part of the integrated field. A sampled law needs another test.
+    """
+    advance = integrator(method).advance
+
+    def growth(pole: complex) -> float:
+        return float(abs(advance(lambda _, x: pole * x, 1.0 + 0.0j, step)))
+
+    return max(map(growth, poles))

@@ -1,0 +1,168 @@
+"""Natural earthquake of an uncontrolled fault, and runs that end before their event.
+
+For such a run, the time of onset is extrapolated with the growth rate of the unstable eigenvalue.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from math import log, pi
+from typing import Any
+
+from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.fault import Disturbance, Fault
+from quakedesign.loop import simulation_scheme
+from quakedesign.simulation.integrators import integrator
+from quakedesign.simulation.recorder import Recorder
+from quakedesign.simulation.run import RunSetting, loop_class, run
+from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, OutcomeCriterion, Trajectory
+from quakedesign.symbolic import derive
+
+# ----------------------------------------------------------------------
+# What happens without control.
+
+NUDGE = 1e-9  # of the largest change of friction: far above rounding, far below what the peak depends on
+FOLDINGS = 90
+PERIODS = 100
+ENDING = 30, 10  # e-foldings and natural periods, of a fault that grows much faster than it swings
+FINENESS = 2e-3  # a step passes a kink of friction with an error of its square
+STILL = 1e3  # times the slip rate that the nudge alone gives: less is no growth
+
+_PEAKS: dict[Fault, float | None] = {}
+_MOST_PEAKS = 64
+
+
+def natural_earthquake(
+    fault: Fault,
+    pressure: float = 0.0,
+    *,
+    progress: Callable[[float], None] | None = None,
+    compiled: bool | None = None,
+    plant: str = "smooth",
+) -> Trajectory:
+    """Let an uncontrolled fault go, under a constant pressure and, if it is unstable, a tiny constant acceleration.
+
+    The acceleration is a share of 1e-9 of the largest change of friction, and the step so short, that the peak of the
+    slip rate depends on neither of them in its first six digits.
+
+    Parameters
+    ----------
+    fault : Fault
+        Its own disturbance is replaced.
+    pressure : float
+        Fluid pressure [Pa] from t = 0 on: 0 for a natural, positive for an induced earthquake.
+    progress, compiled, plant
+        As in `simulate`.
+
+    Returns
+    -------
+    Trajectory
+        Over 90 e-foldings of the unstable eigenvalue, or 30 of them and 10 natural periods if that is longer, or 100
+        natural periods of a stable fault, which stays at rest; steps of at most 2e-3/ω_n. Of the metrics only
+        `peak_slip_rate`, `steps` and `seconds` are given.
+
+    Raises
+    ------
+    ParameterError
+        For a pressure that is not below the effective normal stress.
+    SimulationError
+        When the fault is unstable and yet does not move.
+    """
+    fault.require_memoryless("the natural earthquake")
+    if not abs(pressure) < fault.effective_normal_stress:
+        raise ParameterError(
+            f"pressure must be below the effective normal stress ({fault.effective_normal_stress!r} Pa) in size. "
+            f"Received {pressure!r} Pa."
+        )
+    growth = derive(fault).eigenvalues[0].real
+    nudge = _nudge(fault) if growth > 0 else 0.0
+    nudged = fault.with_disturbance(Disturbance(constant=nudge))
+    step = min(fault.sampling_time, FINENESS / fault.natural_frequency)
+    setting = RunSetting.of(nudged, step, _duration(fault, growth), 2000, 0.0)
+    recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
+    criterion = OutcomeCriterion.of(fault, natural_peak(fault) if pressure else None)
+    earthquake = run(recorder, setting, integrator("dormand-prince"), criterion, progress=progress, compiled=compiled)
+    if pressure:
+        return earthquake
+    natural = earthquake if growth <= 0 else _with_peak(earthquake, fault, growth)
+    if plant == "smooth":
+        _PEAKS[_alone(fault)] = natural.criterion.natural_peak
+        if len(_PEAKS) > _MOST_PEAKS:
+            del _PEAKS[next(iter(_PEAKS))]
+    return natural
+
+
+def _with_peak(earthquake: Trajectory, fault: Fault, growth: float) -> Trajectory:
+    """Event of an unstable fault that is the measure of others, if it moves more than by the nudge alone."""
+    peak = earthquake.metrics.peak_slip_rate  # none where the run diverges
+    if peak is not None and peak <= STILL * _nudge(fault) / growth:
+        raise SimulationError(
+            f"{fault.name} is unstable (eigenvalue {growth:.4g} 1/s), but its simulation does not move: its peak is "
+            f"{peak!r} m/s. Rounding may drown its friction; check the numbers of the law."
+        )
+    return replace(earthquake, criterion=OutcomeCriterion.of(fault, peak))
+
+
+def natural_peak(fault: Fault) -> float | None:
+    """Largest slip rate [m/s] of a fault without control; None for a stable one. Computed once for every fault."""
+    alone = _alone(fault)
+    if alone not in _PEAKS:
+        natural_earthquake(alone, compiled=False)
+    return _PEAKS[alone]
+
+
+def _alone(fault: Fault) -> Fault:
+    """Fault without what its natural earthquake does not depend on."""
+    return fault.with_disturbance(Disturbance()).with_box("paper")
+
+
+def _nudge(fault: Fault) -> float:
+    """Acceleration [m/s²] that is small beside the forces of an event."""
+    low, high = fault.friction.bounds
+    return NUDGE * (high - low) * fault.authority * fault.effective_normal_stress
+
+
+def _duration(fault: Fault, growth: float) -> float:
+    """Time [s] in which an instability has grown from nothing and ended."""
+    period = 2 * pi / fault.natural_frequency
+    if growth <= 0:
+        return PERIODS * period
+    return max(FOLDINGS / growth, ENDING[0] / growth + ENDING[1] * period)
+
+
+# ----------------------------------------------------------------------
+# Uncontrolled runs of unstable faults that end before the earthquake begins.
+
+BEGUN_SHARE = 0.01
+"""Of the natural peak: a slip rate beyond it is no mere growth from rest any more."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waiting:
+    """An event that has not begun.
+
+    Attributes
+    ----------
+    growth : float
+        Real part of the unstable eigenvalue [1/s].
+    onset : float or None
+        Time [s] at which the slip rate would reach 10 % of the natural peak, by growth at that rate from where the run
+        ends; None for a fault that has not moved forward.
+    """
+
+    growth: float
+    onset: float | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI."""
+        return asdict(self)
+
+
+def waiting(run: Trajectory, fault: Fault) -> Waiting | None:
+    """What a run without control waits for; None where the event has begun, or there is none to come."""
+    natural, reached = run.criterion.natural_peak, run.outcome.share_of_natural
+    if run.provenance["controller"] != "none" or natural is None or reached is None or reached >= BEGUN_SHARE:
+        return None
+    growth = derive(fault).eigenvalues[0].real
+    speed = max(float(run.slip_rate[-1]), growth * float(run.slip[-1]))
+    onset = float(run.time[-1]) + log(EARTHQUAKE_SHARE * natural / speed) / growth if speed > 0 else None
+    return Waiting(growth=growth, onset=onset)

@@ -1,0 +1,417 @@
+"""Spring-sliders with rate-and-state friction in logarithms of slip rate and state.
+
+The second chapter holds the conditions of a run in slow sliding: tide, deviation of the true constants
+from the nominal ones, pressure path, and instruments with their memory.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import sympy as sp
+
+from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.exact import rational
+from quakedesign.fault import Fault, FrictionLaw
+from quakedesign.fault.model import require_nonnegative, require_positive
+from quakedesign.laws import Sampling
+from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Layer
+from quakedesign.loop.actuators.base import SampledStage
+from quakedesign.loop.sensing import Transducer
+from quakedesign.symbolic import plant
+from quakedesign.symbolic.casadi_printer import to_casadi
+from quakedesign.symbolic.rate_and_state_plant import loading_rate, rate, state_symbols, without_overflow
+
+# ----------------------------------------------------------------------
+# Spring-sliders whose friction has a state, as differential equations in logarithms of rate and state.
+
+slip, stretch, pressure_rate = sp.symbols("slip stretch pressure_rate", real=True)
+_WIDEST = 1e3  # change of the logarithm of a rate that is looked for
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringSlider:
+    """A block per unit of area: mass·v' = stiffness·stretch − (normal_stress − p)·μ(slip, v, state) − damping·v.
+
+    The stretch of the spring grows with the loading rate less the slip rate. Without mass the balance of forces is a
+    constraint, which its time derivative turns into v' (quasi-dynamic; needs (normal_stress − p)·∂μ/∂v + damping > 0).
+    The pressure p changes the state as well, if the law says so (`FrictionLaw.stress_exponents`).
+
+    Attributes
+    ----------
+    law : FrictionLaw
+    stiffness : float
+        [Pa/m], positive.
+    normal_stress : float
+        Effective normal stress [Pa] where p = 0, positive.
+    damping : float
+        [Pa·s/m], not negative.
+    mass : float
+        [kg/m²]; 0: quasi-dynamic.
+
+    Raises
+    ------
+    ParameterError
+        When a value is outside its range.
+    """
+
+    law: FrictionLaw
+    stiffness: float
+    normal_stress: float
+    damping: float = 0.0
+    mass: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive(stiffness=self.stiffness, normal_stress=self.normal_stress)
+        require_nonnegative(damping=self.damping, mass=self.mass)
+
+    @classmethod
+    def of(cls, fault: Fault, *, inertia: bool = True) -> "SpringSlider":
+        """Spring-slider of a fault, with its damping.
+
+        For radiation damping replace the fault's damping by `quakedesign.fault.fault_toml.radiation_damping`.
+        """
+        return cls(
+            law=fault.friction,
+            stiffness=fault.stiffness / fault.area,
+            normal_stress=fault.effective_normal_stress,
+            damping=fault.damping / fault.area,
+            mass=fault.mass / fault.area if inertia else 0.0,
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Variables of `rates`: slip [m], stretch [m], log of the rate [m/s], logs of the states (in SI units)."""
+        return ("slip", "stretch", "log_slip_rate", *(f"log_{name}" for name in self.law.state_names))
+
+    @property
+    def numbers(self) -> dict[sp.Symbol, sp.Rational]:
+        """Exact values for the symbols of the force balance, of an area of 1 m²; a massless block has any mass."""
+        held = {
+            plant.m: self.mass or 1.0,
+            plant.k: self.stiffness,
+            plant.eta: self.damping,
+            plant.sigma: self.normal_stress,
+        }
+        exact = {symbol: sp.Rational(str(rational(value))) for symbol, value in held.items()}
+        return exact | {plant.A: sp.Integer(1)}
+
+    @cached_property
+    def derivation(self) -> tuple[sp.Expr, ...]:
+        """Rates of slip, stretch, v and the states, in these, the pressure, `loading_rate` and `pressure_rate`."""
+        law, states = self.law.exact(), state_symbols(self.law.state_names)
+        stressing = -pressure_rate / (self.numbers[plant.sigma] - plant.p)
+        state_rates = tuple(
+            change + exponent * x * stressing
+            for change, exponent, x in zip(
+                law.state_rates(slip, rate, *states), law.stress_exponents, states, strict=True
+            )
+        )
+        friction = without_overflow(law.coefficient(slip, rate, *states))
+        acceleration = spring_acceleration().replace(plant.mu, lambda *_: friction)
+        acceleration = acceleration.subs(self.numbers)
+        moving = (rate, loading_rate - rate)
+        if not self.mass:
+            carried = zip((slip, stretch, *states, plant.p), (*moving, *state_rates, pressure_rate), strict=True)
+            change = sum((acceleration.diff(x) * dx for x, dx in carried), start=sp.Integer(0))
+            acceleration = -change / acceleration.diff(rate)
+        return (*moving, acceleration, *state_rates)
+
+    @cached_property
+    def rates(self) -> Any:
+        """CasADi Function (y as in `names`, (loading rate [m/s], p [Pa], dp/dt [Pa/s])) → dy/dt, Jacobian."""
+        y, load, values = self._variables()
+        known = values | {loading_rate: load[0], plant.p: load[1], pressure_rate: load[2]}
+        _, _, *logged = to_casadi(self.derivation, known, [y[0], y[2]])
+        logged = [change / values[x] for change, x in zip(logged, list(values)[2:], strict=True)]
+        field = ca.cse([ca.vertcat(values[rate], load[0] - values[rate], *logged)])[0]
+        return ca.Function("rates", [y, load], [field, ca.jacobian(field, y)])
+
+    @cached_property
+    def readings(self) -> Any:
+        """CasADi Function (y, p [Pa]) → friction coefficient [-], driving less resisting stress [Pa]."""
+        y, load, values = self._variables()
+        law, states = self.law.exact(), state_symbols(self.law.state_names)
+        (friction,) = to_casadi([without_overflow(law.coefficient(slip, rate, *states))], values)
+        driving = self.stiffness * y[1] - self.damping * values[rate]
+        pressure = load[1]
+        return ca.Function("readings", [y, pressure], [friction, driving - (self.normal_stress - pressure) * friction])
+
+    def start(self, at_rate: float, states: tuple[float, ...] | None = None, pressure: float = 0.0) -> list[float]:
+        """Vector y with the forces in balance at a rate [m/s] and a pressure [Pa], in its steady state unless told.
+
+        Raises
+        ------
+        ParameterError
+            When the rate or a state is not positive, or the number of states is not that of the law.
+        """
+        require_positive("Rate and state enter by their logarithms.", start_rate=at_rate)
+        held = self.law.steady_state(at_rate) if states is None else states
+        if len(held) != len(self.law.state_names):
+            raise ParameterError(f"start_state must hold {len(self.law.state_names)} values. Received {len(held)}.")
+        require_positive(
+            "Rate and state enter by their logarithms.", **dict(zip(self.law.state_names, held, strict=True))
+        )
+        logs = [float(sp.log(rational_number(value)).evalf(30)) for value in (at_rate, *held)]
+        friction = float(sp.N(self.law.exact().coefficient(0, *map(rational_number, (at_rate, *held))), 30))
+        resisting = (self.normal_stress - pressure) * friction + self.damping * at_rate
+        return [0.0, resisting / self.stiffness, *logs]
+
+    def stepped(self, y: "np.ndarray", before: float, after: float) -> "np.ndarray":
+        """Vector y after a step of the pressure [Pa]: no slip meanwhile, but of the state what the law says.
+
+        Without mass the slip rate jumps to where the forces balance again.
+
+        Raises
+        ------
+        SimulationError
+            When they do at no rate.
+        """
+        found = np.array(y)
+        change = math.log((self.normal_stress - after) / (self.normal_stress - before))
+        found[3:] += np.array(self.law.stress_exponents, dtype=float) * change
+        if not self.mass:
+            found[2] = self._balanced(found, after)
+        return found
+
+    def _balanced(self, y: "np.ndarray", pressure: float) -> float:
+        """Logarithm of the rate at which the forces balance, which they do from below; near that of y."""
+        from scipy.optimize import brentq
+
+        def excess(logarithm: float) -> float:
+            return float(self.readings([*y[:2], logarithm, *y[3:]], pressure)[1])
+
+        way = 1.0 if excess(y[2]) > 0 else -1.0
+        width = way
+        while excess(y[2] + width) * way > 0:
+            width *= 2
+            if abs(width) > _WIDEST:
+                raise SimulationError(
+                    f"the forces must balance after a step of the pressure to {pressure:.6g} Pa. Received a slip rate "
+                    "that leaves all sizes. Give a smaller step, or inertia."
+                )
+        return float(brentq(excess, *sorted((y[2], y[2] + width)), xtol=1e-14, rtol=1e-15))
+
+    def _variables(self) -> tuple[Any, Any, dict[sp.Symbol, Any]]:
+        states = state_symbols(self.law.state_names)
+        y, load = ca.SX.sym("y", 3 + len(states)), ca.SX.sym("load", 3)
+        logged = {x: ca.exp(y[2 + i]) for i, x in enumerate((rate, *states))}
+        return y, load, {slip: y[0], stretch: y[1]} | logged
+
+
+def rational_number(value: Any) -> sp.Rational:
+    """Exact SymPy number of a float."""
+    return sp.Rational(str(rational(float(value))))
+
+
+def spring_acceleration() -> sp.Expr:
+    """v' [m/s²] of eq. springmodel in `stretch`, `rate` and μ, without disturbance."""
+    z, v, acceleration, far = sp.symbols("z v a delta_far", real=True)
+    balance = plant.force_balance().replace(plant.disturbance, lambda *_: sp.Integer(0))
+    moving = sp.solve(balance.subs(far, z + stretch), acceleration)[0]
+    return sp.expand(moving.subs({z: slip, v: rate}))
+
+
+# ----------------------------------------------------------------------
+# Around a fault in slow sliding: what pushes it, what its law does not know, and what the pressure goes through.
+
+TIDE = 12.42 * 3600.0  # s, of the largest tide, M2
+MODES = 24  # of the layer; the law has fewer
+FRICTION = ("direct_effect", "evolution_effect", "critical_slip")
+"""Constants of friction that a spread is about: a, b and D_c."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tide:
+    """Shear stress S·sin(2πt/P + φ) on the fault, beside that of the spring; it begins with what it has at once.
+
+    Attributes
+    ----------
+    amplitude : float
+        S [Pa], not negative.
+    period : float
+        P [s], positive.
+    phase : float
+        φ [rad], not negative.
+    """
+
+    amplitude: float = 0.0
+    period: float = 1.0
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_nonnegative(stress=self.amplitude, stress_phase=self.phase)
+        require_positive(stress_period=self.period)
+
+    def at(self, time: Any) -> Any:
+        """Stress [Pa] at a time [s]."""
+        return self.amplitude * np.sin(2 * math.pi / self.period * time + self.phase)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingVariation:
+    """True constants of a fault over those that its law and its plan know [-], each positive.
+
+    Attributes
+    ----------
+    direct_effect, evolution_effect, critical_slip : float
+        Of a, b and D_c.
+    normal_stress, stiffness, damping : float
+        Of σ', k and η.
+    """
+
+    direct_effect: float = 1.0
+    evolution_effect: float = 1.0
+    critical_slip: float = 1.0
+    normal_stress: float = 1.0
+    stiffness: float = 1.0
+    damping: float = 1.0
+
+    def __post_init__(self) -> None:
+        require_positive(**asdict(self))
+
+    def slider(self, fault: Fault, *, inertia: bool) -> SpringSlider:
+        """The true fault."""
+        nominal, factors = SpringSlider.of(fault, inertia=inertia), asdict(self)
+        changed = {name: getattr(nominal.law, name) * factors[name] for name in FRICTION if factors[name] != 1}
+        law = replace(nominal.law, **changed) if changed else nominal.law  # type: ignore[type-var]
+        plant = {name: getattr(nominal, name) * factors[name] for name in ("normal_stress", "stiffness", "damping")}
+        return replace(nominal, law=law, **plant)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressurePath:
+    """What a pressure goes through before it is in the fault: a pump, then a lag of pump and pipe, then rock.
+
+    Attributes
+    ----------
+    lag, diffusion : Fraction
+        Time constant and L²/D [s], not negative; 0 for none.
+    stages : tuple of SampledStage
+        What happens to it once a sample, before it is held. All but a delay see the pump's whole pressure, the planned
+        one included; what is planned is known ahead, so that it is not late.
+    """
+
+    lag: Fraction = Fraction(0)
+    diffusion: Fraction = Fraction(0)
+    stages: tuple[SampledStage, ...] = ()
+
+    @classmethod
+    def of(cls, meant: Sampling, actuator: Actuator | None) -> "PressurePath":
+        """That of an actuator; without a lag and rock in it that which a law of samples is meant for.
+
+        Raises
+        ------
+        ParameterError
+        """
+        given = (
+            Actuator.meant_for(replace(meant, lag=Fraction(0), diffusion=Fraction(0))) if actuator is None else actuator
+        )
+        stages, flowing = given.sampled, given.flowing
+        if not flowing:
+            return cls(lag=meant.lag, diffusion=meant.diffusion, stages=stages)
+        if [type(stage) for stage in flowing] not in ([Lag], [Diffusion], [Lag, Diffusion]):
+            raise ParameterError(
+                "the pressure of slow sliding goes through a lag, rock, or both. Received "
+                f"{', '.join(stage.name for stage in flowing)}. Leave out the others."
+            )
+        told = {stage.name: stage for stage in flowing}
+        lag, rock = told.get("lag"), told.get("diffusion")
+        return cls(
+            stages=stages,
+            lag=rational(lag.time_constant) if isinstance(lag, Lag) else Fraction(0),
+            diffusion=rational(rock.time) if isinstance(rock, Diffusion) else Fraction(0),
+        )
+
+    @property
+    def modes(self) -> "tuple[np.ndarray, np.ndarray]":
+        """Rates λ_i [1/s] and shares c_i [-] of filters side by side, of a step 1 − Σ c_i·e^{−λ_i·t}.
+
+        Partial fractions of those of the rock behind the lag: exact but for what 24 modes of the rock leave out. A lag
+        that has the rate of a mode is taken as a billionth slower.
+        """
+        rock = Layer(time=self.diffusion or Fraction(1))
+        found = [(float(rock.rate(i)), float(rock.share(i))) for i in range(MODES if self.diffusion else 0)]
+        rates, shares = np.array(found).reshape(-1, 2).T
+        if not self.lag:
+            return rates, shares
+        own = 1 / float(self.lag)
+        own *= 1 - 1e-9 if np.any(np.abs(rates / own - 1) < 1e-9) else 1
+        behind = shares * own / (own - rates)
+        return np.append(rates, own), np.append(behind, 1 - sum(behind))
+
+
+class Instruments:
+    """A transducer and a pump between samples of one run, with their memories.
+
+    Attributes
+    ----------
+    step : float
+        T_s [s].
+    part : float
+        Share of it after which the pressure that is held changes.
+    """
+
+    def __init__(self, step: float, part: float, reading: Any, late: Any, pumped: Any) -> None:
+        self.step, self.part = step, part
+        self._reading, self._late, self._pumped = reading, late, pumped
+
+    @classmethod
+    def of(cls, path: PressurePath, transducer: Transducer | None, step: float) -> "Instruments":
+        """Before the first sample."""
+        late = [stage for stage in path.stages if isinstance(stage, Delay)]
+        others = [stage for stage in path.stages if not isinstance(stage, Delay)]
+        stages = (_remembering(_held(s, step)) for s in (late, others))
+        return cls(step, Actuator(stages=path.stages).part, _remembering(_read(transducer, step)), *stages)
+
+    def read(self, slip: float) -> float:
+        """Slip [m] that is told."""
+        return float(self._reading(slip))
+
+    def pump(self, asked: float, planned: float) -> float:
+        """Pressure [Pa] beside a planned one that is held, of what is asked for beside it."""
+        return float(self._pumped(float(self._late(asked)) + planned)) - planned
+
+    def sections(self, now: float, before: float, after: float) -> list[tuple[float, float, float]]:
+        """Starts and lengths [s] between a sample and the next of what is held, with the pressures."""
+        late = self.part * self.step
+        return [(now, late, before)] * (late > 0) + [(now + late, self.step - late, after)]
+
+
+def _read(transducer: Transducer | None, step: float) -> Any:
+    """CasADi Function (memory, slip) → reading, memory, and the memory at first; None without a transducer."""
+    if transducer is None:
+        return None
+    memory, slip = ca.SX.sym("memory", len(transducer.start)), ca.SX.sym("slip")
+    seen, after = transducer.pass_on([*map(ca.SX, transducer.numbers(step))], ca.vertsplit(memory), slip)
+    return ca.Function("reading", [memory, slip], [seen, ca.vertcat(*after)]), transducer.start
+
+
+def _held(stages: Sequence[SampledStage], step: float) -> Any:
+    """The same of a pressure and what is held of it; None without stages."""
+    if not stages:
+        return None
+    chain, start = Actuator(stages=tuple(stages)), tuple(v for stage in stages for v in stage.start)
+    numbers = [ca.SX(v) for stage in stages for v in stage.numbers]
+    memory, asked = ca.SX.sym("memory", len(start)), ca.SX.sym("asked")
+    held, _, after = chain.hold(numbers, ca.vertsplit(memory), asked, step)
+    return ca.Function("held", [memory, asked], [held, ca.vertcat(*after)]), start
+
+
+def _remembering(element: Any) -> Any:
+    """Number → number of such a Function, which keeps its memory; as it is without one."""
+    if element is None:
+        return float
+    function, start = element
+    memory = [ca.DM(start)]
+
+    def passed_on(value: float) -> Any:
+        found, memory[0] = function(memory[0], value)
+        return found
+
+    return passed_on

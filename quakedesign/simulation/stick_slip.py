@@ -1,0 +1,532 @@
+"""Uncontrolled runs with rate-and-state friction: velocity steps and stick–slip cycles.
+
+Further chapters: slip events (nucleation, event, arrest, recurrence) and initial conditions (steady
+sliding, after a hold, or late in a cycle).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault import Fault, FrictionLaw
+from quakedesign.fault.model import magnitude, require_positive
+from quakedesign.simulation.closed_loop import EnergyBudget
+from quakedesign.simulation.inputs import PressureCourse
+from quakedesign.simulation.run import library_versions
+from quakedesign.simulation.smooth import Ramp, SmoothProblem, SmoothSolution
+from quakedesign.simulation.state_plant import SpringSlider
+from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, Outcome, StateTrajectory
+from quakedesign.symbolic import derive
+
+# ----------------------------------------------------------------------
+# Faults with rate-and-state friction under loading from afar and pressure: velocity steps and stick-slip cycles.
+
+_ONSET = 10.0
+_SHARE_OF_STRETCH = 1e-3
+_LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
+
+
+def simulate_state(
+    subject: Fault | SpringSlider,
+    loading: "float | Sequence[tuple[float, float]]",
+    *,
+    duration: float | None = None,
+    inertia: bool = True,
+    pressure: "float | PressureCourse" = 0.0,
+    start_rate: float | None = None,
+    start_state: Sequence[float] | None = None,
+    times: "Sequence[float] | np.ndarray | None" = None,
+    onset_rate: float | None = None,
+    method: str = "radau",
+    rtol: float = 1e-9,
+) -> StateTrajectory:
+    """Simulate a fault whose friction has a state, uncontrolled, loaded from afar, under a prescribed pressure.
+
+    Rate and state are integrated in their logarithms, so that a hold of years and a slip of milliseconds keep the same
+    number of digits. At the start the forces are in balance, under the pressure before a step at t = 0.
+
+    Parameters
+    ----------
+    subject : Fault or SpringSlider
+        A fault with its own damping.
+    loading : float or sequence of (float, float)
+        v_∞ [m/s], for `duration`; or pairs of (time it lasts [s], v_∞ [m/s]), one after the other. Not negative.
+    duration : float, optional
+        [s]; only for a single loading rate.
+    inertia : bool
+        Of a fault: third order with inertia, or quasi-dynamic without. A `SpringSlider` has its own mass.
+    pressure : float or PressureCourse
+        Fluid pressure [Pa], below the effective normal stress. Where it steps, the values before and after are returned
+        both, at the same time; of the instants in `times` those after.
+    start_rate : float, optional
+        Slip rate at the start [m/s]; the first loading rate unless given.
+    start_state : sequence of float, optional
+        State at the start, in the law's units; steady at `start_rate` unless given.
+    times : sequence of float, optional
+        Instants to return [s]; every step of the method unless given.
+    onset_rate : float, optional
+        Slip rate whose upward crossings are events [m/s]; ten times the fastest loading rate unless given.
+    method : str
+        ``"radau"`` (stiff: inertia), ``"dop853"`` (usually faster without inertia), ``"cvodes"`` or ``"idas"`` (both
+        for stiff problems, as independent codes).
+    rtol : float
+        Tolerance of one step, for logarithms of rate and state absolute, 1e-13 … 1e-3.
+
+    Returns
+    -------
+    StateTrajectory
+
+    Raises
+    ------
+    ParameterError
+        For a law without state, or settings that are not positive, finite or known.
+    SimulationError
+        When the method cannot go on, as when the slip rate grows without bound (no inertia and no damping).
+    """
+    slider = subject if isinstance(subject, SpringSlider) else SpringSlider.of(subject, inertia=inertia)
+    if not slider.law.state_names:
+        raise ParameterError(f"the friction law must have a state. Received {slider.law.name}. Use simulate.")
+    course = pressure if isinstance(pressure, PressureCourse) else PressureCourse.constant(pressure)
+    _require_closed(slider, course)
+    pieces = _pieces(loading, duration)
+    first = pieces[0][1] if start_rate is None else start_rate
+    start = slider.start(first, None if start_state is None else tuple(start_state), course.before(0.0))
+    level = _ONSET * max(v for _, v in pieces) if onset_rate is None else onset_rate
+    problem = SmoothProblem(slider.rates, _scales(slider, start), 2, math.log(level) if level > 0 else math.inf)
+    history = _History(slider, problem, pieces, course, _wanted(times, pieces), method, rtol)
+    name = f"{subject.name if isinstance(subject, Fault) else slider.law.name}, loaded from afar"
+    area = subject.area if isinstance(subject, Fault) else 1.0
+    return _trajectory(name, slider, history, history.run(start), level, area)
+
+
+def velocity_step(
+    law: FrictionLaw,
+    stiffness: float,
+    loading: Sequence[tuple[float, float]],
+    *,
+    times: "Sequence[float] | np.ndarray | None" = None,
+    method: str = "dop853",
+    rtol: float = 1e-11,
+) -> StateTrajectory:
+    """Slide a sample through a spring whose far end is driven at given rates, as in the laboratory.
+
+    Starts in steady sliding at the first rate, with neither inertia nor damping. A rate of 0 is a hold.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+        With state.
+    stiffness : float
+        Change of friction per displacement of the far end [1/m]: stiffness per area over normal stress.
+    loading : sequence of (float, float)
+        Pairs of (time it lasts [s], rate of the far end [m/s]).
+    times, method, rtol
+        As in `simulate_state`.
+
+    Returns
+    -------
+    StateTrajectory
+
+    Raises
+    ------
+    ParameterError, SimulationError
+        As `simulate_state`.
+    """
+    slider = SpringSlider(law=law, stiffness=stiffness, normal_stress=1.0)
+    return simulate_state(slider, loading, times=times, method=method, rtol=rtol)
+
+
+def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
+    single = isinstance(loading, int | float)
+    if single == (duration is None):
+        raise ParameterError(
+            "loading must be one rate with a duration, or pairs of (time, rate) without. "
+            f"Received loading={loading!r}, duration={duration!r}."
+        )
+    pieces: list[tuple[Any, Any]] = [(duration, loading)] if single else list(loading)
+    for length, speed in pieces:
+        if not (math.isfinite(length) and length > 0 and math.isfinite(speed) and speed >= 0):
+            raise ParameterError(
+                "loading must last a positive time at a rate that is not negative, both finite. "
+                f"Received {length!r} s at {speed!r} m/s."
+            )
+    if not pieces:
+        raise ParameterError("loading must hold at least one pair of (time, rate). Received none.")
+    return [(float(length), float(speed)) for length, speed in pieces]
+
+
+def _require_closed(slider: SpringSlider, course: PressureCourse) -> None:
+    if course.largest >= slider.normal_stress:
+        raise ParameterError(
+            f"pressure must stay below the effective normal stress, {slider.normal_stress:.6g} Pa, at which the fault "
+            f"opens. Received {course.largest:.6g} Pa. Inject less."
+        )
+
+
+def _wanted(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None":
+    if times is None:
+        return None
+    wanted, end = np.asarray(times, dtype=float), math.fsum(length for length, _ in pieces)
+    if (
+        wanted.ndim != 1
+        or not len(wanted)
+        or np.any(np.diff(wanted) <= 0)
+        or wanted[0] < 0
+        or wanted[-1] > end * (1 + 1e-12)
+    ):
+        raise ParameterError(f"times must ascend between 0 and the duration ({end!r} s). Received {times!r}.")
+    return np.asarray(np.minimum(wanted, end))
+
+
+def _scales(slider: SpringSlider, start: list[float]) -> "np.ndarray":
+    """Critical slip for the displacements (or a share of the stretch), 1 for the logarithms."""
+    length = getattr(slider.law, "critical_slip", abs(start[1]) * _SHARE_OF_STRETCH)
+    return np.array([length, length, *[1.0] * (len(start) - 2)])
+
+
+@dataclass(frozen=True)
+class _History:
+    slider: SpringSlider
+    problem: SmoothProblem
+    pieces: list[tuple[float, float]]
+    course: PressureCourse
+    wanted: "np.ndarray | None"
+    method: str
+    rtol: float
+
+    def run(self, start: list[float]) -> SmoothSolution:
+        """Solution over all pieces; at a jump of the loading rate the variables are continuous."""
+        parts: list[SmoothSolution] = []
+        y = np.array(start)
+        for now, end, load in self._spans():
+            y, onset = self._stepped(y, now)
+            pressure = self.course.after(now)
+            slope = (self.course.before(end) - pressure) / (end - now)
+            inner = np.empty(0) if self.wanted is None else self.wanted[(self.wanted > now) & (self.wanted < end)]
+            part = self.problem.integrate(
+                y,
+                Ramp(now, (load, pressure, slope), (0.0, slope, 0.0)),
+                np.array([now, *inner, end]),
+                every_step=self.wanted is None,
+                method=self.method,
+                rtol=self.rtol,
+            )
+            parts.append(replace(part, crossings=np.concatenate([onset, part.crossings])))
+            y = part.values[:, -1]
+        return self._joined(np.array(start), parts)
+
+    def _spans(self) -> "list[tuple[float, float, float]]":
+        """Starts, ends [s] and loading rates [m/s] of spans without a break of loading or pressure, none too long."""
+        found, now = [], 0.0
+        for length, load in self.pieces:
+            end = now + length
+            inside = {time for time in self.course.times if now < time < end}
+            inside |= {now + i * _LONGEST for i in range(1, math.ceil(length / _LONGEST))}
+            found += [(a, b, load) for a, b in pairwise((now, *sorted(inside), end))]
+            now = end
+        return found
+
+    def _stepped(self, y: "np.ndarray", now: float) -> "tuple[np.ndarray, np.ndarray]":
+        """Variables after a step of the pressure, if there is one now, and the time if the rate jumps to an event."""
+        before, after = self.course.before(now), self.course.after(now)
+        if before == after:
+            return y, np.empty(0)
+        found, watched = self.slider.stepped(y, before, after), self.problem.watched
+        risen = y[watched] < self.problem.level <= found[watched]
+        return found, np.array([now] if risen else [])
+
+    def _joined(self, start: "np.ndarray", parts: list[SmoothSolution]) -> SmoothSolution:
+        """All parts; where a variable jumps, both values are kept, or the later one at an instant that is asked for."""
+        times, values = [parts[0].time[:1]], [start[:, None]]
+        for part in parts:
+            same = int(np.array_equal(part.values[:, 0], values[-1][:, -1]))
+            times.append(part.time[same:])
+            values.append(part.values[:, same:])
+        time, value = np.concatenate(times), np.concatenate(values, axis=1)
+        if self.wanted is not None:
+            kept = np.isin(time, self.wanted) & np.append(np.diff(time) > 0, True)
+            time, value = time[kept], value[:, kept]
+        crossings = np.concatenate([part.crossings for part in parts])
+        return SmoothSolution(time, value, crossings, sum(part.evaluations for part in parts))
+
+    def load_point(self, time: "np.ndarray") -> "np.ndarray":
+        """Displacement of the far end [m]."""
+        ends = np.cumsum([0.0, *(length for length, _ in self.pieces)])
+        passed = np.cumsum([0.0, *(length * load for length, load in self.pieces)])
+        return np.asarray(np.interp(time, ends, passed))
+
+
+def _trajectory(
+    name: str, slider: SpringSlider, history: _History, solution: SmoothSolution, level: float, area: float
+) -> StateTrajectory:
+    loaded = history.load_point(solution.time)
+    pressure = history.course.sampled(solution.time)
+    readings = slider.readings.map(len(solution.time))(solution.values, pressure)
+    friction, excess = (row.full().ravel() for row in readings)
+    return StateTrajectory(
+        name=name,
+        time=solution.time,
+        load_point=loaded,
+        slip=solution.values[0],
+        slip_rate=np.exp(solution.values[2]),
+        stretch=solution.values[1],
+        friction=friction,
+        pressure=pressure,
+        states=np.exp(solution.values[3:]),
+        state_names=slider.law.state_names,
+        state_units=slider.law.state_units,
+        imbalance=excess / slider.normal_stress,
+        onsets=solution.crossings,
+        onset_rate=level,
+        energy=_energy(slider, area, loaded, solution.values, friction, pressure),
+        provenance={
+            "friction": slider.law.name,
+            "inertia": str(slider.mass > 0),
+            "method": history.method,
+            "rtol": history.rtol,
+            "evaluations": solution.evaluations,
+        }
+        | library_versions("scipy", "casadi", "numpy", "quakedesign"),
+    )
+
+
+def _energy(
+    slider: SpringSlider,
+    area: float,
+    loaded: "np.ndarray",
+    values: "np.ndarray",
+    friction: "np.ndarray",
+    pressure: "np.ndarray",
+) -> EnergyBudget:
+    """Budget of an area [m²] from forces along the paths of block and load point, both resolved by the instants."""
+    slip, stretch, rate = values[0], values[1], np.exp(values[2])
+
+    def gained(energy: "np.ndarray") -> float:
+        return float(area * (energy[-1] - energy[0]))
+
+    def work(force: "np.ndarray", path: "np.ndarray") -> float:
+        return float(area * np.trapezoid(force, path))
+
+    return EnergyBudget(
+        kinetic=gained(0.5 * slider.mass * rate**2),
+        elastic=gained(0.5 * slider.stiffness * stretch**2),
+        frictional=work((slider.normal_stress - pressure) * friction, slip),
+        injection=work(pressure * friction, slip),
+        viscous=work(slider.damping * rate, slip),
+        far_field=work(slider.stiffness * stretch, loaded),
+        disturbance=0.0,
+    )
+
+
+# ----------------------------------------------------------------------
+# What a fault with a state did without control: nucleation, event and arrest, and how often.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlipEvent:
+    """One event of a fault, as far as the run shows it.
+
+    Attributes
+    ----------
+    nucleation : float or None
+        Time [s] at which the slip rate last rose through the loading rate before the onset; None if it began above.
+    onset : float
+        Time [s] at which it rises through the `onset_rate` of the run.
+    arrest : float or None
+        Time [s] at which it falls below that again; None where the run ends before, as are the three last ones then.
+    peak_slip_rate : float
+        [m/s].
+    slip : float or None
+        From onset to arrest [m].
+    moment : float or None
+        GA times that slip [N·m].
+    magnitude : float or None
+        M_w of that moment [-].
+    """
+
+    nucleation: float | None
+    onset: float
+    arrest: float | None
+    peak_slip_rate: float
+    slip: float | None
+    moment: float | None
+    magnitude: float | None
+
+
+def slip_events(fault: Fault, run: StateTrajectory, loading_rate: float) -> tuple[SlipEvent, ...]:
+    """Every event of a run of a fault that was loaded at a rate [m/s] and returned at every step."""
+    slips, arrests = run.event_slips, run.arrests
+    ends = [*map(float, arrests), *[None] * (len(run.onsets) - len(arrests))]
+    return tuple(
+        _event(fault, run, loading_rate, float(onset), end, float(slips[i]) if i < len(slips) else None)
+        for i, (onset, end) in enumerate(zip(run.onsets, ends, strict=True))
+    )
+
+
+def last_cycle(events: Sequence[SlipEvent]) -> dict[str, float | None]:
+    """Recurrence interval [s], slip [m] and magnitude of the last one that is complete; None for none."""
+    intervals = [later.onset - event.onset for event, later in pairwise(events)]
+    whole = [event for event in events if event.arrest is not None]
+    return {
+        "recurrence_interval": intervals[-1] if intervals else None,
+        "slip": whole[-1].slip if whole else None,
+        "magnitude": whole[-1].magnitude if whole else None,
+    }
+
+
+def _event(
+    fault: Fault, run: StateTrajectory, loading_rate: float, onset: float, arrest: float | None, slip: float | None
+) -> SlipEvent:
+    during = (run.time >= onset) & (run.time <= (np.inf if arrest is None else arrest))
+    moment = None if slip is None else fault.moment_of(slip)
+    return SlipEvent(
+        nucleation=_last_rise(run, loading_rate, onset),
+        onset=onset,
+        arrest=arrest,
+        peak_slip_rate=float(np.max(run.slip_rate[during], initial=run.onset_rate)),
+        slip=slip,
+        moment=moment,
+        magnitude=None if moment is None else magnitude(moment),
+    )
+
+
+def _last_rise(run: StateTrajectory, rate: float, before: float) -> float | None:
+    """Last time [s] before another at which the slip rate rises through a rate, by straight lines in its logarithm."""
+    if rate <= 0:
+        return None
+    ahead = np.log(run.slip_rate[run.time <= before]) - np.log(rate)
+    rises = np.flatnonzero((ahead[:-1] < 0) & (ahead[1:] >= 0))
+    if not len(rises):
+        return None
+    i = rises[-1]
+    return float(run.time[i] + (run.time[i + 1] - run.time[i]) * ahead[i] / (ahead[i] - ahead[i + 1]))
+
+
+def direct_strength(fault: Fault) -> float:
+    """aσ' [Pa]: what the strength of steady sliding gains at once when the slip rate grows e-fold."""
+    law = fault.friction
+    rate, state = law.operating_rate, law.steady_state(law.operating_rate)
+    gain = law.coefficient(0, math.e * rate, *state) - law.coefficient(0, rate, *state)
+    return float(gain) * fault.effective_normal_stress
+
+
+def dynamic_rate(fault: Fault) -> float:
+    """aσ'A/(η + √(km)) [m/s]: where damping and inertia take as much stress as the direct effect gives."""
+    resisting = fault.damping + fault.mass * fault.natural_frequency
+    return direct_strength(fault) * fault.area / resisting
+
+
+def cycle_outcome(fault: Fault, run: StateTrajectory) -> Outcome:
+    """``earthquake`` where a tenth of the `dynamic_rate` is reached, ``slow slip`` with an event, or else ``creep``."""
+    peak = float(np.max(run.slip_rate))
+    fast = peak >= EARTHQUAKE_SHARE * dynamic_rate(fault)
+    kind = "earthquake" if fast else "slow slip" if peak >= run.onset_rate else "creep"
+    return Outcome(kind=kind, peak_slip_rate=peak, share_of_natural=None)
+
+
+# ----------------------------------------------------------------------
+# Where a fault with a state starts: in steady sliding, after a hold, or late in its cycle.
+
+_CYCLES = 3  # the first one depends on its start
+_FIRST_LOADS, _MOST_LOADS = 10.0, 1000.0  # by which a strength aσ' is loaded, before a fault is taken to have no cycle
+_OLDER = 1.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartingState:
+    """Slip rate and state of friction at the start; the spring is stretched so that the forces are in balance.
+
+    Attributes
+    ----------
+    slip_rate : float
+        [m/s].
+    state : tuple of float
+        In the units of the law.
+    """
+
+    slip_rate: float
+    state: tuple[float, ...]
+
+
+def sliding(fault: Fault, rate: float) -> StartingState:
+    """Steady sliding at a rate [m/s]."""
+    return StartingState(slip_rate=rate, state=tuple(map(float, fault.friction.steady_state(rate))))
+
+
+def locked(fault: Fault, rate: float, hold: float, **settings: Any) -> StartingState:
+    """A fault that slid steadily at a rate [m/s] until the far end stopped, and has been held so for a time [s].
+
+    `settings` are ``inertia, method, rtol`` of `simulate_state`.
+
+    Raises
+    ------
+    ParameterError, SimulationError
+    """
+    require_positive(hold=hold)
+    run = simulate_state(fault, [(hold, 0.0)], start_rate=rate, times=[hold], **settings)
+    return StartingState(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
+
+
+def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> StartingState:
+    """A fault loaded at a rate [m/s] when a share of the time between the onsets of two of its events has passed.
+
+    `settings` are ``inertia, method, rtol`` of `simulate_state`.
+
+    Raises
+    ------
+    ParameterError
+        Also for a fault that does not repeat its events.
+    SimulationError
+    """
+    require_positive(loading_rate=rate)
+    if not 0 <= share < 1:
+        raise ParameterError(
+            f"share of the cycle must be at least 0 and less than 1. Received {share!r}. Give 0.9, say."
+        )
+    if not derive(fault).unstable:
+        raise ParameterError(
+            f"late in the cycle needs a fault with repeated events. Received {fault.name}, which slides stably. "
+            "Start it in steady sliding."
+        )
+    found = cycles(fault, rate, **settings)
+    if len(found.onsets) < _CYCLES:
+        raise ParameterError(
+            f"late in the cycle needs a fault with repeated events. Received {fault.name}, with {len(found.onsets)} of "
+            f"them in {found.time[-1]:.3g} s at {rate:.3g} m/s. Start it in steady sliding."
+        )
+    before, after = found.onsets[-2:]
+    time = float(before + share * (after - before))
+    run = simulate_state(
+        fault, rate, duration=math.nextafter(time, math.inf), times=[time], **_disturbed(fault, rate), **settings
+    )
+    return StartingState(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
+
+
+def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
+    """A fault loaded at a rate [m/s], near steady sliding at first, until it has repeated its events.
+
+    One that does not ends after a thousand times the load of its direct effect, a stable one after ten. `settings` as
+    in `locked`.
+    """
+    unit = direct_strength(fault) * fault.area / (fault.stiffness * rate)
+    loads, most = _FIRST_LOADS, _MOST_LOADS if derive(fault).unstable else _FIRST_LOADS
+    while True:
+        run = simulate_state(fault, rate, duration=loads * unit, **_disturbed(fault, rate), **settings)
+        loads *= 2
+        if len(run.onsets) >= _CYCLES or loads > most:
+            return run
+
+
+def disturbed(fault: Fault, rate: float) -> StartingState:
+    """Sliding at a rate [m/s] with a state that is older than steady."""
+    return StartingState(slip_rate=rate, state=tuple(_OLDER * float(v) for v in fault.friction.steady_state(rate)))
+
+
+def _disturbed(fault: Fault, rate: float) -> dict[str, Any]:
+    start = disturbed(fault, rate)
+    return {"start_rate": start.slip_rate, "start_state": start.state}

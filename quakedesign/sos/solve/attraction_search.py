@@ -1,0 +1,523 @@
+"""Search for Lyapunov functions and the largest regions of attraction of polynomial fields.
+
+Chapters: lowest points where V̇ ≥ 0; expansion of a region by alternation (W. Tan and A. Packard, IEEE
+Trans. Automat. Contr. 53, 2008); stability and the largest proved level.
+"""
+
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from math import inf
+from typing import Any
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+from scipy.optimize import fsolve, minimize
+
+from quakedesign.errors import PolynomialError
+from quakedesign.exact import fraction_of, nearest
+from quakedesign.sos.exact.answer import Answer
+from quakedesign.sos.exact.attraction import Attraction, LyapunovProof, Region, along
+from quakedesign.sos.exact.polynomial import (
+    Exponents,
+    Polynomial,
+    combination,
+    constant,
+    degree,
+    evaluate,
+    mapping,
+    monomials,
+    product,
+)
+from quakedesign.sos.exact.polynomial_statement import Statement, statement
+from quakedesign.sos.exact.polynomial_text import read
+from quakedesign.sos.exact.proofs import Point, SumOfSquares, form, integer_gram
+from quakedesign.sos.solve.decide import strict_proof
+from quakedesign.sos.solve.engine import decide
+from quakedesign.sos.solve.facial_reduction import just_below, simplest, simplest_between
+from quakedesign.sos.solve.points import Arrays
+from quakedesign.sos.solve.program import NoSolution, Program
+
+# ----------------------------------------------------------------------
+# Where a Lyapunov function stops to fall: the lowest such points, in floating point, then rational and exact.
+
+_SEED = 20240609
+_DIRECTIONS, _REFINED, _STARTS = 300, 3, 30  # directions for every state
+_NEAR = 1e-3  # distance of a point in a direction in which V never falls
+_PRECISE = {"xatol": 1e-12, "fatol": 1e-14, "maxiter": 200}
+_TOLERANCES = (1e-3, 1e-7, 1e-12)  # of the fractions that are tried for a point
+_BEYOND = (0.0, 1e-10, 1e-7, 1e-4)  # how far a point is moved out, relative
+
+
+class _Rays:
+    """V, and V̇ or another polynomial that becomes positive, along rays from the origin, in powers of the distance."""
+
+    def __init__(self, size: int, lyapunov: Polynomial, rate: Polynomial) -> None:
+        self.size = size
+        self.lyapunov = Arrays(lyapunov, size)
+        self.rate = self.graded(rate)
+
+    def graded(self, polynomial: Polynomial) -> list[Arrays]:
+        """Forms of every degree."""
+        top = max((sum(e) for e in polynomial), default=0)
+        return [Arrays({e: c for e, c in polynomial.items() if sum(e) == k}, self.size) for k in range(top + 1)]
+
+    def crossings(self, directions: Any, parts: list[Arrays]) -> Any:
+        """Points, one a row, from which on a polynomial is no longer negative; infinite where it remains so."""
+        table = np.array([part.at(directions) for part in parts]).T
+        distances = np.array([_first_root(row) for row in table])
+        return np.where(
+            np.isfinite(distances)[:, None], np.nan_to_num(distances, posinf=0.0)[:, None] * directions, np.inf
+        )
+
+    def heights(self, directions: Any) -> Any:
+        """V where it stops to fall in every direction; infinite where it never does."""
+        points = self.crossings(directions, self.rate)
+        finite = np.isfinite(points).all(axis=1)
+        return np.where(finite, self.lyapunov.at(np.where(finite[:, None], points, 0.0)), np.inf)
+
+    def height(self, direction: Any) -> float:
+        """V where it stops to fall in one direction."""
+        return float(self.heights((direction / np.linalg.norm(direction))[None, :])[0])
+
+    def sampled(self) -> Any:
+        """Seeded directions, one a row, and those of the axes."""
+        random = np.random.default_rng(_SEED).standard_normal((_DIRECTIONS * self.size, self.size))
+        return np.concatenate([random / np.linalg.norm(random, axis=1)[:, None], np.eye(self.size), -np.eye(self.size)])
+
+    def lowest(self, directions: Any) -> list[Any]:
+        """Directions, refined, in which V stops to fall where it is lowest."""
+        heights = self.heights(directions)
+        order = np.argsort(heights, kind="stable")[:_REFINED]
+        starts = [directions[i] for i in order if np.isfinite(heights[i])]
+        return [minimize(self.height, d, method="Nelder-Mead", options=_PRECISE).x for d in starts]
+
+
+def _first_root(row: Any) -> float:
+    """Smallest r > 0 from which on Σ row_k·r^k is not negative; infinite if there is none."""
+    used = np.flatnonzero(row)
+    if not len(used) or row[used[0]] > 0:
+        return _NEAR
+    roots = np.roots(row[used[0] :][::-1])
+    real = roots.real[(np.abs(roots.imag) < 1e-7 * (1 + np.abs(roots))) & (roots.real > 0)]
+    return float(np.min(real, initial=np.inf))
+
+
+def lowest_crossing(claim: Attraction) -> Point | None:
+    """Rational point, not the origin, where V ≤ 0 or V̇ ≥ 0, with the lowest V found; None if none is found."""
+    size = len(claim.variables)
+    rays = _Rays(size, claim.lyapunov, claim.derivative)
+    directions = rays.sampled()
+    ends = [rays.crossings((d / np.linalg.norm(d))[None, :], rays.rate)[0] for d in rays.lowest(directions)]
+    depth = rays.graded({e: -c for e, c in claim.lyapunov.items()})
+    below = rays.crossings(directions, depth)
+    ends += list(below[np.isfinite(below).all(axis=1)][:_REFINED])
+    candidates = (point for x in ends if np.all(np.isfinite(x)) for point in _rational(claim, x))
+    return min(candidates, key=lambda point: evaluate(claim.lyapunov, point.coordinates), default=None)
+
+
+def lowest_value_on(function: Polynomial, boundary: Polynomial) -> float:
+    """Lowest value found of a polynomial where another, negative at the origin, first vanishes along a ray."""
+    rays = _Rays(len(next(iter(boundary))), function, boundary)
+    return min(map(rays.height, rays.lowest(rays.sampled())), default=0.0)
+
+
+def _rational(claim: Attraction, x: Any) -> Iterator[Point]:
+    """Points near one, or a little beyond it, that refute."""
+    for beyond in _BEYOND:
+        for tolerance in _TOLERANCES:
+            point = Point(coordinates=_fractions(x * (1 + beyond), tolerance))
+            if claim.refuted_by(point):
+                yield point
+
+
+def _fractions(x: Any, tolerance: float) -> tuple[Fraction, ...]:
+    """Simple fractions near coordinates; those far below the largest are zero."""
+    least = 1e-9 * float(np.abs(x).max())
+    return tuple(simplest(float(v), tolerance) if abs(v) > least else Fraction(0) for v in x)
+
+
+def other_equilibrium(claim: Attraction) -> Point | None:
+    """Rational point, not the origin, where the field vanishes; None if none is found."""
+    size = len(claim.variables)
+    field = [Arrays(f, size) for f in claim.field]
+    random = np.random.default_rng(_SEED)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        ends = [fsolve(lambda x: [f(x) for f in field], random.standard_normal(size) * 3) for _ in range(_STARTS)]
+    for x in ends:
+        for tolerance in _TOLERANCES if np.all(np.isfinite(x)) and np.abs(x).max() > 1e-3 else ():
+            point = _fractions(x, tolerance)
+            if any(point) and not any(evaluate(f, point) for f in claim.field):
+                return Point(coordinates=point)
+    return None
+
+
+# ----------------------------------------------------------------------
+# Searched Lyapunov functions: the largest part of a shape in a region of attraction, by alternation.
+#
+# For V < 1 on the region, fixed multipliers s and t with
+#
+#     −V̇ − s·(1 − V),  1 − V − t·(β − shape)  and  V  sums of squares
+#
+# are found by `strict_proof` for the V at hand, and then V and β, the larger the better, by a programme that is
+# linear in
+# them (W. Tan and A. Packard, IEEE Trans. Automat. Contr. 53, 2008). Every V is proved anew by who asks.
+
+_ROUNDS = 30
+_GROWTH = Fraction(1002, 1000)  # of β in a round: less is no progress
+_INSIDE = Fraction(999999, 1000000)  # of the level, that V does not exceed on the part of the shape
+_SHARES = tuple(Fraction(s) for s in ("99999/100000", "999/1000", "99/100", "9/10"))  # of β where shape and level touch
+_SLACK = (Fraction(99, 100), Fraction(9, 10))  # of level and β, where multipliers are taken: at both, V can only stay
+_MORE = (0, 2)
+_ROOM = 1e-3  # of β, given up for a V inside of what is possible
+_GRID = 2**20  # of the coefficients of V
+
+
+def with_shape(found: Region, shape: Polynomial) -> Region:
+    """Region with the largest β found for which {shape ≤ β} is proved to lie in it."""
+    claim = found.proved
+    if claim is None or claim.level is None:
+        return found
+    size = len(claim.variables)
+    touching = lowest_value_on(shape, combination([(Fraction(1), claim.lyapunov), (-claim.level, constant(size))]))
+    if not 0 < touching < inf:
+        return found
+    for beta in (just_below(Fraction(touching) * share) for share in _SHARES):
+        asked = _inclusion(claim, _INSIDE * claim.level, shape, beta, degree(claim.lyapunov))
+        proof = strict_proof(asked)
+        if proof is not None:
+            return replace(found, inclusion=Answer(statement=asked, proof=proof))
+    return found
+
+
+def expanded(found: Region, shape: Polynomial, top: int, certify: Callable[[Attraction], Region]) -> Region:
+    """Region of a V of degree at most `top` with a larger part of the shape, from one that is proved.
+
+    Parameters
+    ----------
+    found : Region
+    shape : Polynomial
+    top : int
+    certify : callable
+        Region that is proved for a V.
+    """
+    best = with_shape(found, shape)
+    for degree_now in range(2, top + 1, 2):
+        for _ in range(_ROUNDS):
+            candidates = (with_shape(certify(claim), shape) for claim in _improved(best, shape, degree_now))
+            better = next((region for region in candidates if _grows(best, region)), None)
+            if better is None:
+                break
+            best = better
+    return best
+
+
+def _grows(old: Region, new: Region) -> bool:
+    return new.shape_level is not None and old.shape_level is not None and new.shape_level > _GROWTH * old.shape_level
+
+
+def _improved(found: Region, shape: Polynomial, top: int) -> Iterator[Attraction]:
+    """Claims, not yet proved, with another V, from multipliers that leave less and more slack."""
+    claim, beta = found.proved, found.shape_level
+    if claim is None or claim.level is None or beta is None:
+        return
+    own = combination([(1 / claim.level, claim.lyapunov)])
+    top = max(top, degree(own))
+    for slack in _SLACK:
+        held = replace(claim, lyapunov=own, level=slack, proof=None)
+        falling = _multiplier(held.decrease, top - 1 + max(map(degree, claim.field)))
+        inner = _multiplier(_inclusion(held, Fraction(1), shape, slack * beta, top), top)
+        if falling is not None and inner is not None:
+            lyapunov = _larger(claim, shape, top, falling, inner)
+            if lyapunov is not None:
+                yield replace(claim, lyapunov=lyapunov, level=None, proof=None)
+
+
+def _inclusion(claim: Attraction, level: Fraction, shape: Polynomial, beta: Fraction, top: int) -> Statement:
+    """That V ≤ level where shape ≤ β."""
+    one = constant(len(claim.variables))
+    return statement(
+        claim.variables,
+        combination([(level, one), (Fraction(-1), claim.lyapunov)]),
+        inequalities=(combination([(beta, one), (Fraction(-1), shape)]),),
+        products=False,
+        degree_bound=_even(max(top, degree(claim.lyapunov), degree(shape))),
+    )
+
+
+def _even(number: int) -> int:
+    return number + number % 2
+
+
+def _multiplier(asked: Statement, least: int) -> Polynomial | None:
+    """Squares that multiply the inequality in a proof of at least some degree; None without a proof."""
+    for more in _MORE:
+        proof = strict_proof(replace(asked, degree=max(asked.degree, _even(least)) + more))
+        if proof is not None:
+            size = len(asked.variables)
+            parts = (mapping(form(s.basis, integer_gram(s), size)) for s in proof.squares if s.product)
+            return combination((Fraction(1), part) for part in parts)
+    return None
+
+
+def _larger(
+    claim: Attraction, shape: Polynomial, top: int, falling: Polynomial, inner: Polynomial
+) -> Polynomial | None:
+    """V of degree `top` with the largest β for two multipliers; None if none is found."""
+    size = len(claim.variables)
+    terms = list(monomials(size, top, 2))
+    program = Program(claim.variables, decision_names(claim.variables, len(terms) + 1))
+    powers: list[Polynomial] = [{e: Fraction(1)} for e in terms]
+    minus = [combination([(Fraction(-1), p)]) for p in powers]
+    slopes = [
+        combination([(Fraction(-1), along(claim.field, p)), (Fraction(1), product(size, (falling, p)))]) for p in powers
+    ]
+    program.require(affine({}, [*powers, {}]))
+    one = combination([(Fraction(1), constant(size)), (Fraction(1), product(size, (inner, shape)))])
+    program.require(affine(one, [*minus, combination([(Fraction(-1), inner)])]))
+    program.require(affine(combination([(Fraction(-1), falling)]), [*slopes, {}]))
+    program.maximize({tuple(int(i == len(terms)) for i in range(len(terms) + 1)): Fraction(1)})
+    values = program.proposal(_ROOM)
+    if values is None:
+        return None
+    found = {e: nearest(v, _GRID) for e, v in zip(terms, values, strict=False)}
+    return {e: c for e, c in found.items() if c}
+
+
+def affine(fixed: Polynomial, parts: list[Polynomial]) -> dict[Exponents, Fraction]:
+    """Polynomial fixed + Σ_j decision_j·part_j in variables and decisions, as `Program.require` takes it."""
+    whole = {(*e, *(0,) * len(parts)): c for e, c in fixed.items()}
+    for j, part in enumerate(parts):
+        whole |= {(*e, *(int(i == j) for i in range(len(parts)))): c for e, c in part.items()}
+    return whole
+
+
+def decision_names(variables: tuple[str, ...], count: int) -> list[str]:
+    """Names that no variable has."""
+    prefix = "c" * (1 + max(map(len, variables)))
+    return [f"{prefix}{i}" for i in range(count)]
+
+
+# ----------------------------------------------------------------------
+# Stability and regions of attraction of polynomial fields: Lyapunov functions, and the largest level proved.
+
+_LEVEL_SHARES = tuple(
+    Fraction(s) for s in ("999999/1000000", "9999/10000", "999/1000", "99/100", "9/10", "1/2", "1/10", "1/1000")
+)
+_UNBOUNDED = tuple(Fraction(10) ** power for power in range(6, -7, -1))  # levels where nothing refutes
+_FINEST = 1e-6  # step of a bisection whose levels are of few digits
+
+
+def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int] = (2, 4)) -> Attraction:
+    """Decide whether every solution of x' = field(x) tends to the origin, by a polynomial Lyapunov function.
+
+    Parameters
+    ----------
+    field : mapping of str or Symbol to str, SymPy expression or mapping
+        For every state its rate: a polynomial in the states with rational coefficients that vanishes at the origin.
+    V : str, SymPy expression or mapping, optional
+        Searched unless given.
+    degrees : sequence of int
+        Of V, to be tried in turn where it is searched.
+
+    Returns
+    -------
+    Attraction
+        ``proved``: the origin is globally asymptotically stable. ``refuted``: by a point where V is not positive or
+        does not fall; without a given V, by another equilibrium. ``undecided`` otherwise.
+
+    Raises
+    ------
+    PolynomialError
+        When something cannot be read, or does not vanish at the origin.
+    """
+    claim = _claim(field, V)
+    if V is not None:
+        refuted = _refuted(claim)
+        return _proved(claim) or (replace(refuted, level=None) if refuted else claim)
+    rest = other_equilibrium(claim)
+    if rest is not None:
+        return replace(claim, proof=rest)
+    searched = filter(None, (_searched(claim, top) for top in degrees))
+    return next(filter(None, map(_proved, searched)), claim)
+
+
+def region_of_attraction(
+    field: Mapping[Any, Any],
+    V: Any = None,
+    *,
+    relative: float = 1e-4,
+    degree: int | None = None,
+    shape: Any = None,
+) -> Region:
+    """Find the largest level ρ for which V̇ < 0 wherever V < ρ, but at the origin: then {V < ρ} is attracted by it.
+
+    Parameters
+    ----------
+    field, V
+        As for `stability`, but V solves AᵀP + PA = −I for the linearised field x' = Ax unless given.
+    relative : float
+        Width of the last step of the bisection, between proved and not proved; from 1e-6 to below 1.
+    degree : int, optional
+        Even: search other V of at most this degree, from the one at hand, for a larger part of the shape in the region.
+    shape : str, SymPy expression or mapping, optional
+        A polynomial that is positive but at the origin. The largest β found is proved for which shape ≤ β lies in
+        the region. Σ x_i² with a degree, none unless given.
+
+    Returns
+    -------
+    Region
+        The largest level proved, and a point that refutes every larger one where such a point is found.
+
+    Raises
+    ------
+    PolynomialError
+        As for `stability`, or for another width.
+    """
+    if not _FINEST <= relative < 1:
+        raise PolynomialError(
+            f"relative must be from {_FINEST:g} to below 1. Received {relative!r}. Leave it out for 1e-4."
+        )
+    claim = _claim(field, V)
+    inner = _shape(field, shape, degree)
+    if V is None:
+        own = _of_linearised(claim)
+        if own is None:
+            return Region(proved=None, refuted=None, remark="the linearised field has no V = x'Px. Give a V")
+        claim = replace(claim, lyapunov=own)
+    found = _region(claim, relative)
+    if inner is None:
+        return found
+    return (
+        with_shape(found, inner) if degree is None else expanded(found, inner, degree, lambda c: _region(c, relative))
+    )
+
+
+def _region(claim: Attraction, relative: float) -> Region:
+    """Largest level that is proved for the V of a claim, and what refutes more."""
+    refuted = _refuted(claim)
+    if refuted is None:
+        proved = _proved(claim) or next(filter(None, (_proved(replace(claim, level=r)) for r in _UNBOUNDED)), None)
+        return Region(proved=proved, refuted=None, remark="" if proved else "no level was proved, and none refuted")
+    if refuted.level is None:
+        return Region(proved=None, refuted=refuted, remark="V is not positive")
+    found = Region(proved=_bisected(claim, refuted.height or Fraction(0), relative), refuted=refuted)
+    return found if found.proved else replace(found, remark="no level below was proved")
+
+
+def _shape(field: Mapping[Any, Any], shape: Any, degree: int | None) -> Polynomial | None:
+    """The shape as it is read, Σ x_i² where V is searched without one, or else None."""
+    if degree is not None and not (isinstance(degree, int) and degree >= 2 and degree % 2 == 0):
+        raise PolynomialError(f"degree must be an even number from 2. Received {degree!r}. Give for example 4.")
+    return None if shape is None and degree is None else _claim(field, shape).lyapunov
+
+
+def _claim(field: Mapping[Any, Any], V: Any) -> Attraction:
+    """The field as it is read, V or else Σ x_i²."""
+    names = tuple(map(str, field))
+    size = len(names)
+    if not names:
+        raise PolynomialError("a field needs a rate for every state. Received none. Give for example {'x': '-x'}.")
+    exact = tuple(read(f, (), None, names)[1] for f in field.values())
+    squares = {tuple(2 * (i == j) for j in range(size)): Fraction(1) for i in range(size)}
+    function = squares if V is None else read(V, (), None, names)[1]
+    return Attraction(variables=names, field=exact, lyapunov=function, level=None, multiplier=constant(size))
+
+
+def _refuted(claim: Attraction) -> Attraction | None:
+    """Level just above the lowest point found where V does not fall; no level where V is not positive."""
+    found = replace(claim, proof=lowest_crossing(claim))
+    if found.height is None:
+        return None
+    return _checked(replace(found, level=_just_above(found.height) if found.height > 0 else None))
+
+
+def _just_above(height: Fraction) -> Fraction:
+    """Simple number above one, by less than two parts in a thousand million."""
+    return simplest_between(height * (1 + Fraction(1, 10**9)), height * (1 + Fraction(2, 10**9)))
+
+
+def _checked(claim: Attraction) -> Attraction | None:
+    return claim if claim.check() else None
+
+
+def _proved(claim: Attraction, *, thorough: bool = False) -> Attraction | None:
+    """Claim with its proof; None if none is found."""
+    positive = _squares(claim.positive, thorough)
+    for more in _MORE if positive is not None else ():
+        asked = replace(claim.decrease, degree=claim.decrease.degree + more)
+        decrease = _squares(asked, thorough)
+        if positive is not None and decrease is not None:
+            found = _checked(replace(claim, proof=LyapunovProof(positive=positive, decrease=decrease)))
+            if found is not None:
+                return found
+    return None
+
+
+def _squares(asked: Statement, thorough: bool) -> SumOfSquares | None:
+    """Proof of one statement: with a margin, or where that has none, on a face."""
+    found = strict_proof(asked)
+    if found is None and thorough:
+        proof = decide(asked).proof
+        found = proof if isinstance(proof, SumOfSquares) else None
+    return found
+
+
+def _bisected(claim: Attraction, ceiling: Fraction, relative: float) -> Attraction | None:
+    """Largest level that is proved, a simple number just below the refuted ones where it can be."""
+    best, above = None, ceiling
+    for share in _LEVEL_SHARES:
+        best = _proved(replace(claim, level=just_below(share * ceiling)))
+        if best is not None:
+            break
+        above = share * ceiling
+    if best is None or best.level is None:
+        return None
+    if above == ceiling:
+        exact = replace(claim, level=simplest_between(best.level, ceiling))
+        return _proved(exact, thorough=True) or best
+    low = best.level
+    while above - low > Fraction(relative) * above:
+        middle = just_below((low + above) / 2)
+        found = _proved(replace(claim, level=middle))
+        best, low, above = (found, middle, above) if found is not None else (best, low, middle)
+    return best
+
+
+def _of_linearised(claim: Attraction) -> dict[Exponents, Fraction] | None:
+    """V = xᵀPx with AᵀP + PA = −I, exactly; None where there is no such V > 0."""
+    size = len(claim.variables)
+    units = [tuple(int(i == j) for j in range(size)) for i in range(size)]
+    A = [[f.get(u, Fraction(0)) for u in units] for f in claim.field]
+    places = [(i, j) for i in range(size) for j in range(size)]
+    rows = [[fmpq(0)] * len(places) for _ in places]
+    for row, (i, j) in zip(rows, places, strict=True):
+        for k in range(size):
+            for place, entry in (((k, j), A[k][i]), ((i, k), A[k][j])):
+                row[places.index(place)] += fmpq(entry.numerator, entry.denominator)
+    try:
+        P = fmpq_mat(rows).solve(fmpq_mat([[fmpq(-(i == j))] for i, j in places]))
+    except ZeroDivisionError:
+        return None
+    parts = (
+        (fraction_of(P[n, 0]), tuple(map(sum, zip(units[i], units[j], strict=True)))) for n, (i, j) in enumerate(places)
+    )
+    found = combination((value, {e: Fraction(1)}) for value, e in parts)
+    return found if strict_proof(replace(claim, lyapunov=found).positive) is not None else None
+
+
+def _searched(claim: Attraction, top: int) -> Attraction | None:
+    """Claim with a V of some degree for which V − Σ x_i² and −V̇ have squares; None if none is found."""
+    size = len(claim.variables)
+    terms = list(monomials(size, top, 2))
+    program = Program(claim.variables, decision_names(claim.variables, len(terms)))
+    powers: list[Polynomial] = [{e: Fraction(1)} for e in terms]
+    program.require(affine(combination([(Fraction(-1), claim.lyapunov)]), powers))
+    program.require(affine({}, [combination([(Fraction(-1), along(claim.field, p))]) for p in powers]))
+    solution = program.solve()
+    if isinstance(solution, NoSolution):
+        return None
+    values = zip(terms, solution.values.values(), strict=True)
+    return replace(claim, lyapunov={e: c for e, c in values if c})

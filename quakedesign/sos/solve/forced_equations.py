@@ -1,0 +1,205 @@
+"""Facial reduction with decisions: linear equations that membership in a cone forces on the decisions.
+
+A polynomial p(d), affine in the decisions d, is in the span of the products that the cone allows. A monomial that no
+product reaches therefore has the coefficient zero, an equation on d. Its exact solution may empty further
+coefficients; then diagonal Gram entries vanish (`reduction`), and fewer monomials are reached: this is repeated until
+nothing changes. Where a Gram matrix has a numerical kernel for every d, its rounded kernel restricts the basis in the
+same way; such equations are a guess. What follows from them is proved for the decisions found, as all else.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+
+from flint import fmpq, fmpq_mat
+
+from quakedesign.exact import fraction_of
+from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination
+from quakedesign.sos.exact.polynomial_statement import Statement
+from quakedesign.sos.solve.decide import initial_blocks
+from quakedesign.sos.solve.facial_reduction import Block, modulo
+from quakedesign.sos.solve.joint import shape_of
+from quakedesign.sos.solve.moment import MomentProgram
+from quakedesign.sos.solve.rounding import System, relations
+
+Affine = tuple[Fraction, ...]
+"""Constant and the factor of every decision."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Requirement:
+    """One polynomial p(d) that must be in a cone, as far as it is reduced.
+
+    Attributes
+    ----------
+    parts : sequence of Polynomial
+        Constant part of p and the part of every decision; empty for those that are eliminated.
+    template : Statement
+        The cone; its polynomial only says which monomials may occur.
+    blocks : list of Block, optional
+        Faces, in place of the blocks that follow from the template.
+    """
+
+    parts: Sequence[Polynomial]
+    template: Statement
+    blocks: Sequence[Block] | None = None
+
+    @cached_property
+    def shape(self) -> MomentProgram | None:
+        """The cone in floats; None where only zero is in it."""
+        rows = [{e: float(c) for e, c in r.items()} for _, _, r in relations(self.template)]
+        if not self.present and not rows:
+            return None
+        whole = self.blocks is None and self.present
+        return shape_of(self.template) if whole else MomentProgram([b.shape() for b in self.present], rows)
+
+    @property
+    def reached(self) -> Mapping[Exponents, int]:
+        """Monomials that a product or a multiple of an equality may have."""
+        return {} if self.shape is None else self.shape.index
+
+    @property
+    def present(self) -> Sequence[Block]:
+        """Blocks of `shape`."""
+        return _blocks(self.template) if self.blocks is None else self.blocks
+
+    def coefficient(self, e: Exponents) -> Affine:
+        """Coefficient of a monomial."""
+        return tuple(part.get(e, Fraction(0)) for part in self.parts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forced:
+    """Equations on the decisions, solved, and the requirements without the decisions that they eliminate.
+
+    Attributes
+    ----------
+    requirements : tuple of Requirement
+    solved : mapping of int to Affine
+        Decisions that follow from the others.
+    reasons : tuple of str
+        A sentence for every equation, in the order in which they were found.
+    contradiction : bool
+        Whether the last equation has no solution.
+    """
+
+    requirements: tuple[Requirement, ...]
+    solved: Mapping[int, Affine] = field(default_factory=dict)
+    reasons: tuple[str, ...] = ()
+    contradiction: bool = False
+
+    def completed(self, values: Sequence[Fraction]) -> list[Fraction]:
+        """Decisions that satisfy every equation, from those that are free."""
+        return [_value(self.solved[j], values) if j in self.solved else v for j, v in enumerate(values)]
+
+    def reduced(self, names: Sequence[str]) -> "Forced":
+        """Requirements after all equations that monomials out of reach force."""
+        present, before = self, -1
+        while len(present.reasons) > before and not present.contradiction:
+            before = len(present.reasons)
+            for k, asked in enumerate(present.requirements):
+                reached = asked.reached
+                for e in sorted({e for part in asked.parts for e in part if e not in reached}, reverse=True):
+                    rule = f"requirement {k + 1}: no term of a certificate has {_monomial(asked.template.variables, e)}"
+                    present = present._with(present.requirements[k].coefficient(e), rule, names)
+        return present
+
+    def on_faces(self, faces: Sequence[Sequence[Block] | None], names: Sequence[str]) -> "Forced":
+        """Requirements on faces, where there are any, after all equations that the span of their products forces."""
+        within = (
+            r if b is None else replace(r, blocks=tuple(b)) for r, b in zip(self.requirements, faces, strict=True)
+        )
+        present = replace(self, requirements=tuple(within))
+        for k, asked in enumerate(present.requirements):
+            rule = f"requirement {k + 1}: a kernel of its Gram matrix, rounded"
+            for row in _annihilators(asked) if faces[k] is not None else ():
+                parts = present.requirements[k].parts
+                equation = tuple(sum((c * p.get(e, 0) for e, c in row.items()), start=Fraction(0)) for p in parts)
+                present = present._with(equation, rule, names)
+        return present.reduced(names)
+
+    def refuted(self) -> str:
+        """Requirement with a monomial that squares alone produce, and whose coefficient is negative; else nothing."""
+        for k, asked in enumerate(self.requirements):
+            system = System(asked.template, asked.present)
+            mixed = {e for _, _, r in system.relations for e in r}
+            for (_, i, j), column in zip(system.entries, system.columns, strict=False):
+                mixed |= {e for e, c in column.items() if i != j or c < 0}
+            for e, c in asked.parts[0].items():
+                if c < 0 and e not in mixed and not any(asked.coefficient(e)[1:]):
+                    monomial = _monomial(asked.template.variables, e)
+                    return f"requirement {k + 1}: squares alone produce {monomial}, but {c} stands before it"
+        return ""
+
+    def _with(self, equation: Affine, rule: str, names: Sequence[str]) -> "Forced":
+        """One more equation, equation·(1, d) = 0."""
+        if self.contradiction or not any(equation):
+            return self
+        pivot = next((j for j, c in enumerate(equation[1:]) if c), None)
+        if pivot is None:
+            said = f"{rule}, but {equation[0]} stands before it"
+            return replace(self, reasons=(*self.reasons, said), contradiction=True)
+        row = tuple(Fraction(0) if j == pivot + 1 else -c / equation[pivot + 1] for j, c in enumerate(equation))
+        said = f"{rule}, so {names[pivot]} = {_sentence(row, names)}"
+        solved = {pivot: row} | {j: _insert(old, pivot, row) for j, old in self.solved.items()}
+        requirements = tuple(_eliminated(r, pivot, row) for r in self.requirements)
+        return Forced(requirements=requirements, solved=solved, reasons=(*self.reasons, said))
+
+
+def _eliminated(asked: Requirement, pivot: int, row: Affine) -> Requirement:
+    gone = asked.parts[pivot + 1]
+    if not gone:
+        return asked
+    parts = [combination([(Fraction(1), p), (c, gone)]) if c else p for p, c in zip(asked.parts, row, strict=True)]
+    parts[pivot + 1] = {}
+    support = dict.fromkeys((e for p in parts for e in p), Fraction(1))
+    return replace(asked, parts=tuple(parts), template=replace(asked.template, polynomial=support))
+
+
+def _insert(affine: Affine, pivot: int, row: Affine) -> Affine:
+    factor = affine[pivot + 1]
+    if not factor:
+        return affine
+    return tuple(
+        (Fraction(0) if j == pivot + 1 else c) + factor * r for j, (c, r) in enumerate(zip(affine, row, strict=True))
+    )
+
+
+def _value(affine: Affine, values: Sequence[Fraction]) -> Fraction:
+    return sum((c * v for c, v in zip(affine[1:], values, strict=True) if c), start=affine[0])
+
+
+def _blocks(template: Statement) -> list[Block]:
+    return modulo(initial_blocks(template), [r for _, _, r in relations(template)])
+
+
+def _annihilators(asked: Requirement) -> Iterable[dict[Exponents, Fraction]]:
+    """Basis of the functionals on the monomials that vanish on every product of a face."""
+    columns = [dict(c) for c in {frozenset(c.items()) for c in System(asked.template, asked.present).columns}]
+    keys = sorted({e for c in (*columns, *asked.parts) for e in c})
+    if not columns:
+        return [{e: Fraction(1)} for e in keys]
+    entries = [[c.get(e, Fraction(0)) for e in keys] for c in columns]
+    reduced, rank = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in entries]).rref()
+    rows = [[fraction_of(v) for v in row] for row in reduced.tolist()[:rank]]
+    pivots = [next(i for i, v in enumerate(row) if v) for row in rows]
+    free = [i for i in range(len(keys)) if i not in set(pivots)]
+    return [
+        {keys[i]: Fraction(1)} | {keys[p]: -row[i] for p, row in zip(pivots, rows, strict=True) if row[i]} for i in free
+    ]
+
+
+def _monomial(variables: Sequence[str], e: Exponents) -> str:
+    return "*".join(v if n == 1 else f"{v}^{n}" for v, n in zip(variables, e, strict=True) if n) or "1"
+
+
+def _sentence(equation: Affine, names: Sequence[str]) -> str:
+    """Affine function of the decisions."""
+    terms = [(equation[0], ""), *zip(equation[1:], names, strict=True)]
+    said = "".join(f" {'-' if c < 0 else '+'} {'*'.join(filter(None, (_factor(c, n), n)))}" for c, n in terms if c)
+    return said.removeprefix(" + ").removeprefix(" ") or "0"
+
+
+def _factor(c: Fraction, name: str) -> str:
+    return "" if name and abs(c) == 1 else str(abs(c))

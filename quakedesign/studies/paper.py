@@ -1,0 +1,227 @@
+"""Studies for the figures and tables of the paper: metrics, extra runs, and trade-off.
+
+The trade-off is between the certified peak of the slip rate and the tracking error.
+"""
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib.resources import files
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from quakedesign.fault import Fault
+from quakedesign.guarantees import Guarantee, design_held, task_of
+from quakedesign.simulation import Trajectory, natural_earthquake, simulate
+from quakedesign.simulation.closed_loop import ClosedLoop
+from quakedesign.studies.comparison import Compared, Entry, Run
+
+# ----------------------------------------------------------------------
+# The numbers behind the bars: every metric of every run, and the five of the paper over those of the e-LQR.
+
+BARS = {
+    "mise_slip": "MISE of the slip",
+    "mise_slip_rate": "MISE of the slip rate",
+    "max_slip_error": "max |slip error|",
+    "max_slip_rate_error": "max |slip-rate error|",
+    "rms_pressure": "RMS pressure",
+}
+"""Metrics of the paper's bar charts (fig:simindex, fig:labindex), MISE being the mean of the squared error."""
+BASIS = "elqr"
+"""Law whose numbers the paper divides by."""
+_MADE = ("scheme", "step", "method", "plant")
+
+
+def baseline(comparison: Compared) -> Entry | None:
+    """Entry that numbers are divided by: the published e-LQR, the designed one where there is no other."""
+    able = [
+        e
+        for origin in ("published", "designed")
+        for e in comparison.of(origin)
+        if e.design.name == BASIS and e.run is not None and e.run.metrics.max_slip_error is not None
+    ]
+    return able[0] if able else None
+
+
+def relative(run: Run | None, basis: Run | None) -> dict[str, float | None]:
+    """Metrics of the bars over those of another run [-]; None where one of the two has none or the other is zero."""
+    ratios: dict[str, float | None] = {}
+    for name in BARS:
+        own, other = (getattr(r.metrics, name) if r else None for r in (run, basis))
+        ratios[name] = own / other if own is not None and other else None
+    return ratios
+
+
+def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> list[dict[str, Any]]:
+    """One row a run: what it is, its metrics in SI units, the five ratios, and how it was made.
+
+    Parameters
+    ----------
+    comparison : Compared
+    more : dict of str to Trajectory, optional
+        Further runs without a controller, by name.
+    """
+    runs: list[tuple[str, str, str, Run | None]] = [("uncontrolled", "none", "", comparison.uncontrolled)]
+    runs += [(name, "none", "", run) for name, run in (more or {}).items()]
+    runs += [(e.label, e.design.name, e.origin, e.run) for e in comparison.entries]
+    basis = baseline(comparison)
+    return [
+        {"run": label, "law": law, "origin": origin}
+        | (_outcome(run) | run.metrics.to_dict() if run else {})
+        | {f"{name}_over_{BASIS}": ratio for name, ratio in relative(run, basis.run if basis else None).items()}
+        | ({name: run.provenance[name] for name in _MADE} if run else {})
+        for label, law, origin, run in runs
+    ]
+
+
+def _outcome(run: Run) -> dict[str, Any]:
+    outcome = run.outcome
+    return {"outcome": outcome.kind, "share_of_natural": outcome.share_of_natural}
+
+
+def printed(comparison: Compared) -> list[dict[str, Any]]:
+    """Numbers that the paper prints about these runs beside ours, their ratio, and why they differ."""
+    data = tomllib.loads((files(__package__) / "printed.toml").read_text(encoding="utf-8"))
+    runs: dict[str, Run | None] = {"uncontrolled": comparison.uncontrolled}
+    runs |= {f"{e.origin} {e.design.name}": e.run for e in comparison.entries}
+    rows = []
+    for said in data.get(comparison.fault.name, []):
+        run = runs.get(said["run"])
+        value = getattr(run.metrics, said["metric"]) if run else None
+        ratio = value / said["printed"] if value is not None else None
+        rows.append({**said, "unit": run.metrics.unit(said["metric"]) if run else None, "found": value, "ratio": ratio})
+    return rows
+
+
+# ----------------------------------------------------------------------
+# Peak against tracking: what a design for the loop that runs gains in one by giving up the other.
+
+ROOMS = (1.2, 1.4, 1.6, 2.2)
+"""What tracking may spend of the smallest certified slip-rate error; 1.6 is that of the default."""
+_PERIODS = 32  # natural periods of a run; errors count in its second half
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrontPoint:
+    """One design.
+
+    Attributes
+    ----------
+    objective : str
+        ``peak``, or ``tracking`` with its room.
+    guarantee : Guarantee
+    run : Trajectory
+        Under the fault's own disturbance, from rest.
+    """
+
+    objective: str
+    guarantee: Guarantee
+    run: Trajectory
+
+
+def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
+    """Designs from the smallest certified peak to the best tracking, with a guarantee each.
+
+    Parameters
+    ----------
+    fault : Fault
+    step : Fraction
+        T_s [s].
+    """
+    task = task_of(fault)
+    designs = {"peak": design_held(task, step, objective="peak")}
+    designs |= {f"tracking, {room:g} times the peak": design_held(task, step, room=room) for room in ROOMS}
+    length = min(_PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
+    return tuple(
+        FrontPoint(
+            objective=name,
+            guarantee=claim,
+            run=simulate(fault, claim.controller, duration=max(length, float(step)), settled_from=length / 2),
+        )
+        for name, claim in designs.items()
+        if isinstance(claim, Guarantee)
+    )
+
+
+# ----------------------------------------------------------------------
+# What the figures of the paper need beside a comparison: the induced earthquake, and a closer look at every law.
+
+INDUCING_SHARE = 0.1
+"""Constant pressure over σ'_n of the induced earthquake: 5 MPa on the paper's fault at 50 MPa."""
+PERIODS = 16
+"""Length of a close-up in natural periods."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperRuns:
+    """Runs of all figures.
+
+    Attributes
+    ----------
+    comparison : Compared
+    induced : Trajectory or None
+        Without control, under a constant pressure of a tenth of the effective normal stress; None for friction with a
+        state, which has none of the short runs.
+    close_ups : mapping of str to Trajectory
+        By label of the entry: its first `PERIODS` natural periods with every step kept.
+    front : tuple of FrontPoint
+        Peak against tracking, where a law of samples was designed.
+    """
+
+    comparison: Compared
+    induced: Trajectory | None
+    close_ups: Mapping[str, Trajectory]
+    front: tuple[FrontPoint, ...] = ()
+
+
+def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] | None = None) -> PaperRuns:
+    """Make the short runs that the figures of the paper need beside a comparison.
+
+    Parameters
+    ----------
+    comparison : Compared
+    progress : callable, optional
+        Called with what is being done and the fraction done [-].
+
+    Returns
+    -------
+    PaperRuns
+    """
+    tell, fault = progress or (lambda _what, _done: None), comparison.fault
+    if fault.friction.state_names:
+        return PaperRuns(comparison=comparison, induced=None, close_ups={})
+    tell("induced earthquake", 0.0)
+    induced = natural_earthquake(fault, INDUCING_SHARE * fault.effective_normal_stress)
+    length = min(PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
+    close_ups = {}
+    for entry in comparison.entries:
+        if entry.run is not None:
+            tell(f"{entry.label}: close-up", 0.0)
+            step = entry.run.provenance["step"]
+            close_ups[entry.label] = simulate(
+                fault,
+                entry.design.controller,
+                scheme=entry.run.provenance["scheme"],
+                duration=max(length, step),
+                step=step,
+                samples=int(length / step) + 1,
+            )
+    laws = [entry.design.controller for entry in comparison.of("designed")]
+    tell("peak against tracking", 0.0)
+    steps = [law.sampling.step for law in laws if law and law.sampling and law.lipschitz_limit is None]
+    front = objective_front(fault, steps[0]) if steps else ()
+    return PaperRuns(comparison=comparison, induced=induced, close_ups=close_ups, front=front)
+
+
+def friction_curve(fault: Fault, largest: float, points: int = 400) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Slips [m] up to the largest, the friction coefficient at rest there, and how the spring unloads from the first.
+
+    Both curves [-] have shape (points,); the fault is unstable where friction falls faster than the spring unloads.
+    """
+    slips, coefficient = np.linspace(0, largest, points), ClosedLoop(fault).friction
+    values = np.array([float(coefficient([slip, 0])) for slip in slips])
+    unloading = fault.specific_stiffness / (fault.authority * fault.effective_normal_stress)
+    return slips, values, values[0] - unloading * slips

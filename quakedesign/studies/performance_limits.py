@@ -1,0 +1,548 @@
+"""Performance limits of every controller, reported with the proved bounds of designed ones."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any, cast
+
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.exact import Bound, LowerBound, UpperBound, rational, shortly
+from quakedesign.fault import Fault
+from quakedesign.guarantees import (
+    MEASURED,
+    Guarantee,
+    NoGuarantee,
+    SlidingGuarantee,
+    Task,
+    continued,
+    design_at,
+    design_held,
+    farthest_rock,
+    longest_delay,
+    longest_step,
+    task_of,
+)
+from quakedesign.guarantees.exact.impossibility import (
+    Noise,
+    SlidingPush,
+    farthest_well,
+    longest_diffusion,
+    longest_reaction,
+    nearest_proved_well,
+    smallest_peak,
+    smallest_withdrawal,
+)
+from quakedesign.guarantees.exact.loop import Around
+from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
+from quakedesign.guarantees.search.lqg import near_path, sliding_model
+from quakedesign.simulation.natural import natural_peak
+from quakedesign.synthesis.guarantee import Quantity, exact_surroundings
+
+# ----------------------------------------------------------------------
+# Limits of every controller as values, each beside what a designed one is proved to do.
+
+_POINTS = 24  # of the curve of smallest peaks
+
+KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
+TOLD = "all controllers, linear or not, that know the fault and are told up to the sample no more than {}"
+WAITING = "all controllers, linear or not, all-knowing from the first sample after the disturbance begins"
+QUANTITIES = {
+    "peak_slip_rate_error": ("slip-rate error", "m/s"),
+    "largest_step": ("T_s", "s"),
+    "largest_delay": ("delay", "s"),
+    "largest_diffusion_time": ("diffusion time L^2/D", "s"),
+    "farthest_well": ("distance of the well", "m"),
+    "smallest_pressure": ("withdrawal", "Pa"),
+}
+"""Title and unit of every limit, by the name of its field."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """One quantity, its limit for all controllers, and how far designed ones have a guarantee.
+
+    Attributes
+    ----------
+    title : str
+    unit : str
+    impossible_beyond : LowerBound or UpperBound or None
+        A LowerBound: nothing smaller is possible; an UpperBound: nothing larger; None: no limit is known.
+    proved_up_to : LowerBound or UpperBound or None
+        Of the designs that were tried, the best with a guarantee; None where none was found.
+    holds_for : str
+        Controllers for which it is impossible.
+    """
+
+    title: str
+    unit: str
+    impossible_beyond: Bound | None
+    proved_up_to: Bound | None
+    holds_for: str
+
+    def to_dict(self) -> dict[str, str | None]:
+        """Decimal texts, rounded outwards."""
+        beyond, proved = self.impossible_beyond, self.proved_up_to
+        return {
+            "impossible_beyond": None if beyond is None else str(beyond),
+            "proved_up_to": None if proved is None else str(proved),
+            "unit": self.unit,
+            "holds_for": self.holds_for,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """What controllers are told of slip and slip rate, at all times up to a sample.
+
+    Attributes
+    ----------
+    measured : str
+        ``slip-and-rate`` or ``slip``.
+    slip_noise, rate_noise : Fraction
+        Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
+    setup : Around
+        What else is between law and fault, or off, for designs.
+
+    Raises
+    ------
+    ParameterError
+        For a negative bound, another name, or noise of a slip rate that is not measured.
+    """
+
+    measured: str = MEASURED[0]
+    slip_noise: Fraction = Fraction(0)
+    rate_noise: Fraction = Fraction(0)
+    setup: Around = field(default_factory=Around)
+
+    def __post_init__(self) -> None:
+        require_known(self.measured, MEASURED[:2], "measured")
+        noise = f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s"
+        if min(self.slip_noise, self.rate_noise) < 0:
+            raise ParameterError(f"a bound of noise must be 0 or more. Received {noise}. Check their signs.")
+        if self._alone and self.rate_noise:
+            raise ParameterError(
+                f"noise of the slip rate needs one that is measured. Received {noise}, measured {self.measured}. Leave "
+                "it out."
+            )
+
+    @property
+    def _alone(self) -> bool:
+        return self.measured == MEASURED[1]
+
+    @property
+    def noisy(self) -> bool:
+        """Whether noise hides anything: what is known exactly of the slip rate tells as much as both."""
+        return bool(self.slip_noise and (self._alone or self.rate_noise))
+
+    @property
+    def bounds(self) -> Noise:
+        """Of `smallest_peak`."""
+        return {"slip_noise": self.slip_noise, "rate_noise": None if self._alone else self.rate_noise}
+
+    @property
+    def around(self) -> dict[str, Any]:
+        """Of a design."""
+        noise = {"slip_noise": self.slip_noise, "rate_noise": self.rate_noise}
+        return {**self.setup, "measured": self.measured, **noise}
+
+    def words(self) -> str:
+        """For people: rounded up, since who is told less can do less."""
+        slip = f"the slip within {UpperBound(self.slip_noise).quantity('m')}"
+        return slip if self._alone else f"{slip}, the slip rate within {UpperBound(self.rate_noise).quantity('m/s')}"
+
+    def knowing(self) -> str:
+        """Controllers for which a smallest slip-rate error holds."""
+        return TOLD.format(self.words()) if self.noisy else KNOWING
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits of a fault, for the worst friction and parameters of its box.
+
+    Attributes
+    ----------
+    fault : Fault
+    withdrawal : Fraction
+        Largest withdrawal [Pa], P of −P ≤ p.
+    diffusivity : Fraction
+        [m²/s].
+    slip_error : UpperBound or None
+        Within which the smallest slip-rate error is meant [m]; None for any bounded slip error.
+    peak_slip_rate_error, largest_step, largest_delay, largest_diffusion_time, farthest_well, smallest_pressure : Limit
+        Each of the latter three and the delay at the fault's T_s.
+    proved : tuple of Guarantee
+        Of the designs without delay that were found on the way, by T_s.
+    told : Told
+        What controllers are told, for the slip-rate error and designs; all others may know everything.
+    """
+
+    fault: Fault
+    withdrawal: Fraction
+    diffusivity: Fraction
+    slip_error: UpperBound | None
+    peak_slip_rate_error: Limit
+    largest_step: Limit
+    largest_delay: Limit
+    largest_diffusion_time: Limit
+    farthest_well: Limit
+    smallest_pressure: Limit
+    proved: tuple[Guarantee, ...]
+    told: Told
+
+    def __repr__(self) -> str:
+        return f"Limits({self.fault.name}: {', '.join(self.named())})"
+
+    @property
+    def against(self) -> str:
+        """The disturbances that are meant."""
+        return f"any disturbance of at most {float(self.fault.disturbance_bounds[0]):.6g} m/s^2"
+
+    @property
+    def achieved(self) -> list[tuple[Fraction, UpperBound]]:
+        """T_s [s] and proved slip-rate error [m/s] of the designs that were found on the way, by T_s."""
+        return sorted((g.held.step, g.claims.slip_rate_error) for g in self.proved)
+
+    def named(self) -> dict[str, Limit]:
+        """All limits by name."""
+        return {name: getattr(self, name) for name in QUANTITIES}
+
+    @property
+    def natural_peak(self) -> float | None:
+        """Slip rate [m/s] of the natural earthquake, which is simulated; None where there is none."""
+        return natural_peak(self.fault)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; what is proved as decimal texts, rounded outwards."""
+        return {
+            "fault": self.fault.name,
+            "box": self.fault.box.name,
+            "disturbance": float(self.fault.disturbance_bounds[0]),
+            "class": "amplitude",
+            "step": self.fault.sampling_time,
+            "withdrawal": float(self.withdrawal),
+            "diffusivity": float(self.diffusivity),
+            "measured": self.told.measured,
+            "slip_noise": str(self.told.slip_noise),
+            "rate_noise": str(self.told.rate_noise),
+            "slip_error": None if self.slip_error is None else str(self.slip_error),
+            **{name: limit.to_dict() for name, limit in self.named().items()},
+        }
+
+    def smallest_peaks(self, *, told: bool = True) -> list[tuple[Fraction, LowerBound]]:
+        """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below.
+
+        Of controllers that are `told` no more than these, or that know everything.
+        """
+        task, noise = task_of(self.fault), (self.told if told else Told()).bounds
+        peaks = [(step, smallest_peak(task, step, **noise)) for step in self._steps()]
+        return [(step, peak.slip_rate_error) for step, peak in peaks if peak is not None]
+
+    def _steps(self) -> list[Fraction]:
+        first = rational(self.fault.sampling_time) / 10
+        last = float(self.largest_step.impossible_beyond or 10_000 * first)
+        ratio = max(last / float(first), 100.0) ** (1 / _POINTS)
+        return [Fraction(f"{float(first) * ratio**i:.4g}") for i in range(_POINTS + 1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingLimits(Limits):
+    """Limits of a fault in slow sliding along its task, of its nominal plant linearised there.
+
+    Attributes
+    ----------
+    push : SlidingPush
+    guarantee : SlidingGuarantee or None
+    rock : Fraction
+        L²/D [s] of the well that was asked about; 0 without one.
+    """
+
+    push: SlidingPush
+    guarantee: SlidingGuarantee | None
+    rock: Fraction
+
+    @property
+    def beyond(self) -> bool:
+        """Whether no controller can hold the fault through the rock that was asked about."""
+        farthest = self.largest_diffusion_time.impossible_beyond
+        return farthest is not None and self.rock > farthest
+
+    @property
+    def against(self) -> str:
+        """The disturbances that are meant."""
+        return f"any shear stress of at most {UpperBound(self.push.amplitude).quantity('Pa')}"
+
+    @property
+    def achieved(self) -> list[tuple[Fraction, UpperBound]]:
+        """T_s [s] and proved slip-rate error [m/s] of the guarantee."""
+        found = self.guarantee
+        return [] if found is None else [(found.held.step, above_the_reference(found))]
+
+    @property
+    def natural_peak(self) -> float | None:
+        """None: it takes a cycle to know."""
+        return None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; what is proved as decimal texts, rounded outwards."""
+        return Limits.to_dict(self) | {"disturbance": None, "stress": float(self.push.amplitude)}
+
+    def smallest_peaks(self, *, told: bool = True) -> list[tuple[Fraction, LowerBound]]:
+        """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below."""
+        return [(step, self.push.smallest_rate_error(step)) for step in self._steps()]
+
+
+def above_the_reference(found: SlidingGuarantee) -> UpperBound:
+    """What is proved of the slip rate, less V [m/s]."""
+    return UpperBound(found.peak_slip_rate - found.task.rate)
+
+
+# ----------------------------------------------------------------------
+# What no controller can do with a fault, beside what a designed one is proved to do.
+
+
+def limits(
+    fault: Fault,
+    *,
+    pressure: float | None = None,
+    diffusivity: float = 1.0,
+    lag: float | str | Fraction = 0,
+    diffusion: float | str | Fraction | None = None,
+    stress: float | None = None,
+    spread: float | str | Fraction = 0,
+    measured: str = MEASURED[0],
+    slip_noise: float | str | Fraction = 0,
+    rate_noise: float | str | Fraction = 0,
+    prove: bool = True,
+    **setup: Quantity,
+) -> Limits:
+    """What no controller can do with a fault whose disturbance is of the class ``amplitude``.
+
+    With friction that has a state: in slow sliding along its task, of the nominal plant linearised there.
+
+    There are none of the class ``rate``: every proof pushes the fault with a disturbance that jumps.
+
+    Parameters
+    ----------
+    fault : Fault
+    pressure : float, optional
+        Largest withdrawal [Pa]; the effective normal stress unless given. In slow sliding: largest pressure beside what
+        the reference needs, in both directions.
+    diffusivity : float
+        Of the rock between well and fault [m²/s].
+    lag : float, str or Fraction
+        Time constant of pump and pipe [s] behind which designs are proved.
+    diffusion : float, str or Fraction, optional
+        The same of L²/D of the rock [s]; with a state that of a well near the fault without it and a lag.
+    stress : float, optional
+        Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that a design stands unless
+        given.
+    spread : float, str or Fraction
+        Of friction with a state: by how much of their values a, b and D_c may be off [-] for a design that is proved;
+        what is impossible is so for the nominal ones.
+    measured : str
+        What controllers are told: ``slip-and-rate`` or ``slip``.
+    slip_noise, rate_noise : float, str or Fraction
+        Bounds of what that is off [m], [m/s], whatever the course, for the slip-rate error and designs. With friction
+        that has a state no limit of noise is known.
+    prove : bool
+        Whether to look for designs with a guarantee, which takes a minute.
+    **setup : float, str or Fraction
+        What else designs are proved with, as in `quakedesign.guarantee`: delay, starts, jitter, averaging, a pump.
+
+    Returns
+    -------
+    Limits
+
+    Raises
+    ------
+    ParameterError
+        For a negative pressure, a diffusivity that is not positive, a stress without friction that has a state, no
+        stress where no design stands any, noise or more of a setup with it, negative noise, or noise of a slip rate
+        that is not measured.
+    """
+    off = rational(spread, "spread")
+    path = exact_surroundings(lag=lag, diffusion=diffusion or 0, **setup)
+    told = Told(
+        measured=measured,
+        slip_noise=rational(slip_noise, "slip noise"),
+        rate_noise=rational(rate_noise, "rate noise"),
+        setup=cast(Around, {name: value for name, value in path.items() if value}),
+    )
+    if fault.friction.state_names:
+        _require_plain(fault, told)
+        way: Around = {"lag": path["lag"], "diffusion": path["diffusion"]}
+        return _sliding_limits(fault, pressure, diffusivity, stress, way if prove else None, off)
+    if stress is not None or off:
+        raise ParameterError(
+            f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Leave it "
+            "out: the box and the disturbance of the fault are meant."
+        )
+    task, step = task_of(fault), rational(fault.sampling_time)
+    withdrawal, spread = _given(fault, pressure, diffusivity)
+    held, own = _proved_steps(task, step, told) if prove else ((), None)
+    late = told.setup.get("delay", Fraction(0))
+    peak, proved = smallest_peak(task, step, late, **told.bounds), dict[str, Bound | None]()
+    if held:
+        proved["largest_step"] = LowerBound(held[-1].held.step)
+    if own is not None:
+        proved["peak_slip_rate_error"] = own.claims.slip_rate_error
+        proved["largest_delay"] = _proved_delay(task, step, told)
+        proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
+        if (rock := _proved_rock(task, step, told)) is not None:
+            proved["largest_diffusion_time"] = rock
+            proved["farthest_well"] = nearest_proved_well(rock, spread)
+    return Limits(
+        fault=fault,
+        withdrawal=withdrawal,
+        diffusivity=spread,
+        slip_error=peak.slip_error if peak else None,
+        **_limits(
+            _impossible(task, withdrawal, step, spread, peak.slip_rate_error if peak else None), proved, told.knowing()
+        ),
+        proved=held,
+        told=told,
+    )
+
+
+def _impossible(
+    push: Task | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
+) -> dict[str, Bound | None]:
+    """What no controller can do, by name; nothing where no limit is known."""
+    reaction, path = longest_reaction(push, withdrawal), longest_diffusion(push, withdrawal, step)
+    return {
+        "peak_slip_rate_error": peak,
+        "largest_step": reaction,
+        "largest_delay": None if reaction is None else UpperBound(max(reaction - step, Fraction(0))),
+        "largest_diffusion_time": path,
+        "farthest_well": None if path is None else farthest_well(path, diffusivity),
+        "smallest_pressure": smallest_withdrawal(push, step),
+    }
+
+
+def _limits(
+    impossible: Mapping[str, Bound | None], proved: Mapping[str, Bound | None], knowing: str, plant: str = ""
+) -> dict[str, Limit]:
+    """Limits by name, of a plant that is not the fault itself if one is named."""
+    return {
+        name: Limit(
+            title=title,
+            unit=unit,
+            impossible_beyond=impossible[name],
+            proved_up_to=proved.get(name),
+            holds_for=(knowing if name == "peak_slip_rate_error" else WAITING) + plant,
+        )
+        for name, (title, unit) in QUANTITIES.items()
+    }
+
+
+def _require_plain(fault: Fault, told: Told) -> None:
+    if replace(told, setup={}) != Told():
+        raise ParameterError(
+            f"no limit of slow sliding is known for noise. Received {fault.friction.name}, told {told.words()}. "
+            "Leave noise out: what cannot be done without it cannot be done with it."
+        )
+    if more := told.setup.keys() - {"lag", "diffusion"}:
+        raise ParameterError(
+            f"limits of slow sliding know a lag and rock alone. Received {', '.join(sorted(more))}. Leave them out."
+        )
+
+
+def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fraction, Fraction]:
+    withdrawal = rational(fault.effective_normal_stress if pressure is None else pressure, "pressure")
+    spread = rational(diffusivity, "diffusivity")
+    if withdrawal <= 0 or spread <= 0:
+        raise ParameterError(
+            f"pressure and diffusivity must be positive. Received {shortly(withdrawal)} Pa and {shortly(spread)} "
+            "m^2/s. Give the size of the largest withdrawal."
+        )
+    return withdrawal, spread
+
+
+def _sliding_limits(
+    fault: Fault,
+    pressure: float | None,
+    diffusivity: float,
+    stress: float | None,
+    path: Around | None,
+    off: Fraction,
+) -> SlidingLimits:
+    """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path.
+
+    Unless a stress is told, it is that which the design stands, or that with a near well where none is found behind the
+    path; behind a path that is impossible under the latter no design is looked for.
+    """
+    withdrawal, spread = _given(fault, pressure, diffusivity)
+    model, step = sliding_model(fault), rational(fault.sampling_time)
+    asked = None if stress is None else rational(stress, "stress")
+    told = path if path is not None and any(path.values()) else None
+    near: Around = {"diffusion": near_path(model)}
+    answer = None if path is None else answer_sliding(fault, stress=asked, spread=off, **near)
+    found = answer.found if answer is not None and isinstance(answer.found, SlidingGuarantee) else None
+    amplitude = asked if asked is not None or found is None else found.task.stress
+    if amplitude is None or amplitude <= 0:
+        raise ParameterError(
+            "limits of slow sliding need a shear stress above 0 that pushes the fault. Received none, and no design "
+            f"was found that stands any{_why(answer)}. Give --stress, such as '25 kPa'."
+        )
+    push = SlidingPush(model=model, amplitude=amplitude)
+    farthest, rock = longest_diffusion(push, withdrawal, step), (told or {}).get("diffusion", Fraction(0))
+    if told is not None and (farthest is None or rock <= farthest):
+        behind = answer_sliding(fault, stress=asked, spread=off, **told).found
+        found = behind if isinstance(behind, SlidingGuarantee) else None
+        push = replace(push, amplitude=found.task.stress) if found else push
+    impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
+    proved: dict[str, Bound | None] = {}
+    if found is not None:
+        proved["peak_slip_rate_error"] = above_the_reference(found)
+        proved["largest_step"] = LowerBound(step)
+        proved["largest_diffusion_time"] = LowerBound(found.held.diffusion)
+        proved["smallest_pressure"] = found.claims.push
+    known = _limits(impossible, proved, KNOWING, ", of the linearised plant")
+    return SlidingLimits(
+        fault=fault,
+        withdrawal=withdrawal,
+        diffusivity=spread,
+        slip_error=None,
+        **known | {"smallest_pressure": replace(known["smallest_pressure"], title="pressure")},
+        proved=(),
+        told=Told(),
+        push=push,
+        guarantee=found,
+        rock=rock,
+    )
+
+
+def _why(answer: SlidingAnswer | None) -> str:
+    return f": {answer.found.reason}" if answer is not None and isinstance(answer.found, NoGuarantee) else ""
+
+
+def _proved_steps(task: Task, step: Fraction, told: Told) -> tuple[tuple[Guarantee, ...], Guarantee | None]:
+    """Guarantees at growing T_s up to nearly the longest, and that at the fault's own, if there is one."""
+    own: Guarantee | NoGuarantee | None = design_held(task, step, objective="peak", **told.around)
+    longest = longest_step(task, **told.around)
+    if isinstance(own, Guarantee):
+        own = _best_at(own, told)
+    else:
+        own = continued(task, step, longest, **told.around)
+    found = [] if own is None else [own]
+    if longest is not None and (own is None or longest.guarantee.held.step > step):
+        found.append(design_at(task, longest))
+    return tuple(found), own
+
+
+def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
+    """Of a design for the smallest slip-rate error and one that tracks, that with the smaller one that is proved."""
+    tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.around)
+    found = [least_peak, *([tracking] if isinstance(tracking, Guarantee) else [])]
+    return min(found, key=lambda g: g.claims.slip_rate_error)
+
+
+def _proved_delay(task: Task, step: Fraction, told: Told) -> LowerBound | None:
+    longest = longest_delay(task, step, **told.around)
+    return LowerBound(longest.held.delay) if longest else None
+
+
+def _proved_rock(task: Task, step: Fraction, told: Told) -> LowerBound | None:
+    """L²/D [s] behind which a law that is told of a clock is proved."""
+    farthest = farthest_rock(task, step, **told.around)
+    return LowerBound(farthest.held.diffusion) if farthest else None

@@ -1,0 +1,850 @@
+"""Single runs: rate-and-state faults (free or controlled), estimated states, any law.
+
+The first chapter runs a fault with friction state, the second sets up sensor and differentiator with
+their premise, the third selects a controller and runs it once.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from quakedesign.errors import CertificateError, ParameterError, SimulationError, UnknownNameError, require_known
+from quakedesign.exact import rational
+from quakedesign.fault import Disturbance, Fault, SlidingReference
+from quakedesign.fault.model import require_positive
+from quakedesign.guarantees import ContinuousPeaks, Guarantee, SlidingGuarantee, load_guarantee, sliding_task, task_of
+from quakedesign.guarantees.exact.statement import differences
+from quakedesign.guarantees.search.compensated_search import recovered
+from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_model
+from quakedesign.laws import Controller, Sampling, control_law, published
+from quakedesign.laws.feed_forward import feed_forward
+from quakedesign.loop import Actuator, SlidingModel, simulation_scheme
+from quakedesign.loop.actuators.base import SampledStage
+from quakedesign.loop.actuators.chain import DIRECT
+from quakedesign.loop.sensing import (
+    Averaging,
+    Differentiator,
+    JointCondition,
+    OutputFeedback,
+    Sensor,
+    SlipStage,
+    Transducer,
+    joint_condition,
+)
+from quakedesign.loop.sensing.measurement import EXACT, Measurement
+from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.fault_bounds import least_authority
+from quakedesign.lyapunov.exact.premises import Premise
+from quakedesign.simulation import (
+    Load,
+    PressureCourse,
+    StateTrajectory,
+    Trajectory,
+    natural_earthquake,
+    simulate,
+    simulate_state,
+)
+from quakedesign.simulation import simulate as run_loop
+from quakedesign.simulation.recorder import Metrics
+from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
+from quakedesign.simulation.state_plant import TIDE, Tide
+from quakedesign.simulation.stick_slip import (
+    SlipEvent,
+    StartingState,
+    cycle_outcome,
+    cycles,
+    disturbed,
+    dynamic_rate,
+    last_cycle,
+    late_in_cycle,
+    locked,
+    sliding,
+    slip_events,
+)
+from quakedesign.simulation.trajectory import Outcome
+from quakedesign.studies.certified import certified_bound, trajectory_premise
+from quakedesign.symbolic import derive
+from quakedesign.synthesis import Design, answer, design
+
+# ----------------------------------------------------------------------
+# Runs of a fault whose friction has a state: free, as it is by nature, or held in slow sliding.
+
+_RTOL = 1e-8
+_NATURAL = (True, "radau"), (True, "cvodes"), (False, "cvodes")  # inertia, method: of cycles, in this order
+_MOMENT = 1e-3  # of the state's age at first, over which any solver goes on
+_UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
+_SWINGS = 4  # of the stress at least, in a run that is shown
+_SHOWN = 500  # D_c/V of a slow task that are run: the loop settles within some tens
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateRun:
+    """A run, and what it comes to.
+
+    Attributes
+    ----------
+    fault : Fault
+    loading_rate : float
+        v_∞ [m/s].
+    start : StartingState
+    trajectory : StateTrajectory
+    seconds : float
+        Time that it took [s], where that was measured.
+    failed : str
+        Why what the fault does is not known: the trajectory is but the first instants. Empty otherwise.
+    """
+
+    fault: Fault
+    loading_rate: float
+    start: StartingState
+    trajectory: StateTrajectory
+    seconds: float = 0.0
+    failed: str = ""
+
+    @property
+    def outcome(self) -> Outcome:
+        """Earthquake, slow slip or creep; unknown where that could not be computed."""
+        if self.failed:
+            return Outcome(kind="unknown", peak_slip_rate=None, share_of_natural=None)
+        return cycle_outcome(self.fault, self.trajectory)
+
+    @property
+    def time(self) -> "np.ndarray":
+        """[s], shape (n,)."""
+        return self.trajectory.time
+
+    @property
+    def slip(self) -> "np.ndarray":
+        """[m], shape (n,)."""
+        return self.trajectory.slip
+
+    @property
+    def slip_rate(self) -> "np.ndarray":
+        """[m/s], shape (n,)."""
+        return self.trajectory.slip_rate
+
+    @cached_property
+    def slip_events(self) -> tuple[SlipEvent, ...]:
+        """Every event."""
+        return slip_events(self.fault, self.trajectory, self.loading_rate)
+
+    @property
+    def cycle(self) -> dict[str, float | None]:
+        """Recurrence interval [s], slip [m] and magnitude of the last one that is complete; None for none."""
+        return last_cycle(self.slip_events)
+
+    @property
+    def natural_peak(self) -> float | None:
+        """Largest slip rate of its events [m/s]; None without any."""
+        return self.outcome.peak_slip_rate if self.slip_events else None
+
+    @property
+    def metrics(self) -> Metrics:
+        """Largest slip rate and number of steps: nothing is followed."""
+        run = self.trajectory
+        return Metrics(
+            peak_slip_rate=self.outcome.peak_slip_rate, settled_from=0.0, steps=len(run.time) - 1, seconds=self.seconds
+        )
+
+    @property
+    def events(self) -> dict[str, float]:
+        """Nothing that ends a run happened."""
+        return {}
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """How it was made, as of runs with a controller."""
+        run, plant = self.trajectory.provenance, "smooth" if self.trajectory.provenance["inertia"] == "True" else ""
+        return {**run, "scheme": "continuous", "step": None, "plant": plant or "quasi-dynamic", "controller": "none"}
+
+    @property
+    def resting(self) -> bool:
+        """Whether the run slides steadily at the law's reference rate, where that is unstable: nothing disturbs it."""
+        still = np.all(np.abs(np.log(self.trajectory.slip_rate / self.fault.friction.operating_rate)) < _UNDISTURBED)
+        return bool(still) and derive(self.fault).unstable
+
+    def to_dict(self) -> dict[str, Any]:
+        """Answer of ``simulate`` for such a fault, SI units; the cycle is the last one that is complete."""
+        run = self.trajectory
+        return {
+            "outcome": self.outcome.to_dict() | {"earthquake_from": 0.1 * dynamic_rate(self.fault)},
+            "resting": self.resting,
+            "loading_rate": self.loading_rate,
+            "start": {
+                "slip_rate": self.start.slip_rate,
+                "state": dict(zip(run.state_names, self.start.state, strict=True)),
+            },
+            "cycle": self.cycle,
+            "slip_events": [asdict(event) for event in self.slip_events],
+            "pressure": [float(run.pressure.min()), float(run.pressure.max())],
+            "slip": float(run.slip[-1]),
+            "duration": float(run.time[-1]),
+            "energy": run.energy.to_dict() | {"relative_residual": run.energy.relative_residual},
+            "steps": len(run.time),
+            "run": dict(run.provenance),
+        }
+
+
+def run_state(
+    fault: Fault,
+    *,
+    start: str = "steady",
+    hold: float | None = None,
+    share: float | None = None,
+    pressure: PressureCourse | None = None,
+    loading_rate: float | None = None,
+    duration: float | None = None,
+    plant: str = "smooth",
+    method: str = "radau",
+) -> StateRun:
+    """Run a fault whose friction has a state under loading from afar and a prescribed pressure.
+
+    Parameters
+    ----------
+    fault : Fault
+    start : str
+        ``steady`` (sliding at the loading rate), ``locked`` (held since then for the time `hold`) or ``late`` (when a
+        `share` of the time between two events has passed).
+    hold : float, optional
+        [s].
+    share : float, optional
+        [-], of 0 to 1; 0.9 unless given.
+    pressure : PressureCourse, optional
+        None: no pressure.
+    loading_rate : float, optional
+        v_∞ [m/s]; the reference rate of the law unless given.
+    duration : float, optional
+        [s]; the operation time of the task unless given.
+    plant : str
+        ``smooth`` (with inertia) or ``quasi-dynamic`` (without).
+    method : str
+        As of `simulate_state`.
+
+    Raises
+    ------
+    ParameterError, UnknownNameError, SimulationError
+    """
+    _require_runnable(fault, plant)
+    rate = fault.friction.operating_rate if loading_rate is None else loading_rate
+    require_positive("Steady sliding at this rate is where the run begins.", loading_rate=rate)
+    settings: dict[str, Any] = {"inertia": PLANTS[plant], "method": method, "rtol": _RTOL}
+    begun = _start(fault, start, rate, hold, share, settings)
+    run = simulate_state(
+        fault,
+        rate,
+        duration=fault.reference.operation_time if duration is None else duration,
+        start_rate=begun.slip_rate,
+        start_state=begun.state,
+        pressure=pressure or 0.0,
+        **settings,
+    )
+    return StateRun(fault=fault, loading_rate=rate, start=begun, trajectory=run)
+
+
+def natural_run(fault: Fault) -> StateRun:
+    """What a fault does that is loaded at the reference rate of its law, with inertia: its cycle, or that it creeps.
+
+    Where one method cannot go on another one is taken, and without inertia if there is none: the run says which. Where
+    none can it says why, in `failed`.
+    """
+    began, rate = perf_counter(), fault.friction.operating_rate
+    start = disturbed(fault, rate)
+    for inertia, method in _NATURAL:
+        try:
+            run = cycles(fault, rate, inertia=inertia, method=method, rtol=_RTOL)
+        except SimulationError as error:
+            failed = error
+            continue
+        return StateRun(fault=fault, loading_rate=rate, start=start, trajectory=run, seconds=perf_counter() - began)
+    moment = _MOMENT * min(start.state)
+    begun = simulate_state(
+        fault, rate, duration=moment, start_rate=rate, start_state=start.state, inertia=False, method="cvodes"
+    )
+    return StateRun(fault=fault, loading_rate=rate, start=start, trajectory=begun, failed=str(failed))
+
+
+def shown_time(fault: Fault, *, whole: bool = False) -> float:
+    """How much of a task [s] is run of a design for slow sliding: 500 D_c/V, in which the loop settles many times over.
+
+    All of a shorter task, of one whose rate swells on the way, and of a `whole` one.
+    """
+    task = fault.reference
+    ageing = float(min(fault.friction.steady_state(task.target_slip / task.operation_time)))
+    return task.operation_time if whole or task.ramp else min(task.operation_time, _SHOWN * ageing)
+
+
+def designed_run(
+    design: Design, natural_peak: float | None, progress: Callable[[float], None], *, whole: bool = False
+) -> SlidingRun:
+    """The law of a design for slow sliding over its `shown_time`, under the stress that it is designed for as a sine.
+
+    Its period is that of the tide, or a quarter of a run that is shorter than four of them.
+    """
+    answer = design.sliding
+    if answer is None or answer.held is None:
+        raise ParameterError(f"a designed run needs a law for slow sliding. Received {design!r:.60}. Use simulate.")
+    duration = shown_time(design.fault, whole=whole)
+    run = simulate_sliding(
+        design.fault,
+        answer.held.law,
+        answer.held.step,
+        lag=answer.held.lag,
+        diffusion=answer.held.diffusion,
+        tide=Tide(amplitude=float(answer.task.stress), period=min(TIDE, duration / _SWINGS)),
+        duration=duration,
+        inertia=True,
+        progress=progress,
+    )
+    return replace(run, criterion=replace(run.criterion, natural_peak=natural_peak))
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldRun:
+    """A controlled run, and what it comes to.
+
+    Attributes
+    ----------
+    fault : Fault
+    model : SlidingModel
+    step, lag, diffusion : Fraction
+        [s].
+    stages : tuple of str
+        What else the pressure goes through.
+    trajectory : SlidingRun
+    claim : SlidingGuarantee or None
+        What is proved of the law, where it comes from the file of that.
+    """
+
+    fault: Fault
+    model: SlidingModel
+    step: Fraction
+    lag: Fraction
+    diffusion: Fraction
+    stages: tuple[str, ...]
+    trajectory: SlidingRun
+    claim: SlidingGuarantee | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Answer of ``simulate`` with a controller, SI units."""
+        run, rate = self.trajectory, float(self.model.rate)
+        reference = SlidingReference(task=self.fault.reference)
+        followed = reference.rate(run.time)
+        return {
+            "outcome": run.outcome.to_dict() | {"earthquake_from": rate + 0.1 * dynamic_rate(self.fault)},
+            "reference_rate": rate,
+            "largest_reference_rate": float(np.max(followed)),
+            "growth_rate": growth_rate(self.model),
+            "step": float(self.step),
+            "lag": float(self.lag),
+            "diffusion": float(self.diffusion),
+            "stages": list(self.stages),
+            "metrics": {
+                "max_log_rate": float(np.max(np.abs(np.log(run.slip_rate / followed)))),
+                "max_slip_error": float(np.max(np.abs(run.slip - reference.slip(run.time)))),
+                "max_asked": float(np.max(np.abs(run.asked))),
+            },
+            "pressure": [float(run.pressure.min()), float(run.pressure.max())],
+            "stress": float(np.max(np.abs(run.stress))),
+            "slip": float(run.slip[-1]),
+            "duration": float(run.time[-1]),
+            "steps": len(run.time),
+            "run": dict(run.provenance),
+            "guarantee": {"sentence": self.claim.sentence()} if self.claim else None,
+            "outside": [],
+        }
+
+
+def run_held(
+    fault: Fault,
+    *,
+    step: float | None = None,
+    lag: float = 0.0,
+    diffusion: float = 0.0,
+    stages: Sequence[SampledStage] = (),
+    transducer: Transducer | None = None,
+    stress: float = 0.0,
+    stress_period: float = TIDE,
+    duration: float | None = None,
+    plant: str = "smooth",
+    method: str = "cvodes",
+    claim: SlidingGuarantee | None = None,
+) -> HeldRun:
+    """Let the e-LQR of `sliding_law`, or that of a guarantee, hold a fault at the mean rate of its task.
+
+    It starts in steady sliding.
+
+    Parameters
+    ----------
+    fault : Fault
+        Its friction has one state.
+    step : float, optional
+        [s]; the sampling time of the fault unless given.
+    lag : float
+        Time constant of pump and pipe [s], which the law does not know.
+    diffusion : float
+        L²/D of the rock between well and fault [s].
+    stages, transducer : sequence of SampledStage, Transducer
+        As of `simulate_sliding`; the law does not know them.
+    stress, stress_period : float
+        Of a sine of shear stress [Pa], [s].
+    duration, plant, method
+        As of `run_state`.
+    claim : SlidingGuarantee, optional
+        Its law runs, with its T_s, delay, lag and rock in place of those above, which are not to be given.
+
+    Raises
+    ------
+    ParameterError, UnknownNameError, SimulationError
+    """
+    _require_runnable(fault, plant)
+    held, path = rational(fault.sampling_time if step is None else step), rational(diffusion)
+    through, model = rational(lag), sliding_model(fault)
+    if claim is None:
+        law = sliding_law(model, held, diffusion=path)
+    else:
+        law, held, path, through = claim.held.law, claim.held.step, claim.held.diffusion, claim.held.lag
+        stages = (*Actuator.meant_for(Sampling(step=held, delay=claim.held.delay)).sampled, *stages)
+    run = simulate_sliding(
+        fault,
+        law,
+        held,
+        lag=through,
+        diffusion=path,
+        stages=stages,
+        transducer=transducer,
+        tide=Tide(amplitude=stress, period=stress_period),
+        duration=duration,
+        inertia=PLANTS[plant],
+        method=method,
+    )
+    around: dict[str, Any] = {"lag": through, "diffusion": path, "stages": tuple(s.name for s in stages)}
+    return HeldRun(fault=fault, model=model, step=held, **around, trajectory=run, claim=claim)
+
+
+def _require_runnable(fault: Fault, plant: str) -> None:
+    require_known(plant, PLANTS, "plant of a fault with a state", UnknownNameError)
+    if fault.disturbance != Disturbance():
+        raise ParameterError(
+            "a run of friction with a state has no disturbance but a pressure or a stress. Received a fault with a "
+            "table disturbance. Remove it, and give --pressure, or --stress with a controller."
+        )
+
+
+def _start(
+    fault: Fault, kind: str, rate: float, hold: float | None, share: float | None, settings: dict[str, Any]
+) -> StartingState:
+    given = {"hold": hold, "share": share}
+    wanted: dict[str, tuple[str, ...]] = {"steady": (), "locked": ("hold",), "late": ("share",)}
+    require_known(kind, wanted, "start", UnknownNameError)
+    if others := [name for name, value in given.items() if value is not None and name not in wanted[kind]]:
+        raise ParameterError(f"{others[0]} belongs to another start than {kind}. Received both. Leave one out.")
+    if kind == "steady":
+        return sliding(fault, rate)
+    if kind == "late":
+        return late_in_cycle(fault, rate, 0.9 if share is None else share, **settings)
+    if hold is None:
+        raise ParameterError("a locked start needs the time that the fault was held. Received none. Give --hold.")
+    return locked(fault, rate, hold, **settings)
+
+
+# ----------------------------------------------------------------------
+# A law that is told estimates: the sensor, and whether its differentiator can follow.
+
+WINDOW = 4000
+DEVIATIONS = 4.0  # of normal noise that count as its bound
+
+
+def sensor(
+    step: float,
+    noise: Measurement,
+    bound: float | None,
+    filter_order: int = 0,
+    *,
+    order: int = 1,
+    bandwidth: float = math.inf,
+    averaging: int = 1,
+    quantum: float = 0.0,
+    inner_steps: int = 1,
+) -> Measurement | OutputFeedback:
+    """What a law is told: exact or noisy states, or estimates from the noisy slip.
+
+    Parameters
+    ----------
+    step : float
+        Sampling period [s].
+    noise : Measurement
+    bound : float or None
+        λ_d [m/s^(n_d + 1)] of a differentiator; None for none.
+    filter_order : int
+        n_f of it.
+    order : int
+        n_d of it.
+    bandwidth : float
+        Of the transducer [Hz].
+    averaging : int
+        Number of the latest readings whose mean the differentiator gets.
+    quantum : float
+        Steps in which the transducer reads [m]; 0 for none.
+    inner_steps : int
+        Of the differentiator for every reading.
+
+    Raises
+    ------
+    ParameterError
+        For noise of a slip rate that is not measured, or for what belongs to a differentiator without one.
+    """
+    if bound is None:
+        given = {
+            "differentiator order": order != 1,
+            "filter order": filter_order != 0,
+            "bandwidth": bandwidth != math.inf,
+            "averaging": averaging != 1,
+            "quantum of the slip": quantum != 0,
+            "number of steps": inner_steps != 1,
+        }
+        for name in (name for name, there in given.items() if there):
+            raise ParameterError(f"the {name} belongs to a differentiator. Received no bound. Give both or neither.")
+        return noise
+    if noise.rate_noise:
+        raise ParameterError(
+            "with a differentiator the slip alone is measured. "
+            f"Received rate noise {noise.rate_noise:g} m/s. Leave it out."
+        )
+    transducer = Transducer(deviation=noise.slip_noise, bandwidth=bandwidth, quantum=quantum, seed=noise.seed)
+    stages: list[SlipStage] = [transducer] if transducer.start or quantum else []
+    stages += [Averaging(samples=averaging)] if averaging != 1 else []
+    differentiator = Differentiator(
+        bound=bound, step=step, order=order, filter_order=filter_order, inner_steps=inner_steps
+    )
+    return OutputFeedback(stages=tuple(stages), differentiator=differentiator)
+
+
+def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, *, scheme: str = "explicit") -> Premise:
+    """Whether λ_d exceeds what slip and law ask of it, jointly with the sampling period (ERRATA 21).
+
+    The largest |x1''| comes from a run with exact states over 4000 sampling periods. The condition is sufficient for
+    the differentiator to follow, not necessary for the loop to work. Where that run diverges, nothing is certified.
+    With n_d of 2 or more a bound of the next derivative is needed, which no held pressure has: the requirement is
+    infinite.
+    """
+    differentiator = seen.differentiator
+    noise = max((DEVIATIONS * s.deviation for s in seen.stages if isinstance(s, Transducer)), default=0.0)
+    reached, diverged = largest_acceleration(fault, law, scheme=scheme, step=differentiator.step)
+    condition = joint_condition(fault, law, differentiator, acceleration=reached, noise=noise)
+    premise = Premise(
+        name="differentiator",
+        required=condition.required,
+        certified=condition.certified,
+        unit=f"m/s^{differentiator.order + 1}",
+        measured=True,
+        note=_note(differentiator.order, reached, condition),
+    )
+    if diverged is None:
+        return premise
+    said = (
+        f"the loop with exact states diverges at {diverged:.4g} s, so that no λ_d is enough; until then {premise.note}"
+    )
+    return replace(premise, certified=0.0, proved=False, note=said)
+
+
+def _note(order: int, reached: float, condition: JointCondition) -> str:
+    if order > 1:
+        return f"no λ_d bounds derivative {order + 1} of the slip: its derivative 2 jumps wherever a held pressure does"
+    return (
+        f"λ_d against |x1''| <= {reached:.3g} m/s² with exact states and what the errors of the estimates, "
+        f"{condition.slip_error:.2g} m and {condition.rate_error:.2g} m/s, add to it through the law"
+    )
+
+
+def largest_acceleration(fault: Fault, law: Controller, *, scheme: str, step: float) -> tuple[float, float | None]:
+    """Largest |Δx2|/T_s [m/s²] of the sampled loop with exact states over 4000 sampling periods.
+
+    The second entry is the time [s] of its divergence, after which nothing counts, or None.
+    """
+    window = min(WINDOW * step, fault.reference.operation_time)
+    run = simulate(fault, law, scheme=scheme, step=step, duration=window, samples=WINDOW)
+    steps = np.abs(np.diff(run.slip_rate)) / np.diff(run.time)
+    return float(np.max(steps, initial=0.0)), run.events.get("diverged")
+
+
+# ----------------------------------------------------------------------
+# One run of one controller, as the command line asks for it.
+
+PUBLISHED, DESIGNED, CONTINUOUS = ("published",), ("designed",), ("continuous",)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """Controller, and what is certified of it without asking a solver.
+
+    Attributes
+    ----------
+    controller : Controller
+    lipschitz : Fraction or None
+        Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law.
+    claim : Guarantee, SlidingGuarantee or None
+        What is proved of the law as it runs, where it comes from the file of that.
+    """
+
+    controller: Controller
+    lipschitz: Fraction | None = None
+    claim: Guarantee | SlidingGuarantee | None = None
+
+    def noise(self, seed: int) -> Measurement:
+        """What the controller is told wrongly at most by its guarantee, anywhere within that; none without one."""
+        held = self.claim.held if self.claim else None
+        off = {name: float(bound) for name, bound in held.noise.items()} if held else {}
+        return Measurement(**off, seed=seed, bounded=True) if off else EXACT
+
+
+def chosen_controller(
+    fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
+) -> Controller:
+    """Controller of a `choice`, which see."""
+    return choice(fault, name, gains, scale=scale, feedforward=feedforward).controller
+
+
+def certified_choice(fault: Fault, path: str | Path) -> Choice:
+    """Law of a file of `guarantee`, which must be about the fault and hold; its proof is checked anew.
+
+    Raises
+    ------
+    CertificateError
+        When the file cannot be read, is about something else, or does not hold.
+    UnsupportedError
+        For a sliding mode whose gains cannot be read off its implicit step.
+    """
+    claim = load_guarantee(path)
+    if isinstance(claim, ContinuousPeaks) or isinstance(claim, SlidingGuarantee) != bool(fault.friction.state_names):
+        raise CertificateError(
+            "the law of a certificate runs once per sample, and is about friction with a state where that of the fault "
+            f"has one. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."
+        )
+    if apart := _apart(fault, claim):
+        raise CertificateError(
+            f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
+            f"{'; '.join(apart)}. Give the fault that it is about, or prove a new one with guarantee."
+        )
+    if isinstance(claim, Guarantee) and claim.held.law.root is not None:
+        controller: Controller = recovered(claim).limited
+    else:
+        controller = claim.controller
+    if claim.check() is not Verdict.PROVED:
+        raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
+    return Choice(controller=controller, claim=claim)
+
+
+def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee) -> list[str]:
+    """What of a fault a certificate does not cover."""
+    if isinstance(claim, SlidingGuarantee):
+        return claim.task.differences(sliding_task(fault, claim.task.stress))
+    return differences(claim.task, task_of(fault, rate_limited=claim.task.change is not None))
+
+
+def optional_choice(fault: Fault, name: str, gains: tuple[str, ...], **more: Any) -> Choice | None:
+    """A `choice`, which see, or None for the name ``none``.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        Also for gains, a scale or a feed-forward of no controller.
+    """
+    if name != "none":
+        return choice(fault, name, gains, **more)
+    if gains != PUBLISHED or more.get("scale") is not None or more.get("feedforward", "none") != "none":
+        raise ParameterError("gains, scale and feedforward need a controller. Received none. Give --controller.")
+    return None
+
+
+def choice(
+    fault: Fault,
+    name: str,
+    gains: tuple[str, ...],
+    *,
+    scale: str | None = None,
+    feedforward: str = "none",
+    step: float | None = None,
+    path: Mapping[str, float] | None = None,
+) -> Choice:
+    """Controller from a law's name and ``("published",)``, ``("designed",)``, ``("continuous",)`` or exact gains.
+
+    Designed ones run as they are guaranteed, with their own scheme and T_s; those designed in continuous time, as in
+    the paper, run with any.
+
+    Parameters
+    ----------
+    fault : Fault
+    name : str
+    gains : tuple of str
+    scale : str, optional
+        λ of a sliding mode in place of that of the gains.
+    feedforward : str
+        ``none``, ``nominal`` or ``centred``; for a sliding mode.
+    step : float, optional
+        T_s [s] of a design; the fault's unless given.
+    path : mapping of str to float, optional
+        Delay, lag and diffusion [s] for which a law is designed as it runs, as `answer` does; none unless given.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+    """
+    law, base = _with_gains(fault, name, gains, step, path or {})
+    if law.divisor is None:
+        if scale is None and feedforward == "none":
+            return Choice(controller=law, lipschitz=base)
+        raise ParameterError(f"a scale and a feed-forward belong to a sliding mode. Received {name}. Leave them out.")
+    if law.sampling is not None and feedforward != "none":
+        raise ParameterError(
+            "a feed-forward has no guarantee with the pressure held over T_s, as designed gains run. "
+            f"Received {feedforward}. Give --gains continuous, or leave it out."
+        )
+    scaled = law if scale is None else law.scaled(rational(scale, "scale"))
+    known = feed_forward(feedforward, fault, law.divisor)
+    return Choice(
+        controller=law if scaled is law and feedforward == "none" else scaled.with_feedforward(known),
+        lipschitz=None if base is None else base * (scaled.scale or 1),
+    )
+
+
+def _with_gains(
+    fault: Fault, name: str, gains: tuple[str, ...], step: float | None, path: Mapping[str, float]
+) -> tuple[Controller, Fraction | None]:
+    """Law, and the bound on |h'| that is certified for λ = 1."""
+    law = control_law(name)
+    if len(gains) == 1 and gains[0].isalpha():
+        require_known(gains[0], (*PUBLISHED, *DESIGNED, *CONTINUOUS), "gains in a word", UnknownNameError)
+    if gains == PUBLISHED:
+        known = published(fault.name)
+        if name not in known:
+            raise UnknownNameError(
+                f"published gains exist for real-fault and lab-fault. Received {fault.name!r}. "
+                "Give --gains designed, or the gains of the law."
+            )
+        return known[name], None
+    if gains == DESIGNED and step is not None:
+        fault = replace(fault, sampling_time=step)
+    if gains == DESIGNED and path:
+        return _designed_behind(fault, name, path), None
+    if gains in (DESIGNED, CONTINUOUS):
+        designed = design(fault, name, continuous=gains == CONTINUOUS)
+        if designed.controller is None:
+            raise ParameterError(f"no gains with a proof were found for {name} on {fault.name}. Give --gains.")
+        return designed.controller, certified_bound(designed)
+    return law.for_authority(gains, least_authority(fault)), None
+
+
+def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Controller:
+    """Law that is designed for a delay, a lag and rock, as it runs at the fault's T_s.
+
+    Raises
+    ------
+    ParameterError
+        Where none has a proof, or the delay is more than a run takes.
+    """
+    around: Any = {part: rational(time, part) for part, time in path.items()}
+    Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **around))
+    found = answer(fault, controller=name, **around)
+    if not isinstance(found.found, Guarantee):
+        told = ", ".join(f"{part} {time:g} s" for part, time in path.items())
+        sooner = f"--step '{float(found.shorter.held.step):g} s', where it has, " if found.shorter else ""
+        raise ParameterError(
+            f"designed gains must have a proof behind what is around them. Received {name} with {told}, "
+            f"T_s = {fault.sampling_time:g} s: {found.found.reason}. Give {sooner}gains as numbers, or see limits."
+        )
+    return found.compensation.limited if found.compensation else found.found.controller
+
+
+def run_single(
+    fault: Fault,
+    law: Controller | Choice | None,
+    *,
+    tell: Callable[[float], None],
+    duration: float | None = None,
+    load: Load | None = None,
+    noise: Sensor = EXACT,
+    actuator: Actuator = DIRECT,
+    tuning: Mapping[str, float] | None = None,
+    initial: Mapping[str, float] | None = None,
+    **settings: Any,
+) -> tuple[Trajectory, list[Premise]]:
+    """Run a loop, and say which premises hold that a run decides.
+
+    Parameters
+    ----------
+    fault : Fault
+    law : Controller, Choice or None
+        Of a choice it is known what is certified. None with a duration: the fault under its own disturbance. None
+        without: the natural earthquake.
+    tell : callable
+        Progress.
+    duration : float, optional
+        [s]; the operation time unless given.
+    load : Load, optional
+    noise : Measurement or Sensor
+        What the law is told.
+    actuator : Actuator
+        What lies between law and fault.
+    tuning : mapping of str to float, optional
+        Settings of the scheme itself, such as ``weight`` and ``authority`` of ``compensated``.
+    initial : mapping of str to float, optional
+        ``initial_slip`` [m] and ``initial_slip_rate`` [m/s], where the run does not start from rest.
+    **settings
+        ``step, scheme, method, plant, substeps`` of `quakedesign.simulation.simulate`.
+
+    Returns
+    -------
+    Trajectory
+    list of Premise
+        `on_trajectory` of a sliding mode, certified or not, and `differentiator`.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+    """
+    around: dict[str, Any] = {"measurement": noise} if noise.noisy else {}
+    around |= {"actuator": actuator} if actuator.stages else {}
+    if law is None and duration is None:
+        more = dict(tuning or {}) | dict(initial or {}) | ({"load": load} if load else {})
+        return _natural(fault, settings, around | more), []
+    name = settings["scheme"]
+    if tuning:
+        substeps = settings.pop("substeps")
+        around |= {"substeps": substeps} if substeps != 1 else {}
+        settings, around = settings | {"scheme": simulation_scheme(name, **tuning, **around)}, {}
+    known = law if isinstance(law, Choice) or law is None else Choice(controller=law)
+    own = known.controller if known else None
+    around |= dict(initial or {})
+    run = run_loop(fault, own, duration=duration, load=load, progress=tell, **settings, **around)
+    if known is None:
+        return run, []
+    return run, _premises(fault, known, run, noise, name)
+
+
+def _premises(fault: Fault, known: Choice, run: Trajectory, seen: Sensor, scheme: str) -> list[Premise]:
+    """Premises that a run decides, or a differentiator needs."""
+    law, bound = known.controller, known.lipschitz
+    premises = [trajectory_premise(law, None if bound is None else float(bound), run)]
+    if isinstance(seen, OutputFeedback):
+        premises.append(differentiator_premise(fault, law, seen, scheme=scheme))
+    return [premise for premise in premises if premise is not None]
+
+
+def _natural(fault: Fault, settings: dict[str, Any], around: dict[str, Any]) -> Trajectory:
+    """Natural earthquake, to which nothing but the plant can be told."""
+    usual = {"step": None, "scheme": "continuous", "method": "dormand-prince", "substeps": 1}
+    given = [name for name, value in settings.items() if name != "plant" and value != usual[name]]
+    given += list(around)
+    if given:
+        raise ParameterError(
+            f"the natural earthquake is run as the fault asks for. Received {', '.join(given)}. "
+            "Choose a controller, or give a duration."
+        )
+    return natural_earthquake(fault, plant=settings["plant"])

@@ -1,0 +1,733 @@
+"""Rigorous enclosures of SymPy expressions over boxes, and proofs of upper limits.
+
+Interval arithmetic with rational ends over boxes that may be unbounded: rational operations are exact,
+all others are rounded outwards. Further chapters: ball arithmetic (python-flint), and proof that an
+expression stays below a limit, by subdivision of the box.
+"""
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property, lru_cache, partial, reduce
+from itertools import count
+from math import inf
+from operator import methodcaller, mul
+from typing import Any, NoReturn
+
+import flint
+import sympy as sp
+from flint import arb, fmpq
+
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.exact import end_of, fraction_of, fraction_of_float, rational
+from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, slope_off_kinks
+
+# ----------------------------------------------------------------------
+# Rigorous enclosures of SymPy expressions over boxes that may be unbounded, with exact rational ends.
+#
+# Rational operations are exact, so a bound that is attained is found as it is; the others are rounded outwards to
+# `_BITS` bits by python-flint. At a jump of `Heaviside` or `sign`, which derivatives of Max, Min and Abs bring, the
+# enclosure holds every value between both sides; where a box only touches the jump it holds the side of the box.
+
+End = Fraction | float  # the only floats are −inf and inf
+Interval = tuple[End, End]
+Box = Mapping[sp.Symbol, Interval]
+
+EVERYTHING: Interval = (-inf, inf)
+_ZERO, _ONE = Fraction(0), Fraction(1)
+_BITS = 256
+_LONGEST = 3 * _BITS  # bits of a numerator or denominator beyond which an end is rounded
+_LARGEST = 16 * _BITS  # bits of size beyond which an end is rounded to infinity or zero, or away from them
+_RISING: dict[Any, Interval] = {  # with their limits at −inf and inf
+    sp.exp: (_ZERO, inf),
+    sp.log: EVERYTHING,
+    sp.asinh: EVERYTHING,
+    sp.sinh: EVERYTHING,
+    sp.cosh: (_ONE, inf),  # of a size
+    sp.tanh: (-_ONE, _ONE),
+}
+
+
+def interval(expression: sp.Expr, box: Box) -> Interval:
+    """Interval that contains every value of an expression over a box; the whole line where it may be undefined.
+
+    Parameters
+    ----------
+    expression : Expr
+        Built from numbers, real symbols, +, ·, powers, exp, log, sin, cos, asinh, sinh, tanh, Abs, Max, Min, signed
+        powers, and what the derivatives of these bring.
+    box : mapping of Symbol to (low, high)
+        Fractions, or −inf and inf.
+
+    Raises
+    ------
+    UnsupportedError
+        For a function without an enclosure.
+    """
+    return _intervals(expression, box)[sp.sympify(expression)]
+
+
+def regular(expression: sp.Expr, box: Box) -> bool:
+    """Whether an expression has no pole, no end of its domain and no jump of a signed power on a box.
+
+    Then its derivatives off the kinks tell how it runs; at other jumps derivatives have an impulse.
+    """
+    known = _intervals(expression, box)
+    ends = [known[node.args[0]] for node in known if _singular_at_zero(node)]
+    return all(low > 0 or high < 0 for low, high in ends)
+
+
+def _singular_at_zero(node: Any) -> bool:
+    if isinstance(node, sp.Pow | SignedPower | AbsolutePower):
+        return not (node.args[1].is_Integer and node.args[1] > 0)
+    return isinstance(node, sp.log)
+
+
+def _intervals(expression: sp.Expr, box: Box) -> dict[sp.Basic, Interval]:
+    """Intervals of an expression and of every part of it."""
+    known: dict[sp.Basic, Interval] = dict(box)
+
+    def walk(node: Any) -> Interval:
+        if node not in known:
+            known[node] = _rounded(_number(node) if node.is_Number or node.is_NumberSymbol else _operate(node, walk))
+        return known[node]
+
+    walk(sp.sympify(expression))
+    return known
+
+
+def _number(node: Any) -> Interval:
+    if node.is_finite is not True:
+        return EVERYTHING
+    if node.is_NumberSymbol:
+        near, error = rational(str(sp.N(node, 60))), Fraction(1, 10**50)
+        return near - error, near + error
+    exact = fraction_of(node) if node.is_Rational else fraction_of_float(node)
+    return exact, exact
+
+
+def _operate(node: Any, walk: Callable[[Any], Interval]) -> Interval:
+    if node.is_Pow:
+        return _power(walk(node.base), node.exp)
+    if isinstance(node, SignedPower | AbsolutePower):
+        return _signed_power(walk(node.args[0]), node.args[1], signed=isinstance(node, SignedPower))
+    if node.func in _OPERATIONS:
+        return _OPERATIONS[node.func]([walk(argument) for argument in node.args])
+    if node.func in _RISING:
+        return _rising(node.func, walk(node.args[0]))
+    return _without(str(node) if node.is_Symbol else node.func.__name__)
+
+
+def _without(what: str) -> NoReturn:
+    raise UnsupportedError(
+        f"no enclosure for {what}. Write it with powers, exp, log, sin, cos, asinh, sinh, tanh, Abs, Min or Max."
+    )
+
+
+def add(a: Interval, b: Interval) -> Interval:
+    """Sums of two intervals."""
+    return _sum(a[0], b[0]), _sum(a[1], b[1])
+
+
+def times(a: Interval, b: Interval) -> Interval:
+    """Products of two intervals."""
+    ends = [_product(x, y) for x in a for y in b]
+    return min(ends), max(ends)
+
+
+def negative(a: Interval) -> Interval:
+    """The interval mirrored at 0."""
+    return -a[1], -a[0]
+
+
+def _sum(a: End, b: End) -> End:
+    return next((x for x in (a, b) if isinstance(x, float)), None) or a + b
+
+
+def _product(a: End, b: End) -> End:
+    if a == 0 or b == 0:
+        return _ZERO
+    if isinstance(a, float) or isinstance(b, float):
+        return inf if (a > 0) == (b > 0) else -inf
+    return a * b
+
+
+def _size(a: Interval) -> Interval:
+    return max(a[0], -a[1], _ZERO), max(-a[0], a[1])
+
+
+def _reciprocal(a: Interval) -> Interval:
+    if a[0] < 0 < a[1] or a == (0, 0):
+        return EVERYTHING
+    if a[1] <= 0:
+        return negative(_reciprocal(negative(a)))
+    return _ZERO if isinstance(a[1], float) else 1 / a[1], inf if a[0] == 0 else 1 / a[0]
+
+
+def _power(base: Interval, exponent: sp.Expr) -> Interval:
+    if not exponent.is_Rational:
+        _without(f"the exponent {exponent}")
+    if exponent < 0:
+        return _reciprocal(_power(base, -exponent))
+    if not exponent.is_Integer:
+        return EVERYTHING if base[0] < 0 else (_root(base[0], exponent, up=False), _root(base[1], exponent, up=True))
+    n, (low, high) = int(exponent), base if exponent % 2 else _size(base)
+    return low**n, high**n
+
+
+def _root(x: End, exponent: sp.Rational, *, up: bool) -> End:
+    power = fmpq(int(exponent.p), int(exponent.q))
+    return x if isinstance(x, float) else _end(lambda: arb(fmpq(x.numerator, x.denominator)) ** arb(power), up=up)
+
+
+def _signed_power(x: Interval, exponent: sp.Expr, *, signed: bool) -> Interval:
+    if exponent == 0:
+        return _sign([x])
+    if not signed or x[0] >= 0:
+        return _power(_size(x), exponent)
+    if x[1] <= 0:
+        return negative(_power(negative(x), exponent))
+    return negative(_power((_ZERO, -x[0]), exponent))[0], _power((_ZERO, x[1]), exponent)[1]
+
+
+def _rising(function: Any, x: Interval) -> Interval:
+    """Enclosure by a function that rises."""
+    if function is sp.log and x[0] < 0:
+        return EVERYTHING
+    return _rise(function, x[0], up=False), _rise(function, x[1], up=True)
+
+
+def _rise(function: Any, x: End, *, up: bool) -> End:
+    if isinstance(x, float):
+        return _RISING[function][x == inf]
+    return _end(lambda: getattr(arb(fmpq(x.numerator, x.denominator)), function.__name__)(), up=up)
+
+
+def _end(evaluate: Callable[[], Any], *, up: bool) -> End:
+    """Upper or lower end of a ball that is evaluated with `_BITS` bits."""
+    with flint.ctx.workprec(_BITS):
+        return upper_end(evaluate()) if up else -upper_end(-evaluate())
+
+
+def upper_end(ball: Any) -> End:
+    """Rational at or above a ball of python-flint, of a size between 2 to ± `_LARGEST`; zero, or infinite.
+
+    Numbers of any size have balls, but as rationals the largest and the smallest would fill the memory.
+    """
+    end, large = ball.upper(), type(ball)(2) ** _LARGEST
+    if not end < large:
+        return inf
+    if end < -large:
+        return -(Fraction(2) ** _LARGEST)
+    if abs(end) * large < 1:
+        return Fraction(1 if end > 0 else 0, 2**_LARGEST)
+    return end_of(end)
+
+
+def _wave(name: str) -> Callable[[list[Interval]], Interval]:
+    def operation(arguments: list[Interval]) -> Interval:
+        low, high = arguments[0]
+        if isinstance(low, float) or isinstance(high, float):
+            return -_ONE, _ONE
+
+        def over() -> Any:
+            ends = [arb(fmpq(x.numerator, x.denominator)) for x in (low, high)]
+            return getattr(ends[0].union(ends[1]), name)()
+
+        return max(-_ONE, _end(over, up=False)), min(_ONE, _end(over, up=True))
+
+    return operation
+
+
+def _step(arguments: list[Interval]) -> Interval:
+    low, high = arguments[0]
+    if low == high == 0:
+        return _ZERO, _ONE
+    return _ONE if low >= 0 else _ZERO, _ZERO if high <= 0 else _ONE
+
+
+def _sign(arguments: list[Interval]) -> Interval:
+    low, high = _step(arguments)
+    return 2 * low - 1, 2 * high - 1
+
+
+def _impulse(arguments: list[Interval]) -> Interval:
+    low, high = arguments[0]
+    return EVERYTHING if low < 0 < high or low == high == 0 else (_ZERO, _ZERO)
+
+
+def _extreme(choose: Callable[[Iterable[End]], End]) -> Callable[[list[Interval]], Interval]:
+    def operation(arguments: list[Interval]) -> Interval:
+        lows, highs = zip(*arguments, strict=True)
+        return choose(lows), choose(highs)
+
+    return operation
+
+
+_OPERATIONS: dict[Any, Callable[[list[Interval]], Interval]] = {
+    sp.Add: lambda arguments: reduce(add, arguments),
+    sp.Mul: lambda arguments: reduce(times, arguments),
+    sp.Max: _extreme(max),
+    sp.Min: _extreme(min),
+    sp.Abs: lambda arguments: _size(arguments[0]),
+    sp.sin: _wave("sin"),
+    sp.cos: _wave("cos"),
+    sp.cosh: lambda arguments: _rising(sp.cosh, _size(arguments[0])),
+    sp.Heaviside: _step,
+    sp.sign: _sign,
+    sp.DiracDelta: _impulse,
+}
+
+
+def _rounded(a: Interval) -> Interval:
+    """The interval, rounded outwards where its ends have grown long."""
+
+    def end(x: End, *, up: bool) -> End:
+        if isinstance(x, float) or max(x.numerator.bit_length(), x.denominator.bit_length()) <= _LONGEST:
+            return x
+        return _end(lambda: arb(fmpq(x.numerator, x.denominator)), up=up)
+
+    return end(a[0], up=False), end(a[1], up=True)
+
+
+# ----------------------------------------------------------------------
+# Rigorous enclosures of SymPy expressions over boxes, in ball arithmetic (python-flint).
+
+BallBox = Mapping[sp.Symbol, tuple[Fraction, Fraction]]
+Operation = Callable[[list[Any]], Any]
+Work = list[tuple[int, Operation, list[int]]]
+
+
+def ball(low: Fraction, high: Fraction) -> Any:
+    """Ball that contains the interval [low, high]."""
+    ends = [arb(fmpq(v.numerator, v.denominator)) for v in (low, high)]
+    return ends[0].union(ends[1])
+
+
+def enclose(expression: sp.Expr, box: BallBox) -> Any:
+    """Ball that contains every value of an expression over a box.
+
+    Parameters
+    ----------
+    expression : Expr
+        Built from rationals, symbols, +, ·, powers, exp, sin, cos, Abs, Max, Min and signed powers.
+    box : mapping of Symbol to (Fraction, Fraction)
+
+    Returns
+    -------
+    flint.arb
+        Not finite where the expression is not defined on all of the box.
+
+    Raises
+    ------
+    UnsupportedError
+        For a function without an enclosure.
+    """
+    return _compiled(sp.sympify(expression)).value(_balls(box))
+
+
+class _Operations:
+    """An expression as a list of ball operations, each subexpression once."""
+
+    def __init__(self, expression: sp.Expr) -> None:
+        places: dict[sp.Expr, int] = {}
+        self._places: dict[sp.Symbol, int] = {}
+        self._start: list[Any] = []
+        work: Work = []
+
+        def place(e: sp.Expr) -> int:
+            if e not in places:
+                arguments = [place(a) for a in e.args]
+                places[e] = len(self._start)
+                self._start.append(_ball_number(e) if e.is_number else None)
+                if e.is_Symbol:
+                    self._places[e] = places[e]
+                elif not e.is_number:
+                    work.append((places[e], _operation(e), arguments))
+            return places[e]
+
+        place(expression)
+        self._work = work
+        self._after = {symbol: _depending(work, index) for symbol, index in self._places.items()}
+
+    def value(self, balls: Mapping[sp.Symbol, Any]) -> Any:
+        """Ball of the expression for balls of its symbols."""
+        return self.values(balls)[-1]
+
+    def values(self, balls: Mapping[sp.Symbol, Any]) -> list[Any]:
+        """Balls of all subexpressions, the expression's own last."""
+        results = self._start.copy()
+        for symbol, index in self._places.items():
+            results[index] = balls[symbol]
+        return _worked(results, self._work)
+
+    def moved(self, results: list[Any], symbol: sp.Symbol, changed: Any) -> list[Any]:
+        """The same for another ball of one symbol: what depends on it is computed again."""
+        results = results.copy()
+        results[self._places[symbol]] = changed
+        return _worked(results, self._after[symbol])
+
+
+_compiled = lru_cache(maxsize=64)(_Operations)
+
+
+def _worked(results: list[Any], work: Work) -> list[Any]:
+    for i, operation, arguments in work:
+        results[i] = operation([results[j] for j in arguments])
+    return results
+
+
+def _depending(work: Work, index: int) -> Work:
+    known, depending = {index}, []
+    for step in work:
+        if not known.isdisjoint(step[2]):
+            known.add(step[0])
+            depending.append(step)
+    return depending
+
+
+def _ball_number(e: sp.Expr) -> Any:
+    if e.is_Rational:
+        return arb(fmpq(int(e.p), int(e.q)))
+    if e.is_Float:
+        exact = fraction_of_float(e)
+        return arb(fmpq(exact.numerator, exact.denominator))
+    if e is sp.pi:
+        return arb.pi()
+    if e is sp.E:
+        return arb(1).exp()
+    return _operation(e)([_ball_number(a) for a in e.args])
+
+
+def _operation(e: sp.Expr) -> Operation:
+    """What a node does with the balls of its arguments; everything about its exponent is settled here."""
+    if e.is_Add:
+        return sum
+    if e.is_Mul or isinstance(e, sp.Max | sp.Min):
+        return partial(reduce, {sp.Max: _larger, sp.Min: _smaller}.get(type(e), mul))
+    if e.is_Pow:
+        return _ball_power(e.exp)
+    if isinstance(e, AbsolutePower | SignedPower):
+        return _monotone(e.args[1], signed=isinstance(e, SignedPower))
+    methods = {sp.exp: "exp", sp.sin: "sin", sp.cos: "cos", sp.log: "log", sp.asinh: "asinh", sp.Abs: "__abs__"}
+    for function, method in methods.items():
+        if isinstance(e, function):
+            return partial(_of_one, methodcaller(method))
+    return _without_ball(type(e).__name__)
+
+
+def _of_one(function: Callable[[Any], Any], values: list[Any]) -> Any:
+    return function(values[0])
+
+
+def _without_ball(what: str) -> Operation:
+    def refuse(values: list[Any]) -> Any:
+        raise UnsupportedError(f"no enclosure for {what}. Write it with powers, exp, log, sin, cos, asinh, Min or Max.")
+
+    return refuse
+
+
+def _larger(a: Any, b: Any) -> Any:
+    return a.max(b)
+
+
+def _smaller(a: Any, b: Any) -> Any:
+    return a.min(b)
+
+
+def _ball_power(exponent: sp.Expr) -> Operation:
+    if exponent.is_Integer:
+        n = abs(int(exponent))
+        if exponent.is_positive:
+            return lambda values: _integer_power(values[0], n)
+        return lambda values: 1 / _integer_power(values[0], n)
+    if exponent.is_Rational:
+        power = arb(fmpq(int(exponent.p), int(exponent.q)))
+        return lambda values: values[0] ** power
+    return _without_ball(f"the exponent {exponent}")
+
+
+def _integer_power(base: Any, n: int) -> Any:
+    """Tight enclosure of base^n, n ≥ 1, from its ends; arb's own power is not finite about a zero midpoint."""
+    if n == 1:
+        return base
+
+    def at(end: Any) -> Any:
+        return reduce(mul, [end] * n)
+
+    if n % 2:
+        return at(base.lower()).union(at(base.upper()))
+    return at(base.abs_lower()).union(at(base.abs_upper()))
+
+
+def _monotone(exponent: sp.Expr, *, signed: bool) -> Operation:
+    if not exponent.is_Rational:
+        return _without_ball(f"the exponent {exponent}")
+    power = arb(fmpq(int(exponent.p), int(exponent.q)))
+    negative, jumps = bool(exponent < 0), signed and bool(exponent == 0)
+
+    def at(end: Any) -> Any:
+        value = abs(end) ** power
+        return value * end.sgn() if signed else value
+
+    def operation(values: list[Any]) -> Any:
+        x = values[0]
+        low, high = x.lower(), x.upper()
+        straddles = not (low > 0 or high < 0)
+        if not x.is_finite() or (straddles and negative):
+            return arb("nan")
+        if straddles and jumps:
+            return arb(-1).union(arb(1))
+        hull = at(low).union(at(high))
+        return hull.union(arb(0)) if straddles and not signed else hull
+
+    return operation
+
+
+def upper_bound(
+    expression: sp.Expr,
+    box: BallBox,
+    *,
+    tolerance: Fraction = Fraction(1, 100),
+    pieces: int = 1500,
+    limit: Fraction | None = None,
+) -> Fraction:
+    """Rigorous upper bound of |expression| over a box, by subdivision.
+
+    Parameters
+    ----------
+    expression : Expr
+    box : mapping of Symbol to (Fraction, Fraction)
+    tolerance : Fraction
+        Stop when the bound is within this share of a value that is attained.
+    pieces : int
+        Largest number of subdivisions; the bound is rigorous whenever it stops.
+    limit : Fraction, optional
+        Stop as soon as the bound is below that, or never will be, where nothing else is asked.
+
+    Returns
+    -------
+    Fraction
+
+    Raises
+    ------
+    ParameterError
+        When no finite bound is found.
+    """
+    order = count()
+    operations = _compiled(sp.sympify(expression))
+    free = expression.free_symbols
+    start = {symbol: ends for symbol, ends in box.items() if symbol in free}
+    values = operations.values(_balls(start))
+    attained = Fraction(0)
+    heap = [(-_upper(values[-1]), next(order), start, values)]
+    for _ in range(pieces):
+        bound, _, worst, values = heap[0]
+        middle = {s: ((a + b) / 2,) * 2 for s, (a, b) in worst.items()}
+        attained = max(attained, _lower(operations.value(_balls(middle))))
+        if -bound <= attained * (1 + tolerance):
+            break
+        if limit is not None and (-bound < limit or limit <= attained < -bound < float("inf")):
+            break
+        heapq.heappop(heap)
+        for part, found in _halves(operations, worst, values):
+            heapq.heappush(heap, (-_upper(found[-1]), next(order), part, found))
+    result = -heap[0][0]
+    if result == float("inf"):
+        raise ParameterError(
+            f"no finite bound was found in {pieces} subdivisions of the box. An expression that is defined all over it "
+            "is expected. Narrow the ranges."
+        )
+    return Fraction(result)
+
+
+def _balls(box: BallBox) -> dict[sp.Symbol, Any]:
+    return {symbol: ball(*ends) for symbol, ends in box.items()}
+
+
+def _halves(operations: _Operations, box: dict[Any, Any], values: list[Any]) -> list[tuple[dict[Any, Any], list[Any]]]:
+    """Halve the box where that lowers the bound most: parts with the balls of all subexpressions."""
+    best: list[tuple[dict[Any, Any], list[Any]]] = []
+    least: Any = None
+    for symbol, (low, high) in box.items():
+        if low == high:
+            continue
+        middle = (low + high) / 2
+        parts, worst = [], None
+        for part in ((low, middle), (middle, high)):
+            found = operations.moved(values, symbol, ball(*part))
+            upper = _upper(found[-1])
+            if least is not None and upper >= least:  # the other half cannot make it better
+                break
+            parts.append((box | {symbol: part}, found))
+            worst = upper if worst is None else max(worst, upper)
+        else:
+            best, least = parts, worst
+    return best or [(box, values)]
+
+
+def _upper(enclosure: Any) -> Any:
+    return upper_end(abs(enclosure))
+
+
+def _lower(enclosure: Any) -> Any:
+    return max(Fraction(0), -upper_end(-abs(enclosure)))
+
+
+# ----------------------------------------------------------------------
+# Whether an expression stays below a limit on a box, decided by subdivision in interval arithmetic.
+
+PIECES = 600
+FURTHEST = 10**60  # beyond it a half-line is not halved any more
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Where a limit is exceeded.
+
+    Attributes
+    ----------
+    at : mapping of Symbol to Fraction
+    value : Fraction
+        A rigorous lower bound of the expression there.
+    """
+
+    at: dict[sp.Symbol, Fraction]
+    value: Fraction
+
+
+@dataclass(frozen=True)
+class Undecided:
+    """What subdivision did not decide.
+
+    Attributes
+    ----------
+    where : Box
+        The box with the largest enclosure that is left.
+    """
+
+    where: Box
+
+
+def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction) -> Fraction | Excess | Undecided:
+    """Smallest proved upper bound of an expression on a box that is not below a limit, if it is at most limit + slack.
+
+    Parameters
+    ----------
+    expression : Expr
+        As in `quakedesign.symbolic.enclosure.interval`.
+    box : mapping of Symbol to (low, high)
+        May be unbounded.
+    limit : Fraction
+        Returned itself where the expression does not exceed it.
+    slack : Fraction
+        How far an enclosure may exceed the limit where it cannot be sharpened.
+
+    Returns
+    -------
+    Fraction, Excess or Undecided
+        `Excess` with a point at which the expression exceeds limit + slack.
+
+    Raises
+    ------
+    UnsupportedError
+        For a function without an enclosure.
+    """
+    form, order, found = _Form(sp.sympify(expression)), count(), limit
+    heap: list[tuple[End, int, Box]] = []
+
+    def push(part: Box) -> None:
+        heapq.heappush(heap, (-form.highest(part), next(order), part))
+
+    push({symbol: ends for symbol, ends in box.items() if symbol in form.expression.free_symbols})
+    for _ in range(PIECES):
+        top = -heap[0][0]
+        if top <= limit + slack:
+            return max(found, Fraction(top))
+        part = heapq.heappop(heap)[2]
+        risen = form.risen(part)
+        for point in (_centre(risen), _centre(part)):  # a face may lie on a kink, where less is known than beside it
+            low, _ = interval(form.expression, {symbol: (x, x) for symbol, x in point.items()})
+            if low > limit + slack:
+                return Excess(at=point, value=Fraction(low))
+        if any(abs(x) > FURTHEST for x in _centre(risen).values()):
+            return Undecided(risen)
+        for half in form.halves(risen):
+            push(half)
+    return Undecided(heap[0][2])
+
+
+@dataclass(frozen=True)
+class _Form:
+    """An expression with its derivatives."""
+
+    expression: sp.Expr
+
+    @cached_property
+    def slopes(self) -> dict[sp.Symbol, sp.Expr]:
+        return {
+            x: sp.factor_terms(slope_off_kinks(self.expression, x))
+            for x in sorted(self.expression.free_symbols, key=str)
+        }
+
+    @cached_property
+    def jumps(self) -> bool:
+        return bool(self.expression.has(sp.Heaviside, sp.sign, SignedPower))
+
+    def slope(self, symbol: sp.Symbol, box: Box) -> Interval:
+        return interval(self.slopes[symbol], box)
+
+    def highest(self, box: Box) -> End:
+        """The lower of the upper ends of the plain enclosure and, on a bounded box, of the mean-value form."""
+        high = interval(self.expression, box)[1]
+        if any(isinstance(end, float) for ends in box.values() for end in ends) or not regular(self.expression, box):
+            return high
+        point = {symbol: (x, x) for symbol, x in _centre(box).items()}
+        mean = interval(self.expression, point)
+        for symbol, ends in box.items():
+            if ends[0] != ends[1]:
+                mean = add(mean, times(self.slope(symbol, box), add(ends, negative(point[symbol]))))
+        return min(high, mean[1])
+
+    def risen(self, box: Box) -> Box:
+        """The face of a box on which the expression is largest, as far as the signs of its derivatives tell.
+
+        Where the expression has jumps, the half beside that face, so that the side of the jump stays known.
+        """
+        if not regular(self.expression, box):
+            return box
+        risen = dict(box)
+        for symbol, (low, high) in box.items():
+            falls, rises = self.slope(symbol, risen)
+            end = low if rises <= 0 else high if falls >= 0 else None
+            if end is not None and not isinstance(end, float):
+                inner = _middle((low, high)) if self.jumps else end
+                risen[symbol] = (min(inner, end), max(inner, end))
+        return risen
+
+    def halves(self, box: Box) -> list[Box]:
+        """Both halves of a box, across the side whose halves have the smaller largest enclosure."""
+        splits = [list(_halved_box(box, symbol)) for symbol, (low, high) in box.items() if low != high]
+        return min(splits, key=lambda parts: max(map(self.highest, parts)), default=[box])
+
+
+def _halved_box(box: Box, symbol: sp.Symbol) -> Iterator[Box]:
+    low, high = box[symbol]
+    middle = _middle((low, high))
+    yield {**box, symbol: (low, middle)}
+    yield {**box, symbol: (middle, high)}
+
+
+def _centre(box: Box) -> dict[sp.Symbol, Fraction]:
+    return {symbol: _middle(ends) for symbol, ends in box.items()}
+
+
+def _middle(ends: Interval) -> Fraction:
+    """A rational inside an interval: its middle, or twice as far out as its only end."""
+    low, high = ends
+    if isinstance(low, float):
+        return Fraction(0) if isinstance(high, float) or high > 0 else min(Fraction(-1), Fraction(2 * high))
+    if isinstance(high, float):
+        return Fraction(0) if low < 0 else max(Fraction(1), Fraction(2 * low))
+    return (low + high) / 2

@@ -1,1 +1,0 @@
-"""Gains found together with their Lyapunov function, for an objective."""

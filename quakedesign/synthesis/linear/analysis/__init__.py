@@ -1,1 +1,0 @@
-"""What is proved of a given K: stability over a box, margins, optimality, and their limits."""

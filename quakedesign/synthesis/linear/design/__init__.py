@@ -1,1 +1,0 @@
-"""Gains of the e-LQR from Riccati equations, in continuous time and sampled."""

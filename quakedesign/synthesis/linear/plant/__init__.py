@@ -1,1 +1,0 @@
-"""The linear loop of a fault as exact matrices, and the bounds of its uncertainty."""

@@ -1,1 +1,0 @@
-"""A given K with its pressure held over the sampling time."""

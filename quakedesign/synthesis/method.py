@@ -1,0 +1,331 @@
+"""Design methods by family of control laws: problem, interface and sampled linear laws.
+
+The base method also judges a law that belongs to no family.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cache
+from typing import Any, ClassVar, Generic, TypeVar
+
+import sympy as sp
+
+from quakedesign.discovery import discovered
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.exact import to_sympy
+from quakedesign.fault import Fault
+from quakedesign.guarantees import (
+    CLASSES,
+    MEASURED,
+    OBJECTIVES,
+    Compensation,
+    ContinuousPeaks,
+    Guarantee,
+    Held,
+    LoopAnswer,
+    NoGuarantee,
+    SlidingGuarantee,
+    Task,
+    best_guarantee,
+    task_of,
+)
+from quakedesign.guarantees.exact.loop import Around
+from quakedesign.laws import Controller, SampledController, Signals, control_laws
+from quakedesign.laws.feed_forward import NONE, FeedForward
+from quakedesign.linear.robust_stability import sector_loop
+from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.lyapunov import Certificate, Verdict, decided_once
+from quakedesign.lyapunov.exact.domain import Domain
+from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.lyapunov.exact.premises import Premise, Variant, linear_premises
+from quakedesign.lyapunov.search.search import find_certificate
+
+# ----------------------------------------------------------------------
+# What is asked of every family of laws, and what is answered of a law that belongs to none.
+
+Designed = TypeVar("Designed")
+MEMORYLESS = "laws of one's own are designed for friction of slip and slip rate alone"
+L = TypeVar("L", bound=Controller)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowSlidingDesign:
+    """What is asked of a law that holds a fault with a state in slow sliding; see `quakedesign.synthesis.design`.
+
+    Attributes
+    ----------
+    diffusion : Fraction or None
+        L²/D [s]; None for a well near the fault.
+    stress : Fraction or None
+        [Pa]; None for the largest that the design stands.
+    spread : Fraction
+        [-].
+    """
+
+    diffusion: Fraction | None = None
+    stress: Fraction | None = None
+    spread: Fraction = Fraction(0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GainProblem(Generic[Designed]):
+    """Gains that are wanted for a fault; see `quakedesign.synthesis.design`.
+
+    Attributes
+    ----------
+    fault : Fault
+    answer : callable
+        What is made of all that is found.
+    objective : str
+    continuous : bool
+    feedforward : FeedForward
+    measured : str
+    noise, path : Around
+        Bounds of what it is told wrongly; delay, lag and L²/D behind which it acts.
+    sliding : SlowSlidingDesign
+        Of friction with a state.
+    disturbance_class : str
+        ``amplitude`` or ``rate``, of the disturbances that a guarantee is about.
+    tell : callable
+        Called with what a long search is doing, and the fraction done [-].
+    """
+
+    fault: Fault
+    answer: Callable[..., Designed]
+    objective: str = OBJECTIVES[0]
+    continuous: bool = False
+    feedforward: FeedForward = NONE
+    measured: str = MEASURED[0]
+    noise: Around = field(default_factory=Around)
+    path: Around = field(default_factory=Around)
+    sliding: SlowSlidingDesign = field(default_factory=SlowSlidingDesign)
+    disturbance_class: str = CLASSES[0]
+    tell: Callable[[str, float], None] = lambda what, done: None
+
+    @property
+    def task(self) -> Task:
+        """What a guarantee uses of the fault."""
+        return task_of(self.fault, rate_limited=self.disturbance_class == "rate")
+
+    def require_exact_in_continuous_time(self) -> None:
+        """Refuse a design in continuous time that is told less than slip and slip rate as they are.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if self.continuous and (self.measured != MEASURED[0] or any(self.noise.values()) or self.behind):
+            raise ParameterError(
+                "a design in continuous time knows slip and slip rate exactly and acts at once. Received noise, the "
+                "slip alone, a delay, a lag or rock. Leave continuous out."
+            )
+
+    @property
+    def behind(self) -> bool:
+        """Whether there is a delay, a lag or rock between law and fault."""
+        return any(self.path.values())
+
+    def by_method(self, law: type[Controller]) -> Designed:
+        """Gains by the method of the family that a law belongs to."""
+        return method_of(law).design(self, law)
+
+    def assessed(self, controller: Controller) -> Designed:
+        """Verdict on gains, by the method of the family of their law."""
+        return method_of(type(controller)).assess(self, controller)
+
+    def judged(
+        self,
+        controller: Controller,
+        certificate: Certificate | None = None,
+        *,
+        runs: Guarantee | SlidingGuarantee | NoGuarantee | None = None,
+        premises: tuple[Premise, ...] = (),
+        **more: Any,
+    ) -> Designed:
+        """Gains with what was found of them, premises of what runs first.
+
+        The verdict is that on the certificate unless given; of a law of samples it is that on what runs.
+        """
+        own, domain = method_of(type(controller)).premises(self.fault, controller, certificate)
+        verdict = decided_once(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
+        if runs is not None and controller.sampling is not None:
+            verdict = runs.check()
+        found = {
+            "name": controller.name,
+            "verdict": verdict,
+            "domain": domain,
+            "runs": runs,
+            "path": self.path,
+            **self.noise,
+            **more,
+        }
+        found["disturbance_class"] = self.disturbance_class
+        known = (*premises, *own, *controller.premises(self.fault, certificate))
+        return self.answer(fault=self.fault, controller=controller, certificate=certificate, premises=known, **found)
+
+    def undecided(self, name: str, reason: str, runs: NoGuarantee | None = None, **more: Any) -> Designed:
+        """Answer where no gains were found."""
+        none: dict[str, Any] = {"controller": None, "certificate": None, "premises": (), "details": {"reason": reason}}
+        none |= {"disturbance_class": self.disturbance_class, "path": self.path}
+        return self.answer(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none, **more)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What is asked of a law as it runs; see `quakedesign.synthesis.answer`."""
+
+    gains: tuple[str, ...] = ()
+    objective: str = OBJECTIVES[0]
+    scheme: str | None = None
+    measured: str = MEASURED[0]
+    around: Around = field(default_factory=Around)
+
+    def require_all_measured(self) -> None:
+        """Refuse a law that is told the slip alone where it needs the slip rate as well."""
+        if self.measured != MEASURED[0]:
+            raise ParameterError(
+                "measured is for a designed e-LQR, all other laws need slip and slip rate. "
+                f"Received {self.measured!r}. Leave it out, or the gains and the controller."
+            )
+
+
+def linear_about_a_reference(controller: Controller) -> bool:
+    """Whether the loop that a law states is x2' = s·x1 − w·x2 + β·b·p with its own p and ξ', as an e-LQR's."""
+    try:
+        model = controller.loop_field()
+    except UnsupportedError:
+        return False
+    names = {str(symbol): symbol for symbol in (*model.uncertain, *model.constants)}
+    if set(names) != {"beta", "s", "w", "b"} or model.domain != "reals" or len(model.states) < 2:
+        return False
+    slip, rate, *own = model.states
+    signals = Signals(slip=slip, slip_rate=rate, slip_error=slip, slip_rate_error=rate, integrals=tuple(own))
+    pushed = names["s"] * slip - names["w"] * rate + names["beta"] * names["b"] * controller.pressure(signals)
+    rates = (rate, pushed, *controller.integral_rates(signals))
+    gains = {gain: to_sympy(controller.gains[str(gain)]) for gain in model.gains}
+    stated = [model.field[state].subs(gains) for state in model.states]
+    return len(rates) == len(stated) and all(sp.expand(a - b) == 0 for a, b in zip(rates, stated, strict=True))
+
+
+class DesignMethod(Generic[L]):
+    """How laws of a family are designed and judged; this one, for laws of no family, knows what they say themselves.
+
+    Attributes
+    ----------
+    name : str
+    family : type of Controller
+        From which the laws of the family derive.
+    designs : bool
+        Whether it finds gains for a fault.
+    without_state : str
+        Why it finds none for friction with a state; empty where it does.
+    """
+
+    name: ClassVar[str] = "any"
+    family: ClassVar[type] = Controller
+    designs: ClassVar[bool] = False
+    without_state: ClassVar[str] = MEMORYLESS
+
+    def design(self, problem: GainProblem[Designed], law: type[L]) -> Designed:
+        """Find gains with a proof.
+
+        Raises
+        ------
+        UnsupportedError
+            Where no way is known.
+        """
+        raise UnsupportedError(f"no way to design {law.title} is known. Give its class a classmethod design(problem).")
+
+    def assess(self, problem: GainProblem[Designed], controller: L) -> Designed:
+        """Judge given gains: by a quadratic V where the closed loop is linear about any constant reference."""
+        if not linear_about_a_reference(controller):
+            return problem.judged(controller, details={"reason": f"no way to prove {controller.title} is known"})
+        loop = sector_loop(controller, sectors(problem.fault))
+        return problem.judged(controller, find_certificate(loop, 2, subject=type(controller)))
+
+    def premises(
+        self, fault: Fault, controller: L, certificate: Certificate | None
+    ) -> tuple[tuple[Premise, ...], Domain | None]:
+        """Premises of the certificate, and the domain that it certifies."""
+        known = linear_about_a_reference(controller)
+        return tuple(linear_premises(fault, controller, certificate)) if known else (), None
+
+    def guarantee(self, fault: Fault, task: Task, controller: L, noise: Around) -> Guarantee | NoGuarantee:
+        """What is proved of the law as it runs on a task of the fault, p held."""
+        return NoGuarantee(
+            reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
+        )
+
+    def certified_peaks(self, fault: Fault, controller: L, disturbance_class: str) -> ContinuousPeaks | NoGuarantee:
+        """How far slip, slip rate and pressure go at most if the pressure acts at once."""
+        return NoGuarantee(reason=f"no bound of peaks of {controller.title} is known here", small_gain=None)
+
+    def compensation(self, controller: L, found: Guarantee | NoGuarantee) -> Compensation | None:
+        """A law of samples that runs in the scheme ``compensated``, with its guarantee; None for another."""
+        return None
+
+    def held_loop(self, fault: Fault, controller: L) -> HeldLoop | None:
+        """What is decided when p is held over the fault's sampling time; None where nothing is."""
+        return None
+
+    def variants(self, fault: Fault, controller: L, certificate: Certificate | None) -> tuple[Variant, ...]:
+        """Premises and domain of the same gains with every named feed-forward; none for laws without."""
+        return ()
+
+    def sampled(self, fault: Fault, task: Task, law: type[L], step: Fraction, wanted: Wanted) -> LoopAnswer:
+        """Guarantee of given gains, or of a design, as they run once every T_s [s]."""
+        reason = f"no analysis of {law.title} under a held pressure is known here"
+        return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
+
+
+@cache
+def methods() -> dict[str, DesignMethod[Any]]:
+    """Every method by name."""
+    return {name: method() for name, method in discovered("quakedesign.synthesis", DesignMethod).items()}
+
+
+def method_of(law: type[Controller]) -> DesignMethod[Any]:
+    """Method of the family that a law belongs to: that of the nearest class that it derives from."""
+    known = {method.family: method for method in methods().values()}
+    return next(known[base] for base in law.__mro__ if base in known)
+
+
+def designable(fault: Fault | None = None) -> tuple[str, ...]:
+    """Names of the package's laws that find gains for a fault; for some fault if none is given."""
+    left = left_out(fault) if fault is not None else {}
+    return tuple(name for name, law in control_laws().items() if method_of(law).designs and name not in left)
+
+
+def left_out(fault: Fault) -> dict[str, str]:
+    """Why laws of the package that find gains for others find none for a fault, by name."""
+    able = {name: method_of(law) for name, law in control_laws().items()}
+    found = {name: method.without_state for name, method in able.items() if method.designs and method.without_state}
+    return found if fault.friction.state_names else {}
+
+
+# ----------------------------------------------------------------------
+# Linear laws that run once per sample.
+
+
+class Samples(DesignMethod[SampledController]):
+    """Laws without a loop in continuous time: what is guaranteed of them as they run is all."""
+
+    name: ClassVar[str] = "samples"
+    family: ClassVar[type] = SampledController
+
+    def assess(self, problem: GainProblem[Designed], controller: SampledController) -> Designed:
+        """By the guarantee."""
+        return problem.judged(controller, runs=self.guarantee(problem.fault, problem.task, controller, problem.noise))
+
+    def premises(
+        self, fault: Fault, controller: SampledController, certificate: Certificate | None
+    ) -> tuple[tuple[Premise, ...], Domain | None]:
+        """None: those of the guarantee stand with it."""
+        return (), None
+
+    def guarantee(
+        self, fault: Fault, task: Task, controller: SampledController, noise: Around
+    ) -> Guarantee | NoGuarantee:
+        """At its own T_s, behind its own delay, lag and rock."""
+        return best_guarantee(task, Held(law=controller.law, step=controller.step, **controller.sampling.path, **noise))

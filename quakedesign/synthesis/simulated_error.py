@@ -1,0 +1,224 @@
+"""Gains that err least at a given sampling time, as simulated on a fault, among gains with a proof."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.exact import rational
+from quakedesign.fault import Fault
+from quakedesign.laws import Controller, control_law
+from quakedesign.loop import simulation_scheme
+from quakedesign.lyapunov import Loop
+from quakedesign.lyapunov.exact.fault_bounds import coefficient_range, least_authority
+from quakedesign.lyapunov.gains.path_following import look, scaled_norm, short, with_gains
+from quakedesign.lyapunov.gains.synthesise import ComparedGains, Synthesis, SynthesisProblem, question, synthesise
+from quakedesign.lyapunov.search.certify import Number
+from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.simulation import Metrics, simulate
+from quakedesign.synthesis.sliding_mode_design import required_lipschitz, smallest_root
+
+_HEADROOM = Fraction(11, 10)
+_WINDOW = 4000
+_SIMPLEX = 0.15
+_WORST = 50.0
+_NO_AIM = ("min_pressure", "settled_from", "steps", "seconds")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialSampling:
+    """How a set of gains is tried out.
+
+    Attributes
+    ----------
+    fault : Fault
+    law : type of Controller
+    gain_range : tuple of two
+        b_m and b_M that the gains must be proved for.
+    scale, divisor : Fraction
+        λ and μ0N̂0 [m²/kg] of the controller; λ makes |h'| ≤ 1 of the base gains enough for the bound asked for.
+    metric, scheme : str
+    step, duration : float
+        [s].
+    """
+
+    fault: Fault
+    law: type[Controller]
+    gain_range: tuple[Fraction, Fraction]
+    scale: Fraction
+    divisor: Fraction
+    metric: str
+    scheme: str
+    step: float
+    duration: float
+
+    def controller(self, gains: Sequence[Fraction]) -> Controller:
+        """Controller of base gains."""
+        return self.law.for_authority(tuple(gains), self.divisor).scaled(self.scale)
+
+    def error(self, gains: Sequence[Fraction]) -> float | None:
+        """Metric of a run from rest; None if it diverges."""
+        run = simulate(
+            self.fault,
+            self.controller(gains),
+            step=self.step,
+            scheme=self.scheme,
+            duration=self.duration,
+            samples=2,
+            compiled=False,
+        )
+        error: float | None = getattr(run.metrics, self.metric)
+        return error
+
+
+def sampling(
+    fault: Fault,
+    law: str = "cta",
+    *,
+    lipschitz: Number | None = None,
+    gain_range: tuple[Number, Number] | None = None,
+    metric: str = "max_slip_rate_error",
+    scheme: str = "explicit",
+    step: float | None = None,
+    duration: float | None = None,
+) -> TrialSampling:
+    """Read how gains shall be tried out on a fault.
+
+    Parameters
+    ----------
+    fault : Fault
+    law : str
+        A sliding mode.
+    lipschitz : number or text, optional
+        L̄ [m/s³]; a tenth above what the fault's reference and disturbance need unless given.
+    gain_range : tuple of two, optional
+        b_m and b_M; those of the fault's box unless given.
+    metric : str
+        One of `Metrics` that are better when smaller.
+    scheme : str
+        One of `quakedesign.loop.schemes`.
+    step : float, optional
+        Sampling time T_s [s]; the fault's unless given.
+    duration : float, optional
+        [s]; 4000 T_s unless given.
+
+    Raises
+    ------
+    ParameterError
+        For a law that is no sliding mode, an unknown metric or scheme, or numbers that are not positive.
+    """
+    chosen = control_law(law)
+    divisor = least_authority(fault)
+    law_of_ones = chosen.for_authority((1,) * len(chosen.gain_units), divisor)
+    if law_of_ones.scale is None:
+        raise ParameterError(f"sampled errors are searched for sliding modes. Received {law!r}.")
+    require_known(metric, [name for name in Metrics.__dataclass_fields__ if name not in _NO_AIM], "metric")
+    simulation_scheme(scheme)
+    for name, given in (("step", step), ("duration", duration)):
+        if given is not None and not 0 < given < math.inf:
+            raise ParameterError(f"{name} must be positive. Received {given} s.")
+    needed = required_lipschitz(fault, divisor) * _HEADROOM if lipschitz is None else rational(lipschitz)
+    if not needed > 0:
+        raise ParameterError(f"lipschitz must be positive. Received {lipschitz}.")
+    low, high = coefficient_range(fault, divisor) if gain_range is None else map(rational, gain_range)
+    wanted = step or fault.sampling_time
+    return TrialSampling(
+        fault=fault,
+        law=chosen,
+        gain_range=(low, high),
+        scale=smallest_root(needed) ** 6,
+        divisor=divisor,
+        metric=metric,
+        scheme=scheme,
+        step=wanted,
+        duration=duration or min(_WINDOW * wanted, fault.reference.operation_time),
+    )
+
+
+def synthesise_sampled(
+    trial: TrialSampling, *, degrees: Iterable[int] | None = None, rounds: int = 80
+) -> Synthesis | None:
+    """Find base gains with a proof for |h'| ≤ 1 and a range of β whose sampled run errs least.
+
+    By the method of Nelder and Mead on the logarithms of the gains, from the gains of the smallest norm and from the
+    best of the literature; every point is screened before it is simulated. The figure is measured on one window of one
+    run, and no part of the proof.
+
+    Parameters
+    ----------
+    trial : TrialSampling
+    degrees : iterable of int, optional
+        Of V, as for `synthesise`; the search itself uses the last.
+    rounds : int
+        Simulations at most.
+
+    Returns
+    -------
+    Synthesis or None
+        Its value is the metric, in its unit; never worse than that of gains from the literature that are proved.
+    """
+    asked = question(trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=degrees)
+    known = [_measured(trial, asked, loop) for loop in asked.known]
+    small = synthesise(
+        trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=asked.degrees, starts=1, compare=False
+    )
+    begin = [tuple(small.gains.values())] if small else []
+    good = [one for one in known if one.value is not None]
+    begin += [tuple(one.gains.values()) for one in sorted(good, key=lambda one: one.value or 0.0)[:1]]
+    tried = {one.value: tuple(one.gains.values()) for one in good if one.value is not None}
+    for gains in begin:
+        tried |= _tried(trial, asked, gains, rounds // len(begin))
+    for error, gains in sorted(tried.items(), key=lambda item: item[0]):
+        loop = with_gains(asked.loop, dict(zip(asked.loop.gains, gains, strict=True)))
+        certificate = find_certificate(loop, asked.degrees, subject=trial.law)
+        if certificate is None:
+            continue
+        return Synthesis(
+            law=trial.law.name,
+            objective=trial.metric,
+            unit=Metrics.unit(trial.metric),
+            gains=loop.gains,
+            certificate=certificate,
+            value=error,
+            norm=scaled_norm(loop, asked.setting.exponents),
+            compared=tuple(replace(c, ratio=c.value and c.value / error) for c in known),
+        )
+    return None
+
+
+def _tried(
+    trial: TrialSampling, asked: SynthesisProblem, begin: Sequence[Fraction], rounds: int
+) -> dict[float, tuple[Fraction, ...]]:
+    """Screened gains by their errors, from some gains on."""
+    base = {name: float(k) for name, k in zip(asked.loop.gains, begin, strict=True)}
+    free = [name for name, k in base.items() if k]
+    setting = replace(asked.setting, degree=asked.degrees[-1])
+    tried: dict[float, tuple[Fraction, ...]] = {}
+
+    def error(factors: Any) -> float:
+        grown = {**base, **{n: base[n] * math.exp(x) for n, x in zip(free, factors, strict=True)}}
+        loop = with_gains(asked.loop, short(asked.loop, grown))
+        if look(setting, loop, scaled_norm(loop, setting.exponents)) is None:
+            return _WORST
+        value = trial.error(tuple(loop.gains.values()))
+        if not value:
+            return _WORST
+        tried.setdefault(value, tuple(loop.gains.values()))
+        return math.log(value)
+
+    simplex = np.vstack([np.zeros(len(free)), _SIMPLEX * np.eye(len(free))])
+    minimize(error, simplex[0], method="Nelder-Mead", options={"maxfev": rounds, "initial_simplex": simplex})
+    return tried
+
+
+def _measured(trial: TrialSampling, asked: SynthesisProblem, loop: Loop) -> ComparedGains:
+    """Error of gains from the literature in the same trial; None for those without a proof."""
+    certificate = find_certificate(loop, asked.degrees, subject=trial.law)
+    error = trial.error(tuple(loop.gains.values())) if certificate else None
+    norm = scaled_norm(loop, asked.setting.exponents)
+    return ComparedGains(gains=dict(loop.gains), value=error, norm=norm, ratio=None, certificate=certificate)

@@ -1,0 +1,197 @@
+"""Homogeneous laws: base gains that are proved, and a scale λ for the fault."""
+
+from dataclasses import replace
+from fractions import Fraction
+from math import floor, log10
+from typing import Any, ClassVar
+
+from quakedesign.errors import CertificateError, KinkError, ParameterError, UnsupportedError
+from quakedesign.exact import rational
+from quakedesign.fault import Fault
+from quakedesign.guarantees import (
+    MEASURED,
+    Compensation,
+    Guarantee,
+    LoopAnswer,
+    NoGuarantee,
+    Task,
+    attacked,
+    guarantee_of,
+    sampled_sliding_mode,
+)
+from quakedesign.guarantees.exact.loop import Around
+from quakedesign.guarantees.search.compensated_search import GUARANTEED
+from quakedesign.guarantees.search.defaults import sliding_mode
+from quakedesign.laws import BaseGains, Controller, SlidingMode
+from quakedesign.laws.feed_forward import NONE, FeedForward
+from quakedesign.lyapunov import Certificate, Loop, loop_of
+from quakedesign.lyapunov.exact.domain import Domain
+from quakedesign.lyapunov.exact.fault_bounds import Errors, coefficient_range, largest_matched_rate, least_authority
+from quakedesign.lyapunov.exact.premises import Premise, Variant, feedforward_variants, sliding_mode_premises
+from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
+
+_HEADROOM = Fraction(11, 10)
+_SHARES = (Fraction(99, 100), Fraction(9, 10), Fraction(1, 2))
+
+
+class SlidingModes(DesignMethod[SlidingMode]):
+    """Base gains of families.toml, proved in continuous time for the fault's range of β."""
+
+    name: ClassVar[str] = "sliding-mode"
+    family: ClassVar[type] = SlidingMode
+    designs: ClassVar[bool] = True
+    without_state: ClassVar[str] = (
+        "sliding modes of second order do not apply to friction with a state, where the slip rate follows the pressure "
+        "at once (it is algebraic without inertia)"
+    )
+
+    def design(self, problem: GainProblem[Designed], law: type[SlidingMode]) -> Designed:
+        """λ for what is guaranteed in the scheme ``compensated``, or for L̄ in continuous time."""
+        if problem.measured != MEASURED[0]:
+            raise ParameterError(
+                f"a sliding mode needs slip and slip rate. Received {problem.measured!r} for {law.name}. Leave it out, "
+                "or design an e-LQR."
+            )
+        problem.require_exact_in_continuous_time()
+        if problem.behind:
+            raise UnsupportedError(
+                f"sliding modes are designed for a pressure that acts at once. Received a delay, a lag or rock with "
+                f"{law.name}. Design an elqr; guarantee says what is proved of a sliding mode behind them."
+            )
+        if problem.feedforward != NONE and not problem.continuous:
+            raise ParameterError(
+                "a feed-forward has no guarantee with the pressure held over T_s. "
+                f"Received {problem.feedforward.name!r}. Design with continuous, or leave it out."
+            )
+        base, certificate = _proved_base(problem.fault, law)
+        if problem.continuous:
+            return _scaled(problem, base, certificate)
+        return _compensated(problem, base, certificate)
+
+    def assess(self, problem: GainProblem[Designed], controller: SlidingMode) -> Designed:
+        """Try 99, 90 and 50 % of the bound on |h'| that no V can exceed."""
+        runs = guarantee_of(problem.task, controller) if controller.sampling else None
+        limit = controller.lipschitz_limit / controller.scale
+        beta = coefficient_range(problem.fault, controller.divisor)
+        for share in _SHARES if limit > 0 else ():
+            try:
+                loop = sliding_mode_loop(controller, limit * share, beta)
+                certificate = find_certificate(loop, controller.loop_field().degree, subject=type(controller))
+            except (CertificateError, KinkError):
+                break
+            if certificate is not None:
+                return problem.judged(
+                    controller, certificate, details={"base_lipschitz": str(limit * share)}, runs=runs
+                )
+        return problem.judged(controller, runs=runs)
+
+    def premises(
+        self, fault: Fault, controller: SlidingMode, certificate: Certificate | None
+    ) -> tuple[tuple[Premise, ...], Domain | None]:
+        """|h'| against L̄, along the reference and on a level set."""
+        premises, domain = sliding_mode_premises(fault, controller, certificate)
+        return tuple(premises), domain
+
+    def guarantee(self, fault: Fault, task: Task, controller: SlidingMode, noise: Around) -> Guarantee | NoGuarantee:
+        """In the scheme ``compensated``, and in no other."""
+        return guarantee_of(task, controller, **noise)
+
+    def compensation(self, controller: SlidingMode, found: Guarantee | NoGuarantee) -> Compensation:
+        """With the weight and the authority of its scheme."""
+        return Compensation(controller=controller, found=found)
+
+    def variants(self, fault: Fault, controller: SlidingMode, certificate: Certificate | None) -> tuple[Variant, ...]:
+        """Every named feed-forward, its own first; takes a few seconds."""
+        return feedforward_variants(fault, controller, certificate)
+
+    def sampled(self, fault: Fault, task: Task, law: type[SlidingMode], step: Fraction, wanted: Wanted) -> LoopAnswer:
+        """In a scheme, with given base gains or the first ones known."""
+        wanted.require_all_measured()
+        options: Any = {"gains": wanted.gains, "scheme": wanted.scheme or GUARANTEED, "objective": wanted.objective}
+        made = sliding_mode(task, law, step, **options, **wanted.around)
+        if isinstance(made, NoGuarantee):
+            return LoopAnswer(fault=fault, found=made)
+        return replace(attacked(fault, made.found), compensation=made)
+
+
+def _proved_base(fault: Fault, law: type[SlidingMode]) -> tuple[BaseGains[SlidingMode], Certificate | None]:
+    """First base gains of a law that are proved for the fault's range of β, else the first of all."""
+    beta, known = coefficient_range(fault, least_authority(fault)), law.base_gains()
+    for base in known:
+        loop = sliding_mode_loop(base.law, base.lipschitz, beta)
+        certificate = find_certificate(loop, law.loop_field().degree, subject=law)
+        if certificate is not None:
+            return base, certificate
+    return known[0], None
+
+
+def _compensated(
+    problem: GainProblem[Designed], base: BaseGains[SlidingMode], certificate: Certificate | None
+) -> Designed:
+    """As it runs with a guarantee; in continuous time where no T_s has one."""
+    fault = problem.fault
+    law = base.law.with_divisor(least_authority(fault))
+    step = rational(fault.sampling_time)
+    made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, **problem.noise)
+    if found.runs is None:
+        none = NoGuarantee(reason=f"run in the scheme compensated, {found.reason}", small_gain=None)
+        return _scaled(problem, base, certificate, runs=none)
+    details = {
+        "objective": problem.objective,
+        "step": str(found.runs.held.step),
+        "reason": found.reason or None,
+        **{name: str(value) for name, value in found.runs.held.noise.items()},
+        "rho": str(smallest_root(made.controller.scale)),
+        **_origin(base),
+    }
+    return problem.judged(made.limited, certificate, details=details, runs=found.runs, premises=found.premises())
+
+
+def _scaled(
+    problem: GainProblem[Designed],
+    base: BaseGains[SlidingMode],
+    certificate: Certificate | None,
+    runs: NoGuarantee | None = None,
+) -> Designed:
+    """In continuous time, with the smallest scale for the fault's |h'|; with why nothing is proved of what runs."""
+    law, divisor, added = base.law, least_authority(problem.fault), problem.feedforward
+    why = {"reason": runs.reason} if runs else {}
+    if certificate is None:
+        none = "no base gains of the family were proved for the fault's range of β"
+        return problem.undecided(law.name, none, runs)
+    rho = smallest_root(required_lipschitz(problem.fault, divisor, added) * _HEADROOM / base.lipschitz)
+    scaled = law.scaled(rho**6).with_divisor(divisor).with_feedforward(added)
+    details = {**why, "rho": str(rho), **_origin(base)}
+    return problem.judged(scaled, certificate, details=details, runs=runs)
+
+
+def _origin(base: BaseGains[SlidingMode]) -> dict[str, str]:
+    return {"base_lipschitz": str(base.lipschitz), "base_source": base.source}
+
+
+def required_lipschitz(fault: Fault, divisor: Fraction, added: FeedForward = NONE) -> Fraction:
+    """Bound on |h'| [m/s³] that the reference, the disturbance and the uncertainty need while the errors are zero."""
+    return largest_matched_rate(fault, divisor, Errors(), feedforward=added)
+
+
+def smallest_root(scale: Fraction) -> Fraction:
+    """Smallest ρ with three significant digits and ρ⁶ ≥ scale."""
+    estimate = float(scale) ** (1 / 6)
+    unit = Fraction(10) ** (floor(log10(estimate)) - 2)
+    steps = floor(Fraction(estimate) / unit)
+    while (steps * unit) ** 6 < scale:
+        steps += 1
+    return steps * unit
+
+
+def sliding_mode_loop(controller: Controller, lipschitz: Fraction, beta: tuple[Fraction, Fraction]) -> Loop:
+    """Loop of base gains for |h'| ≤ lipschitz and a range of β.
+
+    Raises
+    ------
+    CertificateError
+        When the law has parts that certificates cannot express.
+    """
+    uncertain = {"beta": beta, "d": (-lipschitz, lipschitz)}
+    return loop_of(controller.name, controller.loop_field(), gains=controller.gains, uncertain=uncertain)

@@ -1,0 +1,212 @@
+"""Linear state feedback with integral action: Riccati equations, quadratic V, guarantees of the loop that runs."""
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any, ClassVar
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import rational
+from quakedesign.fault import Fault
+from quakedesign.guarantees import (
+    CLASSES,
+    MEASURED,
+    OBJECTIVES,
+    ContinuousPeaks,
+    Guarantee,
+    Held,
+    LoopAnswer,
+    NoGuarantee,
+    Task,
+    attacked,
+    best_guarantee,
+    certified_peaks,
+    design_held,
+    sampled_design,
+)
+from quakedesign.guarantees.exact.impossibility import hopeless
+from quakedesign.guarantees.exact.loop import Around
+from quakedesign.guarantees.guarantee_result import GAINS, answer_sliding
+from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
+from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
+from quakedesign.laws import summed_integrals
+from quakedesign.laws.elqr import ExtendedLQR
+from quakedesign.laws.feed_forward import NONE
+from quakedesign.linear.linear_problem import FeedbackLoop, LinearProblem, Matrix
+from quakedesign.linear.riccati import RiccatiDesign, riccati_design
+from quakedesign.linear.robust_stability import finished_exactly, robust_stability, sector_loop, why_undecided
+from quakedesign.linear.sampled_stability import HeldLoop, held_loop
+from quakedesign.loop.sensing.differentiator import told_by_differences
+from quakedesign.lyapunov import Certificate, Loop, Verdict
+from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.lyapunov.search.search import claims_of, find_certificate, finish, quadratic_margin
+from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
+
+
+class StateFeedback(DesignMethod[ExtendedLQR]):
+    """Feedback with an estimate of the disturbance for what runs, the Riccati equation in continuous time."""
+
+    name: ClassVar[str] = "state-feedback"
+    family: ClassVar[type] = ExtendedLQR
+    designs: ClassVar[bool] = True
+    without_state: ClassVar[str] = ""
+
+    def design(self, problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
+        """As it runs, or with an exact proof about any constant reference in continuous time."""
+        if problem.feedforward != NONE:
+            raise ParameterError(
+                f"a feed-forward is part of sliding-mode laws. Received {problem.feedforward.name!r} with {law.name}. "
+                "Leave it out."
+            )
+        problem.require_exact_in_continuous_time()
+        if problem.fault.friction.state_names:
+            return _sliding(problem, law)
+        return _continuous(problem, law) if problem.continuous else _sampled(problem, law)
+
+    def assess(self, problem: GainProblem[Designed], controller: ExtendedLQR) -> Designed:
+        """Over the fault's sectors."""
+        loop = sector_loop(controller, sectors(problem.fault))
+        return _judged(problem, controller, quadratic_certificate(loop), {})
+
+    def guarantee(self, fault: Fault, task: Task, controller: ExtendedLQR, noise: Around) -> Guarantee | NoGuarantee:
+        """With integrals summed over the T_s of the fault."""
+        if controller.feedback != "error" or controller.limits is not None or controller.offset:
+            return super().guarantee(fault, task, controller, noise)
+        step = rational(fault.sampling_time)
+        return best_guarantee(task, Held(law=summed_integrals(tuple(controller.gains.values()), step), step=step))
+
+    def certified_peaks(
+        self, fault: Fault, controller: ExtendedLQR, disturbance_class: str
+    ) -> ContinuousPeaks | NoGuarantee:
+        """In continuous time."""
+        return certified_peaks(fault, controller, disturbance_class=disturbance_class)
+
+    def held_loop(self, fault: Fault, controller: ExtendedLQR) -> HeldLoop | None:
+        """The law as it is, over the fault's T_s."""
+        return held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
+
+    def sampled(self, fault: Fault, task: Task, law: type[ExtendedLQR], step: Fraction, wanted: Wanted) -> LoopAnswer:
+        """Integrals of given gains are summed; without gains, a law with an estimate of the disturbance."""
+        differs = wanted.measured == MEASURED[2]
+        if wanted.gains and not differs:
+            wanted.require_all_measured()
+        if wanted.scheme not in (None, "explicit"):
+            raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {wanted.scheme!r}. Leave it out.")
+        if wanted.gains:
+            summed = summed_integrals(_four(wanted.gains), step)
+            if differs and (reason := why_no_law(step, wanted.measured, wanted.around)):
+                return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
+            summed = told_by_differences(summed, step) if differs else summed
+            given = best_guarantee(task, Held(law=summed, step=step, **wanted.around))
+            if isinstance(given, Guarantee):
+                return attacked(fault, given)
+            other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
+            if isinstance(other.found, Guarantee):
+                return LoopAnswer(fault=fault, found=given, nearest=(GAINS, other.found))
+            return replace(other, found=given)
+        told: Any = {"measured": wanted.measured, **wanted.around}
+        found = design_held(task, step, objective=wanted.objective, **told)
+        if isinstance(found, Guarantee) or wanted.around.get("longest_step"):
+            return attacked(fault, found)
+        longest = longest_step(task, **told)
+        if (again := continued(task, step, longest, **told)) is not None:
+            return attacked(fault, again)
+        shorter, asked = (None, None) if longest is None else (design_at(task, longest), step)
+        nearest = nearest_setup(task, step, **told)
+        return LoopAnswer(fault=fault, found=found, shorter=shorter, asked_step=asked, nearest=nearest)
+
+
+def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
+    if len(gains) != 4:
+        raise ParameterError(f"gains must be four numbers, k1 to k4. Received {len(gains)}. Leave them out to design.")
+    return tuple(rational(v, f"k{i}") for i, v in enumerate(gains, 1))
+
+
+def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
+    fault = problem.fault
+    step, measured = rational(fault.sampling_time), problem.measured
+    task, path, stress = problem.task, problem.path, rational(fault.effective_normal_stress)
+    zero = Fraction(0)
+    if beyond := hopeless(task, stress, path.get("delay", zero), path.get("diffusion", zero)):
+        return problem.undecided(law.name, beyond, NoGuarantee(reason=beyond, small_gain=None))
+    told: Any = {**problem.noise, **path}
+    found = sampled_design(task, step, problem.objective, measured=measured, **told)
+    if found.runs is None:
+        return problem.undecided(law.name, found.reason)
+    runs, held = found.runs, found.runs.held
+    details = {
+        "objective": problem.objective,
+        "step": str(held.step),
+        "reason": found.reason or None,
+        "measured": measured,
+        **{name: str(value) for name, value in (*held.noise.items(), *held.path.items()) if value},
+    }
+    return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=found.premises())
+
+
+def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
+    """A law of the slip alone that holds slow sliding along the task."""
+    usual = OBJECTIVES[0], CLASSES[0]
+    if problem.continuous or (problem.objective, problem.disturbance_class) != usual or any(problem.noise.values()):
+        raise ParameterError(
+            "a law for friction with a state is designed as it runs, told the slip as it is, with the objective "
+            f"{OBJECTIVES[0]}, for any stress of an amplitude. Received continuous, noise, another objective or class "
+            "rate. Leave them out; guarantee takes noise of the slip."
+        )
+    wanted, fault = problem.sliding, problem.fault
+    path = wanted.diffusion or near_path(sliding_model(fault))
+    answer = answer_sliding(fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, diffusion=path)
+    reason = answer.found.reason if isinstance(answer.found, NoGuarantee) else None
+    if answer.held is None:
+        return problem.undecided(law.name, str(reason), sliding=answer)
+    assumed = None if wanted.diffusion else f"a well near the fault, L^2/D = {float(path):g} s"
+    details = {"step": str(answer.held.step), "diffusion": str(path), "measured": MEASURED[1]}
+    details |= {name: said for name, said in {"assumed": assumed, "reason": reason}.items() if said}
+    return problem.judged(answer.held.controller, name=law.name, details=details, runs=answer.found, sliding=answer)
+
+
+def _continuous(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
+    bounds = sectors(problem.fault)
+    try:
+        found = riccati_design(problem.fault)
+    except ParameterError as error:
+        return problem.undecided(law.name, str(error))
+    loop = sector_loop(found.controller, bounds)
+    certificate = _of_riccati(loop, found) or quadratic_certificate(loop, theta=found.theta)
+    details = {
+        "R": found.R,
+        "poles": [[float(z.real), float(z.imag)] for z in found.E],
+        "fastest_pole": found.fastest_pole,
+    }
+    return _judged(problem, found.controller, certificate, details)
+
+
+def _of_riccati(loop: Loop, found: RiccatiDesign) -> Certificate | None:
+    """Certificate with the V of the Riccati equation."""
+    margin = quadratic_margin(loop, found.lyapunov)
+    claims = claims_of(loop, found.lyapunov, (margin, Fraction(0)))
+    return finish(loop, found.lyapunov, claims) if min(claims.values()) > 0 else None
+
+
+def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certificate | None:
+    """Quadratic V for a linear loop: searched in two scalings, then a known one, whose rate is decided exactly.
+
+    Parameters
+    ----------
+    loop : Loop
+    theta : matrix (4 × 4) of Fraction, optional
+        V = xᵀΘx in SI that may be a proof.
+    """
+    found = find_certificate(loop, 2) or robust_stability(loop)
+    return found or (finished_exactly(loop, theta) if theta is not None else None)
+
+
+def _judged(
+    problem: GainProblem[Designed], controller: ExtendedLQR, certificate: Certificate | None, details: dict[str, Any]
+) -> Designed:
+    """Refuted where a constant vertex of the box is not stable, undecided where no V was found."""
+    details = {**details, "rate": str(certificate.claims["rate"]) if certificate else None}
+    if certificate is not None:
+        return problem.judged(controller, certificate, details=details)
+    loop = FeedbackLoop(gains=tuple(controller.gains.values()), sectors=sectors(problem.fault))
+    verdict = Verdict.UNDECIDED if loop.unstable_vertex() is None else Verdict.REFUTED
+    return problem.judged(controller, verdict=verdict, details={**details, "reason": why_undecided(loop)})

@@ -1,0 +1,86 @@
+"""Searches from the disk: their finding saves time, and only time."""
+
+from fractions import Fraction
+
+import pytest
+
+from quakedesign import cache
+from quakedesign.fault import load_fault
+from quakedesign.guarantees import Guarantee, NoGuarantee, task_of
+from quakedesign.guarantees.search import adversary
+from quakedesign.guarantees.search import linear_design as design
+from quakedesign.guarantees.search import linear_design as longest_times
+from quakedesign.lyapunov import Verdict
+
+STEP = Fraction("0.184")
+
+
+@pytest.fixture(scope="module")
+def task():
+    return task_of(load_fault("real-fault"))
+
+
+def test_what_a_search_proposes_is_decided_each_time(task, monkeypatch):
+    """A search that is told to have found nonsense, and to have found it good."""
+
+    def told(_search, *question):
+        return [-1.0, question[-2]]
+
+    monkeypatch.setattr(design, "search_once", told)
+    longest = longest_times.longest_step(task)
+    assert longest is None or longest.guarantee.check() is Verdict.PROVED
+    found = design.design_held(task, STEP)
+    assert isinstance(found, Guarantee)
+    assert found.check() is Verdict.PROVED
+    monkeypatch.setattr(design, "search_once", lambda _search, *question: [-1.0, [-3.0 for _ in question[-2]]])
+    assert longest_times.longest_step(task) is None
+    found = design.design_held(task, STEP)
+    assert isinstance(found, NoGuarantee) or found.check() is Verdict.PROVED
+
+
+def test_a_design_is_searched_once(task, tmp_path, monkeypatch):
+    monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
+    first = design.design_held(task, STEP)
+    near = design.closest(task, STEP)
+    monkeypatch.setattr(design, "_search", None)
+    again = design.design_held(task, STEP)
+    assert design.closest(task, STEP).held == near.held
+    assert (again, again.rest_limit) == (first, first.rest_limit)
+    assert again.held.law.applied == first.held.law.applied != ()
+    with pytest.raises(TypeError):
+        design.closest(task, STEP / 2)
+    worst = adversary.worst_found(first)
+    monkeypatch.setattr(adversary, "_searched", None)
+    assert adversary.worst_found(first) == worst
+    with pytest.raises(TypeError):
+        adversary.worst_found(first, sticks=True)
+
+
+def test_where_a_reach_ended_is_tried_at_once_and_no_more_is_believed(tmp_path, monkeypatch):
+    """Guarantees up to 5 s; what a file says of 9 s is tried like all else."""
+    tried = []
+
+    def attempt(time):
+        tried.append(time)
+        return object.__new__(Guarantee) if time <= 5 else NoGuarantee(reason="too long", small_gain=None)
+
+    def end():
+        tried.clear()
+        assert isinstance(
+            longest_times.reached_again(attempt, lambda once: longest_times.reached_delay(STEP, once, Fraction(1)), 1),
+            Guarantee,
+        )
+        return tried[-1]
+
+    monkeypatch.setattr(longest_times, "MOST_DELAY", 100)
+    monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
+    end()
+    searched = list(tried)
+    longest = max(time for time in searched if time <= 5)
+    assert len(searched) > 3
+    assert longest > Fraction(15, 16) * min(time for time in searched if time > 5)
+    assert end() == longest
+    assert tried == [longest]
+    monkeypatch.setattr(longest_times, "search_once", lambda _search, *_question: ["9"])
+    end()
+    assert tried == [9, *searched]

@@ -1,0 +1,90 @@
+"""Laws for far wells are found from near ones on; where there is none, the answer says which V or well has a proof."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from quakedesign.exact import UpperBound
+from quakedesign.fault import Fault, Reference, friction_law
+from quakedesign.guarantees import WHOLE, NoGuarantee, SlidingClaims, SlidingGuarantee, sliding_task
+from quakedesign.guarantees.guarantee_result import _beyond
+from quakedesign.guarantees.search.sliding_design import LOG_RATES, farthest, searched_sliding, suitable, what_would_do
+from quakedesign.studies.performance_limits import limits
+
+GOUGE = friction_law("rate-and-state-aging")(
+    reference_coefficient=0.6,
+    direct_effect=0.008,
+    evolution_effect=0.0125,
+    critical_slip=6e-5,
+    reference_rate=1e-9,
+    slowest_rate=1e-20,
+    fastest_rate=10.0,
+)
+FAULT = Fault(
+    name="far",
+    density=2600.0,
+    shear_modulus=30e9,
+    length=4000.0,
+    damping=7.06e13,
+    effective_normal_stress=40e6,
+    friction=GOUGE,
+    reference=Reference(target_slip=0.05, operation_time=552000.0),
+    sampling_time=33.0,
+    source="a test",
+)
+TASK, STEP = sliding_task(FAULT, Fraction(1)), Fraction(33)
+CLAIMS = SlidingClaims(**{name: UpperBound(Fraction(1)) for name in SlidingClaims.__dataclass_fields__})
+
+
+def proved(task, held, log_rate):
+    return SlidingGuarantee(task=task, held=held, cuts=WHOLE, claims=CLAIMS)
+
+
+def test_a_law_for_a_far_well_is_found_from_nearer_ones_on():
+    """L²/D is 3.8 D_c/V, through which the usual starts lead to no law."""
+    around = {"diffusion": Fraction(2531)}
+    assert searched_sliding(TASK, STEP, LOG_RATES[-1], around)[0] is None
+    reach = farthest(TASK, STEP, around, stressed=False)
+    assert reach.share == 1
+    assert (reach.held.diffusion, reach.held.step) == (2531, 33)
+
+
+def test_where_a_well_is_too_far_a_slower_task_and_a_nearer_well_are_named():
+    around = {"diffusion": Fraction(20000)}
+    reach = farthest(TASK, STEP, around, stressed=False, most=Fraction(1, 40))
+    assert reach.share == Fraction(1, 40)
+    said = what_would_do(FAULT, TASK, reach, around, proved, spread=Fraction(0))
+    assert "at this V for L^2/D = 500 s with T_s = 33 s under a stress of at most 1 Pa" in said
+    # 40 times slower with 5 % spare: 552000 s · 42 = 2.3e7 s, D_c/(20 V) = 6e-5 · 2.3e7/(20 · 0.05) s
+    assert "operation_time = '2.3e+07 s', sampling_time = '1300 s'" in said
+    assert "for V = 2.17e-09 m/s" in said
+    assert "extrapolated" not in said
+    known = replace(FAULT, friction=replace(GOUGE, slowest_rate=1e-8, reference_rate=1e-8))
+    said = what_would_do(known, TASK, reach, around, proved, spread=Fraction(0))
+    assert "(but V = 2.17e-09 m/s is below the rates for which friction is known" in said
+
+    def unproved(task, held, log_rate):
+        return NoGuarantee(reason="", small_gain=None)
+
+    assert what_would_do(FAULT, TASK, reach, around, unproved, spread=Fraction(0)).startswith("a smaller spread")
+
+
+def test_where_no_law_is_found_near_the_fault_nothing_is_promised():
+    reach = farthest(replace(TASK, stress=Fraction(10**9)), STEP, {"lag": Fraction(600)}, stressed=False)
+    assert (reach.share, reach.held) == (0, None)
+    assert what_would_do(FAULT, TASK, reach, {}, proved, spread=Fraction(0)).startswith("none was found with a well")
+
+
+def test_a_well_that_no_controller_reaches_the_fault_through_is_said_to_be_one():
+    """From the same L²/D on as `limits` says with T_s = 33 s, but for what T_s makes of it."""
+    found = limits(FAULT, stress=1e4, prove=False).largest_diffusion_time.impossible_beyond
+    assert _beyond(FAULT, Fraction(10**4), {"diffusion": found * Fraction(999, 1000)}) == ""
+    assert _beyond(FAULT, Fraction(10**4), {"lag": found * 2}) == ""
+    said = _beyond(FAULT, Fraction(10**4), {"diffusion": found * Fraction(21, 20)})
+    assert said.startswith("no controller whatever whose pressure is within 40 MPa of what the reference needs")
+
+
+@pytest.mark.parametrize(("step", "suits"), [(20, 20), (60, 60), (15, 33), (120, 33)])
+def test_a_sampling_time_is_kept_within_twice_what_suits(step, suits):
+    assert suitable(TASK, Fraction(step)) == suits

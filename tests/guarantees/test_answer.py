@@ -1,0 +1,80 @@
+"""A guarantee beside what was seen: claims that a course with stick leaves make way, one by one."""
+
+from dataclasses import replace
+from fractions import Fraction as F
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from quakedesign.fault import load_fault
+from quakedesign.guarantees import WorstFound, attacked, guarantee
+from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.lyapunov.exact.claim import Verdict
+
+MODULE = import_module("quakedesign.guarantees.guarantee_result")
+FILE = Path(__file__).parents[2] / "proofs" / "certificates" / "guarantee_real-fault.json"
+SLOW = parse_guarantee(FILE.read_text())
+WIDE = guarantee(SLOW.task, SLOW.held)
+ANYHOW = WIDE.claims
+
+
+def between(name, share=F(1, 2)):
+    """A number between the claims of both proofs."""
+    return float(getattr(SLOW.claims, name) * (1 - share) + getattr(ANYHOW, name) * share)
+
+
+def stuck(monkeypatch, slip, rate):
+    """Answer where a search on the sticking fault ends at these errors."""
+    seen = WorstFound(slip_error=slip, slip_rate_error=rate)
+    quiet = WorstFound(slip_error=0.0, slip_rate_error=0.0)
+    monkeypatch.setattr(MODULE, "worst_found", lambda _, sticks=False: seen if sticks else quiet)
+    return attacked(load_fault("real-fault"), SLOW)
+
+
+def test_claims_that_no_course_leaves_stay(monkeypatch):
+    inside = (float(v) * (1 - 1e-9) for v in (SLOW.claims.slip_error, SLOW.claims.slip_rate_error))
+    assert stuck(monkeypatch, *inside).found == SLOW
+
+
+@pytest.mark.parametrize(
+    ("slip", "rate", "left"),
+    [
+        (between("slip_error"), 0.0, {"slip_error"}),
+        (0.0, between("slip_rate_error"), {"slip_rate_error", "peak_slip_rate"}),
+    ],
+)
+def test_a_claim_that_a_course_with_stick_leaves_is_that_of_any_gain(monkeypatch, slip, rate, left):
+    found = stuck(monkeypatch, slip, rate)
+    assert not found.leaves_with_stick
+    assert (found.found.check(), found.found.slow_gain) == (Verdict.PROVED, SLOW.slow_gain)
+    for name in ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure"):
+        assert getattr(found.found.claims, name) == getattr(ANYHOW if name in left else SLOW.claims, name)
+
+
+def test_a_disturbance_that_is_slow_has_a_class_of_its_own(monkeypatch):
+    found = stuck(monkeypatch, 0.0, 0.0)
+    given = found.fault.disturbance
+    said = [line for line in found.lines() if "class rate may prove much less" in line]
+    assert len(said) == 1
+    assert f"changes by at most {given.amplitude * given.frequency:.3g}"[:-1] in said[0]
+    for other in (replace(given, constant=1e-6), replace(given, frequency=0.0)):
+        asked = replace(found, fault=replace(found.fault, disturbance=other))
+        assert "class rate" not in " ".join(asked.lines())
+    of_rate = replace(found.found, task=replace(found.found.task, change=F(1)))
+    assert "may prove much less" not in " ".join(replace(found, found=of_rate).lines())
+
+
+def test_a_course_beyond_both_is_said_and_the_narrow_claims_stay(monkeypatch):
+    found = stuck(monkeypatch, between("slip_error", F(2)), 0.0)
+    assert found.found == SLOW
+    assert "leaves the bounds" in found.lines()[-1]
+    assert found.limit_lines()[0].startswith("no controller held over T_s = 0.184 s keeps the slip-rate error below ")
+
+
+def test_what_is_widened_is_proved_or_not_said(monkeypatch):
+    monkeypatch.setattr(MODULE, "guarantee", lambda *_: SLOW)
+    assert stuck(monkeypatch, between("slip_error"), 0.0).found == SLOW
+    monkeypatch.setattr(type(SLOW), "check", lambda _: Verdict.UNDECIDED)
+    monkeypatch.setattr(MODULE, "guarantee", lambda *_: WIDE)
+    assert stuck(monkeypatch, between("slip_error"), 0.0).found == SLOW

@@ -1,0 +1,159 @@
+"""Laws of samples as matrices, against their recursions in exact arithmetic, and what makes no law."""
+
+from fractions import Fraction as F
+from random import Random
+
+import pytest
+
+from quakedesign.errors import ParameterError
+from quakedesign.laws import ImplicitRoot, LinearLaw, Power, Prediction, disturbance_estimate, summed_integrals
+from quakedesign.loop import PeriodicLoop, Segment
+
+ROOT = ImplicitRoot(pull=(Power(factor=(F(1), F(1)), exponent=F(1), argument="slip"),))
+
+
+def some(random):
+    return F(random.choice([-1, 1]) * random.randint(1, 9), random.randint(1, 9))
+
+
+def product(row, column):
+    return sum((a * b for a, b in zip(row, column, strict=True)), F(0))
+
+
+def pressures(law, errors):
+    """p = Cz + Dy and z ← Fz + Gy, exactly."""
+    z, asked = [F(0)] * len(law.states), []
+    for y in errors:
+        asked.append(product(law.output, z) + product(law.feedback, y))
+        z = [product(own, z) + product(fed, y) for own, fed in zip(law.update, law.measured, strict=True)]
+    return asked
+
+
+def test_sums_of_the_error_are_those_of_the_recursion():
+    random = Random(1)
+    gains, step = tuple(some(random) for _ in range(4)), F(2, 7)
+    errors = [(some(random), some(random)) for _ in range(6)]
+    xi1, xi2, asked = F(0), F(0), []
+    for e1, e2 in errors:
+        asked.append(-gains[0] * e1 - gains[1] * e2 - gains[2] * xi1 - gains[3] * xi2)
+        xi1, xi2 = xi1 + step * e1, xi2 + step * xi1
+    law = summed_integrals(gains, step)
+    assert pressures(law, errors) == asked
+    assert law.states == ("xi1", "xi2")
+
+
+@pytest.mark.parametrize("number", [3, 5])
+def test_sums_take_four_gains(number):
+    with pytest.raises(ParameterError, match=f"must be four. Received {number}"):
+        summed_integrals((F(1),) * number, F(1))
+
+
+@pytest.mark.parametrize("late", [0, 1, 3])
+def test_the_estimate_is_its_recursion(late):
+    """d ← d + a(e2 − π)/Σγ, p by the errors that are expected, π ← what comes of the pressures on their way."""
+    random = Random(late)
+    gains, weight, gain = (some(random), some(random)), some(random), abs(some(random))
+    given = Prediction(
+        of_slip=some(random),
+        of_rate=some(random),
+        of_pushes=tuple(some(random) for _ in range(late + 1)),
+        ahead=tuple((some(random), some(random)) for _ in range(2)),
+        ahead_of_pushes=tuple((some(random), some(random)) for _ in range(late)),
+    )
+    errors = [(some(random), some(random)) for _ in range(5)]
+    expected, level, before, asked = F(0), F(0), [F(0)] * late, []
+    for e in errors:
+        level += weight * (e[1] - expected) / sum(given.of_pushes)
+        then = [
+            product(row, e)
+            + sum((added[i] * (gain * p + level) for added, p in zip(given.ahead_of_pushes, before, strict=True)), F(0))
+            for i, row in enumerate(given.ahead)
+        ]
+        asked.append(-gains[0] * then[0] - gains[1] * then[1] - level / gain)
+        before = [asked[-1], *before]
+        pushed = sum(g * (gain * p + level) for g, p in zip(given.of_pushes, before, strict=True))
+        expected = given.of_slip * e[0] + given.of_rate * e[1] + pushed
+        before = before[:late]
+    law = disturbance_estimate(gains, weight, given, gain)
+    assert pressures(law, errors) == asked
+    assert law.states == ("predicted_rate", "disturbance", *(f"asked_{j}_ago" for j in range(1, late + 1)))
+
+
+def test_without_a_delay_the_errors_of_now_are_those_that_are_met():
+    given = Prediction(of_slip=F(0), of_rate=F(1), of_pushes=(F(1),))
+    law = disturbance_estimate((F(2), F(3)), F(1, 2), given, F(1))
+    assert law.feedback == (-2, -3 - F(1, 2))
+    assert given.ahead_of_pushes == ()
+
+
+@pytest.mark.parametrize("gain", [F(0), F(-1)])
+def test_the_gain_of_a_model_is_positive(gain):
+    with pytest.raises(ParameterError, match="must be positive"):
+        disturbance_estimate((F(1), F(1)), F(1), Prediction(of_slip=F(0), of_rate=F(1), of_pushes=(F(1),)), gain)
+
+
+@pytest.mark.parametrize(
+    ("pushes", "ahead"),
+    [((F(1), F(1)), ()), ((F(1),), ((F(1), F(1)),)), ((F(0),), ()), ((F(1), F(-1)), ((F(1), F(1)),))],
+)
+def test_a_prediction_needs_pushes_that_fit_and_act(pushes, ahead):
+    with pytest.raises(ParameterError, match=f"Received {len(pushes)} and {len(ahead)}"):
+        Prediction(of_slip=F(0), of_rate=F(1), of_pushes=pushes, ahead_of_pushes=ahead)
+
+
+def sizes(n, seen=2):
+    return {
+        "states": tuple(f"z{i}" for i in range(n)),
+        "update": ((F(0),) * n,) * n,
+        "measured": ((F(0),) * seen,) * n,
+        "output": (F(1),) * n,
+        "feedback": (F(1),) * seen,
+    }
+
+
+def test_as_many_states_as_are_said_fit():
+    assert LinearLaw(**sizes(12)).root is None
+    assert len(LinearLaw(**sizes(2, 3), root=ROOT).feedback) == 3
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        sizes(13),
+        sizes(2, 3),
+        sizes(2) | {"states": ("z", "z")},
+        sizes(2) | {"update": ((F(0), F(0)), (F(0),))},
+        sizes(2) | {"update": ((F(0), F(0)),)},
+        sizes(2) | {"measured": ((F(0), F(0)), (F(0), F(0), F(0)))},
+        sizes(2) | {"measured": ((F(0), F(0)),)},
+        sizes(2) | {"output": (F(1),)},
+        sizes(2) | {"feedback": (F(1),)},
+        sizes(2) | {"root": ROOT},
+    ],
+)
+def test_sizes_that_do_not_fit_are_refused(wrong):
+    with pytest.raises(ParameterError, match=f"linear law needs .*Received {len(wrong['states'])} states"):
+        LinearLaw(**wrong)
+
+
+def test_a_law_of_the_slip_alone_reads_no_slip_rate():
+    blind = sizes(1) | {"feedback": (F(1), F(0))}
+    assert LinearLaw(**blind).of_slip_alone is True
+    assert LinearLaw(**sizes(1)).of_slip_alone is False
+    assert LinearLaw(**blind | {"measured": ((F(0), F(2)),)}).of_slip_alone is False
+    assert LinearLaw(**sizes(1, 3) | {"feedback": (F(1), F(0), F(1))}, root=ROOT).of_slip_alone is False
+
+
+def test_a_period_is_the_sum_of_its_parts():
+    parts = tuple(Segment(jump=((F(1),),), duration=F(1, n)) for n in (2, 3, 6))
+    loop = PeriodicLoop(states=("x",), flow=((F(0),),), segments=parts, inputs={}, outputs={})
+    assert (loop.period, loop.sampled) == (1, {})
+
+
+def test_a_part_is_cut_where_it_says_or_into_eighths():
+    part = Segment(jump=((F(1),),), duration=F(2))
+    assert part.pieces() == part.pieces(past=True) == (F(1, 4),) * 8
+    ends = {"ends": (F(0), F(1, 4), F(1)), "past_ends": (F(0), F(1, 2), F(1))}
+    part = Segment(jump=((F(1),),), duration=F(2), **ends)
+    assert part.pieces() == (F(1, 2), F(3, 2))
+    assert part.pieces(past=True) == (1, 1)

@@ -1,0 +1,43 @@
+"""Plain values about a given K."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.linear.linear_problem import LinearProblem
+from quakedesign.linear.sampled_stability import held_loop
+from quakedesign.linear.verdict import linear_facts
+
+LAB = qd.load_fault("lab-fault")
+
+
+def facts_of(controller, step="1e-3"):
+    held = held_loop(LinearProblem.of(LAB), tuple(controller.gains.values()), step)
+    return json.loads(json.dumps(linear_facts(LAB, controller, held)))
+
+
+@pytest.mark.slow
+def test_the_facts_of_the_published_gains_can_be_written_as_json():
+    facts = facts_of(qd.published("lab-fault")["elqr"])
+    assert facts["inverse_optimal"] is True
+    assert facts["tests"]["sound"]["verdict"] == "proved"
+    assert facts["held"]["verdict"] == "refuted"
+    assert 0.6e-3 < facts["held"]["largest_step"] < 0.7e-3
+    assert [f["feedback"] for f in facts["feedback"]] == ["error", "state"]
+    assert facts_of(qd.published("lab-fault")["elqr"], step="0.5e-3")["held"]["varying"] == "proved"
+
+
+def test_a_destabilising_gain_has_facts_too():
+    good = qd.published("lab-fault")["elqr"]
+    facts = facts_of(replace(good, gains={n: -k for n, k in good.gains.items()}))
+    assert facts["inverse_optimal"] is False
+    assert facts["held"]["largest_step"] is None
+
+
+def test_without_double_integral_action_there_is_no_way_to_compare():
+    good = qd.published("lab-fault")["elqr"]
+    facts = facts_of(replace(good, gains={**good.gains, "k4": 0}))
+    assert facts["feedback"] == []
+    assert facts["inverse_optimal"] is False

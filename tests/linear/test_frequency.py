@@ -1,0 +1,136 @@
+"""Limits in the frequency domain against eigenvalues, closed forms and another library."""
+
+from fractions import Fraction as F
+from itertools import product
+
+import control
+import numpy as np
+import pytest
+
+from quakedesign.errors import ParameterError
+from quakedesign.linear.frequency import circle_limit, frequency_facts, slip_limit
+from quakedesign.linear.linear_problem import FeedbackLoop, floats
+from quakedesign.lyapunov.exact.fault_bounds import Sectors
+
+
+def loop_of(gains, *, beta, slip, rate):
+    sectors = Sectors(
+        authority=F(1), beta=beta, slip=slip, rate=rate, row_bounds=(F(0), F(0)), largest_effective_stress=F(1)
+    )
+    return FeedbackLoop(gains=tuple(F(k) for k in gains), sectors=sectors)
+
+
+LOOP = loop_of((104, 14, 150, 78), beta=(F(1), F(57, 40)), slip=(F(-1), F(29, 10)), rate=(F(23, 10), F(23, 10)))
+
+
+def eigenvalues(loop, *corner):
+    return np.linalg.eigvals(floats(loop.matrix(corner)))
+
+
+def test_a_loop_is_stable_where_its_eigenvalues_are_and_its_worst_vertex_is_told():
+    rng = np.random.default_rng(3)
+    verdicts = set()
+    for _ in range(400):
+        loop = loop_of(rng.integers(-4, 80, size=4).tolist(), beta=(F(1), F(2)), slip=(F(-1), F(3)), rate=(F(1), F(2)))
+        found = {corner: eigenvalues(loop, *corner).real.max() for corner in loop.sectors.vertices()}
+        assert len(found) == 8
+        if min(map(abs, found.values())) > 1e-6:
+            verdicts.add(loop.unstable_vertex() is None)
+            assert {corner: loop.stable(corner) for corner in found} == {c: value < 0 for c, value in found.items()}
+            assert loop.unstable_vertex() == next((c for c, value in found.items() if value > 0), None)
+    assert verdicts == {True, False}
+
+
+def test_ranges_that_are_not_ordered_are_refused():
+    with pytest.raises(ParameterError, match="ordered"):
+        loop_of((1,) * 4, beta=(F(2), F(1)), slip=(F(0), F(1)), rate=(F(1), F(1)))
+
+
+@pytest.mark.parametrize(
+    "gains", [(104, 14, 150, 78), (74, F(157, 10), F(58, 1000), F(15, 10**7)), (10, 1, 30, 40), (20, 3, 19, 1)]
+)
+def test_the_slip_limit_is_where_an_eigenvalue_crosses(gains):
+    loop = loop_of(tuple(F(g) for g in gains), beta=(F(1), F(4)), slip=(F(-1), F(-1)), rate=(F(23, 10),) * 2)
+    limit, beta = slip_limit(loop, F(23, 10))
+    assert loop.sectors.beta[0] <= beta <= loop.sectors.beta[1]
+    assert eigenvalues(loop, beta, limit + abs(limit) / 1000, F(23, 10)).real.max() > 0
+    below = limit - abs(limit) / 1000
+    dense = [F(1) + F(i, 20) for i in range(61)]
+    assert max(eigenvalues(loop, b, below, F(23, 10)).real.max() for b in dense) < 0
+
+
+def test_the_least_limit_may_lie_inside_the_range_of_beta():
+    # k1·k3 only just above k2·k4: the bracket falls, then rises with β
+    loop = loop_of((F(10), F(3), F(30), F(40)), beta=(F(1), F(10)), slip=(F(-1), F(-1)), rate=(F(2),) * 2)
+    limit, beta = slip_limit(loop, F(2))
+
+    def at(b):
+        strength = float(b)
+        damping = 2 + 3 * strength
+        return 10 * strength - 30 * strength / damping - damping * 40 / 30
+
+    grid = np.linspace(1, 10, 9001)
+    assert float(limit) == pytest.approx(min(at(b) for b in grid), abs=1e-5)
+    assert float(limit) <= min(at(b) for b in grid) + 1e-9
+    assert 1 <= beta <= 10
+
+
+def test_a_loop_without_double_integral_action_has_no_limit():
+    loop = loop_of((F(104), F(14), F(150), F(-1)), beta=(F(1),) * 2, slip=(F(-1),) * 2, rate=(F(2),) * 2)
+    assert slip_limit(loop, F(2)) is None
+
+
+def test_the_circle_criterion_is_never_above_the_linear_limit_and_here_close():
+    limit, beta = slip_limit(LOOP, F(23, 10))
+    circle = circle_limit(LOOP, beta, F(23, 10), F(-1))
+    linear = float(limit + 1)
+    assert 0.99 * linear < circle <= linear * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("corner", list(product((F(1), F(57, 40)), (F(-1), F(29, 10)), (F(23, 10),))))
+def test_margins_move_a_pole_onto_the_axis(corner):
+    facts = frequency_facts(LOOP, corner)
+    beta, slip, rate = (float(v) for v in corner)
+    assert facts.stable
+    if facts.gain_reduction is not None:
+        scaled = loop_of(
+            tuple(k * F(facts.gain_reduction) for k in LOOP.gains),
+            beta=LOOP.sectors.beta,
+            slip=LOOP.sectors.slip,
+            rate=LOOP.sectors.rate,
+        )
+        assert abs(eigenvalues(scaled, *corner).real.max()) < 1e-6
+    assert facts.gain_margin is None
+    # delay: 1 + L(jω)e^{−jωτ} = 0 at the crossing
+    omega = np.logspace(-3, 3, 400001)
+    z = 1j * omega
+    L = beta * (14 * z**3 + 104 * z**2 + 150 * z + 78) / (z**2 * (z**2 + rate * z - slip))
+    distance = np.abs(1 + L * np.exp(-z * facts.delay_margin)).min()
+    assert distance < 1e-3
+    assert np.abs(1 + L * np.exp(-z * facts.delay_margin * 0.9)).min() > 0.02
+    assert facts.return_difference == pytest.approx(np.abs(1 + L).min(), rel=1e-4)
+
+
+def test_norms_agree_with_python_control():
+    for corner in LOOP.sectors.vertices():
+        A = floats(LOOP.matrix(corner))
+        facts = frequency_facts(LOOP, corner)
+        for row, value in ((0, facts.disturbance_peak_slip), (1, facts.disturbance_peak_rate)):
+            system = control.ss(A, np.array([[0.0], [1], [0], [0]]), np.eye(4)[[row]], [[0.0]])
+            peak = np.abs(control.frequency_response(system, np.logspace(-2, 2, 4001)).frdata).max()
+            assert value == pytest.approx(peak, rel=1e-3)
+
+
+def test_an_optimal_k_has_a_return_difference_of_at_least_one():
+    A = np.array([[0, 1, 0, 0], [-1, -2.3, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0]], dtype=float)
+    K, _, _ = control.lqr(A, np.array([[0.0], [1], [0], [0]]), np.eye(4), [[1.0]], method="scipy")
+    loop = loop_of(
+        tuple(F(float(k)) for k in K[0]),
+        beta=(F(1),) * 2,
+        slip=(F(-1),) * 2,
+        rate=(F(23, 10),) * 2,
+    )
+    facts = frequency_facts(loop, loop.sectors.vertices()[0])
+    assert facts.return_difference > 1 - 1e-6
+    assert facts.phase_margin >= 60
+    assert facts.gain_reduction is None or facts.gain_reduction <= 0.5
