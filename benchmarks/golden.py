@@ -1,8 +1,8 @@
 """Golden set: what every command answers on many faults, recorded once and compared after a change of structure.
 
 ``python benchmarks/golden.py record FILE`` runs the commands (about ten minutes on two cores) and writes exit codes and
-JSON; ``compare FILE`` runs them again and lists every difference, the largest relative one of numbers first. The faults are the presets
-and ten others; certificates go through both checkers. Nothing is read from the cache.
+JSON; ``compare FILE`` runs them again and lists every difference, the largest relative one of numbers first. The
+faults are the presets and ten others; certificates go through both checkers. Nothing is read from the cache.
 """
 
 import argparse
