@@ -89,7 +89,7 @@ WRONG = {
     "no path": (lambda: qd.load_certificate(3), "path of load_certificate must be a text or a Path. Received 3"),
     "no entry": (lambda: headline(None), "entry of headline must be an Entry. Received None"),
     "no task": (lambda: guarantee(3, 3), "task of guarantee must be a Task. Received 3"),
-    "no campaign": (lambda: run_campaign(None, 3, "x"), "problem of run_campaign must be a Problem. Received None"),
+    "no campaign": (lambda: run_campaign(None, 3, "x"), "must be a CampaignProblem. Received None"),
     "no delay": (lambda: answer(LAB, delay="x"), "delay of answer must be a Fraction. Received 'x'"),
     "no noise": (lambda: answer(LAB, lag=1, slip_noise=None), "slip_noise of answer must be a Fraction. Received None"),
     "no such surrounding": (

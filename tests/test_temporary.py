@@ -63,9 +63,10 @@ def test_what_a_killed_process_left_goes_and_what_was_there_is_there(tmp_path, h
         with whole_folder(target) as new:
             (new / "old").write_text("old")
     process = holder(program, target)
-    assert len(left(tmp_path)) == 1
+    count = 1 if program is FILE else 2  # beside what is half written, a folder has its lock
+    assert len(left(tmp_path)) == count
     require_room(target)
-    assert len(left(tmp_path)) == 1, "the process lives"
+    assert len(left(tmp_path)) == count, "the process lives"
     process.kill()
     process.communicate()
     require_room(target)

@@ -85,7 +85,7 @@ def wide(count):
 
 
 LIMITS = [
-    (HELD, ("fault", "name"), ["x" * 60, "a-b.c+d e_f"], ["", "x" * 61, "a\n", "-a", 5, None]),
+    (HELD, ("fault", "name"), ["x" * 60, "a-b.c d e_f"], ["", "a+b", "x" * 61, "a\n", "-a", 5, None]),
     *[(HELD, ("fault", key), ["1/9"], ["0", "-1"]) for key in ("density", "shear_modulus", "length", "normal_stress")],
     (HELD, ("fault", "damping"), ["0", "1/2"], ["-1/2"]),
     *[(HELD, ("fault", "spreads", key), ["0", "99/100"], ["1", "-1/10"]) for key in HELD["fault"]["spreads"]],
@@ -373,7 +373,7 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
     ]
     task.change, task.name = None, "größe"
     lines = checker.statement(changed(CONTINUOUS), task, claims, F(1, 3))
-    assert lines[0].startswith("fault gr\\xf6\\xdfe (a name")
+    assert lines[0].startswith('fault "gr\\xf6\\xdfe" (a name')
     at_once = "for a pressure that acts at once (continuous time), which no sampled controller has"
     assert lines[2] == f"law with 1 states, {at_once}"
     assert lines[3].startswith("disturbance: any acceleration of at most 0.3333 m/s^2; from rest")

@@ -87,7 +87,8 @@ def test_a_killed_run_goes_on(start, tmp_path):
     path = tmp_path / "run.checkpoint"
     program = (
         "from quakedesign.laws import published\nfrom quakedesign.fault import load_fault\n"
-        "from quakedesign.simulation import checkpoint, simulate\ncheckpoint.SECONDS = 0.0\n"
+        "from quakedesign.simulation import simulate\n"
+        "from quakedesign.simulation import stepping\nstepping.SECONDS = 0.0\n"
         "done = lambda share: print(share, flush=True)\n"
         "simulate(load_fault('real-fault'), published('real-fault')['cta'], duration=4000.0, samples=300,"
         f" compiled=False, progress=done, checkpoint={str(path)!r})\n"

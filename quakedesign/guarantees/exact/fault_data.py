@@ -43,7 +43,7 @@ def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0))
     state_law, regularised = _LAWS[fault.friction.name]
     if getattr(fault.friction, "evolution", "") == "slip":
         state_law = "slip"
-    law = fault.friction.exact()
+    friction = fault.friction.exact()
     reference = SlidingReference(task=fault.reference)
     if reference.swing >= 1:
         raise UnsupportedError(
@@ -52,9 +52,9 @@ def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0))
         )
     rate = reference.first_rate
     named = {axis: rational(getattr(fault.friction, axis)) for axis in AXES[:3]}
-    steady = law.steady_coefficient(sp.Rational(rate.numerator, rate.denominator))
+    steady = friction.steady_coefficient(sp.Rational(rate.numerator, rate.denominator))
     middle = _near(steady)
-    per_effect = abs(_near(sp.log(sp.Rational(rate.numerator, rate.denominator) / law.reference_rate)))  # type: ignore[attr-defined]
+    per_effect = abs(_near(sp.log(sp.Rational(rate.numerator, rate.denominator) / friction.reference_rate)))  # type: ignore[attr-defined]
     off = spread * per_effect * (named["direct_effect"] + named["evolution_effect"])
     off += Fraction(1, 10**_DIGITS) * middle if off or not steady.is_Rational else 0
     ends = {name: (value * (1 - spread), value * (1 + spread)) for name, value in named.items()}

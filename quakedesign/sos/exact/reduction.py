@@ -13,6 +13,7 @@ from math import comb
 from typing import Any
 
 from quakedesign.errors import PolynomialError
+from quakedesign.exact import shortly
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, times
 from quakedesign.sos.exact.polynomial_statement import Statement, parity, residue
 from quakedesign.sos.exact.work import spend
@@ -30,7 +31,7 @@ def full_bases(statement: Statement) -> Bases:
     if max(counts, default=0) > _MONOMIALS or sum(n * n for n in counts) > _PAIRS:
         raise PolynomialError(
             f"a basis must have at most {_MONOMIALS} monomials, and all together {_PAIRS} pairs. "
-            f"Received {max(counts)} monomials in the largest of {len(counts)}. Lower the degree."
+            f"Received {shortly(max(counts))} monomials in the largest of {len(counts)}. Lower the degree."
         )
     return tuple(tuple(monomials(size, h)) for h in halves)
 

@@ -48,7 +48,6 @@ def test_a_seed_says_everything():
         {"jitter": -1},
         {"jitter": 0.5},
         {"jitter": True},
-        {"jitter": np.int64(1)},  # times a tuple it would be a product of numbers
         {"jitter": 101},
         {"jitter": 1, "seed": -1},
     ],
@@ -56,6 +55,11 @@ def test_a_seed_says_everything():
 def test_what_cannot_be_is_refused(settings):
     with pytest.raises(ParameterError, match=r"whole number"):
         Delay(samples=1, **settings)
+
+
+def test_a_whole_number_of_numpy_is_one_of_python():
+    """Times a tuple, NumPy's would be a product of numbers."""
+    assert type(Delay(samples=1, jitter=np.int64(1)).jitter) is int
 
 
 @pytest.mark.parametrize("part", [-1e-300, 1.0, 1.5, float("nan")])

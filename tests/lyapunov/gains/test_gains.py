@@ -20,7 +20,7 @@ FAST = {"degrees": (5,), "starts": 1, "compare": False}
 
 
 def helper(name):
-    found = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    found = importlib.util.spec_from_file_location(name, Path(__file__).parents[1] / "search" / f"{name}.py")
     module = importlib.util.module_from_spec(found)
     found.loader.exec_module(module)
     return module

@@ -18,7 +18,7 @@ from quakedesign.lyapunov.search.search import find_certificate
 from quakedesign.parallel import Processes
 
 SPECIFICATION = importlib.util.spec_from_file_location(
-    "map_region", Path(__file__).with_name("super_twisting_region.py")
+    "map_region", Path(__file__).parents[1] / "search" / "super_twisting_region.py"
 )
 region = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(region)
