@@ -151,9 +151,9 @@ with tempfile.TemporaryDirectory() as folder:
     print("\n".join((Path(folder) / "controller" / "controller.h").read_text().splitlines()[:24]))
 
 replay = qd.simulate(fault, law, scheme="compensated", duration=200 * 0.184, samples=200)
-memory, asked = list(exported.start.values()), []
+memory, pressure, asked = list(exported.start.values()), exported.start["held_0"], []
 for x1, x2 in zip(replay.slip, replay.slip_rate, strict=True):
-    memory, pressure = exported.function([x1, x2], memory)
+    memory, pressure = exported.function([x1, x2], pressure, memory)  # what was asked for is what was applied
     asked.append(float(pressure))
 largest_difference = np.max(np.abs(asked - replay.pressure)) / np.max(np.abs(replay.pressure))
 print(f"largest difference over {len(asked)} samples: {largest_difference:.1e}")
