@@ -324,8 +324,8 @@ def test_several_faults_for_people(call):
     code, out, _ = call("real-fault", "crustal-patch", "--diffusion", "180 s", "--stress", "1 MPa", "--spread", "0")
     assert (code, "need friction with a state" in out) == (2, False)
     code, out, _ = call("real-fault", "crustal-patch", "--diffusion", "180 s", "--measured", "slip-and-rate")
-    assert out.startswith("real-fault: none: no controller whatever that withdraws at most 50 MPa")
-    assert "\ncrustal-patch: proved: " in out
+    assert out.startswith('"real-fault": none: no controller whatever that withdraws at most 50 MPa')
+    assert '\n"crustal-patch": proved: ' in out
     code, _, err = call("real-fault", "real-fault")
     assert (code, "need names of their own" in err) == (2, True)
 

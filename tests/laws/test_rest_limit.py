@@ -123,7 +123,7 @@ def test_it_is_not_reached_where_the_pressure_follows_one_that_moves_with_the_re
     for away, reached in ((50, False), (70, True)):
         random, cuts = np.random.default_rng(3), 0
         for _ in range(20):
-            z, reference, rest = [0.0] * 4, 0.0, 0.0
+            z, reference, rest = [0.0] * (len(law.states) + 2), 0.0, 0.0
             for _ in range(60):
                 moved = random.exponential(3.0) * (random.random() < 0.7)
                 reference, rest = reference + moved, rest + 7 * moved * random.choice([-1, 1, 1])
@@ -194,9 +194,9 @@ def test_pressures_that_are_proved_never_to_be_passed_are_cut_off_unless_the_fau
     controller = SampledController(law=law, step=F(1), rest_limit=limit)
     cases = (4.0, 4.0, -3.0), (4.0, 0.0, -3.0), (-4.0, 0.0, 2.0), (1.0, 0.0, -1.0), (9.0, 0.0, -9.0)
     for error, last, applied in cases:
-        pressure, after = stepped(controller, [0.0, 0.0, 0.0, last], error, 0.0, 0.0)
+        pressure, after = stepped(controller, [*(0.0 for _ in law.states), 0.0, last], error, 0.0, 0.0)
         assert pressure == applied
-        assert after[2] == max(0.0, applied)  # the highest so far is that which was applied
+        assert after[len(law.states)] == max(0.0, applied)  # the highest so far is that which was applied
     with pytest.raises(ParameterError, match="both or none"):
         replace(limit, largest=None)
     with pytest.raises(ParameterError, match="must have 0 between them"):
