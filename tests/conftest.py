@@ -20,6 +20,7 @@ settings.load_profile("reproducible")
 
 ROOT = Path(__file__).parent.parent
 sys.path.append(str(ROOT / "tests" / "data"))  # parts of a user's own, `own_parts`
+sys.path.append(str(ROOT / "benchmarks"))  # studies beside the package
 sys.path.append(str(ROOT / "notebooks"))  # what stands beside the notebooks, `own`
 LAUNCH = """
 import os, signal, sys

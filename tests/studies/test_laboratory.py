@@ -6,14 +6,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 import sympy as sp
-from scipy.integrate import solve_ivp
-
-from quakedesign.fault import load_fault
-from quakedesign.fault.model import rest_slip
-from quakedesign.laws import published
-from quakedesign.simulation.campaign import Campaign
-from quakedesign.simulation.campaign.problem import SampleResult
-from quakedesign.studies.laboratory import (
+from laboratory import (  # beside the package
     Apparatus,
     LaboratoryFinding,
     as_proved,
@@ -23,6 +16,13 @@ from quakedesign.studies.laboratory import (
     guarantees,
     numbers,
 )
+from scipy.integrate import solve_ivp
+
+from quakedesign.fault import load_fault
+from quakedesign.fault.model import rest_slip
+from quakedesign.laws import published
+from quakedesign.simulation.campaign import Campaign
+from quakedesign.simulation.campaign.problem import SampleResult
 
 PRINTED, KNOWN = Apparatus.printed(), Apparatus.known()
 TABLE, BOTH = load_fault("lab-fault"), load_fault("lab-apparatus")
