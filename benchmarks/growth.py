@@ -21,7 +21,6 @@ from quakedesign.loop import Actuator, Diffusion
 from quakedesign.lyapunov.maps.gain_map import gain_map
 from quakedesign.lyapunov.search.search import find_certificate
 from quakedesign.simulation.campaign import campaign_problem, run_campaign
-from quakedesign.synthesis import answer
 from quakedesign.synthesis.sliding_mode_design import sliding_mode_loop
 
 FAULT = qd.load_fault("real-fault")
@@ -63,7 +62,7 @@ def of_states() -> Iterator[Line]:
     """Deciding a guarantee of the e-LQR that acts some periods late, p held over 50 ms."""
     for late in range(4):
         step = Fraction(1, 20)
-        designing, found = spent(partial(answer, FAULT, step=step, delay=late * step))
+        designing, found = spent(partial(qd.guarantee, FAULT, step=step, delay=late * step))
         if isinstance(found.found, Guarantee):
             _norms.cache_clear()
             yield f"{len(found.found.loop.states)} states", spent(found.found.check)[0], f"designing {designing:.1f} s"

@@ -30,7 +30,6 @@ import numpy as np
 # %matplotlib inline
 import quakedesign as qd
 from quakedesign.laws.elqr import ExtendedLQR
-from quakedesign.synthesis import answer
 
 fault = qd.load_fault("real-fault")
 period = fault.sampling_time  # T_s [s]
@@ -84,7 +83,7 @@ plt.tight_layout()
 # disturbance inside the box; beside it stands the worst that a search for bad courses finds. From the command line: `quakedesign guarantee real-fault --gains …`.
 
 # %%
-found = answer(fault, gains=tuple(gains.values()))
+found = qd.guarantee(fault, gains=tuple(gains.values()))
 guarantee = found.found
 print(guarantee.sentence())
 print(f"worst found: {found.worst.slip_rate_error:.3g} m/s, {found.worst.slip_error:.3g} m")

@@ -12,6 +12,7 @@ _HOME = {
     "Disturbance": "fault",
     "Fault": "fault",
     "FrictionLaw": "fault",
+    "LoopSetup": "loop.loop_setup",
     "Reference": "fault",
     "Scales": "fault",
     "Trajectory": "simulation",

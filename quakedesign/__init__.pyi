@@ -10,6 +10,7 @@ from quakedesign.guarantees import load_guarantee as load_guarantee
 from quakedesign.identification.identify import identify as identify
 from quakedesign.laws import Controller as Controller
 from quakedesign.laws import published as published
+from quakedesign.loop.loop_setup import LoopSetup as LoopSetup
 from quakedesign.lyapunov import Certificate as Certificate
 from quakedesign.lyapunov import Verdict as Verdict
 from quakedesign.lyapunov import certify as certify

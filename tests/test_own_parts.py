@@ -19,7 +19,7 @@ from quakedesign.loop import simulation_scheme
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.symbolic.friction_bounds import friction_bounds
-from quakedesign.synthesis import answer, assess
+from quakedesign.synthesis import assess
 from quakedesign.synthesis.method import method_of
 
 REAL, LAB = qd.load_fault("real-fault"), qd.load_fault("lab-fault")
@@ -93,7 +93,7 @@ def test_premises_of_a_law_stand_beside_those_of_its_family():
 
 
 def test_what_runs_is_asked_of_ones_own_law_too():
-    assert answer(LAB, controller=own_parts.PID).found.reason.startswith("no analysis of PID")
+    assert qd.guarantee(LAB, controller=own_parts.PID).found.reason.startswith("no analysis of PID")
 
 
 def test_a_run_names_ones_own_law():

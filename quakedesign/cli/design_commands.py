@@ -14,17 +14,14 @@ from quakedesign.cli.options import (
     PLAIN,
     Box,
     DisturbanceClass,
-    ExactMetres,
-    ExactMetresPerSecond,
     ExactPascals,
-    ExactSeconds,
-    ExactSquareMetresPerSecond,
     FaultName,
     Force,
     Formats,
     Output,
     Shaking,
-    rock,
+    WellOptions,
+    of_the_setup,
 )
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.files import hold
@@ -36,15 +33,13 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------------
 # The main job.
 
-_SHARED = (
-    *("objective", "continuous", "measured", "slip_noise", "rate_noise"),
-    *("delay", "lag", "stress", "spread", "disturbance_class"),
-)
+_SHARED = ("objective", "continuous", "stress", "spread", "disturbance_class")
 
 
 @Parameter(name="*")
+@of_the_setup("delay", "lag", "diffusion", "slip_noise", "rate_noise")
 @dataclass(frozen=True, kw_only=True)
-class DesignOptions:
+class DesignOptions(WellOptions):
     """Which controllers are designed for a fault, and how.
 
     Parameters
@@ -58,23 +53,12 @@ class DesignOptions:
     measured
         What the e-LQR that samples is told: slip-and-rate, or slip, from which it estimates the slip rate; with slip
         sliding modes are told both as they are.
-    slip_noise
-        Bound of the error of the slip that designed laws are told, such as '1 um', in guarantees and runs.
-        --slip-noise-deviation of simulate is a standard deviation.
-    rate_noise
-        The same of the slip rate.
     disturbance_class
         Of the guarantee: amplitude, any disturbance as large as the fault's; rate, one that starts at 0 and is no
         faster either, such as a tide.
     scheme
         Of the runs of gains designed with --continuous: continuous (unless given), as in the paper, or sampled and
         held: explicit, implicit, semi-implicit, compensated. Others run as they were designed.
-    delay
-        From the measurement to the pressure at the valve, for which an e-LQR is designed and behind which it runs.
-    lag
-        The same of the time constant of pump and pipe.
-    diffusion
-        The same of L²/D of the rock between well and fault. With rate-and-state friction D_c/(10 V) unless given.
     well
         Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
     diffusivity
@@ -96,15 +80,8 @@ class DesignOptions:
     objective: Literal["tracking", "peak"] = "tracking"
     continuous: Annotated[bool, Parameter(negative="")] = False
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate"
-    slip_noise: ExactMetres = "0"
-    rate_noise: ExactMetresPerSecond = "0"
     disturbance_class: DisturbanceClass = "amplitude"
     scheme: str | None = None
-    delay: ExactSeconds = "0"
-    lag: ExactSeconds = "0"
-    diffusion: ExactSeconds | None = None
-    well: ExactMetres | None = None
-    diffusivity: ExactSquareMetresPerSecond | None = None
     stress: ExactPascals | None = None
     spread: str = "0"
     published_scheme: str = "continuous"
@@ -128,9 +105,7 @@ class DesignOptions:
 
     def _behind(self, fault: "Fault") -> bool:
         """Whether the e-LQR alone is designed: friction without a state, behind a delay, a lag or rock."""
-        return not fault.friction.state_names and any(
-            time not in (None, "0") for time in (self.delay, self.lag, self._rock)
-        )
+        return not fault.friction.state_names and bool(self.setup().path)
 
     def told(self) -> dict[str, Any]:
         """Options of `designed_comparison`.
@@ -145,13 +120,8 @@ class DesignOptions:
                 f"--scheme is for gains designed with --continuous, others run as guaranteed. Received {self.scheme}. "
                 "Give both, or none."
             )
-        options = {name: getattr(self, name) for name in _SHARED} | {"diffusion": self._rock}
+        options = {name: getattr(self, name) for name in _SHARED} | {"setup": self.setup(measured=self.measured)}
         return {"options": options, "scheme": self.scheme}
-
-    @property
-    def _rock(self) -> str | None:
-        """L²/D [s], however it was told."""
-        return rock(self.diffusion, self.well, self.diffusivity)
 
     @property
     def _laws(self) -> str:

@@ -4,7 +4,7 @@ The first proves bounds of the sampled loop for all t ≥ 0; the second gives th
 every controller.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -12,17 +12,13 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from quakedesign.cli.app import app, given, new_file, progress
+from quakedesign.cli.app import app, new_file, progress
 from quakedesign.cli.options import (
     PLAIN,
     Box,
     DisturbanceClass,
-    ExactMetres,
-    ExactMetresPerSecond,
     ExactPascals,
-    ExactPascalsPerSecond,
     ExactSeconds,
-    ExactSquareMetresPerSecond,
     FaultName,
     Force,
     Formats,
@@ -30,9 +26,9 @@ from quakedesign.cli.options import (
     Output,
     Pascals,
     Scheduler,
+    SetupOptions,
     Shaking,
     Whole,
-    rock,
 )
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.exact import rational
@@ -42,96 +38,7 @@ from quakedesign.files import hold, made_folder, require_room
 # The command about the loop that runs.
 
 
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class Surroundings:
-    """What is between a law and its fault, what the law is told wrongly, and where the loop may start.
-
-    Parameters
-    ----------
-    delay
-        From the measurement to the pressure at the valve.
-    lag
-        Time constant between the valve and the fault, or the well where there is a diffusion; the designed e-LQR knows
-        it.
-    diffusion
-        L²/D of the rock between well and fault; the designed e-LQR carries a model of it.
-    well
-        Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
-    diffusivity
-        Of the rock between well and fault, such as '0.5 m^2/s'.
-    slip_noise
-        Bound of the error of the measured slip, whatever its course, such as '1 um'; q/2 for readings in steps of q.
-        --slip-noise-deviation of simulate is a standard deviation.
-    rate_noise
-        The same of the measured slip rate.
-    initial_slip
-        Bound of the slip at the start, of either sign, such as '0.01 mm'; the law begins as it always does.
-    initial_slip_rate
-        The same of the slip rate, such as '0.1 mm/s'. Slip rates below zero are those of the continued plant.
-    jitter
-        By how much a measurement is early or late at most, and its pressure with it, such as '2 ms'.
-    delay_jitter
-        The same of the delay alone.
-    averaging_time
-        Over which the law is told means of slip and slip rate, up to each sample; the delay counts from its end.
-    longest_step
-        By no clock: the next sample comes any time from T_s to this after the last, each time anew, as a computer that
-        sleeps for T_s does; the law is not told.
-    saturation
-        Largest pressure of the pump, such as '20 MPa', and largest withdrawal unless that is given: a proof is one that
-        these limits are never reached.
-    withdrawal
-        Largest decrease of the pressure; 0 for a pump that only injects.
-    rate_limit
-        How fast the pump goes from one pressure to the next, such as '10 MPa/s': a proof counts that it takes its time,
-        and is one that it is there before the next sample.
-    """
-
-    delay: ExactSeconds = "0"
-    lag: ExactSeconds = "0"
-    diffusion: ExactSeconds = "0"
-    well: ExactMetres | None = None
-    diffusivity: ExactSquareMetresPerSecond | None = None
-    slip_noise: ExactMetres = "0"
-    rate_noise: ExactMetresPerSecond = "0"
-    initial_slip: ExactMetres = "0"
-    initial_slip_rate: ExactMetresPerSecond = "0"
-    jitter: ExactSeconds = "0"
-    delay_jitter: ExactSeconds = "0"
-    averaging_time: ExactSeconds = "0"
-    longest_step: ExactSeconds = "0"
-    saturation: ExactPascals | None = None
-    withdrawal: ExactPascals | None = None
-    rate_limit: ExactPascalsPerSecond | None = None
-
-    def exact(self) -> dict[str, Any]:
-        """All of it as rationals in SI units, and the pump, None without limits.
-
-        Raises
-        ------
-        ParameterError
-            For a withdrawal without a largest pressure, or for a well that is not told as one.
-        """
-        from quakedesign.synthesis.guarantee import exact_surroundings
-
-        return exact_surroundings(**self.plain(alone=False))
-
-    def plain(self, *, alone: bool = True) -> dict[str, Any]:
-        """All of it as it was given, with rock in place of a well; a diffusivity may stand alone or may not.
-
-        Raises
-        ------
-        ParameterError
-            For a well that is not told as one.
-        """
-        told = asdict(self)
-        well, spread = told.pop("well"), told.pop("diffusivity")
-        told["diffusion"] = rock(self.diffusion, well, (spread or "1") if well and alone else None if alone else spread)
-        return given(told)
-
-
-_ALONE = Surroundings()
+_IDEAL = SetupOptions()
 
 
 @app.command
@@ -145,7 +52,7 @@ def guarantee(
     scheme: str | None = None,
     step: ExactSeconds | None = None,
     measured: Literal["slip-and-rate", "slip", "differentiator"] = "slip-and-rate",
-    around: Surroundings = _ALONE,
+    around: SetupOptions = _IDEAL,
     disturbance_class: DisturbanceClass = "amplitude",
     stress: ExactPascals | None = None,
     spread: str = "0",
@@ -192,22 +99,18 @@ def guarantee(
     """
     from quakedesign.fault import load_fault
     from quakedesign.synthesis import answers
-    from quakedesign.synthesis.guarantee import question
+    from quakedesign.synthesis import guarantee as guaranteed
 
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     files = _files(out, [one.name for one in faults], force=force)
-    asked: dict[str, Any] = {"controller": controller, "gains": gains, "objective": objective, "scheme": scheme}
-    exact: dict[str, Any] = {
-        "step": None if step is None else rational(step, "step"),
-        "spread": rational(spread, "spread"),
-    }
-    exact["stress"] = None if stress is None else rational(stress, "stress")
-    asked |= {"measured": measured, "disturbance_class": disturbance_class, **around.exact()}
-    questions = [question(one, **asked, **exact) for one in faults]
+    setup = around.setup(step=step, measured=measured)
+    asked: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "stress": stress}
+    asked |= {"disturbance_class": disturbance_class, "spread": spread}
+    calls = [partial(guaranteed, one, controller, setup, **asked) for one in faults]
     with progress() as tell:
-        if not more and faults[0].friction.state_names and scheduler is None and workers == 1:
-            questions = [partial(questions[0], tell=tell)]  # type: ignore[call-arg]
-        found = answers(questions, workers=workers, scheduler=scheduler, tell=tell if more else None)
+        if not more and scheduler is None and workers == 1:
+            calls = [partial(calls[0], progress=tell)]
+        found: Any = answers(calls, workers=workers, scheduler=scheduler, tell=tell if more else None)
     said = {"class": disturbance_class, "seconds": perf_counter() - began}
     if not more:
         if isinstance(found[0], QuakedesignError):
@@ -271,8 +174,6 @@ def _facts(answer: Any, path: Path | None) -> dict[str, Any]:
 # ----------------------------------------------------------------------
 # The command about what no controller can do.
 
-_LIMITS_ALONE = Surroundings()
-
 
 @app.command
 def limits(
@@ -280,7 +181,7 @@ def limits(
     /,
     *,
     pressure: Pascals | None = None,
-    around: Surroundings = _LIMITS_ALONE,
+    around: SetupOptions = _IDEAL,
     stress: Pascals | None = None,
     spread: str = "0",
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
@@ -326,14 +227,14 @@ def limits(
     from quakedesign.report.limits_table import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits
 
+    spreads = around.diffusivity
     answer = all_limits(
         loaded,
+        replace(around, diffusivity=(spreads or "1") if around.well else None).setup(measured=measured),
         pressure=pressure,
-        diffusivity=float(rational(around.diffusivity or "1")),
+        diffusivity=float(rational(spreads or "1")),
         stress=stress,
         spread=spread,
-        measured=measured,
-        **around.plain(),
     )
     if out is not None:
         write_limits(answer, out, format)

@@ -18,6 +18,7 @@ from quakedesign.errors import ParameterError, UnitError
 from quakedesign.exact import rational
 from quakedesign.loop import Actuator, stages
 from quakedesign.loop.actuators.base import Option, Stage
+from quakedesign.loop.loop_setup import IDEAL, LoopSetup, quantities
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
@@ -370,11 +371,81 @@ class StartOptions:
 
 
 # ----------------------------------------------------------------------
+# Loop setup of a guarantee or a design.
+
+Options = TypeVar("Options")
+
+
+def of_the_setup(*names: str) -> Callable[[type[Options]], type[Options]]:
+    """Add options for quantities of `LoopSetup`, with their unit and help text, to a frozen dataclass.
+
+    Parameters
+    ----------
+    *names : str
+        Of fields of `LoopSetup`.
+    """
+
+    def added(options: type[Options]) -> type[Options]:
+        parts = [(name, quantities()[name]) for name in names]
+        new = [(name, _exact_option(part["unit"], part["help"]), None) for name, part in parts]
+        doc = {"__doc__": options.__doc__, "__module__": options.__module__}
+        return make_dataclass(options.__name__, new, bases=(options,), namespace=doc, frozen=True, kw_only=True)
+
+    return added
+
+
+def _exact_option(unit: str, text: str) -> Any:
+    return Annotated[str | None, Parameter(converter=_exact_reader(unit), help=text)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WellOptions:
+    """Diffusion path by the distance of a well.
+
+    Parameters
+    ----------
+    well
+        Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
+    diffusivity
+        Of the rock between well and fault, such as '0.5 m^2/s'.
+    """
+
+    well: ExactMetres | None = None
+    diffusivity: ExactSquareMetresPerSecond | None = None
+
+    def setup(self, **more: Any) -> LoopSetup:
+        """Loop setup of the options, with further fields of `LoopSetup`.
+
+        Raises
+        ------
+        ParameterError
+        """
+        known = quantities()
+        told = {name: value for name, value in vars(self).items() if name in known}
+        told["diffusion"] = rock(told["diffusion"], self.well, self.diffusivity)
+        return IDEAL.with_given(**told, **more)
+
+
+@Parameter(name="*")
+@of_the_setup(*(name for name in quantities() if name != "step"))
+@dataclass(frozen=True, kw_only=True)
+class SetupOptions(WellOptions):
+    """Loop setup: delay, actuator, diffusion path, noise, jitter and initial errors.
+
+    Parameters
+    ----------
+    well
+        Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
+    diffusivity
+        Of the rock between well and fault, such as '0.5 m^2/s'.
+    """
+
+
+# ----------------------------------------------------------------------
 # Options about what lies around a controller: actuator and sensors, the same for every command that runs one.
 
 _ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
 _SENSORS = Group("Sensors (schemes that sample)")
-Options = TypeVar("Options")
 
 
 def _asks_every_stage(options: type[Options]) -> type[Options]:

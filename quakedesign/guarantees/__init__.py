@@ -54,6 +54,6 @@ if TYPE_CHECKING:
     from quakedesign.guarantees.search.linear_design import longest_step as longest_step
     from quakedesign.guarantees.search.linear_design import reached as reached
     from quakedesign.guarantees.search.linear_design import tightened as tightened
-    from quakedesign.guarantees.search.lqg import MEASURED as MEASURED
+    from quakedesign.loop.loop_setup import MEASURED as MEASURED
 
 face(__name__)

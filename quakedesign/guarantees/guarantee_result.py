@@ -18,14 +18,14 @@ from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS
 from quakedesign.guarantees.exact.fault_data import sliding_task
 from quakedesign.guarantees.exact.impossibility import SlidingPush, SmallestPeak, longest_diffusion, smallest_peak
-from quakedesign.guarantees.exact.loop import Around, Held, Pump
+from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.sliding_task import SlidingTask
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.statement import Guarantee, SlidingGuarantee, guarantee
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding, worst_found, worst_sliding
 from quakedesign.guarantees.search.compensated_search import Compensation
 from quakedesign.guarantees.search.estimate import own_poles
-from quakedesign.guarantees.search.lqg import MEASURED, measured_by, sliding_model
+from quakedesign.guarantees.search.lqg import measured_by, sliding_model
 from quakedesign.guarantees.search.sliding_design import (
     LOG_RATES,
     Prove,
@@ -39,6 +39,7 @@ from quakedesign.guarantees.search.sliding_design import (
     what_would_do,
 )
 from quakedesign.laws import LinearLaw, RestLimit
+from quakedesign.loop.loop_setup import MEASURED, Pump
 from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.sos.exact.strict import texts

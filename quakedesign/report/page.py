@@ -463,7 +463,7 @@ def _limits(comparison: "Compared", told: list[Account]) -> list[str]:
 
 def _way(comparison: "Compared") -> str:
     """What the pressure of the runs goes through."""
-    paths = (e.design.path.items() for e in comparison.of("designed"))
+    paths = (e.design.setup.path.items() for e in comparison.of("designed"))
     told = dict.fromkeys(f"{_WAYS[name]} {float(time):.4g} s" for path in paths for name, time in path if time)
     return f"in these runs the pressure {'comes behind ' + ', '.join(told) if told else 'acts at once'}"
 

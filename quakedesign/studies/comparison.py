@@ -147,7 +147,7 @@ class Compared:
     @property
     def path(self) -> dict[str, Fraction]:
         """Delay, lag and diffusion [s] behind which the designs are to act; those that there are."""
-        return {name: time for entry in self.entries for name, time in entry.design.path.items() if time}
+        return {name: time for entry in self.entries for name, time in entry.design.setup.path.items()}
 
     def of(self, origin: str) -> tuple[Entry, ...]:
         """Entries of one origin."""
@@ -172,7 +172,7 @@ def compared(
         return _slowly_compared(fault, designs, tell, whole=whole_task)
     uncontrolled = natural_earthquake(fault)
     entries: list[Entry] = []
-    at_once = not any(any(designed.path.values()) for designed in designs)
+    at_once = not any(designed.setup.path for designed in designs)
     for controller in published(fault.name).values() if with_published and at_once else ():
         tell(f"{controller.title} (published): verdict", 0.0)
         entries.append(_entry("published", assess(fault, controller), schemes, tell))

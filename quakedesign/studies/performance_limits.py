@@ -1,15 +1,14 @@
 """Performance limits of every controller, reported with the proved bounds of designed ones."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, cast
+from typing import Any
 
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
 from quakedesign.guarantees import (
-    MEASURED,
     Guarantee,
     NoGuarantee,
     SlidingGuarantee,
@@ -32,11 +31,10 @@ from quakedesign.guarantees.exact.impossibility import (
     smallest_peak,
     smallest_withdrawal,
 )
-from quakedesign.guarantees.exact.loop import Around
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
 from quakedesign.guarantees.search.lqg import near_path, sliding_model
+from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Quantity
 from quakedesign.simulation.natural import natural_peak
-from quakedesign.synthesis.guarantee import Quantity, exact_surroundings
 
 # ----------------------------------------------------------------------
 # Limits of every controller as values, each beside what a designed one is proved to do.
@@ -92,38 +90,44 @@ class Limit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Told:
-    """What controllers are told of slip and slip rate, at all times up to a sample.
+    """What controllers measure of slip and slip rate, at all times up to a sample.
 
     Attributes
     ----------
-    measured : str
-        ``slip-and-rate`` or ``slip``.
-    slip_noise, rate_noise : Fraction
-        Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
-    setup : Around
-        What else is between law and fault, or off, for designs.
+    setup : LoopSetup
+        What controllers measure, with its noise; all of it is that of the designs that are proved.
 
     Raises
     ------
     ParameterError
-        For a negative bound, another name, or noise of a slip rate that is not measured.
+        For noise of a slip rate that is not measured, or a differentiator.
     """
 
-    measured: str = MEASURED[0]
-    slip_noise: Fraction = Fraction(0)
-    rate_noise: Fraction = Fraction(0)
-    setup: Around = field(default_factory=Around)
+    setup: LoopSetup = IDEAL
 
     def __post_init__(self) -> None:
         require_known(self.measured, MEASURED[:2], "measured")
-        noise = f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s"
-        if min(self.slip_noise, self.rate_noise) < 0:
-            raise ParameterError(f"a bound of noise must be 0 or more. Received {noise}. Check their signs.")
         if self._alone and self.rate_noise:
+            noise = f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s"
             raise ParameterError(
                 f"noise of the slip rate needs one that is measured. Received {noise}, measured {self.measured}. Leave "
                 "it out."
             )
+
+    @property
+    def measured(self) -> str:
+        """``slip-and-rate`` or ``slip``."""
+        return self.setup.measured
+
+    @property
+    def slip_noise(self) -> Fraction:
+        """Bound of the measurement error of the slip [m]."""
+        return self.setup.slip_noise
+
+    @property
+    def rate_noise(self) -> Fraction:
+        """Bound of the measurement error of the slip rate [m/s]."""
+        return self.setup.rate_noise
 
     @property
     def _alone(self) -> bool:
@@ -142,8 +146,7 @@ class Told:
     @property
     def around(self) -> dict[str, Any]:
         """Of a design."""
-        noise = {"slip_noise": self.slip_noise, "rate_noise": self.rate_noise}
-        return {**self.setup, "measured": self.measured, **noise}
+        return {"measured": self.measured, **self.setup.around()}
 
     def words(self) -> str:
         """For people: rounded up, since who is told less can do less."""
@@ -302,18 +305,14 @@ def above_the_reference(found: SlidingGuarantee) -> UpperBound:
 
 def limits(
     fault: Fault,
+    setup: LoopSetup = IDEAL,
     *,
     pressure: float | None = None,
     diffusivity: float = 1.0,
-    lag: float | str | Fraction = 0,
-    diffusion: float | str | Fraction | None = None,
     stress: float | None = None,
-    spread: float | str | Fraction = 0,
-    measured: str = MEASURED[0],
-    slip_noise: float | str | Fraction = 0,
-    rate_noise: float | str | Fraction = 0,
+    spread: Quantity = 0,
     prove: bool = True,
-    **setup: Quantity,
+    **given: Quantity | None,
 ) -> Limits:
     """What no controller can do with a fault whose disturbance is of the class ``amplitude``.
 
@@ -324,30 +323,24 @@ def limits(
     Parameters
     ----------
     fault : Fault
+    setup : LoopSetup
+        What controllers measure, with its noise, and the loop with which designs are proved. In slow sliding a lag or
+        a diffusion path alone; that of a well near the fault without both.
     pressure : float, optional
         Largest withdrawal [Pa]; the effective normal stress unless given. In slow sliding: largest pressure beside what
         the reference needs, in both directions.
     diffusivity : float
         Of the rock between well and fault [m²/s].
-    lag : float, str or Fraction
-        Time constant of pump and pipe [s] behind which designs are proved.
-    diffusion : float, str or Fraction, optional
-        The same of L²/D of the rock [s]; with a state that of a well near the fault without it and a lag.
     stress : float, optional
         Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that a design stands unless
         given.
     spread : float, str or Fraction
         Of friction with a state: by how much of their values a, b and D_c may be off [-] for a design that is proved;
         what is impossible is so for the nominal ones.
-    measured : str
-        What controllers are told: ``slip-and-rate`` or ``slip``.
-    slip_noise, rate_noise : float, str or Fraction
-        Bounds of what that is off [m], [m/s], whatever the course, for the slip-rate error and designs. With friction
-        that has a state no limit of noise is known.
     prove : bool
         Whether to look for designs with a guarantee, which takes a minute.
-    **setup : float, str or Fraction
-        What else designs are proved with, as in `quakedesign.guarantee`: delay, starts, jitter, averaging, a pump.
+    **given : float, str or Fraction
+        Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
     -------
@@ -361,17 +354,10 @@ def limits(
         that is not measured.
     """
     off = rational(spread, "spread")
-    path = exact_surroundings(lag=lag, diffusion=diffusion or 0, **setup)
-    told = Told(
-        measured=measured,
-        slip_noise=rational(slip_noise, "slip noise"),
-        rate_noise=rational(rate_noise, "rate noise"),
-        setup=cast(Around, {name: value for name, value in path.items() if value}),
-    )
+    told = Told(setup=setup.with_given(**given))
     if fault.friction.state_names:
         _require_plain(fault, told)
-        way: Around = {"lag": path["lag"], "diffusion": path["diffusion"]}
-        return _sliding_limits(fault, pressure, diffusivity, stress, way if prove else None, off)
+        return _sliding_limits(fault, pressure, diffusivity, stress, told.setup if prove else None, off)
     if stress is not None or off:
         raise ParameterError(
             f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Leave it "
@@ -380,7 +366,7 @@ def limits(
     task, step = task_of(fault), rational(fault.sampling_time)
     withdrawal, spread = _given(fault, pressure, diffusivity)
     held, own = _proved_steps(task, step, told) if prove else ((), None)
-    late = told.setup.get("delay", Fraction(0))
+    late = told.around.get("delay", Fraction(0))
     peak, proved = smallest_peak(task, step, late, **told.bounds), dict[str, Bound | None]()
     if held:
         proved["largest_step"] = LowerBound(held[-1].held.step)
@@ -436,12 +422,12 @@ def _limits(
 
 
 def _require_plain(fault: Fault, told: Told) -> None:
-    if replace(told, setup={}) != Told():
+    if told.setup.noise or told.measured != MEASURED[0]:
         raise ParameterError(
             f"no limit of slow sliding is known for noise. Received {fault.friction.name}, told {told.words()}. "
             "Leave noise out: what cannot be done without it cannot be done with it."
         )
-    if more := told.setup.keys() - {"lag", "diffusion"}:
+    if more := told.setup.given().keys() - {"lag", "diffusion"}:
         raise ParameterError(
             f"limits of slow sliding know a lag and rock alone. Received {', '.join(sorted(more))}. Leave them out."
         )
@@ -463,7 +449,7 @@ def _sliding_limits(
     pressure: float | None,
     diffusivity: float,
     stress: float | None,
-    path: Around | None,
+    setup: LoopSetup | None,
     off: Fraction,
 ) -> SlidingLimits:
     """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path.
@@ -474,9 +460,9 @@ def _sliding_limits(
     withdrawal, spread = _given(fault, pressure, diffusivity)
     model, step = sliding_model(fault), rational(fault.sampling_time)
     asked = None if stress is None else rational(stress, "stress")
-    told = path if path is not None and any(path.values()) else None
-    near: Around = {"diffusion": near_path(model)}
-    answer = None if path is None else answer_sliding(fault, stress=asked, spread=off, **near)
+    told = setup if setup is not None and setup.path else None
+    near = near_path(model)
+    answer = None if setup is None else answer_sliding(fault, stress=asked, spread=off, diffusion=near)
     found = answer.found if answer is not None and isinstance(answer.found, SlidingGuarantee) else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
@@ -485,9 +471,9 @@ def _sliding_limits(
             f"was found that stands any{_why(answer)}. Give --stress, such as '25 kPa'."
         )
     push = SlidingPush(model=model, amplitude=amplitude)
-    farthest, rock = longest_diffusion(push, withdrawal, step), (told or {}).get("diffusion", Fraction(0))
+    farthest, rock = longest_diffusion(push, withdrawal, step), (told or IDEAL).diffusion
     if told is not None and (farthest is None or rock <= farthest):
-        behind = answer_sliding(fault, stress=asked, spread=off, **told).found
+        behind = answer_sliding(fault, stress=asked, spread=off, **told.around()).found
         found = behind if isinstance(behind, SlidingGuarantee) else None
         push = replace(push, amplitude=found.task.stress) if found else push
     impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))

@@ -28,6 +28,7 @@ from quakedesign.laws.feed_forward import feed_forward
 from quakedesign.loop import Actuator, SlidingModel, simulation_scheme
 from quakedesign.loop.actuators.base import SampledStage
 from quakedesign.loop.actuators.chain import DIRECT
+from quakedesign.loop.loop_setup import IDEAL
 from quakedesign.loop.sensing import (
     Averaging,
     Differentiator,
@@ -71,7 +72,7 @@ from quakedesign.simulation.stick_slip import (
 from quakedesign.simulation.trajectory import Outcome
 from quakedesign.studies.certified import certified_bound, trajectory_premise
 from quakedesign.symbolic import derive
-from quakedesign.synthesis import Design, answer, design
+from quakedesign.synthesis import Design, design, guarantee
 
 # ----------------------------------------------------------------------
 # Runs of a fault whose friction has a state: free, as it is by nature, or held in slow sliding.
@@ -749,9 +750,9 @@ def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Cont
     ParameterError
         Where none has a proof, or the delay is more than a run takes.
     """
-    around: Any = {part: rational(time, part) for part, time in path.items()}
-    Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **around))
-    found = answer(fault, controller=name, **around)
+    setup = IDEAL.with_given(**path)
+    Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **setup.path))
+    found: Any = guarantee(fault, name, setup)
     if not isinstance(found.found, Guarantee):
         told = ", ".join(f"{part} {time:g} s" for part, time in path.items())
         sooner = f"--step '{float(found.shorter.held.step):g} s', where it has, " if found.shorter else ""

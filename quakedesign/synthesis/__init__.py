@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from quakedesign.synthesis.design import Design as Design
     from quakedesign.synthesis.design import assess as assess
     from quakedesign.synthesis.design import design as design
-    from quakedesign.synthesis.guarantee import answer as answer
     from quakedesign.synthesis.guarantee import answers as answers
     from quakedesign.synthesis.guarantee import guarantee as guarantee
     from quakedesign.synthesis.method import designable as designable

@@ -10,11 +10,10 @@ from html import escape
 from typing import Any
 
 from quakedesign.errors import ParameterError, UnsupportedError, require_known
-from quakedesign.exact import rational
 from quakedesign.fault import Fault, require_fault
+from quakedesign.fault.units import exact_value
 from quakedesign.guarantees import (
     CLASSES,
-    MEASURED,
     OBJECTIVES,
     Compensation,
     ContinuousPeaks,
@@ -23,12 +22,12 @@ from quakedesign.guarantees import (
     SlidingGuarantee,
     task_of,
 )
-from quakedesign.guarantees.exact.loop import Around
 from quakedesign.guarantees.guarantee_result import SlidingAnswer
 from quakedesign.guarantees.search.defaults import REACH
 from quakedesign.laws import Controller, control_law, control_laws
 from quakedesign.laws.feed_forward import NONE, feed_forward
 from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.lyapunov import Certificate, Verdict
 from quakedesign.lyapunov.exact.domain import Domain
@@ -61,10 +60,8 @@ class Design:
         Certified domain of the self-consistent premise on |h'|.
     details : mapping
         What synthesis decided: exact numbers as texts.
-    slip_noise, rate_noise : Fraction
-        Bounds of what a law of samples is told wrongly of slip [m] and slip rate [m/s].
-    path : mapping of str to Fraction
-        Delay, lag and diffusion [s] behind which a law of samples is designed to act, where they are told.
+    setup : LoopSetup
+        For which a sampled law is designed.
     runs : Guarantee, SlidingGuarantee or NoGuarantee, optional
         What was proved of the loop that runs while it was designed; None to find it when `guarantee` is asked for.
     sliding : SlidingAnswer, optional
@@ -81,9 +78,7 @@ class Design:
     premises: tuple[Premise, ...]
     domain: Domain | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
-    slip_noise: Fraction = Fraction(0)
-    rate_noise: Fraction = Fraction(0)
-    path: Mapping[str, Any] = field(default_factory=dict)
+    setup: LoopSetup = IDEAL
     runs: Guarantee | SlidingGuarantee | NoGuarantee | None = None
     sliding: SlidingAnswer | None = None
     disturbance_class: str = CLASSES[0]
@@ -105,7 +100,7 @@ class Design:
     @property
     def measurement(self) -> Measurement | None:
         """What the controller is told in a run, with the noise that it is designed for; None without."""
-        slip, rate = float(self.slip_noise), float(self.rate_noise)
+        slip, rate = float(self.setup.slip_noise), float(self.setup.rate_noise)
         return Measurement(slip_noise=slip, rate_noise=rate, bounded=True) if slip or rate else None
 
     @property
@@ -171,9 +166,8 @@ class Design:
             return self.runs
         if law is None:
             return NoGuarantee(reason=f"no gains of {self.title} are known", small_gain=None)
-        noise = Around(slip_noise=self.slip_noise, rate_noise=self.rate_noise)
         task = task_of(self.fault, rate_limited=self.disturbance_class == "rate")
-        return method_of(type(law)).guarantee(self.fault, task, law, noise)
+        return method_of(type(law)).guarantee(self.fault, task, law, self.setup)
 
     @property
     def compensation(self) -> Compensation | None:
@@ -212,20 +206,16 @@ class Design:
 def design(
     fault: Fault,
     controller: str | type[Controller] = "cta",
+    setup: LoopSetup = IDEAL,
     *,
     feedforward: str = "none",
     objective: str = "tracking",
     continuous: bool = False,
-    measured: str = MEASURED[0],
-    slip_noise: str | float | Fraction = 0,
-    rate_noise: str | float | Fraction = 0,
-    delay: str | float | Fraction = 0,
-    lag: str | float | Fraction = 0,
-    diffusion: str | float | Fraction | None = None,
-    stress: str | float | Fraction | None = None,
-    spread: str | float | Fraction = 0,
+    stress: Quantity | None = None,
+    spread: Quantity = 0,
     disturbance_class: str = CLASSES[0],
     progress: Callable[[str, float], None] | None = None,
+    **given: Quantity | None,
 ) -> Design:
     """Find gains with a proof for a fault.
 
@@ -249,6 +239,9 @@ def design(
     controller : str or type of Controller
         ``"cta"``, ``"dia"`` or ``"elqr"``; or a law of your own, also as ``"module:Class"``, which says how it is
         designed or derives from one of these.
+    setup : LoopSetup
+        Delay, lag and diffusion path behind which an e-LQR is designed and runs, what it measures, and bounds of the
+        measurement errors. Of rate-and-state friction a diffusion path of a tenth of D_c/V unless given.
     feedforward : str
         What a sliding mode adds to ν from what is known of the plant: ``"none"``, ``"nominal"`` or ``"centred"``, see
         `quakedesign.laws.feed_forward`. It enlarges the certified domain in continuous time and has no guarantee
@@ -257,25 +250,18 @@ def design(
         ``"tracking"`` for small errors under slow disturbances, ``"peak"`` for the smallest guaranteed slip-rate error.
     continuous : bool
         The paper's design in continuous time.
-    measured : str
-        What the e-LQR of samples is told: ``"slip-and-rate"``, or ``"slip"``, from which it estimates the slip rate.
-    slip_noise, rate_noise : str, float or Fraction
-        Bounds of what a law of samples is told wrongly of slip [m] and slip rate [m/s], for its guarantee.
-    delay, lag : str, float or Fraction
-        From measurement to valve, and time constant of the pump [s], for which an e-LQR is designed and behind which it
-        runs.
-    diffusion : str, float or Fraction, optional
-        The same of rock between well and fault: L²/D [s]. Of friction with a state a tenth of D_c/V unless given.
     stress : str, float or Fraction, optional
-        Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that the design stands unless
-        given.
+        Of rate-and-state friction: bound of the shear stress disturbance [Pa]; the largest that the design withstands
+        unless given.
     spread : str, float or Fraction
-        Of friction with a state: by how much of their values a, b and D_c may be off [-].
+        Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
     disturbance_class : str
         Of the guarantee: ``"amplitude"``, any disturbance as large as the fault's, or ``"rate"``, one that starts at 0
         and is no faster either, such as a tide.
     progress : callable, optional
         Called with what the search for a law around friction with a state is doing, and the fraction done [-].
+    **given : str, float or Fraction
+        Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
     -------
@@ -288,17 +274,20 @@ def design(
         For a controller that cannot be designed, or an unknown feed-forward.
     ParameterError
         For a feed-forward with a law that takes none or runs sampled, an unknown objective, or one of a design in
-        continuous time; for stress or spread without a state of friction, a delay or a lag with one.
+        continuous time; for quantities of the setup that a design does not know; for stress or spread without a state
+        of friction, a delay or a lag with one.
     UnsupportedError
         For a law that does not apply to friction with a state.
     """
     require_fault(fault)
-    law = control_law(controller)
-    times = {"delay": delay, "lag": lag, "diffusion": diffusion or 0}
-    path = {name: rational(time, name) for name, time in times.items()}
-    sliding = _sliding(fault, law, path, diffusion, stress, spread)
+    law, setup = control_law(controller), setup.with_given(**given)
+    if unknown := setup.given().keys() - _DESIGNED_FOR:
+        raise ParameterError(
+            f"a design knows {', '.join(_DESIGNED_FOR)} of the loop setup. Received {', '.join(sorted(unknown))}. "
+            "Use guarantee, which designs for all of them."
+        )
+    sliding = _sliding(fault, law, setup, stress, spread)
     added = NONE if feedforward == NONE.name else feed_forward(feedforward, fault, least_authority(fault))
-    noise = Around(slip_noise=rational(slip_noise, "slip_noise"), rate_noise=rational(rate_noise, "rate_noise"))
     require_known(objective, OBJECTIVES, "objective")
     require_known(disturbance_class, CLASSES, "class")
     if continuous and objective != OBJECTIVES[0]:
@@ -306,25 +295,21 @@ def design(
             f"the objective of a design in continuous time must be {OBJECTIVES[0]}. Received {objective!r}. "
             "Leave it out, or continuous."
         )
-    told: Any = {"objective": objective, "continuous": continuous, "measured": measured, "noise": noise}
-    told |= {"disturbance_class": disturbance_class, "path": {} if fault.friction.state_names else path}
+    told: Any = {"objective": objective, "continuous": continuous, "disturbance_class": disturbance_class}
+    told["setup"] = replace(setup, diffusion=Fraction(0)) if fault.friction.state_names else setup
     told |= {"tell": progress} if progress else {}
     return law.design(GainProblem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **told))
 
 
-def _sliding(
-    fault: Fault, law: type[Controller], path: dict[str, Fraction], diffusion: Any, stress: Any, spread: Any
-) -> SlowSlidingDesign:
-    """What is asked of slow sliding, which only friction with a state has; refuses laws that do not apply to it."""
-    if min(path.values()) < 0:
-        raise ParameterError(
-            "delay, lag and diffusion must be 0 s or more. Received "
-            f"{', '.join(f'{float(time):g} s' for time in path.values())}. Check their signs."
-        )
+_DESIGNED_FOR = ("measured", "delay", "lag", "diffusion", "slip_noise", "rate_noise")
+
+
+def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any, spread: Any) -> SlowSlidingDesign:
+    """Request for slow sliding, which only friction with a state has; refuses laws that do not apply to it."""
     asked = SlowSlidingDesign(
-        diffusion=path["diffusion"] or None,
-        stress=None if stress is None else rational(stress, "stress"),
-        spread=rational(spread, "spread"),
+        diffusion=setup.diffusion or None,
+        stress=None if stress is None else exact_value(stress, "Pa", "stress"),
+        spread=exact_value(spread, "", "spread"),
     )
     if not fault.friction.state_names:
         if asked.stress is not None or asked.spread:
@@ -333,9 +318,7 @@ def _sliding(
                 "Leave them out."
             )
         return SlowSlidingDesign()
-    if diffusion is not None and not path["diffusion"]:
-        raise ParameterError("a diffusion must be above 0 s. Received 0 s. Leave it out for a well near the fault.")
-    if path["delay"] or path["lag"]:
+    if setup.delay or setup.lag:
         raise ParameterError(
             f"a design for friction with a state goes through rock alone. Received a delay or lag with "
             f"{fault.friction.name}. Leave them out; guarantee takes both."

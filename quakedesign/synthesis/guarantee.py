@@ -4,19 +4,18 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
-from typing import Any, TypeVar, Unpack
+from typing import Any, TypeVar
 
 from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.exact import exact_text, rational
 from quakedesign.fault import Fault
 from quakedesign.fault.units import exact_value
-from quakedesign.guarantees import CLASSES, MEASURED, OBJECTIVES, LoopAnswer, NoGuarantee, task_of
+from quakedesign.guarantees import CLASSES, OBJECTIVES, LoopAnswer, NoGuarantee, Task, task_of
 from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
-from quakedesign.guarantees.exact.loop import Around, Pump
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
 from quakedesign.guarantees.search.linear_design import nearest_setup
 from quakedesign.laws import Controller, control_law
+from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
 from quakedesign.synthesis.method import Wanted, method_of
 
@@ -31,12 +30,12 @@ def answers(
     executor: Executor | None = None,
     tell: Callable[[str, float], None] | None = None,
 ) -> list[Found | QuakedesignError]:
-    """Answers to several questions, each asked where there is room, in the order of the questions; refusals too.
+    """Results of several calls, in their order, computed by several processes; errors are among the results.
 
     Parameters
     ----------
     questions : sequence of callable
-        Such as ``partial(answer, fault, step=Fraction(1, 20))``; without argument, and known to other processes.
+        Such as ``partial(guarantee, fault, step=Fraction(1, 20))``; without argument, and known to other processes.
     workers : int
         Number of processes; 1 computes in this one. No digit depends on who computes.
     scheduler : str, optional
@@ -67,137 +66,53 @@ def _asked(question: Callable[[], Found]) -> Found | QuakedesignError:
         return refused
 
 
-def answer(
-    fault: Fault,
-    *,
-    controller: str | type[Controller] = "elqr",
-    gains: tuple[str, ...] = (),
-    objective: str = "tracking",
-    scheme: str | None = None,
-    step: Fraction | None = None,
-    measured: str = MEASURED[0],
-    disturbance_class: str = CLASSES[0],
-    **around: Unpack[Around],
-) -> LoopAnswer:
-    """Guarantee of given e-LQR gains with summed integrals, of a law that is designed for it, or of a sliding mode.
-
-    Nothing is designed for a delay or rock beyond what any controller can do that withdraws at most σ′.
-
-    Parameters
-    ----------
-    fault : Fault
-    controller : str or type of Controller
-        ``elqr``, or a sliding mode, ``cta`` or ``dia``.
-    gains : tuple of str
-        k1 … k4 of the e-LQR, run by the scheme ``explicit``; none to design a law with a disturbance estimate. Base
-        gains of a sliding mode; none for those that a design tries first.
-    objective : str
-        ``tracking`` or ``peak``, of a design.
-    scheme : str, optional
-        Of a sliding mode: ``compensated`` unless given, the only one with a guarantee; of the e-LQR ``explicit``.
-    step : Fraction, optional
-        T_s [s]; the fault's unless given.
-    measured : str
-        ``slip-and-rate``, ``slip`` for a designed e-LQR with an observer, or ``differentiator``.
-    disturbance_class : str
-        ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
-    **around : Fraction
-        Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s], and of both at the start, of
-        either sign (`initial_slip`, `initial_slip_rate`); 0 unless given.
-
-    Raises
-    ------
-    ParameterError
-    """
-    require_known(disturbance_class, CLASSES, "class")
-    period = rational(fault.sampling_time) if step is None else step
-    if not Fraction(1, 10**9) <= period <= 10**9:
-        raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(period):.4g} s.")
-    task = task_of(fault, rate_limited=disturbance_class == "rate")
-    law = control_law(controller)
-    late, far = around.get("delay", Fraction(0)), around.get("diffusion", Fraction(0))
-    beyond = hopeless(task, rational(fault.effective_normal_stress), late, far)
-    if beyond and not gains:
-        near = nearest_setup(task, period, measured=measured, **around) if controller == "elqr" else None
-        return LoopAnswer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None), nearest=near)
-    wanted = Wanted(gains=gains, objective=objective, scheme=scheme, measured=measured, around=around)
-    given = method_of(law).sampled(fault, task, law, period, wanted)
-    longest = max(period, around.get("longest_step", period))
-    slow = "" if gains else too_slow(task, rational(fault.effective_normal_stress), longest, late)
-    if not slow or given.proved:
-        return given
-    return replace(given, found=NoGuarantee(reason=slow, small_gain=None))
-
-
-_UNITS = {
-    "delay": "s",
-    "lag": "s",
-    "diffusion": "s",
-    "slip_noise": "m",
-    "rate_noise": "m/s",
-    "initial_slip": "m",
-    "initial_slip_rate": "m/s",
-    "jitter": "s",
-    "delay_jitter": "s",
-    "averaging_time": "s",
-    "longest_step": "s",
-}
-_SLOWLY = ("delay", "lag", "diffusion", "slip_noise", "pump")
-Quantity = str | float | Fraction
+_PUMP = ("saturation", "withdrawal", "rate_limit")
+_OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", *_PUMP)
 
 
 def guarantee(
     fault: Fault,
     controller: str | type[Controller] = "elqr",
+    setup: LoopSetup = IDEAL,
     *,
     objective: str = "tracking",
     gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]" = (),
     scheme: str | None = None,
-    step: Quantity | None = None,
-    measured: str = MEASURED[0],
     disturbance_class: str = CLASSES[0],
-    saturation: Quantity | None = None,
-    withdrawal: Quantity | None = None,
-    rate_limit: Quantity | None = None,
     stress: Quantity | None = None,
     spread: Quantity = 0,
-    **around: Quantity,
+    progress: Callable[[str, float], None] | None = None,
+    **given: Quantity | None,
 ) -> LoopAnswer | SlidingAnswer:
-    """Prove how far slip, slip rate and pressure of the loop that runs can go, as the command `guarantee` does.
+    """Prove bounds of slip, slip rate and pressure of the sampled loop, as the command `guarantee` does.
 
-    Every quantity is a number in SI units, a decimal or p/q as text, or a text with its unit, such as ``"80 ms"``.
+    The controller is designed for the loop setup unless gains are given.
 
     Parameters
     ----------
     fault : Fault
     controller : str or type of Controller
         ``elqr``, or a sliding mode, ``cta`` or ``dia``.
+    setup : LoopSetup
+        Sampling, delay, lag, diffusion path, noise, jitter, pump and initial errors.
     objective : str
         Of a design: ``tracking``, or ``peak`` for the smallest proved slip-rate error.
     gains : sequence or array of str, float or Fraction, optional
-        k1 to k4 of an e-LQR whose integrals are summed once per sample, base gains of a sliding mode; none to design. A
-        matrix of one row, as the K of ``control.dlqr``, is its row.
+        k1 to k4 of an e-LQR whose integrals are summed once per sample, run by the scheme ``explicit``; base gains of a
+        sliding mode. A matrix of one row, as the K of ``control.dlqr``, is its row.
     scheme : str, optional
-        As in `answer`.
-    step : str, float or Fraction, optional
-        T_s [s]; the fault's unless given.
-    measured : str
-        ``slip-and-rate``, ``slip`` for a designed e-LQR with an observer, or ``differentiator``.
+        Of a sliding mode: ``compensated`` unless given, the only one with a guarantee; of the e-LQR ``explicit``.
     disturbance_class : str
-        ``amplitude`` or ``rate``.
-    saturation, withdrawal : str, float or Fraction, optional
-        Largest pressure of the pump, and largest decrease unless that is the same [Pa]: limits that are never reached.
-    rate_limit : str, float or Fraction, optional
-        How fast the pump goes from one pressure to the next [Pa/s].
+        ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
     stress : str, float or Fraction, optional
-        Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that the design stands unless
-        given.
+        Of rate-and-state friction: bound of the shear stress disturbance [Pa]; the largest that the design withstands
+        unless given.
     spread : str, float or Fraction
-        Of friction with a state: by how much of their values a, b and D_c may be off [-].
-    **around : str, float or Fraction
-        ``delay``, ``lag`` and ``diffusion`` (L²/D) [s], ``slip_noise`` [m] and ``rate_noise`` [m/s] as bounds, and
-        ``initial_slip`` [m] and ``initial_slip_rate`` [m/s] as bounds of the start, ``jitter``, ``delay_jitter``
-        and ``averaging_time`` [s], and ``longest_step`` [s] where samples follow no clock; 0 unless given.
+        Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
+    progress : callable, optional
+        Called with what a search for rate-and-state friction does, and the fraction done [-].
+    **given : str, float or Fraction
+        Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
     -------
@@ -207,92 +122,68 @@ def guarantee(
 
     Raises
     ------
-    ParameterError, UnsupportedError
+    ParameterError
+        For a quantity out of its range, or one that does not apply to the friction or the controller.
+    UnsupportedError
+        For a controller that does not apply to the friction.
     """
-    return question(
-        fault,
-        controller=controller,
-        objective=objective,
-        gains=_listed(gains),
-        scheme=scheme,
-        step=None if step is None else exact_value(step, "s", "step"),
-        measured=measured,
-        disturbance_class=disturbance_class,
-        stress=None if stress is None else exact_value(stress, "Pa", "stress"),
-        spread=exact_value(spread, "", "spread"),
-        **exact_surroundings(saturation=saturation, withdrawal=withdrawal, rate_limit=rate_limit, **around),
-    )()
+    setup = setup.with_given(**given)
+    least = None if stress is None else exact_value(stress, "Pa", "stress")
+    off = exact_value(spread, "", "spread")
+    if fault.friction.state_names:
+        usual = (tuple(gains), scheme, objective, disturbance_class) == ((), None, OBJECTIVES[0], CLASSES[0])
+        if not usual or setup.given().keys() - set(_OF_SLOW_SLIDING):
+            raise ParameterError(
+                "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
+                "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class, an initial "
+                "slip or slip rate, jitter or averaging. Leave them out."
+            )
+        tell: Any = {} if progress is None else {"tell": progress}
+        return answer_sliding(
+            fault,
+            controller=control_law(controller).name,
+            step=setup.step,
+            stress=least,
+            spread=off,
+            **setup.around(),
+            **tell,
+        )
+    if stress is not None or off:
+        raise ParameterError(
+            f"stress and spread need friction with a state. Received {fault.friction.name}. Leave them out."
+        )
+    require_known(disturbance_class, CLASSES, "class")
+    task, law = task_of(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
+    wanted = Wanted(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
+    return _sampled(fault, task, law, wanted)
 
 
-def _listed(gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]") -> tuple[str, ...]:
+def _sampled(fault: Fault, task: Task, law: type[Controller], wanted: Wanted) -> LoopAnswer:
+    """Guarantee on a moving reference; none without given gains where no controller within σ′ can hold the fault."""
+    setup, most = wanted.setup, rational(fault.effective_normal_stress)
+    step = rational(fault.sampling_time) if setup.step is None else setup.step
+    around: Any = {"measured": setup.measured, **setup.around()}
+    delay = around.get("delay", Fraction(0))
+    beyond = hopeless(task, most, delay, setup.diffusion)
+    if beyond and not wanted.gains:
+        near = nearest_setup(task, step, **around) if law.name == "elqr" else None
+        return LoopAnswer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None), nearest=near)
+    result = method_of(law).sampled(fault, task, law, step, wanted)
+    slow = "" if wanted.gains else too_slow(task, most, max(step, setup.longest_step), delay)
+    if not slow or result.proved:
+        return result
+    return replace(result, found=NoGuarantee(reason=slow, small_gain=None))
+
+
+def _exact_texts(gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]") -> tuple[str, ...]:
     """Gains as exact texts.
 
     Raises
     ------
     ParameterError
+        For a gain that is not a finite number.
     """
-    given: list[Any] = list(gains)
-    row = (
-        list(given[0]) if len(given) == 1 and not isinstance(given[0], str) and hasattr(given[0], "__len__") else given
-    )
-    return tuple(exact_text(rational(value, f"gain k{place}")) for place, value in enumerate(row, start=1))
-
-
-def exact_surroundings(
-    *,
-    saturation: Quantity | None = None,
-    withdrawal: Quantity | None = None,
-    rate_limit: Quantity | None = None,
-    **around: Quantity,
-) -> dict[str, Any]:
-    """What is around a law as rationals in SI units, and the pump, None without limits.
-
-    Raises
-    ------
-    ParameterError
-        For another name, or a withdrawal without a largest pressure.
-    """
-    for name in around:
-        require_known(name, _UNITS, "part of what is around a law")
-    values: Any = {name: exact_value(given, _UNITS[name], name.replace("_", " ")) for name, given in around.items()}
-    averaging = values.pop("averaging_time", Fraction(0))
-    if averaging:
-        values |= {"averaging": averaging, "delay": values.get("delay", Fraction(0)) + max(averaging, Fraction(0)) / 2}
-    asked = {"saturation": (saturation, "Pa"), "withdrawal": (withdrawal, "Pa"), "rate_limit": (rate_limit, "Pa/s")}
-    told = {name: exact_value(given, unit, name) for name, (given, unit) in asked.items() if given is not None}
-    largest, rate = told.get("saturation"), told.get("rate_limit")
-    if largest is None and "withdrawal" in told:
-        raise ParameterError(
-            "a withdrawal belongs to a saturation, the largest pressure. Received it alone. Give both."
-        )
-    least = None if largest is None else -told.get("withdrawal", largest)
-    return {**values, "pump": Pump(least=least, largest=largest, rate=rate) if told else None}
-
-
-def question(
-    fault: Fault, *, step: Fraction | None, stress: Fraction | None, spread: Fraction, **asked: Any
-) -> Callable[[], LoopAnswer | SlidingAnswer]:
-    """What `guarantee` is asked, known to other processes; refuses what the friction of the fault has no use for.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if not fault.friction.state_names:
-        if stress is not None or spread:
-            raise ParameterError(
-                f"stress and spread need friction with a state. Received {fault.friction.name}. Leave them out."
-            )
-        return partial(answer, fault, step=step, **asked)
-    usual = {"gains": (), "scheme": None, "objective": OBJECTIVES[0], "disturbance_class": CLASSES[0]}
-    foreign = [name for name, value in asked.items() if name not in (*_SLOWLY, "controller", "measured") and value]
-    if [name for name in foreign if asked[name] != usual.get(name)]:
-        raise ParameterError(
-            "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
-            "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class, an initial slip "
-            "or slip rate, jitter or averaging. Leave them out."
-        )
-    taken: Any = {name: asked[name] for name in _SLOWLY if name in asked}
-    return partial(
-        answer_sliding, fault, controller=asked["controller"], step=step, stress=stress, spread=spread, **taken
-    )
+    values: list[Any] = list(gains)
+    if len(values) == 1 and not isinstance(values[0], str) and hasattr(values[0], "__len__"):
+        values = list(values[0])
+    return tuple(exact_text(rational(value, f"gain k{place}")) for place, value in enumerate(values, start=1))

@@ -17,7 +17,6 @@ from quakedesign.exact import to_sympy
 from quakedesign.fault import Fault
 from quakedesign.guarantees import (
     CLASSES,
-    MEASURED,
     OBJECTIVES,
     Compensation,
     ContinuousPeaks,
@@ -30,11 +29,11 @@ from quakedesign.guarantees import (
     best_guarantee,
     task_of,
 )
-from quakedesign.guarantees.exact.loop import Around
 from quakedesign.laws import Controller, SampledController, Signals, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.linear.robust_stability import sector_loop
 from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup
 from quakedesign.lyapunov import Certificate, Verdict, decided_once
 from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.fault_bounds import sectors
@@ -80,9 +79,7 @@ class GainProblem(Generic[Designed]):
     objective : str
     continuous : bool
     feedforward : FeedForward
-    measured : str
-    noise, path : Around
-        Bounds of what it is told wrongly; delay, lag and L²/D behind which it acts.
+    setup : LoopSetup
     sliding : SlowSlidingDesign
         Of friction with a state.
     disturbance_class : str
@@ -96,9 +93,7 @@ class GainProblem(Generic[Designed]):
     objective: str = OBJECTIVES[0]
     continuous: bool = False
     feedforward: FeedForward = NONE
-    measured: str = MEASURED[0]
-    noise: Around = field(default_factory=Around)
-    path: Around = field(default_factory=Around)
+    setup: LoopSetup = IDEAL
     sliding: SlowSlidingDesign = field(default_factory=SlowSlidingDesign)
     disturbance_class: str = CLASSES[0]
     tell: Callable[[str, float], None] = lambda what, done: None
@@ -115,16 +110,11 @@ class GainProblem(Generic[Designed]):
         ------
         ParameterError
         """
-        if self.continuous and (self.measured != MEASURED[0] or any(self.noise.values()) or self.behind):
+        if self.continuous and self.setup != IDEAL:
             raise ParameterError(
                 "a design in continuous time knows slip and slip rate exactly and acts at once. Received noise, the "
                 "slip alone, a delay, a lag or rock. Leave continuous out."
             )
-
-    @property
-    def behind(self) -> bool:
-        """Whether there is a delay, a lag or rock between law and fault."""
-        return any(self.path.values())
 
     def by_method(self, law: type[Controller]) -> Designed:
         """Gains by the method of the family that a law belongs to."""
@@ -156,8 +146,7 @@ class GainProblem(Generic[Designed]):
             "verdict": verdict,
             "domain": domain,
             "runs": runs,
-            "path": self.path,
-            **self.noise,
+            "setup": self.setup,
             **more,
         }
         found["disturbance_class"] = self.disturbance_class
@@ -167,7 +156,7 @@ class GainProblem(Generic[Designed]):
     def undecided(self, name: str, reason: str, runs: NoGuarantee | None = None, **more: Any) -> Designed:
         """Answer where no gains were found."""
         none: dict[str, Any] = {"controller": None, "certificate": None, "premises": (), "details": {"reason": reason}}
-        none |= {"disturbance_class": self.disturbance_class, "path": self.path}
+        none |= {"disturbance_class": self.disturbance_class, "setup": self.setup}
         return self.answer(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none, **more)
 
 
@@ -178,15 +167,14 @@ class Wanted:
     gains: tuple[str, ...] = ()
     objective: str = OBJECTIVES[0]
     scheme: str | None = None
-    measured: str = MEASURED[0]
-    around: Around = field(default_factory=Around)
+    setup: LoopSetup = IDEAL
 
     def require_all_measured(self) -> None:
         """Refuse a law that is told the slip alone where it needs the slip rate as well."""
-        if self.measured != MEASURED[0]:
+        if self.setup.measured != MEASURED[0]:
             raise ParameterError(
                 "measured is for a designed e-LQR, all other laws need slip and slip rate. "
-                f"Received {self.measured!r}. Leave it out, or the gains and the controller."
+                f"Received {self.setup.measured!r}. Leave it out, or the gains and the controller."
             )
 
 
@@ -251,8 +239,8 @@ class DesignMethod(Generic[L]):
         known = linear_about_a_reference(controller)
         return tuple(linear_premises(fault, controller, certificate)) if known else (), None
 
-    def guarantee(self, fault: Fault, task: Task, controller: L, noise: Around) -> Guarantee | NoGuarantee:
-        """What is proved of the law as it runs on a task of the fault, p held."""
+    def guarantee(self, fault: Fault, task: Task, controller: L, setup: LoopSetup) -> Guarantee | NoGuarantee:
+        """What is proved of the law as it runs on a task of the fault, with the noise of a loop setup."""
         return NoGuarantee(
             reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
         )
@@ -316,7 +304,7 @@ class Samples(DesignMethod[SampledController]):
 
     def assess(self, problem: GainProblem[Designed], controller: SampledController) -> Designed:
         """By the guarantee."""
-        return problem.judged(controller, runs=self.guarantee(problem.fault, problem.task, controller, problem.noise))
+        return problem.judged(controller, runs=self.guarantee(problem.fault, problem.task, controller, problem.setup))
 
     def premises(
         self, fault: Fault, controller: SampledController, certificate: Certificate | None
@@ -325,7 +313,8 @@ class Samples(DesignMethod[SampledController]):
         return (), None
 
     def guarantee(
-        self, fault: Fault, task: Task, controller: SampledController, noise: Around
+        self, fault: Fault, task: Task, controller: SampledController, setup: LoopSetup
     ) -> Guarantee | NoGuarantee:
-        """At its own T_s, behind its own delay, lag and rock."""
-        return best_guarantee(task, Held(law=controller.law, step=controller.step, **controller.sampling.path, **noise))
+        """At its own T_s, behind its own delay, lag and diffusion path."""
+        own, noise = controller.sampling.path, setup.noise
+        return best_guarantee(task, Held(law=controller.law, step=controller.step, **own, **noise))

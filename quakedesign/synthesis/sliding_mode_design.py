@@ -9,7 +9,6 @@ from quakedesign.errors import CertificateError, KinkError, ParameterError, Unsu
 from quakedesign.exact import rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees import (
-    MEASURED,
     Compensation,
     Guarantee,
     LoopAnswer,
@@ -19,11 +18,11 @@ from quakedesign.guarantees import (
     guarantee_of,
     sampled_sliding_mode,
 )
-from quakedesign.guarantees.exact.loop import Around
 from quakedesign.guarantees.search.compensated_search import GUARANTEED
 from quakedesign.guarantees.search.defaults import sliding_mode
 from quakedesign.laws import BaseGains, Controller, SlidingMode
 from quakedesign.laws.feed_forward import NONE, FeedForward
+from quakedesign.loop.loop_setup import MEASURED, LoopSetup
 from quakedesign.lyapunov import Certificate, Loop, loop_of
 from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.fault_bounds import Errors, coefficient_range, largest_matched_rate, least_authority
@@ -48,13 +47,13 @@ class SlidingModes(DesignMethod[SlidingMode]):
 
     def design(self, problem: GainProblem[Designed], law: type[SlidingMode]) -> Designed:
         """λ for what is guaranteed in the scheme ``compensated``, or for L̄ in continuous time."""
-        if problem.measured != MEASURED[0]:
+        if problem.setup.measured != MEASURED[0]:
             raise ParameterError(
-                f"a sliding mode needs slip and slip rate. Received {problem.measured!r} for {law.name}. Leave it out, "
-                "or design an e-LQR."
+                f"a sliding mode needs slip and slip rate. Received {problem.setup.measured!r} for {law.name}. "
+                "Leave it out, or design an e-LQR."
             )
         problem.require_exact_in_continuous_time()
-        if problem.behind:
+        if problem.setup.path:
             raise UnsupportedError(
                 f"sliding modes are designed for a pressure that acts at once. Received a delay, a lag or rock with "
                 f"{law.name}. Design an elqr; guarantee says what is proved of a sliding mode behind them."
@@ -93,9 +92,9 @@ class SlidingModes(DesignMethod[SlidingMode]):
         premises, domain = sliding_mode_premises(fault, controller, certificate)
         return tuple(premises), domain
 
-    def guarantee(self, fault: Fault, task: Task, controller: SlidingMode, noise: Around) -> Guarantee | NoGuarantee:
+    def guarantee(self, fault: Fault, task: Task, controller: SlidingMode, setup: LoopSetup) -> Guarantee | NoGuarantee:
         """In the scheme ``compensated``, and in no other."""
-        return guarantee_of(task, controller, **noise)
+        return guarantee_of(task, controller, **setup.noise)
 
     def compensation(self, controller: SlidingMode, found: Guarantee | NoGuarantee) -> Compensation:
         """With the weight and the authority of its scheme."""
@@ -109,7 +108,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         """In a scheme, with given base gains or the first ones known."""
         wanted.require_all_measured()
         options: Any = {"gains": wanted.gains, "scheme": wanted.scheme or GUARANTEED, "objective": wanted.objective}
-        made = sliding_mode(task, law, step, **options, **wanted.around)
+        made = sliding_mode(task, law, step, **options, **wanted.setup.around())
         if isinstance(made, NoGuarantee):
             return LoopAnswer(fault=fault, found=made)
         return replace(attacked(fault, made.found), compensation=made)
@@ -133,7 +132,7 @@ def _compensated(
     fault = problem.fault
     law = base.law.with_divisor(least_authority(fault))
     step = rational(fault.sampling_time)
-    made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, **problem.noise)
+    made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, **problem.setup.noise)
     if found.runs is None:
         none = NoGuarantee(reason=f"run in the scheme compensated, {found.reason}", small_gain=None)
         return _scaled(problem, base, certificate, runs=none)

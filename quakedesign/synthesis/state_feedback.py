@@ -9,7 +9,6 @@ from quakedesign.exact import rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees import (
     CLASSES,
-    MEASURED,
     OBJECTIVES,
     ContinuousPeaks,
     Guarantee,
@@ -24,7 +23,6 @@ from quakedesign.guarantees import (
     sampled_design,
 )
 from quakedesign.guarantees.exact.impossibility import hopeless
-from quakedesign.guarantees.exact.loop import Around
 from quakedesign.guarantees.guarantee_result import GAINS, answer_sliding
 from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
@@ -35,6 +33,7 @@ from quakedesign.linear.linear_problem import FeedbackLoop, LinearProblem, Matri
 from quakedesign.linear.riccati import RiccatiDesign, riccati_design
 from quakedesign.linear.robust_stability import finished_exactly, robust_stability, sector_loop, why_undecided
 from quakedesign.linear.sampled_stability import HeldLoop, held_loop
+from quakedesign.loop.loop_setup import MEASURED, LoopSetup
 from quakedesign.loop.sensing.differentiator import told_by_differences
 from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.fault_bounds import sectors
@@ -67,10 +66,10 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         loop = sector_loop(controller, sectors(problem.fault))
         return _judged(problem, controller, quadratic_certificate(loop), {})
 
-    def guarantee(self, fault: Fault, task: Task, controller: ExtendedLQR, noise: Around) -> Guarantee | NoGuarantee:
+    def guarantee(self, fault: Fault, task: Task, controller: ExtendedLQR, setup: LoopSetup) -> Guarantee | NoGuarantee:
         """With integrals summed over the T_s of the fault."""
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
-            return super().guarantee(fault, task, controller, noise)
+            return super().guarantee(fault, task, controller, setup)
         step = rational(fault.sampling_time)
         return best_guarantee(task, Held(law=summed_integrals(tuple(controller.gains.values()), step), step=step))
 
@@ -86,26 +85,27 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
 
     def sampled(self, fault: Fault, task: Task, law: type[ExtendedLQR], step: Fraction, wanted: Wanted) -> LoopAnswer:
         """Integrals of given gains are summed; without gains, a law with an estimate of the disturbance."""
-        differs = wanted.measured == MEASURED[2]
+        setup, differs = wanted.setup, wanted.setup.measured == MEASURED[2]
         if wanted.gains and not differs:
             wanted.require_all_measured()
         if wanted.scheme not in (None, "explicit"):
             raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {wanted.scheme!r}. Leave it out.")
+        around: Any = setup.around()
         if wanted.gains:
             summed = summed_integrals(_four(wanted.gains), step)
-            if differs and (reason := why_no_law(step, wanted.measured, wanted.around)):
+            if differs and (reason := why_no_law(step, setup.measured, around)):
                 return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
             summed = told_by_differences(summed, step) if differs else summed
-            given = best_guarantee(task, Held(law=summed, step=step, **wanted.around))
+            given = best_guarantee(task, Held(law=summed, step=step, **around))
             if isinstance(given, Guarantee):
                 return attacked(fault, given)
             other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
             if isinstance(other.found, Guarantee):
                 return LoopAnswer(fault=fault, found=given, nearest=(GAINS, other.found))
             return replace(other, found=given)
-        told: Any = {"measured": wanted.measured, **wanted.around}
+        told: Any = {"measured": setup.measured, **around}
         found = design_held(task, step, objective=wanted.objective, **told)
-        if isinstance(found, Guarantee) or wanted.around.get("longest_step"):
+        if isinstance(found, Guarantee) or setup.longest_step:
             return attacked(fault, found)
         longest = longest_step(task, **told)
         if (again := continued(task, step, longest, **told)) is not None:
@@ -123,13 +123,12 @@ def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
 
 def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
     fault = problem.fault
-    step, measured = rational(fault.sampling_time), problem.measured
-    task, path, stress = problem.task, problem.path, rational(fault.effective_normal_stress)
-    zero = Fraction(0)
-    if beyond := hopeless(task, stress, path.get("delay", zero), path.get("diffusion", zero)):
+    step, task, setup = rational(fault.sampling_time), problem.task, problem.setup
+    around: Any = setup.around()
+    most = rational(fault.effective_normal_stress)
+    if beyond := hopeless(task, most, around.get("delay", Fraction(0)), setup.diffusion):
         return problem.undecided(law.name, beyond, NoGuarantee(reason=beyond, small_gain=None))
-    told: Any = {**problem.noise, **path}
-    found = sampled_design(task, step, problem.objective, measured=measured, **told)
+    found = sampled_design(task, step, problem.objective, measured=setup.measured, **around)
     if found.runs is None:
         return problem.undecided(law.name, found.reason)
     runs, held = found.runs, found.runs.held
@@ -137,7 +136,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
         "objective": problem.objective,
         "step": str(held.step),
         "reason": found.reason or None,
-        "measured": measured,
+        "measured": setup.measured,
         **{name: str(value) for name, value in (*held.noise.items(), *held.path.items()) if value},
     }
     return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=found.premises())
@@ -146,7 +145,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
 def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
     """A law of the slip alone that holds slow sliding along the task."""
     usual = OBJECTIVES[0], CLASSES[0]
-    if problem.continuous or (problem.objective, problem.disturbance_class) != usual or any(problem.noise.values()):
+    if problem.continuous or (problem.objective, problem.disturbance_class) != usual or problem.setup.noise:
         raise ParameterError(
             "a law for friction with a state is designed as it runs, told the slip as it is, with the objective "
             f"{OBJECTIVES[0]}, for any stress of an amplitude. Received continuous, noise, another objective or class "

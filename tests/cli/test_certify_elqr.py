@@ -11,6 +11,7 @@ import pytest
 
 from quakedesign.cli import main
 from quakedesign.cli.design_commands import DesignOptions
+from quakedesign.loop.loop_setup import LoopSetup
 
 SLOW = ("230909365.4", "327662.0266", "39426629850", "2484414953000")
 
@@ -83,8 +84,7 @@ def test_of_the_slip_alone_the_laws_that_need_more_are_left_out_and_noise_is_for
     asked = DesignOptions(measured="slip", slip_noise="1/1000000").asked("lab-fault")[1]
     assert asked["names"] == ["elqr"]
     assert DesignOptions().asked("lab-fault")[1]["names"] == ["cta", "dia", "elqr"]
-    told = {name: asked["options"][name] for name in ("measured", "slip_noise", "rate_noise")}
-    assert told == {"measured": "slip", "slip_noise": "1/1000000", "rate_noise": "0"}
+    assert asked["options"]["setup"] == LoopSetup(measured="slip", slip_noise="1 um")
 
 
 def test_an_objective_is_refused_in_continuous_time(capsys, tmp_path):

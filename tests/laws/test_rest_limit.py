@@ -8,6 +8,7 @@ import control
 import numpy as np
 import pytest
 
+import quakedesign as qd
 from quakedesign import simulate
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
@@ -30,7 +31,6 @@ from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.simulation import Variation, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
-from quakedesign.synthesis import answer
 
 REAL, STEP, GAIN = load_fault("real-fault"), F("0.184"), F("2.282e-8")
 GAINS = F(672300000), F(206000000)
@@ -363,7 +363,7 @@ BEHIND = {
 def test_behind_a_lag_and_rock_a_fault_that_sticks_does_not_wind_up(name):
     """Ahead of its reference the fault rests, and without the limit the pressure falls on. One that moves is free."""
     step, around, stages, substeps = BEHIND[name]
-    found = answer(REAL, step=step, **around).found
+    found = qd.guarantee(REAL, step=step, **around).found
     told = {"actuator": Actuator(stages=stages), "substeps": substeps, "duration": 4000.0, "samples": 500}
     free = replace(found.controller, rest_limit=None)
     runs = {
@@ -381,7 +381,7 @@ def test_behind_a_lag_and_rock_a_fault_that_sticks_does_not_wind_up(name):
 
 def test_the_compensated_step_is_told_what_is_applied():
     """Deadbeat, p = (−e1/T_s − e2)/(T_sB0) − d, d ← d + a[(e2 − e2⁻)/(T_sB0) − p⁻ − d] with the p⁻ that was applied."""
-    made = answer(REAL, controller="cta").compensation
+    made = qd.guarantee(REAL, controller="cta").compensation
     weight, authority, per_slip = float(made.weight), float(made.authority), float(made.found.rest_limit.per_slip)
     assert dict(made.limited.sampling.settings)["rest_width"] == made.found.rest_limit.width
     law, gain = replace(made.controller, sampling=None), 0.184 * authority

@@ -148,9 +148,9 @@ def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
     assert 1.36 < noisy.impossible_beyond / least.impossible_beyond < 1.37
     assert noisy.holds_for.endswith("told up to the sample no more than the slip within 1 µm")
     assert found.largest_step == plain.largest_step  # even for those who know everything
-    told = {"measured": "slip", "slip_noise": F(1, 10**6), "rate_noise": F(0)}
+    told = {"measured": "slip", "slip_noise": F(1, 10**6)}
     assert told in designs[2]
-    assert {"measured": "slip-and-rate", "slip_noise": F(0), "rate_noise": F(0)} in designs[2]
+    assert {"measured": "slip-and-rate"} in designs[2]
     assert {key: found.to_dict()[key] for key in told} == {key: str(value) for key, value in told.items()}
     assert "slip-rate error: told no more than the slip within 1 µm up to" in " ".join(limits_lines(found))
     assert found.smallest_peaks()[0][1] > 2 * found.smallest_peaks(told=False)[0][1]
@@ -170,7 +170,7 @@ def test_noise_of_both_is_told_and_that_of_one_hides_nothing(designs):
 @pytest.mark.parametrize(
     ("told", "said"),
     [
-        ({"slip_noise": -1}, "a bound of noise must be 0 or more"),
+        ({"slip_noise": -1}, "slip noise must be 0 or more"),
         ({"measured": "slip", "rate_noise": 1}, "noise of the slip rate needs one that is measured"),
         ({"measured": "rate"}, "measured must be one of"),
     ],

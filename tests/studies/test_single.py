@@ -13,6 +13,7 @@ from quakedesign.guarantees import Guarantee, NoGuarantee
 from quakedesign.laws import published
 from quakedesign.laws.feed_forward import feed_forward
 from quakedesign.loop import Actuator, Lag, simulation_scheme
+from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.loop.sensing import Measurement
 from quakedesign.simulation import Load, simulate
 from quakedesign.studies import runs as single
@@ -154,11 +155,11 @@ def designs_in_place_of_searches(monkeypatch, found):
     """What is asked of searches, which answer at once."""
     asked = []
 
-    def answered(fault, *names, controller=None, continuous=False, **around):
-        asked.append((fault.sampling_time, *names, controller, around))
+    def answered(fault, name, setup=LoopSetup(), continuous=False):  # noqa: B008
+        asked.append((fault.sampling_time, name, setup))
         return found
 
-    monkeypatch.setattr(single, "answer", answered)
+    monkeypatch.setattr(single, "guarantee", answered)
     monkeypatch.setattr(single, "design", answered)
     return asked
 
@@ -168,7 +169,7 @@ def test_a_design_is_for_what_stands_around_it_in_the_run(monkeypatch):
     proved = SimpleNamespace(found=Mock(spec=Guarantee, controller=law), compensation=None)
     asked = designs_in_place_of_searches(monkeypatch, proved)
     assert choice(LAB, "elqr", ("designed",), path={"lag": 0.02, "delay": 0.05}, step=0.025).controller is law
-    assert asked == [(0.025, "elqr", {"lag": F(1, 50), "delay": F(1, 20)})]
+    assert asked == [(0.025, "elqr", LoopSetup(lag=F(1, 50), delay=F(1, 20)))]
     with pytest.raises(ParameterError, match="delay must be 0 to 100 sampling periods"):
         choice(LAB, "elqr", ("designed",), path={"delay": 3.0}, step=0.025)
     assert len(asked) == 1

@@ -6,8 +6,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError, UnitError
-from quakedesign.synthesis import answer
-from quakedesign.synthesis.guarantee import exact_surroundings
+from quakedesign.loop.loop_setup import LoopSetup
 
 REAL = qd.load_fault("real-fault")
 GAINS = ("6.96e8", "2.53e8", "6.02e8", "2.16e8")
@@ -20,7 +19,8 @@ def test_texts_with_units_are_the_exact_numbers_of_an_answer():
     assert (held.step, held.lag, held.slip_noise, held.rate_noise) == (F(1, 10), F(1, 125), F(1, 10**7), F(1, 10**7))
     assert (held.pump.least, held.pump.largest) == (-15 * 10**6, 20 * 10**6)
     same = {"step": held.step, "lag": held.lag, "slip_noise": held.slip_noise, "rate_noise": held.rate_noise}
-    assert answer(REAL, gains=GAINS, pump=held.pump, **same).found == found
+    setup = LoopSetup(saturation=2 * 10**7, withdrawal=F(15 * 10**6), **same)
+    assert qd.guarantee(REAL, "elqr", setup, gains=GAINS).found == found
 
 
 @pytest.mark.parametrize(
@@ -28,8 +28,8 @@ def test_texts_with_units_are_the_exact_numbers_of_an_answer():
     [
         ({"lag": "8 MPa"}, UnitError, "lag must be a quantity in s"),
         ({"slip_noise": "two um"}, UnitError, "slip noise must be a quantity in m"),
-        ({"latency": "8 ms"}, ParameterError, "part of what is around a law must be"),
-        ({"withdrawal": "1 MPa"}, ParameterError, "a withdrawal belongs to a saturation"),
+        ({"latency": "8 ms"}, ParameterError, "quantity of the loop setup must be"),
+        ({"withdrawal": "1 MPa"}, ParameterError, "withdrawal needs saturation"),
         ({"stress": "25 kPa"}, ParameterError, "stress and spread need friction with a state"),
         ({"spread": 0.1}, ParameterError, "stress and spread need friction with a state"),
     ],
@@ -48,6 +48,6 @@ def test_slow_sliding_refuses_what_it_has_no_use_for(more):
 
 
 def test_a_pump_withdraws_as_much_as_it_injects_unless_told():
-    assert exact_surroundings() == {"pump": None}
-    pump = exact_surroundings(saturation="3/2")["pump"]
+    assert LoopSetup().pump is None
+    pump = LoopSetup(saturation="3/2").pump
     assert (pump.least, pump.largest) == (-F(3, 2), F(3, 2))

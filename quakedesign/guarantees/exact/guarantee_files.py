@@ -12,7 +12,7 @@ from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound, exact_text
 from quakedesign.files import write_whole
 from quakedesign.guarantees.exact.invariant_set import MOST_FACETS, MOST_PIECES, InvariantPolytope, require_fit
-from quakedesign.guarantees.exact.loop import Held, Pump
+from quakedesign.guarantees.exact.loop import Held
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
 from quakedesign.guarantees.exact.sliding_task import AXES, MOST_CELLS, Cuts, SlidingTask, cells
 from quakedesign.guarantees.exact.small_gain import SlowGain
@@ -21,6 +21,7 @@ from quakedesign.guarantees.exact.task import Friction, Task
 from quakedesign.laws import ImplicitRoot, LinearLaw, Power
 from quakedesign.laws.implicit_root import MOST_TERMS
 from quakedesign.loop import ContinuousLaw
+from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.certificate_files import GUARANTEE, SLOW_SLIDING, kind_of, read_json
 from quakedesign.sos.exact.strict import (
     headed,

@@ -31,9 +31,9 @@ from quakedesign.guarantees.search.linear_design import (
     reached_step,
     tightened,
 )
-from quakedesign.guarantees.search.lqg import MEASURED
 from quakedesign.laws import SlidingMode
 from quakedesign.loop import schemes
+from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.lyapunov.exact.premises import Premise
 
 # ----------------------------------------------------------------------

@@ -21,7 +21,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.fault_data import task_of
-from quakedesign.guarantees.exact.loop import Around, Held, Pump
+from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, SlowGain
 from quakedesign.guarantees.exact.statement import ContinuousPeaks, Guarantee, above, continuous_peaks, guarantee
 from quakedesign.guarantees.exact.task import Task
@@ -35,7 +35,6 @@ from quakedesign.guarantees.search.estimate import (
     spectral_radius,
 )
 from quakedesign.guarantees.search.lqg import (
-    MEASURED,
     LawFamily,
     family_of,
     measured_by,
@@ -45,6 +44,7 @@ from quakedesign.guarantees.search.lqg import (
 from quakedesign.guarantees.search.unclocked import unclocked_estimate, unclocked_guarantee
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.loop import PeriodicLoop, exact_integrals
+from quakedesign.loop.loop_setup import MEASURED, Pump
 from quakedesign.lyapunov.exact.claim import Verdict
 
 # ----------------------------------------------------------------------

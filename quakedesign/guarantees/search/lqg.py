@@ -36,6 +36,7 @@ from quakedesign.laws import (
 from quakedesign.laws.sampled_law import Row
 from quakedesign.loop import SHORTEST, Layer, SlidingModel
 from quakedesign.loop.layer import MODES
+from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.loop.sensing.differentiator import ORDER, names_before, told_by_differences
 from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_rate
 
@@ -139,7 +140,6 @@ def _sampled(model: NominalModel, step: Fraction, around: Around, modes: int) ->
 # ----------------------------------------------------------------------
 # Laws of a few numbers without units for one model, T_s and delay, among which searches choose.
 
-MEASURED = ("slip-and-rate", "slip", "differentiator")
 _STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
 _NOT_BY_DIFFERENCES = ("diffusion", "lag", "initial_slip", "initial_slip_rate", "jitter", "averaging")
 _GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same where the slip rate is told late

@@ -19,7 +19,6 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import Held, continuous_peaks, guarantee, task_of
 from quakedesign.guarantees.exact import task as package_task
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, save_guarantee
-from quakedesign.guarantees.exact.loop import Pump
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import (
     ErrorPrediction,
@@ -32,6 +31,7 @@ from quakedesign.laws import (
     summed_integrals,
 )
 from quakedesign.loop import exact_integrals
+from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"

@@ -19,9 +19,10 @@ from quakedesign.guarantees import NoGuarantee, guarantee
 from quakedesign.guarantees.exact import invariant_set as reach
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.invariant_set import _SampleMap, reduced
-from quakedesign.guarantees.exact.loop import Pump, channels_of
+from quakedesign.guarantees.exact.loop import channels_of
 from quakedesign.guarantees.exact.norms import matrix
 from quakedesign.guarantees.exact.small_gain import SlowGain
+from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"

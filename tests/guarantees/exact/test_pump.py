@@ -11,8 +11,8 @@ from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import NoGuarantee, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
-from quakedesign.guarantees.exact.loop import Pump
 from quakedesign.guarantees.search.lqg import family_of
+from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
 
 STORED = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_real-fault.json"

@@ -28,10 +28,10 @@ from quakedesign.guarantees import (
 )
 from quakedesign.guarantees.exact import sliding_small_gain as small_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
-from quakedesign.guarantees.exact.loop import Pump
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import SlidingModel, sliding_loop
+from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov import Verdict
 
 PROOFS = Path(__file__).parents[3] / "proofs"

@@ -11,10 +11,10 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, Claims, Guarantee, Held, NoGuarantee, guarantee, task_of
 from quakedesign.guarantees.exact import statement
 from quakedesign.guarantees.exact import statement as continuous
-from quakedesign.guarantees.exact.loop import Pump
 from quakedesign.guarantees.exact.statement import above, sentence_of
 from quakedesign.laws import ImplicitRoot, LinearLaw, Power, compensated, summed_integrals
 from quakedesign.loop import ContinuousLaw, Instants
+from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
 
 TASK = task_of(load_fault("real-fault"))

@@ -11,9 +11,9 @@ import pytest
 
 from quakedesign.guarantees import NoGuarantee, guarantee, worst_found
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.loop import Pump
 from quakedesign.guarantees.search.adversary import _events, _on_time
 from quakedesign.guarantees.search.estimate import estimated
+from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))

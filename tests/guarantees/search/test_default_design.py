@@ -20,7 +20,7 @@ from quakedesign.report import page
 from quakedesign.report import page as account
 from quakedesign.report import sentences as headlines
 from quakedesign.report.sentences import grade
-from quakedesign.synthesis import answer, assess
+from quakedesign.synthesis import assess
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
 SLOW = load_fault(Path(__file__).parents[2] / "data" / "undersampled_fault.toml")
@@ -65,7 +65,7 @@ def test_a_law_has_one_bound_however_it_is_asked_for(monkeypatch):
     assert found.slow_gain is not None
     assert found.claims.slip_rate_error < guarantee(found.task, found.held).claims.slip_rate_error * F(3, 4)
     monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_found", lambda *_, **__: None)
-    assert answer(REAL).found == assess(REAL, designed("real").controller).guarantee == found
+    assert qd.guarantee(REAL).found == assess(REAL, designed("real").controller).guarantee == found
 
 
 def test_both_objectives_are_what_they_are_called(unreached):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Guarantee, LoopAnswer, NoGuarantee, design_held, guarantee, task_of, worst_found
@@ -18,7 +19,7 @@ from quakedesign.guarantees.search.linear_design import _with_noise, closest
 from quakedesign.laws import published
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.synthesis import Design, answer, state_feedback
+from quakedesign.synthesis import Design, state_feedback
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -263,10 +264,10 @@ def test_the_first_words_are_that_nothing_is_guaranteed_at_the_step_that_was_ask
     monkeypatch.setattr(state_feedback, "design_at", lambda *_: shorter)
     for search in ("continued", "nearest_setup"):
         monkeypatch.setattr(state_feedback, search, lambda *_, **__: None)
-    found = answer(load_fault("real-fault"), step=F("0.5"))
+    found = qd.guarantee(load_fault("real-fault"), step=F("0.5"))
     assert not found.proved
     assert found.lines()[:2] == [
         "not guaranteed at T_s = 0.5 s: small gain 2", f"with T_s = 0.184 s: {shorter.sentence()}"
     ]  # fmt: skip
     monkeypatch.setattr(state_feedback, "longest_step", lambda *_, **__: None)
-    assert answer(load_fault("real-fault"), step=F("0.5")).lines()[0] == "none: small gain 2"
+    assert qd.guarantee(load_fault("real-fault"), step=F("0.5")).lines()[0] == "none: small gain 2"

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import quakedesign as qd
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Guarantee, NoGuarantee, design_held, guarantee, task_of
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.loop import Pump
 from quakedesign.guarantees.search import linear_design as longest_times
 from quakedesign.guarantees.search.linear_design import (
     Closest,
@@ -21,8 +21,8 @@ from quakedesign.guarantees.search.linear_design import (
     nearest_setup,
     with_lowest_rate,
 )
+from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov import Verdict
-from quakedesign.synthesis import answer
 
 REAL = load_fault("real-fault")
 LAGGING = Path(__file__).parents[2] / "data" / "lagging_fault.toml"
@@ -145,8 +145,8 @@ def test_a_design_that_is_missed_at_its_step_is_continued_from_a_longer_one(task
 def test_every_command_proves_what_the_longest_step_says(task, longest):
     step = F("0.9")
     assert isinstance(design_held(task, step), NoGuarantee)  # by itself it is missed
-    assert answer(REAL, step=step).proved
-    none = answer(REAL, step=F(3))
+    assert qd.guarantee(REAL, step=step).proved
+    none = qd.guarantee(REAL, step=F(3))
     assert not none.proved
     assert none.shorter.held.step == longest.guarantee.held.step
     assert f"with T_s = {float(longest.guarantee.held.step):g} s" in none.lines()[1]
@@ -163,7 +163,7 @@ def test_behind_a_lag_with_noise_what_was_proved_at_0_22_s_is_found():
 @pytest.mark.slow
 def test_the_rate_of_a_pump_that_would_do_is_named():
     setup = {"measured": "slip", "lag": F("0.3"), "slip_noise": F(5, 10**6), "pump": Pump(rate=F(2 * 10**6))}
-    found = answer(load_fault(LAGGING), step=F("0.2"), **setup)
+    found = qd.guarantee(load_fault(LAGGING), step=F("0.2"), **setup)
     name, near = found.nearest
     assert (found.proved, name) == (False, "rate_limit")
     assert near.check() is Verdict.PROVED

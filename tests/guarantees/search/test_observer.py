@@ -14,10 +14,10 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Guarantee, NoGuarantee, best_guarantee, design_held, guarantee, task_of, worst_found
 from quakedesign.guarantees.search.linear_design import Longest, closest, design_at
+from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.studies import comparison
-from quakedesign.synthesis import answer
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -127,7 +127,7 @@ def test_more_noise_is_guaranteed_less():
 )
 def test_what_cannot_be_measured_so_is_refused(wrong, said):
     with pytest.raises(ParameterError, match=said):
-        answer(REAL, **wrong)
+        qd.guarantee(REAL, **wrong)
 
 
 MODULE = "quakedesign.guarantees.search.defaults"
@@ -145,8 +145,7 @@ def asked(monkeypatch):
 
 def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for(asked, monkeypatch):
     design = qd.design(REAL, "elqr", measured="slip", slip_noise="1e-6")
-    claim, told = design.guarantee, {"measured": "slip", "slip_noise": NOISE, "rate_noise": 0}
-    told |= {"delay": 0, "lag": 0, "diffusion": 0}
+    claim, told = design.guarantee, {"measured": "slip", "slip_noise": NOISE}
     assert asked["design_held"] == told | {"objective": "tracking"}
     assert (asked["longest_step"], asked["longest_delay"]) == (told, told)
     assert (design.verdict, claim) == (Verdict.PROVED, designed("slip alone"))
@@ -154,7 +153,7 @@ def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for(asked
     ran = []
     monkeypatch.setattr(comparison, "simulate", lambda *_, measurement, **__: ran.append(measurement))
     comparison._entry("designed", design, {"designed": "explicit"}, lambda *_: None)
-    comparison._entry("designed", replace(design, slip_noise=F(0)), {"designed": "explicit"}, lambda *_: None)
+    comparison._entry("designed", replace(design, setup=LoopSetup()), {"designed": "explicit"}, lambda *_: None)
     assert ran == [Measurement(slip_noise=1e-6, bounded=True), None]
 
 

@@ -1,0 +1,303 @@
+"""Loop setup: everything between a control law and the fault, stated once.
+
+`LoopSetup` is read by the guarantee, the simulation, the command line and the documentation: each field carries its
+unit, its help text and its JSON key.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Self
+
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.exact import LowerBound, UpperBound, shortly
+from quakedesign.fault.units import exact_value
+
+Quantity = str | float | Fraction
+"""Number in the SI unit, decimal or p/q as text, or a text with a unit such as ``"80 ms"``."""
+
+MEASURED = ("slip-and-rate", "slip", "differentiator")
+"""What a law measures; `differentiator` estimates the slip rate from the slip."""
+
+
+# ----------------------------------------------------------------------
+# The pump at the valve.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pump:
+    """Limits of the pressure at the valve; None where there are none.
+
+    Attributes
+    ----------
+    least, largest : Fraction, optional
+        [Pa]; 0, the initial pressure, lies between them. Both or none.
+    rate : Fraction, optional
+        Rate limit of the pressure [Pa/s].
+
+    Raises
+    ------
+    ParameterError
+        For limits that exclude 0, or a rate that is not positive.
+    """
+
+    least: Fraction | None = None
+    largest: Fraction | None = None
+    rate: Fraction | None = None
+
+    def __post_init__(self) -> None:
+        low, high = self.least or Fraction(0), self.largest or Fraction(0)
+        alone = (self.least is None) != (self.largest is None)
+        if alone or not low <= 0 <= high or (self.least is not None and low == high):
+            raise ParameterError(
+                "the least and the largest pressure of a pump must have 0 between them. Received "
+                f"{shortly(low)} Pa and {shortly(high)} Pa. Change their signs."
+            )
+        if self.rate is not None and self.rate <= 0:
+            raise ParameterError(
+                f"the rate limit of a pump must be positive. Received {shortly(self.rate)} Pa/s. Omit it for none."
+            )
+
+    @property
+    def limits(self) -> tuple[Fraction, Fraction] | None:
+        """Least and largest pressure [Pa]."""
+        return None if self.least is None or self.largest is None else (self.least, self.largest)
+
+    def exceeded(self, low: LowerBound, high: UpperBound) -> str:
+        """Why pressures between two bounds exceed the limits; empty where they do not."""
+        if self.limits is None or (self.limits[0] <= low and high <= self.limits[1]):
+            return ""
+        return (
+            f"pressures from {low.quantity('Pa')} to {high.quantity('Pa')} may be asked for, which a pump of "
+            f"{self._range()} cannot all hold"
+        )
+
+    def too_slow(self, step: UpperBound | None, time: Fraction) -> str:
+        """Why a change of the pressure may take longer than a time [s]; empty where it does not."""
+        if self.rate is None or (step is not None and step <= self.rate * time):
+            return ""
+        most = "of any size" if step is None else f"of {step.quantity('Pa')}"
+        return (
+            f"changes {most} from one sample to the next may be asked for, which a pump of "
+            f"{LowerBound(self.rate).quantity('Pa/s')} does not make in {LowerBound(time).quantity('s')}"
+        )
+
+    def to_dict(self) -> dict[str, str]:
+        """Exact numbers as texts."""
+        given = {part.name: getattr(self, part.name) for part in fields(self)}
+        return {name: str(value) for name, value in given.items() if value is not None}
+
+    def words(self) -> str:
+        """Sentence part for people."""
+        of = [] if self.limits is None else [self._range()]
+        of += [] if self.rate is None else [LowerBound(self.rate).quantity("Pa/s")]
+        return f"with a pump of {', '.join(of)}, whose limits are never reached"
+
+    def _range(self) -> str:
+        """Limits, rounded inward."""
+        assert self.limits is not None
+        low, high = self.limits
+        return f"{UpperBound(low).quantity('Pa')} to {LowerBound(high).quantity('Pa')}"
+
+
+# ----------------------------------------------------------------------
+# The setup: one field a quantity.
+
+
+def quantity(unit: str, text: str, default: Fraction | None = Fraction(0)) -> Any:
+    """Field of a quantity with its SI unit and its help text."""
+    return field(default=default, metadata={"unit": unit, "help": text})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopSetup:
+    """What lies between a control law and the fault: sampling, delay, actuator, diffusion path, noise, initial errors.
+
+    Every field is given as a number in the SI unit, a decimal or p/q as text, or a text with a unit, such as
+    ``LoopSetup(step="184 ms", slip_noise="5 um")``, and is held as a `Fraction` in the SI unit. None means: not given.
+
+    Attributes
+    ----------
+    step : Fraction or None
+        T_s [s].
+    measured : str
+        One of `MEASURED`.
+    delay, lag, diffusion : Fraction
+        Delay, time constant of the actuator, and L²/D of the diffusion path [s].
+    slip_noise, rate_noise : Fraction
+        Bounds of the measurement errors of slip [m] and slip rate [m/s].
+    initial_slip, initial_slip_rate : Fraction
+        Bounds of the initial errors, of either sign [m], [m/s].
+    jitter, delay_jitter, averaging_time, longest_step : Fraction
+        Timing of measurements and samples [s].
+    saturation, withdrawal : Fraction or None
+        Limits of the pressure at the valve [Pa].
+    rate_limit : Fraction or None
+        [Pa/s].
+
+    Raises
+    ------
+    ParameterError
+        For a negative quantity, a step that is not positive, another `measured`, or a withdrawal without a saturation.
+    UnitError
+        For a unit that is unknown or of another dimension.
+    """
+
+    step: Fraction | None = quantity(
+        "s",
+        "Sampling time T_s, such as '184 ms' or 7/50 (s); the fault's unless given.",
+        None,
+    )
+    measured: str = MEASURED[0]
+    delay: Fraction = quantity("s", "From the measurement to the pressure at the valve.")
+    lag: Fraction = quantity(
+        "s",
+        "Time constant between the valve and the fault, or the well where there is a diffusion path; a designed "
+        "e-LQR has a model of it.",
+    )
+    diffusion: Fraction = quantity(
+        "s",
+        "L^2/D of the diffusion path between well and fault; a designed e-LQR has a model of it.",
+    )
+    slip_noise: Fraction = quantity(
+        "m",
+        "Bound of the measurement error of the slip at any time, such as '1 um'; q/2 for readings in steps of q. "
+        "--slip-noise-deviation of simulate is a standard deviation.",
+    )
+    rate_noise: Fraction = quantity("m/s", "The same of the slip rate.")
+    initial_slip: Fraction = quantity(
+        "m",
+        "Bound of the initial slip, of either sign, such as '0.01 mm'; the law starts as from rest.",
+    )
+    initial_slip_rate: Fraction = quantity(
+        "m/s",
+        "The same of the slip rate, such as '0.1 mm/s'. Negative slip rates are those of the plant without stick.",
+    )
+    jitter: Fraction = quantity(
+        "s",
+        "Largest time by which a measurement, and its pressure, is early or late, such as '2 ms'.",
+    )
+    delay_jitter: Fraction = quantity("s", "The same of the delay alone.")
+    averaging_time: Fraction = quantity(
+        "s",
+        "The law measures means of slip and slip rate over this time, up to each sample; the delay starts at its end.",
+    )
+    longest_step: Fraction = quantity(
+        "s",
+        "Aperiodic sampling: each sample comes T_s to this after the one before; the law does not know when.",
+    )
+    saturation: Fraction | None = quantity(
+        "Pa",
+        "Largest pressure of the pump, such as '20 MPa', and largest withdrawal unless that is given. A proof shows "
+        "that these limits are never reached.",
+        None,
+    )
+    withdrawal: Fraction | None = quantity(
+        "Pa",
+        "Largest decrease of the pressure; 0 for a pump that only injects.",
+        None,
+    )
+    rate_limit: Fraction | None = quantity(
+        "Pa/s",
+        "Rate limit of the pressure at the valve, such as '10 MPa/s'. A proof includes the time that a change "
+        "takes, and shows that it ends before the next sample.",
+        None,
+    )
+
+    if TYPE_CHECKING:
+
+        def __init__(self, *, measured: str = "slip-and-rate", **quantities: Quantity | None) -> None: ...
+
+    def __post_init__(self) -> None:
+        require_known(self.measured, MEASURED, "measured")
+        for name, part in quantities().items():
+            value, title = getattr(self, name), name.replace("_", " ")
+            if value is None:
+                continue
+            exact = exact_value(value, part["unit"], title)
+            if exact < 0:
+                raise ParameterError(
+                    f"{title} must be 0 or more. Received {shortly(exact)} {part['unit']}. Omit the sign."
+                )
+            object.__setattr__(self, name, exact)
+        if self.step is not None and not Fraction(1, 10**9) <= self.step <= 10**9:
+            raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(self.step):.4g} s.")
+        if self.withdrawal is not None and self.saturation is None:
+            raise ParameterError(
+                "withdrawal needs saturation, the largest pressure of the pump. Received withdrawal alone. Give both."
+            )
+        _ = self.pump  # refuse limits that no pump has
+
+    @property
+    def pump(self) -> Pump | None:
+        """Limits of the pump; None without any."""
+        if self.saturation is None and self.rate_limit is None:
+            return None
+        lowest = None if self.saturation is None else -(self.saturation if self.withdrawal is None else self.withdrawal)
+        return Pump(least=lowest, largest=self.saturation, rate=self.rate_limit)
+
+    @property
+    def path(self) -> dict[str, Any]:
+        """Delay, lag and L²/D [s] between law and fault, those that are not 0."""
+        return {name: value for name in ("delay", "lag", "diffusion") if (value := getattr(self, name))}
+
+    @property
+    def noise(self) -> dict[str, Any]:
+        """Bounds of the measurement errors [m], [m/s], those that are not 0."""
+        return {name: value for name in ("slip_noise", "rate_noise") if (value := getattr(self, name))}
+
+    def given(self) -> dict[str, Any]:
+        """Fields that differ from their default, by name, in SI units."""
+        return {part.name: value for part in fields(self) if (value := getattr(self, part.name)) != part.default}
+
+    def around(self) -> dict[str, Any]:
+        """Fields of a sampled loop beside its law and T_s, those that are not 0.
+
+        The delay of a loop counts from the middle of the averaging time, that of the setup from its end.
+        """
+        beside = {name: value for name, value in self.given().items() if name not in _NOT_OF_A_LOOP}
+        if self.averaging_time:
+            beside |= {"averaging": self.averaging_time, "delay": self.delay + self.averaging_time / 2}
+        return beside if self.pump is None else beside | {"pump": self.pump}
+
+    def with_given(self, **given: Quantity | None) -> Self:
+        """The setup with those fields that are not None.
+
+        Raises
+        ------
+        ParameterError
+            For another name, with the nearest valid one.
+        """
+        for name in given:
+            require_known(name, [part.name for part in fields(self)], "quantity of the loop setup")
+        values: Any = {name: value for name, value in given.items() if value is not None}
+        return replace(self, **values) if values else self
+
+    def to_dict(self) -> dict[str, str]:
+        """Fields that differ from their default, exact numbers as texts, in SI units."""
+        return {name: str(value) for name, value in self.given().items()}
+
+    def __repr__(self) -> str:
+        units = {name: part["unit"] for name, part in quantities().items()}
+        parts = (f"{name}={_shown(value, units.get(name))}" for name, value in self.given().items())
+        return f"LoopSetup({', '.join(parts)})"
+
+
+_NOT_OF_A_LOOP = ("step", "measured", "averaging_time", "saturation", "withdrawal", "rate_limit")
+
+
+def quantities() -> dict[str, Any]:
+    """Unit and help text of every quantity of a setup, by name."""
+    return dict(_parts())
+
+
+def _parts() -> Iterator[tuple[str, Any]]:
+    return ((part.name, part.metadata) for part in fields(LoopSetup) if part.metadata)
+
+
+def _shown(value: Any, unit: str | None) -> str:
+    return repr(value) if unit is None else repr(f"{shortly(value)} {unit}")
+
+
+IDEAL = LoopSetup()
+"""Pressure that acts at once, exact measurements, from rest, at the sampling time of the fault."""

@@ -1,0 +1,72 @@
+"""The loop setup: quantities with units in, exact numbers out; its fields are the options of the command line."""
+
+from dataclasses import fields
+from fractions import Fraction as F
+
+import pytest
+
+from quakedesign.cli.options import SetupOptions
+from quakedesign.errors import ParameterError, UnitError
+from quakedesign.guarantees.exact.loop import Held
+from quakedesign.laws import summed_integrals
+from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Pump, quantities
+
+
+def test_quantities_with_units_become_exact_numbers_in_si_units():
+    setup = LoopSetup(step="184 ms", delay="20 ms", lag="3/10", slip_noise=5e-6, saturation="20 MPa")
+    exact = (setup.step, setup.delay, setup.lag, setup.slip_noise, setup.saturation)
+    assert exact == (F(23, 125), F(1, 50), F(3, 10), F(1, 200000), F(20000000))
+    assert setup.to_dict()["step"] == "23/125"
+    assert setup == LoopSetup(**{name: value for name, value in setup.given().items()})
+    assert repr(LoopSetup(delay="20 ms", measured="slip")) == "LoopSetup(measured='slip', delay='0.02 s')"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "error", "said"),
+    [
+        ({"delay": "-1 ms"}, ParameterError, "delay must be 0 or more. Received -0.001 s"),
+        ({"lag": "8 MPa"}, UnitError, "lag must be a quantity in s"),
+        ({"step": "0 s"}, ParameterError, "step must be positive"),
+        ({"step": "1e10 s"}, ParameterError, "step must be positive, between 1e-9 s and 1e9 s"),
+        ({"measured": "slips"}, ParameterError, "measured must be .*slip"),
+        ({"withdrawal": "1 MPa"}, ParameterError, "withdrawal needs saturation"),
+        ({"saturation": "0 Pa"}, ParameterError, "must have 0 between them"),
+        ({"rate_limit": "0 Pa/s"}, ParameterError, "rate limit of a pump must be positive"),
+    ],
+)
+def test_every_refusal_names_quantity_condition_and_value(wrong, error, said):
+    with pytest.raises(error, match=said):
+        LoopSetup(**wrong)
+
+
+def test_another_name_is_refused_with_the_nearest():
+    with pytest.raises(ParameterError, match="slip_noise"):
+        IDEAL.with_given(slip_nois="1 um")
+    assert IDEAL.with_given(delay=None) is IDEAL
+
+
+def test_what_is_given_reaches_the_loop_and_the_delay_counts_from_the_middle_of_a_mean():
+    law = summed_integrals(tuple(map(F, (1, 2, 3, 4))), F(1, 10))
+    setup = LoopSetup(delay="1 ms", averaging_time="4 ms", jitter="1 ms", rate_noise=1e-7, saturation=5, withdrawal=0)
+    held = Held(law=law, step=F(1, 10), **setup.around())
+    assert (held.delay, held.averaging, held.jitter, held.rate_noise) == (
+        F(3, 1000),
+        F(1, 250),
+        F(1, 1000),
+        F(1, 10**7),
+    )
+    assert held.pump == Pump(least=F(0), largest=F(5))
+    assert Held(law=law, step=F(1, 10), **IDEAL.around()) == Held(law=law, step=F(1, 10))
+
+
+def test_every_quantity_is_an_option_with_its_unit_and_help():
+    """Names, units and help texts are stated once: the command line reads them off the fields."""
+    options = {part.name for part in fields(SetupOptions)}
+    assert options == {*quantities(), "well", "diffusivity"} - {"step"}
+    assert {part.name for part in fields(LoopSetup)} == {*quantities(), "measured"}
+    for name, part in quantities().items():
+        assert part["unit"] in ("s", "m", "m/s", "Pa", "Pa/s"), name
+        assert part["help"].endswith("."), name
+    assert SetupOptions(slip_noise="1/1000000", delay="0.02").setup(measured=MEASURED[1]) == LoopSetup(
+        slip_noise="1 um", delay="20 ms", measured="slip"
+    )
