@@ -39,7 +39,7 @@ from quakedesign.guarantees import task_of
 from quakedesign.report.sentences import verdict_lines
 from quakedesign.simulation import natural_earthquake
 from quakedesign.guarantees import design_held, worst_found
-from quakedesign.linear.printed_theorem import both_tests
+from own.printed_theorem import both_tests
 from quakedesign.linear.uncertainty_bounds import uncertainty_bounds
 from quakedesign.linear.verdict import judge
 

@@ -7,7 +7,8 @@ from scipy.optimize import minimize_scalar
 
 from quakedesign.lyapunov.exact.fault_bounds import Sectors
 from quakedesign.fault import load_fault
-from quakedesign.linear.printed_theorem import Switching, decreases, printed_row
+from quakedesign.linear.linear_problem import decreases
+from own.printed_theorem import Switching, printed_row
 from quakedesign.linear.riccati import solve_care
 from quakedesign.linear.riccati import sound_bound
 from quakedesign.linear.linear_problem import LinearProblem, ProblemScales

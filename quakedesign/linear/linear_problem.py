@@ -435,3 +435,24 @@ def _modes(mean: Any) -> tuple[Any, Any]:
             columns += [vector.real] if pole.imag == 0 else [vector.real, vector.imag]
             moduli += [abs(pole)] * (1 if pole.imag == 0 else 2)
     return np.array(columns).T, np.array(moduli)
+
+
+def decreases(
+    problem: LinearProblem, gains: Sequence[Fraction], theta: Matrix, *, rate: Fraction = Fraction(0)
+) -> bool:
+    """Whether V = xᵀΘx is positive and V̇ < −2aV at every vertex, hence over the whole box; exact.
+
+    V̇ is affine in β, s and w each, so that the vertices suffice, for parameters that vary in time as well.
+
+    Parameters
+    ----------
+    problem : LinearProblem
+    gains : sequence of 4 Fraction
+    theta : matrix (4 × 4)
+    rate : Fraction
+        a [1/s].
+    """
+    held = times(-2 * rate, theta)
+    return definite(theta) and all(
+        definite(total(times(-1, lyapunov(problem.loop(v, gains), theta)), held)) for v in problem.vertices()
+    )

@@ -25,6 +25,7 @@ from quakedesign.linear.linear_problem import (
     LinearProblem,
     Matrix,
     ProblemScales,
+    decreases,
     diagonal,
     exact,
     floats,
@@ -36,7 +37,6 @@ from quakedesign.linear.linear_problem import (
     times,
     total,
 )
-from quakedesign.linear.printed_theorem import decreases
 from quakedesign.lyapunov.exact.fault_bounds import Sectors
 from quakedesign.lyapunov.search.search import quadratic_terms
 from quakedesign.symbolic.terms import Term

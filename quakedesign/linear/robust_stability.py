@@ -17,8 +17,7 @@ from quakedesign.exact import LowerBound, UpperBound, fraction_of, nearest, rati
 from quakedesign.fault import Fault
 from quakedesign.laws import Controller
 from quakedesign.linear.frequency import FrequencyFacts, circle_limit, frequency_facts, slip_limit
-from quakedesign.linear.linear_problem import FeedbackLoop, LinearProblem, Polytope, Vertex, modal_scaling, polytope_of
-from quakedesign.linear.printed_theorem import inverse_optimality
+from quakedesign.linear.linear_problem import FeedbackLoop, Polytope, Vertex, modal_scaling, polytope_of
 from quakedesign.lyapunov import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
 from quakedesign.lyapunov.exact.fault_bounds import Sectors, plant_ranges, sectors
 from quakedesign.lyapunov.exact.obligations import Obligation, claimed, different
@@ -478,25 +477,11 @@ def analysis(fault: Fault, controller: Controller) -> Analysis:
     needed = sectors(fault)
     loop = FeedbackLoop(gains=tuple(controller.gains.values()), sectors=needed)
     return Analysis(
-        decay=decay_rate(sector_loop(controller, needed)) or _decay_of_optimal_gains(fault, controller),
+        decay=decay_rate(sector_loop(controller, needed)),
         unstable_at=loop.unstable_vertex(),
         slope=friction_slope_margin(fault, controller),
         span=gain_range(fault, controller),
         frequency=tuple(frequency_facts(loop, corner) for corner in needed.vertices()),
-    )
-
-
-def _decay_of_optimal_gains(fault: Fault, controller: Controller) -> DecayRate | None:
-    """What the Riccati equation that K solves proves, where it covers the uncertainty; None where it does not."""
-    optimality = inverse_optimality(LinearProblem.of(fault), tuple(controller.gains.values()))
-    if optimality.P is None:
-        return None
-    loop = sector_loop(controller, sectors(fault))
-    certificate = finished_exactly(loop, optimality.scales.form_outside(optimality.P))
-    if certificate is None:
-        return None
-    return DecayRate(
-        certified=LowerBound(certificate.claims["rate"]), limit=-polytope_of(loop).slowest(), certificate=certificate
     )
 
 

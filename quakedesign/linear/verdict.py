@@ -17,18 +17,11 @@ from quakedesign.guarantees.exact.guarantee_files import save_guarantee
 from quakedesign.guarantees.search.linear_design import certified_peaks
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.linear.linear_problem import LinearProblem, Matrix
-from quakedesign.linear.printed_theorem import (
-    InverseOptimality,
-    both_tests,
-    compare_feedback,
-    inverse_optimality,
-    printed_row,
-)
 from quakedesign.linear.riccati import smallest_gain
 from quakedesign.linear.robust_stability import Analysis, analysis
 from quakedesign.linear.sampled_stability import HeldLoop, VaryingVerdict, held_loop
 from quakedesign.linear.uncertainty_bounds import uncertainty_bounds
-from quakedesign.lyapunov import Certificate, Verdict
+from quakedesign.lyapunov import Certificate
 from quakedesign.sos import Answer
 from quakedesign.sos.exact.polynomial import constant
 from quakedesign.sos.exact.polynomial_statement import Statement
@@ -38,13 +31,6 @@ from quakedesign.sos.exact.proofs import Square, SumOfSquares
 # Definite matrices as files about polynomials (FORMAT.md): a sum of squares on all variables proves definiteness.
 
 _LARGEST = 16
-
-
-def inverse_optimality_files(optimality: InverseOptimality) -> list[Answer]:
-    """P and Q0 of a K that is optimal for a Q ≥ Q0 + R·D; nothing for another verdict."""
-    if optimality.P is None or optimality.Q0 is None:
-        return []
-    return definite_files({"P": optimality.P, "Q": optimality.Q0})
 
 
 def held_files(problem: LinearProblem, gains: Sequence[Fraction], verdict: VaryingVerdict) -> list[Answer]:
@@ -144,11 +130,8 @@ class LinearVerdict:
         if isinstance(self.peaks, ContinuousPeaks):
             by_name["peaks"] = self.peaks
         problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
-        several = {"inverse-optimal": inverse_optimality_files(inverse_optimality(problem, gains))}
-        several["held"] = held_files(problem, gains, self.held.runs)
-        for name, answers in several.items():
-            by_name |= {f"{name}{f'-{n}' if n else ''}": answer for n, answer in enumerate(answers)}
-        return by_name
+        held = held_files(problem, gains, self.held.runs)
+        return by_name | {f"held{f'-{n}' if n else ''}": answer for n, answer in enumerate(held)}
 
     def save(self, out: Path, *, force: bool = False) -> dict[str, str]:
         """Write every proof: the one of stability to `out`, the others beside it with their names added.
@@ -218,7 +201,7 @@ def judge(
 
 
 def linear_facts(fault: Fault, controller: ExtendedLQR, held: HeldLoop) -> dict[str, Any]:
-    """Bounds, both tests of Theorem 2, sampled stability and the cost of both kinds of feedback.
+    """Bounds of the uncertainty, smallest gains and sampled stability.
 
     Parameters
     ----------
@@ -230,21 +213,11 @@ def linear_facts(fault: Fault, controller: ExtendedLQR, held: HeldLoop) -> dict[
     Returns
     -------
     dict
-        Keys ``inverse_optimal`` (whether K is optimal for a Q that covers the uncertainty; None when undecided),
-        ``tests``, ``bounds``, ``smallest_gain``, ``held`` and ``feedback``; SI.
+        Keys ``bounds``, ``smallest_gain`` and ``held``; SI.
     """
-    gains, problem = tuple(controller.gains.values()), LinearProblem.of(fault)
-    tests = both_tests(problem, gains, printed_row(fault))
-    least = smallest_gain(problem)
-    decided = {Verdict.PROVED: True, Verdict.REFUTED: False, Verdict.UNDECIDED: None}
+    least = smallest_gain(LinearProblem.of(fault))
     return {
-        "inverse_optimal": decided[tests.sound.verdict],
-        "tests": tests.to_dict(),
         "bounds": uncertainty_bounds(fault).to_dict(),
         "smallest_gain": {"k1": least.slip, "k2": least.rate},
         "held": held.to_dict(),
-        "feedback": [
-            {"feedback": c.feedback, "lag": c.lag, "largest_term": c.largest_term, "pressure": c.pressure}
-            for c in (compare_feedback(fault, gains) if gains[3] else ())
-        ],
     }

@@ -210,13 +210,11 @@ def peaks_sentence(peaks: Mapping[str, ContinuousPeaks | NoGuarantee]) -> str:
 
 def verdict_lines(judged: LinearVerdict) -> list[str]:
     """Lines about a given K."""
-    fault, tests = judged.fault, judged.facts["tests"]
+    fault = judged.fault
     gains = " ".join(f"{float(k):.6g}" for k in judged.controller.gains.values())
-    optimal = {True: "yes", False: "no", None: "undecided"}[judged.facts["inverse_optimal"]]
     lines = [
         f'{judged.analysis.verdict}: elqr {gains} on "{fault.name}", box {fault.box.name}',
         *(f"  {line}" for line in margin_lines(judged.analysis)),
-        f"  optimal for a Q that covers the uncertainty: {optimal} (the printed test: {tests['printed']['verdict']})",
         f"  {'; '.join(held_sentences(judged.held))}",
     ]
     if judged.asked is None or judged.peaks is None:

@@ -21,23 +21,12 @@ def facts_of(controller, step="1e-3"):
 @pytest.mark.slow
 def test_the_facts_of_the_published_gains_can_be_written_as_json():
     facts = facts_of(qd.published("lab-fault")["elqr"])
-    assert facts["inverse_optimal"] is True
-    assert facts["tests"]["sound"]["verdict"] == "proved"
     assert facts["held"]["verdict"] == "refuted"
     assert 0.6e-3 < facts["held"]["largest_step"] < 0.7e-3
-    assert [f["feedback"] for f in facts["feedback"]] == ["error", "state"]
     assert facts_of(qd.published("lab-fault")["elqr"], step="0.5e-3")["held"]["varying"] == "proved"
 
 
 def test_a_destabilising_gain_has_facts_too():
     good = qd.published("lab-fault")["elqr"]
     facts = facts_of(replace(good, gains={n: -k for n, k in good.gains.items()}))
-    assert facts["inverse_optimal"] is False
     assert facts["held"]["largest_step"] is None
-
-
-def test_without_double_integral_action_there_is_no_way_to_compare():
-    good = qd.published("lab-fault")["elqr"]
-    facts = facts_of(replace(good, gains={**good.gains, "k4": 0}))
-    assert facts["feedback"] == []
-    assert facts["inverse_optimal"] is False

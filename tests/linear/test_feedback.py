@@ -5,10 +5,10 @@ from fractions import Fraction as F
 import control
 import numpy as np
 import pytest
+from own.printed_theorem import compare_feedback, lag_coefficient, largest_reference_acceleration
 
 import quakedesign as qd
 from quakedesign.linear.linear_problem import LinearProblem
-from quakedesign.linear.printed_theorem import compare_feedback, lag_coefficient, largest_reference_acceleration
 
 REAL = qd.load_fault("real-fault")
 GAINS = tuple(qd.published("real-fault")["elqr"].gains.values())

@@ -6,11 +6,11 @@ from fractions import Fraction as F
 import numpy as np
 import pytest
 from own.printed_examples import printed_design, printed_row_example
+from own.printed_theorem import TheoremProblem, inverse_optimality, moment_matrix, refutes
 
 import quakedesign as qd
 from quakedesign.linear import linear_problem as m
 from quakedesign.linear.linear_problem import LinearProblem
-from quakedesign.linear.printed_theorem import TheoremProblem, inverse_optimality, moment_matrix, refutes
 from quakedesign.linear.riccati import riccati_design
 from quakedesign.lyapunov import Verdict
 

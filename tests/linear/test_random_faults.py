@@ -5,12 +5,12 @@ from fractions import Fraction as F
 
 import numpy as np
 import pytest
+from own.printed_theorem import inverse_optimality
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, Reference, UncertaintyBox, friction_law
 from quakedesign.linear.linear_problem import LinearProblem
-from quakedesign.linear.printed_theorem import inverse_optimality
 from quakedesign.linear.riccati import riccati_design
 from quakedesign.lyapunov import Verdict
 

@@ -10,8 +10,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.fault import Disturbance
 from quakedesign.linear import linear_problem as m
-from quakedesign.linear.linear_problem import LinearProblem
-from quakedesign.linear.printed_theorem import decreases
+from quakedesign.linear.linear_problem import LinearProblem, decreases
 from quakedesign.linear.riccati import riccati_design, sound_bound, vertex_poles
 
 REAL = qd.load_fault("real-fault")

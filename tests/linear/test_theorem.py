@@ -6,12 +6,13 @@ from fractions import Fraction as F
 import numpy as np
 import pytest
 from own.printed_examples import corrected_design, printed_bound_example, printed_design, printed_row_example
+from own.printed_theorem import Switching, both_tests, printed_row, switched_growth
 from scipy.linalg import expm
 
 import quakedesign as qd
 from quakedesign.laws import control_law
 from quakedesign.linear import linear_problem as m
-from quakedesign.linear.printed_theorem import Switching, both_tests, decreases, printed_row, switched_growth
+from quakedesign.linear.linear_problem import decreases
 from quakedesign.lyapunov import Verdict, loop_of
 from quakedesign.lyapunov.search.search import find_certificate
 

@@ -506,27 +506,6 @@ def switched_growth(problem: LinearProblem, gains: Sequence[Fraction], switching
     return best
 
 
-def decreases(
-    problem: LinearProblem, gains: Sequence[Fraction], theta: Matrix, *, rate: Fraction = Fraction(0)
-) -> bool:
-    """Whether V = xᵀΘx is positive and V̇ < −2aV at every vertex, hence over the whole box; exact.
-
-    V̇ is affine in β, s and w each, so that the vertices suffice, for parameters that vary in time as well.
-
-    Parameters
-    ----------
-    problem : LinearProblem
-    gains : sequence of 4 Fraction
-    theta : matrix (4 × 4)
-    rate : Fraction
-        a [1/s].
-    """
-    held = times(-2 * rate, theta)
-    return definite(theta) and all(
-        definite(total(times(-1, lyapunov(problem.loop(v, gains), theta)), held)) for v in problem.vertices()
-    )
-
-
 # ----------------------------------------------------------------------
 # Feedback of the state as printed against feedback of the error (ERRATA 28, 29): one loop, two ways to a reference.
 #
