@@ -13,11 +13,13 @@ main()
 """
 
 
+@pytest.mark.slow
 def test_a_command_does_not_look_again_and_again_for_cycles_in_what_it_has_loaded():
     told = subprocess.run([sys.executable, "-c", COUNTED], capture_output=True, text=True, check=True).stdout
     assert int(told.split("searches")[1]) < 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked", [None, "2"])
 def test_a_command_has_one_thread_of_linear_algebra_unless_it_is_told_another_number(asked):
     """Of small matrices threads wait for another: most of the time of a guarantee on a busy machine."""

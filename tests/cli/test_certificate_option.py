@@ -67,6 +67,7 @@ def test_it_runs_behind_its_lag_with_its_noise(file, capsys):
     assert run["measurement"].startswith("Measurement(slip_noise=1e-09, ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "outside"),
     [
@@ -109,6 +110,7 @@ def test_what_is_exported_says_first_what_it_is_for(file, capsys, tmp_path):
     assert "#define CONTROLLER_STEP 0.15 /* s */" in header
 
 
+@pytest.mark.slow
 def test_a_campaign_runs_it_as_it_is_proved(file, capsys, tmp_path):
     arguments = "--samples", "1", "--rerun", "0", "--workers", "1", "--duration", "3 s", "--out", tmp_path / "samples"
     code, _, err = told(capsys, "campaign", "real-fault", "--certificate", file, *arguments)

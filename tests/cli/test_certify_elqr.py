@@ -102,6 +102,7 @@ def short(folder):
     return str(path)
 
 
+@pytest.mark.slow
 def test_a_design_in_continuous_time_is_reported_with_its_peaks_and_without_a_guarantee(capsys, tmp_path):
     out = tmp_path / "o"
     arguments = ("design", short(tmp_path), "--controller", "elqr", "--continuous", "--out", str(out), "--json")
@@ -118,6 +119,7 @@ def test_a_design_in_continuous_time_is_reported_with_its_peaks_and_without_a_gu
         assert (out / entry["certificate"]).is_file()
 
 
+@pytest.mark.slow
 def test_a_design_is_reported_with_the_guarantee_of_the_loop_that_ran(capsys, tmp_path):
     out = tmp_path / "o"
     code, said, _ = run(capsys, "design", short(tmp_path), "--controller", "elqr", "--out", str(out), "--json")

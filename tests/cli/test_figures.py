@@ -58,6 +58,7 @@ def test_designs_are_compared_in_the_scheme_asked_for(short, capsys):
     assert found["growth_per_step"] is None
 
 
+@pytest.mark.slow
 def test_figures_writes_one_folder_and_says_what_is_in_it(short, capsys, tmp_path, monkeypatch):
     monkeypatch.setattr("quakedesign.studies.paper.ROOMS", (1.6,))  # two designs make a front
     folder = tmp_path / "drawn"

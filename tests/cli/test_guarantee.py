@@ -99,6 +99,7 @@ def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks():
     assert not any("NOT" in line for line in held.lines())
 
 
+@pytest.mark.slow
 def test_one_period_late_the_design_is_for_a_fault_that_sticks(call):
     code, out, _ = call("real-fault", "--delay", "184 ms", "--json")
     found = json.loads(out)
@@ -108,6 +109,7 @@ def test_one_period_late_the_design_is_for_a_fault_that_sticks(call):
         assert found["worst_found_with_stick"][name] <= F(found[name]) <= 2 * F(found["worst_found"][name])
 
 
+@pytest.mark.slow
 def test_gains_that_are_not_guaranteed_say_what_fails(call):
     code, out, _ = call("real-fault", "--gains", *GAINS, "--delay", "150 ms", "--json")
     found = json.loads(out)
@@ -163,6 +165,7 @@ def test_where_no_controller_renews_its_pressure_so_slowly_the_answer_says_so(mo
         assert qd.guarantee(fault, step=step, **other) == none
 
 
+@pytest.mark.slow
 def test_a_sliding_mode_with_its_file(call, tmp_path):
     path = tmp_path / "cta.json"
     code, out, _ = call("real-fault", "--controller", "cta", "--json", "--out", str(path))
@@ -179,6 +182,7 @@ def test_a_sliding_mode_with_its_file(call, tmp_path):
     assert check_files([path], "real-fault")[str(path)][0] == "proved"
 
 
+@pytest.mark.slow
 def test_a_sliding_mode_with_given_gains_for_people(call):
     code, out, _ = call("real-fault", "--controller", "dia", "--gains", "1", "20", "1", "0", "--objective", "peak")
     assert code == 0
@@ -231,6 +235,7 @@ def unattacked(monkeypatch):
     monkeypatch.setattr(module, "worst_found", lambda *_, **__: None)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unattacked")
 def test_the_slip_alone_with_noise_and_its_file(call, tmp_path):
     path = tmp_path / "slip.json"
@@ -300,6 +305,7 @@ def test_a_fault_behind_a_well_with_its_file(call, tmp_path):
     assert check_files([path], "real-fault")[str(path)][0] == "proved"
 
 
+@pytest.mark.slow
 def test_several_faults_are_asked_the_same_and_each_has_its_answer(call, tmp_path):
     own, folder = tmp_path / "own.toml", tmp_path / "proofs"
     own.write_text(load_text("real-fault").replace('name = "real-fault"', 'name = "own"'), encoding="utf-8")
@@ -336,6 +342,7 @@ def test_several_faults_for_people(call, monkeypatch):
     assert (code, "need names of their own" in err) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_pump_is_asked_for_no_more_than_it_can_do(call):
     """14.3 MPa of withdrawal and 14.2 MPa of injection are what is proved of this loop."""
     given = ("real-fault", "--gains", *GAINS, "--saturation", "15 MPa", "--json")
@@ -348,6 +355,7 @@ def test_a_pump_is_asked_for_no_more_than_it_can_do(call):
     assert (code, "withdrawal needs saturation" in err) == (2, True)
 
 
+@pytest.mark.slow
 def test_jitter_and_a_slow_pump_are_in_the_answer_and_in_the_file(call, tmp_path):
     path = tmp_path / "late.json"
     asked = ("--jitter", "1 ms", "--delay-jitter", "1/2000", "--rate-limit", "60 MPa/s", "--json", "--out", str(path))
@@ -364,6 +372,7 @@ def test_jitter_and_a_slow_pump_are_in_the_answer_and_in_the_file(call, tmp_path
         assert call("real-fault", "--gains", *GAINS, *given)[0] == 2
 
 
+@pytest.mark.slow
 def test_means_count_from_their_middle(call, tmp_path):
     path = tmp_path / "mean.json"
     given = ("real-fault", "--gains", *GAINS, "--averaging-time")
@@ -391,6 +400,7 @@ def test_a_well_is_told_by_its_distance_and_the_diffusivity_of_the_rock():
             DesignOptions(**wrong).told()
 
 
+@pytest.mark.slow
 def test_samples_by_no_clock_are_in_the_answer_and_in_the_file(call, tmp_path, monkeypatch):
     monkeypatch.setattr(design, "_FEWER", 8)
     path, asked = tmp_path / "loop.json", ("lab-fault", "--step", "1 ms", "--longest-step", "3/2000")

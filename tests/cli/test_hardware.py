@@ -147,6 +147,7 @@ def test_a_mean_goes_into_an_exported_controller(run, tmp_path):
     assert sizes[mean] >= sizes[mean[2:]]
 
 
+@pytest.mark.slow
 def test_a_campaign_takes_the_same_options(run, monkeypatch, tmp_path):
     monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
     options = (

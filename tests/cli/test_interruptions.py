@@ -110,6 +110,7 @@ def tidy(run, tmp_path, command):
     assert not temporary(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "number"),
     [(MAP, signal.SIGTERM), (GAINS, signal.SIGINT), (CAMPAIGN, signal.SIGKILL)],

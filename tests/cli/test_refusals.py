@@ -155,6 +155,7 @@ def test_another_error_of_the_system_stays_a_defect(capsys, monkeypatch):
     assert "defect: OSError" in err
 
 
+@pytest.mark.slow
 def test_a_design_whose_run_opens_the_fault_is_no_positive_answer(capsys, tmp_path):
     import importlib.resources
 

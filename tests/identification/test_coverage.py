@@ -34,6 +34,7 @@ def truth_of(made, best):
     return best.experiment.inward([values[c.name] for c in best.experiment.coordinates])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_estimates_are_within_four_of_their_deviations(kind):
     """Which one of 40 standardised errors exceeds by chance once in 400 times."""

@@ -162,6 +162,7 @@ def test_weights_are_the_numbers_of_samples():
     assert part.distance(part.fitted) == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "other"), [("slip", "aging"), ("aging", "slip")])
 def test_the_law_that_made_a_record_is_preferred_unless_one_is_asked_for(law, other):
     made = synthetic.sliding(f"rate-and-state-{law}", synthetic.STEPS[:2], sample=0.4)

@@ -116,6 +116,7 @@ def test_an_observer_expects_what_is_applied():
     assert stepped(limited, moving, 2e-6, 0.0, 0.0)[0] == asked
 
 
+@pytest.mark.slow
 def test_it_is_not_reached_where_the_pressure_follows_one_that_moves_with_the_reference():
     """|p − p*| ≤ 50 Pa and |dp*/dr| ≤ 7 Pa/m, p* from 0: never, however p* turns; beyond 50 Pa it is."""
     law = summed_integrals((F(1), F(0), F(0), F(0)), F(1))  # p = −e1
@@ -133,6 +134,7 @@ def test_it_is_not_reached_where_the_pressure_follows_one_that_moves_with_the_re
         assert (cuts > 0) == reached
 
 
+@pytest.mark.slow
 def test_on_a_fault_that_sticks_the_pressure_stays_where_it_is_proved_to_stay(proved):
     """Ahead of a reference that comes to rest the fault rests for ever: the pressure without limits goes on to fall."""
     claims = proved.claims
@@ -330,6 +332,7 @@ def test_the_search_with_stick_lets_the_limit_follow_every_step(proved, monkeypa
     assert max(abs(after - before) for before, after in followed) == pytest.approx(drift, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_adversary_is_held_by_the_limit_and_only_with_stick(proved, monkeypatch):
     """Where the pressure may never fall, however fast the fault goes, what pushes forward makes an earthquake."""
     before = [_searched(proved, sticks) for sticks in (False, True)]

@@ -204,6 +204,7 @@ def test_the_published_linear_law_sticks_most_of_the_time_and_agrees_with_scipy(
     assert np.max(np.abs(run.slip - expected[0])) < 1e-9 * np.max(expected[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["cta", "dia", "elqr"])
 def test_published_controllers_follow_the_reference_without_reverse_slip(law):
     """In the paper's runs δ' < 0 nearly half of the time; with friction in both directions the fault rests instead."""

@@ -112,6 +112,7 @@ def test_a_law_of_the_slip_alone_is_told_the_slip_alone():
     assert controller_step(LAB, SAMPLED).measurement == {"slip": "m", "slip_rate": "m/s"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_c_and_python_agree_bit_for_bit_over_random_steps(case, tmp_path):
     controller, scheme, settings = CASES[case]

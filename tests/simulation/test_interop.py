@@ -38,6 +38,7 @@ def test_a_closed_loop_function_integrates_to_the_simulated_run():
     assert np.max(np.abs(oracle.y[0] - run.slip)) < 1e-6 * np.max(np.abs(run.slip))
 
 
+@pytest.mark.slow
 def test_python_control_joins_fault_and_law():
     """Interconnected by signal names and fed with the reference, they must move as the simulated loop."""
     fault, law = to_iosystem(LAB), to_iosystem(published("lab-fault")["elqr"])

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from quakedesign.fault import load_fault
 from quakedesign.laws import published
@@ -45,6 +46,7 @@ def without_compiler(program, vectors, monkeypatch):
     return vectors
 
 
+@pytest.mark.slow
 def test_the_digits_do_not_depend_on_the_lanes_nor_on_the_processor(monkeypatch, tmp_path):
     """On the verge of instability some samples diverge, each at its own time (ERRATA 22)."""
     of = problem("elqr", NOISY)

@@ -74,6 +74,7 @@ def unstable_from(loop, factor):
     return 10 ** brentq(excess, 0, math.log10(factor), xtol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("around", [{}, {"lag": F(1, 5)}])
 def test_margins_of_a_sampled_loop_are_where_its_poles_and_its_nyquist_curve_say(around):
     """Up to half the sampling frequency, which python-control leaves out."""
@@ -109,6 +110,7 @@ def test_what_is_no_loop_has_no_margins(loop):
         qd.loop_margins(loop)
 
 
+@pytest.mark.slow
 def test_a_law_of_samples_meets_a_fault_that_is_held():
     design = qd.design(REAL, "elqr")
     loop = qd.loop_transfer(REAL, design.controller)

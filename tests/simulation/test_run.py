@@ -48,6 +48,7 @@ def elqr_field(fault, gains):
     return field
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "step", "duration"), [(REAL, 0.0046, 400.0), (LAB, 2e-5, 2.0)], ids=["real", "lab"])
 def test_the_linear_law_agrees_with_scipy(fault, step, duration):
     """The early slip swings through zero, where friction has a kink and a fixed step its second order only."""

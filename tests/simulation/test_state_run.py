@@ -156,6 +156,7 @@ def qdyn_cycles(slider, method, rtol, duration):
     return solve_ivp(qdyn_field(slider), (0, duration), start, events=crossing, **options).t_events[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("slider", "duration", "events"), [(QDYN, 300.0, 10), (QDYN_TEST, 1e4, 17)])
 def test_stick_slip_cycles_agree_with_qdyns_equations_in_stress_and_state(slider, duration, events):
     """The parameters of QDYN's notebook and of its test-suite."""
@@ -174,6 +175,7 @@ def test_stick_slip_cycles_agree_with_qdyns_equations_in_stress_and_state(slider
     assert np.max(np.abs(run.imbalance)) < 1e-10
 
 
+@pytest.mark.slow
 def test_the_recurrence_interval_converges_under_tolerance_refinement():
     """Its relative error stays below the tolerance over four and six decades."""
     exact = np.diff(qdyn_cycles(QDYN, "DOP853", 1e-13, 300.0))[-1]
@@ -369,6 +371,7 @@ def test_sundials_finds_the_same_stick_slip_cycles(method, rtol, error):
     assert np.max(np.abs(run.imbalance)) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["cvodes", "idas"])
 def test_sundials_with_inertia_follows_the_stiff_problem(method):
     slider, times = dataclasses.replace(QDYN, mass=2000.0), np.linspace(0, 40, 21)
@@ -381,6 +384,7 @@ def test_sundials_with_inertia_follows_the_stiff_problem(method):
     assert np.max(np.abs(run.stretch / expected.stretch - 1)) < 1e-5
 
 
+@pytest.mark.slow
 def test_sundials_says_that_an_event_runs_away():
     with pytest.raises(SimulationError, match="slip rate stays finite"):
         velocity_step(law(), 200.0, [(10.0, MICRON), (200.0, 10 * MICRON)], rtol=1e-8, method="cvodes")

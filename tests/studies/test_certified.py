@@ -60,6 +60,7 @@ def test_the_decay_comes_with_a_settling_time():
     assert "settles within" in answer.lines[-1]
 
 
+@pytest.mark.slow
 def test_what_is_not_proved_is_told_with_what_speaks_against_it():
     refuted = certified("super-twisting", ("3", "1"), lipschitz=1)
     assert (refuted.facts["verdict"], refuted.facts["counterexample"]) == ("refuted", "exact")
@@ -78,6 +79,7 @@ def test_gains_too_far_apart_for_floating_point_are_undecided():
     assert "too far apart for a search in floating point" in answer.lines[-1]
 
 
+@pytest.mark.slow
 def test_at_the_necessary_limit_nothing_is_searched_for():
     answer = certified("dia", ("2", "5", "1.44e-4", "0"), lipschitz="1.44e-4")
     assert (answer.facts["verdict"], answer.facts["limit"], answer.facts["dual"]) == ("undecided", "9/62500", [])

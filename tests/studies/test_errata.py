@@ -73,6 +73,7 @@ def ask(site, code):
     )
 
 
+@pytest.mark.slow
 def test_an_installed_package_finds_its_own_checks(tmp_path):
     installed(tmp_path)
     code = "from quakedesign.studies.errata import errata_folder as f, run_rows as r; print(f(), r([4])[0]['holds'])"

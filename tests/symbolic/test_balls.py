@@ -58,6 +58,7 @@ def exact(expression, at):
     return flint.arb(str(found), radius)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(expressions, intervals, intervals, shares, shares)
 def test_an_enclosure_contains_every_value(expression, first, second, along, across):

@@ -70,6 +70,7 @@ def hyperbolic(s, _):
     return 1 / (1 + s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(friction_laws()))
 def test_every_law_of_the_package_is_confirmed_as_declared(name):
     kind = friction_laws()[name]

@@ -230,6 +230,7 @@ def eigenvalues(fault, v):
         return sorted(found, key=lambda z: (-z.real, -z.imag))
 
 
+@pytest.mark.slow
 def test_random_faults_are_stable_exactly_when_their_eigenvalues_say_so():
     draw, seen = random.Random(11), {True: 0, False: 0}
     for i in range(30):

@@ -153,6 +153,7 @@ def largest_real_part(J, *, inertia):
     return max(mpmath.re(z) for z in mpmath.eig(J, left=False, right=False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", [True, False])
 @pytest.mark.parametrize("law", STATEFUL, ids=lambda law: law.name)
 def test_eigenvalues_cross_where_the_critical_stiffness_says(law, inertia):
@@ -172,6 +173,7 @@ def test_eigenvalues_cross_where_the_critical_stiffness_says(law, inertia):
                 assert (worst < 0) == (side > 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("inertia", "plants"), [(True, 18), (False, 40)])
 def test_the_conditions_of_a_law_with_two_states_agree_with_its_eigenvalues(inertia, plants):
     """So many plants that every condition that ever fails alone does so."""

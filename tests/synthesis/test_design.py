@@ -69,6 +69,7 @@ SHORT = {"cta": {"real", "lab", "ten percent", "strong weakening"}, "dia": set()
 SLIDING = [pytest.param(law, v, marks=() if v in SHORT[law] else pytest.mark.slow) for law in SHORT for v in VARIANTS]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "variant"), SLIDING)
 def test_a_sliding_mode_in_continuous_time_is_proved_with_its_premise_along_the_reference(continuous, law, variant):
     design = continuous(law, variant)
@@ -132,6 +133,7 @@ def test_the_root_is_rational_and_just_large_enough(scale):
     assert float(root**6 / F(scale)) < 1.07
 
 
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_digits(real, sampled, continuous):
     again = qd.design(real, "elqr")
     assert again.controller == sampled.controller
@@ -173,6 +175,7 @@ def test_a_sliding_mode_has_no_bound_of_peaks_in_continuous_time(judged):
     assert "no bound of peaks of 2-CTA" in judged["cta"].certified_peaks().reason
 
 
+@pytest.mark.slow
 def test_a_simulation_that_holds_the_pressure_agrees_with_both_guarantees(real, sampled):
     free = qd.design(real, "elqr", continuous=True)
     assert sampled.guarantee.check() is Verdict.PROVED

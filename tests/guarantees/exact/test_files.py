@@ -415,6 +415,7 @@ def test_entries_of_another_kind_are_refused_by_both_at_every_place(new):
         assert package(text).startswith("invalid"), path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("path", "value"),
     [

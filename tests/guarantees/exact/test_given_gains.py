@@ -39,6 +39,7 @@ def test_a_pid_from_a_matrix_of_python_control_is_proved_by_both_checkers(placed
     assert subprocess.run([sys.executable, CHECK, path], capture_output=True, check=False).returncode == 0
 
 
+@pytest.mark.slow
 def test_numbers_lists_and_rows_are_the_same_gains(placed):
     row = [*placed[0], 0.0]
     texts = tuple(str(Fraction(repr(float(v)))) for v in row)

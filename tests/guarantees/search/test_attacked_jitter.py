@@ -68,6 +68,7 @@ def _rate(claim):
     return None if pump is None else float(pump.rate * claim.task.authority)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", ROWS)
 def test_no_course_leaves_the_claims_and_some_come_near(row):
     claim = proved(row)

@@ -117,6 +117,7 @@ def test_intervals_that_change_do_more_than_the_longest_or_the_shortest_alone():
     assert (changing > alone * [1.02, 1.05]).all()
 
 
+@pytest.mark.slow
 def test_the_search_stays_inside_and_finds_more_than_by_a_clock():
     held = claim().held
     seen = worst_found(claim())

@@ -126,6 +126,7 @@ def test_no_course_with_noise_violates_a_guarantee_of_the_slip_alone(behind):
     assert rate <= claim.claims.slip_rate_error <= 2.5 * rate
 
 
+@pytest.mark.slow
 def test_behind_a_short_lag_a_design_holds_as_well_as_behind_none():
     task, step = task_of(REAL), F("0.184")
     short, none = design_held(task, step, lag=F("0.001")), design_held(task, step)

@@ -76,6 +76,7 @@ def test_both_objectives_are_what_they_are_called(unreached):
         qd.design(REAL, "elqr", objective="speed")
 
 
+@pytest.mark.slow
 def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works(monkeypatch):
     design = designed("slow")
     assert not isinstance(design_held(task_of(SLOW), F(1, 10)), Guarantee)

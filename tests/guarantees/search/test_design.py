@@ -138,6 +138,7 @@ def test_a_designed_law_left_to_itself_settles_but_for_its_integral(row):
     assert np.abs(np.diff(asked, 2)[-60:]).max() < 1e-8 * np.abs(asked).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", ROWS)
 def test_with_stick_no_course_leaves_the_bounds(row):
     """The reference moves at its largest rate; the fault never slides backward."""

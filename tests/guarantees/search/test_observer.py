@@ -101,6 +101,7 @@ def test_the_search_uses_the_noise():
     assert loud.slip_rate_error > 1.02 * still.slip_rate_error
 
 
+@pytest.mark.slow
 def test_with_stick_no_course_is_found_that_leaves_the_bounds():
     claim = designed("slip alone")
     found = worst_found(claim, sticks=True)

@@ -41,6 +41,7 @@ def proved(task, held, log_rate):
     return SlidingGuarantee(task=task, held=held, cuts=WHOLE, claims=CLAIMS)
 
 
+@pytest.mark.slow
 def test_a_law_for_a_far_well_is_found_from_nearer_ones_on():
     """L²/D is 3.8 D_c/V, through which the usual starts lead to no law."""
     around = {"diffusion": Fraction(2531)}

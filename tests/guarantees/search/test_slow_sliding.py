@@ -49,6 +49,7 @@ def sizes(claims):
     return {name: getattr(claims, name) for name in NAMES}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", ["0", "0.02"])
 def test_claims_are_followed_down_to_what_both_checkers_still_prove(half):
     found = proved_sliding(task(half, 8000), HELD)

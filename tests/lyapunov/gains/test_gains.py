@@ -78,6 +78,7 @@ def test_a_tighter_bound_on_beta_needs_larger_gains(small):
     assert wide.value > small.value
 
 
+@pytest.mark.slow
 def test_the_fastest_decay_at_equal_norm():
     found = synthesise("cta", "decay", degrees=(5,), starts=1, compare=False)
     assert found.norm <= math.hypot(7, 5, 2.3, 1.1) * (1 + 1e-9)
@@ -132,6 +133,7 @@ def test_the_paper_ratio_is_compared_at_its_best():
     assert given(asked, asked.known[0]).value > math.sqrt(1.425)
 
 
+@pytest.mark.slow
 def test_the_widest_range_covers_what_is_asked_and_more():
     found = synthesise("cta", "beta", gain_range=("0.9", "1.1"), **FAST)
     low, high = found.certificate.loop.uncertain["beta"]

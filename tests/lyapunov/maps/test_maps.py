@@ -118,6 +118,7 @@ def test_an_interrupted_map_leaves_no_process_waiting(monkeypatch):
     assert not active_children()
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_answers_even_if_they_are_killed():
     sheet = maps._sheet("super-twisting", ("1.5", "1.1"), ("k1", "k2"), RANGES, 3, ("1",), (1, 1), 4)
     alone = Screener(sheet)

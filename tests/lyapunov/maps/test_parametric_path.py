@@ -29,6 +29,7 @@ def loops(sheet):
     return [sheet.at(place, level) for row in sheet.rows for place in row for level in (1, 2)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", SHEETS)
 def test_the_sign_is_that_of_the_margin_that_a_solver_finds(law):
     every = loops(sheet_of(law))

@@ -42,6 +42,7 @@ def test_equal_k3_and_k4_are_refuted_even_without_disturbance():
     assert qd.certify("cta", (7, 5, 1, 1), lipschitz=0)[0] is Verdict.REFUTED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "gains", [(0, 0, 0, 0), (-7, -5, "-2.3", "-1.1"), ("1e-300", 1, 1, 0), ("1e30", "1e-30", 2, 1), (1, "0.01", 2, 1)]
 )
@@ -49,6 +50,7 @@ def test_gains_without_a_certificate_are_an_answer_not_an_error(gains):
     assert qd.certify("cta", gains, lipschitz="0.1")[0] in (Verdict.UNDECIDED, Verdict.REFUTED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gains", "lipschitz"),
     [

@@ -15,6 +15,7 @@ region = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(region)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("k1", "k2", "L"), [("0.4", "1.5", "1"), ("0.3", "1.05", "0.9"), ("1", "0.8", "1")])
 def test_a_run_grows_where_the_gains_are_known_not_to_stabilise(k1, k2, L):
     assert region.contraction(float(k1), float(k2), float(L)) > 1.3

@@ -25,6 +25,7 @@ def test_the_scale_makes_the_unit_bound_enough_for_the_fault(fault):
     assert trial.duration == 4000 * fault.sampling_time
 
 
+@pytest.mark.slow
 def test_smaller_gains_chatter_less_and_have_a_proof(fault):
     trial = sampling(fault, scheme="explicit", duration=1000 * fault.sampling_time)
     found = synthesise_sampled(trial, degrees=(5,), rounds=8)

@@ -87,6 +87,7 @@ def test_a_planted_library_is_not_loaded(ends, plant, tmp_path):
     assert not mark.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("left", [0.0, 0.5, 0.99])
 def test_a_damaged_library_is_built_anew(ends, tmp_path, left):
     program = PROBLEM.program.compiled(tmp_path)

@@ -49,6 +49,7 @@ def test_divergence_is_a_result(serial):
     assert told["search"]["value"] is None
 
 
+@pytest.mark.slow
 def test_processes_have_the_same_digits_and_a_death_loses_nothing(serial, tmp_path):
     killed = []
 
@@ -168,6 +169,7 @@ print(json.dumps(files))
 """
 
 
+@pytest.mark.slow
 def test_killed_five_times_it_ends_as_if_it_had_not_been(serial, tmp_path):
     """SIGKILL at random points, in the middle of batches and of writing."""
     call = [sys.executable, "-c", KILLED, str(tmp_path / "campaign")]

@@ -69,6 +69,7 @@ def test_an_automatic_multiplier_is_one_of_what_is_left_beside_squares(factor):
     assert all(not e[answer.statement.variables.index("w")] for e in answer.statement.multiplier)
 
 
+@pytest.mark.slow
 def test_a_square_in_the_multiplier_stays_where_what_is_left_needs_it():
     quartic = (
         "x^2*(x - w)^2 + y^2*(y - w)^2 + z^2*(z - w)^2 + 2*x*y*z*(x + y + z - 2*w)"  # Robinson's, in four variables
