@@ -24,7 +24,7 @@ import sympy as sp
 # %matplotlib inline
 import quakedesign as qd
 from quakedesign.symbolic import homogeneous, plant, weights_for
-from quakedesign.symbolic.stability import critical_stiffness, nucleation_length, stability
+from quakedesign.symbolic import critical_stiffness, nucleation_length, stability
 
 plant.force_balance()
 
@@ -54,7 +54,7 @@ for pressure in ("0", "-20e6", "40e6"):
 print(f"critical stiffness {critical_stiffness(fault):.4g} N/m, nucleation length {nucleation_length(fault):.4g} m")
 
 # %%
-from quakedesign.report.figures import stability_map
+from quakedesign.report import stability_map
 
 stability_map(fault)
 
@@ -89,8 +89,8 @@ found
 # The dimensionless groups are computed from the units. Two faults are similar if all groups agree; gains then carry over.
 
 # %%
-from quakedesign.report.plain import scale_lines
-from quakedesign.studies.scaling import scale_answer
+from quakedesign.report import scale_lines
+from quakedesign.studies import scale_answer
 
 answer = scale_answer("lab-fault", "real-fault", "cta", "published")
 print("\n".join(scale_lines(answer)))

@@ -29,7 +29,6 @@ import sympy as sp
 
 import quakedesign as qd
 from quakedesign.lyapunov import certificate_text
-from quakedesign.checking import check_files
 
 PROOFS = next(base / "proofs" for base in Path(qd.__file__).parents if (base / "proofs").is_dir())
 path = PROOFS / "certificates" / "cta_7_5_2.3_1.1.json"
@@ -41,7 +40,7 @@ certificate = qd.load_certificate(path)
 # (here $e_1 = \pm u_1^3$, $e_2 = \pm u_2^2$, $e_3 = \pm u_3$ with $u_i \ge 0$), so that "$V$ is positive" and "$V$ decreases" are statements about polynomials.
 
 # %%
-((verdict, lines),) = check_files([path]).values()
+((verdict, lines),) = qd.check_files([path]).values()
 print(verdict)
 print("\n".join(lines))
 
@@ -50,7 +49,7 @@ print("\n".join(lines))
 # $\kappa$ in $\dot V \le -\kappa V^{4/5}$: the origin is reached within $\frac{5}{\kappa}V(0)^{1/5}$.
 
 # %%
-from quakedesign.lyapunov.search.settling import settling
+from quakedesign.lyapunov import settling
 
 print(f"settles from |e_i| <= 1 within {settling(certificate, 1).seconds:.3g} s")
 
@@ -73,7 +72,7 @@ for square in witness["squares"]:
 # %%
 def verdicts(file: Path) -> tuple[str, str]:
     """First words of both checkers."""
-    ((own, _),) = check_files([file]).values()
+    ((own, _),) = qd.check_files([file]).values()
     call = [sys.executable, str(PROOFS / "check.py"), str(file)]
     other = subprocess.run(call, capture_output=True, text=True, check=False).stdout.splitlines()[0]
     return own.split(":")[0], other.rsplit(f"{file.name}: ", 1)[1].split(":")[0]

@@ -21,10 +21,10 @@
 import pandas as pd
 
 # %matplotlib inline
-from quakedesign.report.gain_map_figure import gain_map_figure
-from quakedesign.lyapunov.gains.synthesise import synthesise
-from quakedesign.lyapunov.maps.gain_map import gain_map
-from quakedesign.lyapunov.search.certify import largest_lipschitz
+from quakedesign.report import gain_map_figure
+from quakedesign.lyapunov import synthesise
+from quakedesign.lyapunov import gain_map
+from quakedesign.lyapunov import largest_lipschitz
 
 # %% [markdown]
 # ## The smallest gains for a given disturbance

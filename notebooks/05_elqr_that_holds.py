@@ -33,15 +33,14 @@ from scipy.linalg import expm
 
 # %matplotlib inline
 import quakedesign as qd
-from quakedesign.exact import UpperBound
 from quakedesign.lyapunov import Verdict
 from quakedesign.guarantees import task_of
-from quakedesign.report.sentences import verdict_lines
+from quakedesign.report import verdict_lines
 from quakedesign.simulation import natural_earthquake
 from quakedesign.guarantees import design_held, worst_found
 from own.printed_theorem import both_tests
-from quakedesign.linear.uncertainty_bounds import uncertainty_bounds
-from quakedesign.linear.verdict import judge
+from quakedesign.linear import uncertainty_bounds
+from quakedesign.linear import judge
 
 from own import printed_examples as examples  # beside this notebook
 
@@ -177,7 +176,8 @@ plt.show()
 
 # %%
 certificate = peaks["amplitude"]
-smaller = replace(certificate.claims, slip_rate_error=UpperBound(certificate.claims.slip_rate_error * Fraction(99, 100)))
+bound = certificate.claims.slip_rate_error
+smaller = replace(certificate.claims, slip_rate_error=type(bound)(bound * Fraction(99, 100)))
 refused = replace(certificate, claims=smaller).check() is Verdict.UNDECIDED
 print(certificate.sentence())
 

@@ -35,11 +35,11 @@ import numpy as np
 # %matplotlib inline
 import quakedesign as qd
 from quakedesign.fault import friction_law
-from quakedesign.identification.fault_file import save_fault
-from quakedesign.report.identification_page import identification_figure
-from quakedesign.report.limits_table import limits_lines
+from quakedesign.identification import save_fault
+from quakedesign.report import identification_figure
+from quakedesign.report import limits_lines
 from quakedesign.simulation import Tide, velocity_step
-from quakedesign.studies.runs import natural_run
+from quakedesign.studies import natural_run
 
 folder = Path(tempfile.mkdtemp())
 truth = {"direct_effect": 0.010, "evolution_effect": 0.014, "critical_slip": 1e-4}

@@ -29,7 +29,7 @@ import numpy as np
 
 # %matplotlib inline
 import quakedesign as qd
-from quakedesign.laws.elqr import ExtendedLQR
+from quakedesign.laws import ExtendedLQR
 
 fault = qd.load_fault("real-fault")
 period = fault.sampling_time  # T_s [s]

@@ -3,7 +3,7 @@
 The public names load on first use, so that ``import quakedesign`` costs nothing; ``__init__.pyi`` names them for tools.
 """
 
-from importlib import import_module
+from importlib import import_module as _import_module
 
 _HOME = {
     "Certificate": "lyapunov",
@@ -21,6 +21,7 @@ _HOME = {
     "assess": "synthesis",
     "campaign_problem": "simulation.campaign",
     "certify": "lyapunov",
+    "check_files": "checking",
     "compare": "report",
     "derive": "symbolic",
     "design": "synthesis",
@@ -49,11 +50,11 @@ __all__ = list(_HOME)
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
-        return import_module("importlib.metadata").version("quakedesign")
+        return _import_module("importlib.metadata").version("quakedesign")
     if name not in _HOME:
         raise AttributeError(f"module 'quakedesign' has no attribute {name!r}")
-    return getattr(import_module(f"quakedesign.{_HOME[name]}"), name)
+    return getattr(_import_module(f"quakedesign.{_HOME[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME])
+    return [*__all__, "__version__"]

@@ -1,3 +1,4 @@
+from quakedesign.checking import check_files as check_files
 from quakedesign.fault import Disturbance as Disturbance
 from quakedesign.fault import Fault as Fault
 from quakedesign.fault import FrictionLaw as FrictionLaw

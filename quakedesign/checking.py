@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign import fault as faults
 from quakedesign import guarantees, lyapunov
+from quakedesign.arguments import check_arguments
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.certificate_files import (
@@ -32,8 +33,22 @@ if TYPE_CHECKING:
     from quakedesign.guarantees.exact.guarantee_files import Claim
 
 
+__all__ = ["check_files"]
+
+
 def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tuple[str, list[str]]]:
-    """Verdict (``proved``, ``refuted`` or ``invalid: reason``) and statement for every file.
+    """Verdict (``proved``, ``refuted`` or ``invalid: reason``) and statement for every certificate file.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+    fault : str, optional
+        Name of a preset or path of a fault file: the statement must be about this fault.
+
+    Returns
+    -------
+    dict of str to (str, list of str)
+        By path.
 
     Raises
     ------
@@ -150,3 +165,6 @@ def statement(certificate: Certificate) -> list[str]:
     lines.append("SignedPower(x, a) is |x|^a with the sign of x, AbsolutePower(x, a) is |x|^a")
     lines.append("claims: " + ", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
     return lines
+
+
+check_arguments(__name__)

@@ -122,7 +122,7 @@ FRESH = """
 import sys
 from pathlib import Path
 from quakedesign.checking import check_files
-for verdict, _ in check_files(map(Path, sys.argv[1:])).values():
+for verdict, _ in check_files([*map(Path, sys.argv[1:])]).values():
     print(verdict, *({"sympy", "numpy"} & set(sys.modules)))
 """
 

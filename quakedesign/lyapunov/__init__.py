@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from quakedesign.lyapunov.exact.claim import loop_of as loop_of
     from quakedesign.lyapunov.exact.premises import covers as covers
     from quakedesign.lyapunov.gains.synthesise import synthesise as synthesise
+    from quakedesign.lyapunov.maps.gain_map import gain_map as gain_map
     from quakedesign.lyapunov.search.certify import certify as certify
+    from quakedesign.lyapunov.search.certify import largest_lipschitz as largest_lipschitz
+    from quakedesign.lyapunov.search.settling import settling as settling
 
 face(__name__)

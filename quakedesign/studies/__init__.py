@@ -11,5 +11,7 @@ if TYPE_CHECKING:
     from quakedesign.studies.performance_limits import Limit as Limit
     from quakedesign.studies.performance_limits import Limits as Limits
     from quakedesign.studies.performance_limits import limits as limits
+    from quakedesign.studies.runs import natural_run as natural_run
+    from quakedesign.studies.scaling import scale_answer as scale_answer
 
 face(__name__)

@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from quakedesign.symbolic.signed_power import normal_form as normal_form
     from quakedesign.symbolic.signed_power import off_kinks as off_kinks
     from quakedesign.symbolic.stability import Model as Model
+    from quakedesign.symbolic.stability import critical_stiffness as critical_stiffness
     from quakedesign.symbolic.stability import derive as derive
+    from quakedesign.symbolic.stability import nucleation_length as nucleation_length
+    from quakedesign.symbolic.stability import stability as stability
     from quakedesign.symbolic.term_expressions import real_symbols as real_symbols
 
 face(__name__)
