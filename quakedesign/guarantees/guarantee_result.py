@@ -25,6 +25,7 @@ from quakedesign.guarantees.exact.statement import Guarantee, SlidingGuarantee, 
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding, worst_found, worst_sliding
 from quakedesign.guarantees.search.compensated_search import Compensation
 from quakedesign.guarantees.search.estimate import own_poles
+from quakedesign.guarantees.search.linear_design import AMPLITUDE, BOX, SATURATION
 from quakedesign.guarantees.search.lqg import measured_by, sliding_model
 from quakedesign.guarantees.search.sliding_design import (
     LOG_RATES,
@@ -254,6 +255,7 @@ _QUANTITIES = {
     "delay": ("delay", "s"),
     "lag": ("lag", "s"),
     "diffusion": ("diffusion time L^2/D", "s"),
+    "longest_step": ("longest interval", "s"),
 }
 
 
@@ -266,17 +268,37 @@ def _with_nearest(name: str, found: Guarantee) -> str:
         if not getattr(found.held, name):
             return f"without any {title}"
         return f"with a {title} of at most {LowerBound(getattr(found.held, name)).quantity(unit)}"
+    if name == BOX:
+        widths = (f"{LowerBound(100 * width):.3g} % of {of}" for width, of in _widths(found))
+        return f"with the box of +-{', '.join(widths)}" if any(found.task.spreads) else "with the box paper"
+    if name == AMPLITUDE:
+        return f"with a disturbance of at most {LowerBound(found.task.amplitude):.3g} m/s^2"
     pump = found.held.pump
+    if name == SATURATION and pump is not None and pump.limits is not None:
+        low, high = pump.limits
+        return f"with a pump from {LowerBound(low).quantity('Pa')} or less to {UpperBound(high).quantity('Pa')} or more"
     if pump is None:
         return "with a pump without limits"
     return f"with a pump of at least {UpperBound(pump.rate or 0).quantity('Pa/s')}"
 
 
 def _nearest(name: str, found: Guarantee) -> dict[str, Any]:
-    """Plain values, SI; exact numbers as texts."""
-    pump = found.held.pump
-    value = getattr(found.held, name, None) if name in _QUANTITIES else pump and pump.rate
-    return {"quantity": name, "value": None if value is None else str(value), **found.claims.to_dict()}
+    """Plain values, SI; exact numbers as texts, of a box and of a pump's pressures several."""
+    pump, value = found.held.pump, None
+    if name == AMPLITUDE:
+        value = str(found.task.amplitude)
+    elif name in (BOX, SATURATION):
+        several = found.task.spreads if name == BOX else (pump and pump.limits) or ()
+        return {"quantity": name, "value": [str(v) for v in several], **found.claims.to_dict()}
+    else:
+        one = getattr(found.held, name, None) if name in _QUANTITIES else pump and pump.rate
+        value = None if one is None else str(one)
+    return {"quantity": name, "value": value, **found.claims.to_dict()}
+
+
+def _widths(found: Guarantee) -> list[tuple[Fraction, str]]:
+    """Relative half-widths of the box of a guarantee, and of what."""
+    return [pair for pair in zip(found.task.spreads, ("k", "eta", "N"), strict=True) if pair[0]]
 
 
 def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> LoopAnswer:

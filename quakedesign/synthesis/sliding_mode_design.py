@@ -19,7 +19,8 @@ from quakedesign.guarantees import (
     sampled_sliding_mode,
 )
 from quakedesign.guarantees.search.compensated_search import GUARANTEED
-from quakedesign.guarantees.search.defaults import sliding_mode
+from quakedesign.guarantees.search.defaults import deadbeat, sliding_mode
+from quakedesign.guarantees.search.linear_design import longest_step, nearest_setup
 from quakedesign.laws import BaseGains, Controller, SlidingMode
 from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.loop.loop_setup import MEASURED, LoopSetup
@@ -108,9 +109,21 @@ class SlidingModes(DesignMethod[SlidingMode]):
         """In a scheme, with given base gains or the first ones known."""
         wanted.require_all_measured()
         options: Any = {"gains": wanted.gains, "scheme": wanted.scheme or GUARANTEED, "objective": wanted.objective}
-        made = sliding_mode(task, law, step, **options, **wanted.setup.around())
+        around: Any = wanted.setup.around()
+        made = sliding_mode(task, law, step, **options, **around)
         if isinstance(made, NoGuarantee):
             return LoopAnswer(fault=fault, found=made)
+        if isinstance(made.found, NoGuarantee):
+            laws, none = deadbeat(task, law, wanted.gains), made.found
+            longest = longest_step(task, kind=laws, **around)
+            again = laws.continued(task, step, longest, **around)
+            if again is None:
+                nearest = nearest_setup(task, step, kind=laws, pressed=none.pressed, **around)
+                shorter = None if longest is None else laws.at(task, longest).found
+                known = shorter if isinstance(shorter, Guarantee) else None
+                asked = step if known else None
+                return LoopAnswer(fault=fault, found=none, shorter=known, asked_step=asked, nearest=nearest)
+            made = again
         return replace(attacked(fault, made.found), compensation=made)
 
 

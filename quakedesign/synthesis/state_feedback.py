@@ -105,8 +105,12 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
             return replace(other, found=given)
         told: Any = {"measured": setup.measured, **around}
         found = design_held(task, step, objective=wanted.objective, **told)
-        if isinstance(found, Guarantee) or setup.longest_step:
+        if isinstance(found, Guarantee):
             return attacked(fault, found)
+        if setup.longest_step or found.pressed:
+            nearest = nearest_setup(task, step, pressed=found.pressed, **told)
+            if nearest is not None or not found.pressed:
+                return LoopAnswer(fault=fault, found=found, nearest=nearest)
         longest = longest_step(task, **told)
         if (again := continued(task, step, longest, **told)) is not None:
             return attacked(fault, again)

@@ -197,11 +197,14 @@ class NoGuarantee:
         At least 1; None where something else fails, such as the stability of the nominal loop.
     needs : Fraction, optional
         Change of the pressure from sample to sample that a pump would have to make [Pa].
+    pressed : bool
+        Whether it is the pressure alone that fails: more than a pump can hold, or enough to open the fault.
     """
 
     reason: str
     small_gain: UpperBound | None
     needs: Fraction | None = None
+    pressed: bool = False
 
     def check(self) -> Verdict:
         """UNDECIDED."""

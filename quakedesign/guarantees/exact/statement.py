@@ -375,7 +375,9 @@ def _of_claims(
         return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
     if reason := claims.opens(task) or _beyond_the_pump(held, claims):
         slow = held.pump is not None and bool(held.pump.too_slow(claims.largest_step, held.ramp))
-        return NoGuarantee(reason=reason, small_gain=None, needs=claims.largest_step if slow else None)
+        return NoGuarantee(
+            reason=reason, small_gain=None, needs=claims.largest_step if slow else None, pressed=not slow
+        )
     return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
 
 

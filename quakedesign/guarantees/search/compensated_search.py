@@ -9,8 +9,10 @@ from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import product
+from math import inf
 from typing import Any, Unpack
 
+import numpy as np
 import sympy as sp
 
 from quakedesign.cache import search_once
@@ -21,8 +23,17 @@ from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, holds
 from quakedesign.guarantees.exact.statement import Guarantee, guarantee
 from quakedesign.guarantees.exact.task import Task
-from quakedesign.guarantees.search.estimate import BoundsEstimate, estimated
-from quakedesign.guarantees.search.linear_design import OBJECTIVES
+from quakedesign.guarantees.search.estimate import BoundsEstimate, closeness, estimated
+from quakedesign.guarantees.search.linear_design import (
+    MOST_DELAY,
+    OBJECTIVES,
+    Closest,
+    Kind,
+    Longest,
+    best_guarantee,
+    search_near,
+    unpredictable,
+)
 from quakedesign.laws import Controller, ImplicitRoot, Power, Sampling, SlidingMode
 from quakedesign.laws import compensated as compensated_law
 from quakedesign.laws.cta import ContinuousTwisting
@@ -105,6 +116,9 @@ _REMAINDERS = tuple(Fraction(v) for v in ("0", "0.02", "0.1"))  # of the slip-ra
 _NEARLY = 2  # of these slopes are near enough to a deadbeat step for the choice of a scale
 _MARGIN = Fraction(21, 20)
 _DEADBEAT = ImplicitRoot(pull=(Power(factor=(Fraction(1), Fraction(1)), exponent=Fraction(0), argument="slip"),))
+_STARTS = (0.2, 0.75), (0.35, 1.0)  # weight, and B0 by the middle of the input gain, for long and for short T_s
+_BESIDE = 0.2, 3.0  # of B0 by the middle
+_EVALUATIONS, _NEAR_ENOUGH, _WORST = 60, 0.9, 9.0
 _ROOTS = tuple(Fraction(f"{10 ** (k / 24):.1e}") for k in range(-48, 73))  # ρ of λ = ρ⁶
 
 
@@ -199,9 +213,11 @@ def compensated(
         return NoGuarantee(reason=str(error), small_gain=None)
     held = _held(ImplicitRoot(pull=pull), weight, authority, step, around)
     first = guarantee(task, held)
-    deadbeat = estimated(task, held)
-    if isinstance(first, Guarantee) or deadbeat is None or isinstance(deadbeat.bounds, NoGuarantee):
+    if isinstance(first, Guarantee):
         return first
+    deadbeat = estimated(task, held)
+    if deadbeat is None or isinstance(deadbeat.bounds, NoGuarantee):
+        return best_guarantee(task, held)
     size = deadbeat.bounds.slip_rate_error
     for share, slope in product(_REMAINDERS, _SLOPES):
         root = ImplicitRoot(pull=pull, slopes=(slope, Fraction(1)), remainder=share * size)
@@ -214,7 +230,7 @@ def compensated(
         found = guarantee(task, wider) if within else None
         if isinstance(found, Guarantee):
             return found
-    return first
+    return best_guarantee(task, held)
 
 
 def design_compensated(
@@ -239,7 +255,18 @@ def design_compensated(
     ParameterError
     """
     require_ordinary(step=step)
-    weight, authority, errors = _deadbeat(task, step, objective, weights, **around)
+    return _made(task, controller, step, _deadbeat(task, step, objective, weights, **around), around)
+
+
+def _made(
+    task: Task,
+    controller: SlidingMode,
+    step: Fraction,
+    chosen: tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None],
+    around: Around,
+) -> Compensation:
+    """A controller with a weight, B0 and the smallest λ for errors of a size, and what is guaranteed of it."""
+    weight, authority, errors = chosen
     settings = ("weight", weight), ("authority", authority)
     path: dict[str, Any] = {name: around.get(name, Fraction(0)) for name in ("delay", "lag", "diffusion")}
     sampling = Sampling(step=step, scheme=GUARANTEED, settings=settings, **path)
@@ -250,6 +277,81 @@ def design_compensated(
     except UnsupportedError as error:
         return Compensation(controller=law, found=NoGuarantee(reason=str(error), small_gain=None))
     return Compensation(controller=law, found=compensated(task, law, weight, authority, step, **around))
+
+
+@dataclass(frozen=True, slots=True)
+class Deadbeat(Kind):
+    """Sliding modes with given base gains in the scheme ``compensated``; numbers are a weight and B0 by the middle."""
+
+    controller: SlidingMode
+
+    def closest(
+        self, task: Task, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]
+    ) -> Closest | NoGuarantee:
+        """The weight and B0 with which a deadbeat step comes nearest to a guarantee, whatever the gains."""
+        if (none := unpredictable(task, step)) is not None:
+            return none
+        if around.get("delay", 0) > MOST_DELAY * step:
+            return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
+
+        def cost(x: np.ndarray) -> float:
+            known = 0 < x[0] <= 1 and _BESIDE[0] <= x[1] <= _BESIDE[1]
+            return min(closeness(task, self.held(task, x, step, **around))[0], _WORST) if known else _WORST
+
+        question = "nearly deadbeat", task, step, tuple(sorted(around.items()))
+        least, x = inf, np.array(_STARTS[0])
+        for start in _STARTS if near is None else (near,):
+            found = search_near(question, cost, start, enough=_NEAR_ENOUGH, evaluations=_EVALUATIONS)
+            least, x = min((least, x), found, key=lambda reached: reached[0])
+            if least < _NEAR_ENOUGH:
+                break
+        return Closest(least, x, self.held(task, x, step, **around))
+
+    def held(self, task: Task, numbers: np.ndarray, step: Fraction, **around: Unpack[Around]) -> Held:
+        """The loop with a deadbeat step, of any gains."""
+        return _held(_DEADBEAT, *_settled(task, numbers), step, around)
+
+    def proved(self, task: Task, found: Closest) -> Guarantee | NoGuarantee:
+        """Of the smallest λ for which the step is deadbeat."""
+        return self.made(task, found.held.step, found.numbers, **found.held.around).found
+
+    def made(self, task: Task, step: Fraction, numbers: np.ndarray, **around: Unpack[Around]) -> Compensation:
+        """The controller with these numbers, and what is guaranteed of it."""
+        (weight, authority), held = _settled(task, numbers), self.held(task, numbers, step, **around)
+        bounds = closeness(task, held)[1]
+        noise = around.get("slip_noise", Fraction(0)), around.get("rate_noise", Fraction(0))
+        errors = None if bounds is None else (bounds.slip_error + noise[0], bounds.slip_rate_error + noise[1])
+        return _made(task, self.controller, step, (weight, authority, errors), around)
+
+    def leanest(self, task: Task, step: Fraction, **around: Unpack[Around]) -> Held | None:
+        """That with the smallest peak."""
+        weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, **around)
+        law = _made(task, self.controller, step, (weight, authority, errors), around).controller
+        root = ImplicitRoot(pull=implicit_pull(law, step, authority))
+        return None if errors is None else _held(root, weight, authority, step, around)
+
+    def continued(
+        self, task: Task, step: Fraction, longest: Longest | None, **around: Unpack[Around]
+    ) -> Compensation | None:
+        """Design for a T_s [s] up to the longest, of numbers near those; None where none is proved."""
+        if longest is None or longest.guarantee.held.step < step:
+            return None
+        near = self.closest(task, step, longest.numbers, **around)
+        made = None if isinstance(near, NoGuarantee) else self.made(task, step, near.numbers, **around)
+        return made if made is not None and isinstance(made.found, Guarantee) else None
+
+    def at(self, task: Task, longest: Longest, objective: str = "peak") -> Compensation:
+        """Design for the longest T_s and all else of a guarantee: as others are made, else that of the search."""
+        held = longest.guarantee.held
+        made = design_compensated(task, self.controller, held.step, objective=objective, **held.around)
+        if isinstance(made.found, Guarantee):
+            return made
+        return self.made(task, held.step, longest.numbers, **held.around)
+
+
+def _settled(task: Task, numbers: np.ndarray) -> tuple[Fraction, Fraction]:
+    """Weight and B0 in few digits."""
+    return Fraction(f"{numbers[0]:.3g}"), _short(Fraction(float(numbers[1])) * task.model.gain)
 
 
 def recovered(found: Guarantee) -> Compensation:

@@ -15,8 +15,8 @@ from quakedesign.guarantees.exact.statement import Guarantee
 from quakedesign.guarantees.exact.task import Task
 from quakedesign.guarantees.search.compensated_search import (
     GUARANTEED,
-    WEIGHTS,
     Compensation,
+    Deadbeat,
     compensated,
     design_compensated,
 )
@@ -26,9 +26,6 @@ from quakedesign.guarantees.search.linear_design import (
     design_held,
     longest_delay,
     longest_step,
-    reached_again,
-    reached_delay,
-    reached_step,
     tightened,
 )
 from quakedesign.laws import SlidingMode
@@ -123,45 +120,31 @@ def sampled_sliding_mode(
 ) -> tuple[Compensation, SampledDesign]:
     """Sliding mode with the base gains of a law for a T_s [s], or for the longest shorter one that has a guarantee.
 
-    How far others would go is looked for with the smallest weight, which has the smallest peak where T_s is long; none
-    of them knows of a delay.
+    How far others would go is looked for as of linear laws; none of them knows of a delay.
 
     Raises
     ------
     ParameterError
         For an unknown objective.
     """
-
-    def careful(time: Fraction, delay: Fraction = Fraction(0)) -> Compensation:
-        around = noise | {"delay": delay}
-        return design_compensated(task, law, time, objective="peak", weights=WEIGHTS[:1], **around)
-
-    question = (task, law, *(item for item in sorted(noise.items()) if item[1]))
+    laws = Deadbeat(law)
     made = design_compensated(task, law, step, objective=objective, **noise)
+    longest = longest_step(task, kind=laws, **noise)
+    if isinstance(made.found, NoGuarantee):
+        made = laws.continued(task, step, longest, **noise) or made
     reason = made.found.reason if isinstance(made.found, NoGuarantee) else ""
-    most = step if reason else None
-    longest = reached_again(
-        lambda time: careful(time).found,
-        lambda attempt: reached_step(task, attempt, most),
-        *(*question, step, most),
-    )
     if reason and longest is not None:
-        made = design_compensated(task, law, longest.held.step, objective=objective, **noise)
-        made = careful(longest.held.step) if isinstance(made.found, NoGuarantee) else made
+        made = laws.at(task, longest, objective)
     if isinstance(made.found, NoGuarantee):
         return made, SampledDesign(step=step, runs=None, reason=reason)
     runs = tightened(made.found)
     held = runs.held
-    delayed = reached_again(
-        lambda delay: careful(held.step, delay).found,
-        lambda attempt: reached_delay(held.step, attempt, held.step / 8),
-        *(*question, held.step, "delay"),
-    )
+    delayed = longest_delay(task, held.step, kind=laws, **noise)
     return replace(made, found=runs), SampledDesign(
         step=step,
         runs=runs,
         reason=reason,
-        longest_step=max(held.step, longest.held.step if longest else held.step),
+        longest_step=max(held.step, longest.guarantee.held.step if longest else held.step),
         longest_delay=delayed.held.delay if delayed else Fraction(0),
     )
 
@@ -216,12 +199,17 @@ def sliding_mode(
         For an unknown scheme or objective, or a wrong number of gains.
     """
     require_known(scheme, sorted(schemes()), "scheme")
-    base = law.from_values(gains) if gains else law.base_gains()[0].law
+    known = deadbeat(task, law, gains)
     if scheme != GUARANTEED:
         return NoGuarantee(reason=_why_none(task, law, scheme, step), small_gain=None)
-    known = replace(base, gains=dict(base.gains), divisor=task.authority)
-    made = design_compensated(task, known, step, objective=objective, **around)
+    made = design_compensated(task, known.controller, step, objective=objective, **around)
     return replace(made, found=tightened(made.found))
+
+
+def deadbeat(task: Task, law: type[SlidingMode], gains: tuple[str, ...] = ()) -> Deadbeat:
+    """Sliding modes of a law with given base gains, or the first ones known for it."""
+    base = law.from_values(gains) if gains else law.base_gains()[0].law
+    return Deadbeat(replace(base, gains=dict(base.gains), divisor=task.authority))
 
 
 def _why_none(task: Task, law: type[SlidingMode], scheme: str, step: Fraction) -> str:

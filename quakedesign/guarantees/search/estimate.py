@@ -96,6 +96,11 @@ def closeness(task: Task, held: Held) -> tuple[float, Bounds | None]:
     return _closeness(None, least)
 
 
+def told_closeness(bounds: Bounds | NoGuarantee) -> tuple[float, Bounds | None]:
+    """The same of bounds that are known already."""
+    return _closeness(bounds, _small(bounds))
+
+
 def _small(bounds: Bounds | NoGuarantee) -> float:
     return inf if bounds.small_gain is None else float(bounds.small_gain)
 

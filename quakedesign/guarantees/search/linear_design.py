@@ -5,6 +5,7 @@ longest sampling period, delay and diffusion time that have a guarantee; certifi
 continuous time.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -33,6 +34,7 @@ from quakedesign.guarantees.search.estimate import (
     short,
     slowly_estimated,
     spectral_radius,
+    told_closeness,
 )
 from quakedesign.guarantees.search.lqg import (
     LawFamily,
@@ -237,6 +239,9 @@ def design_held(
         limit = (room or laws.room) * float(seen.bounds.slip_rate_error)
         _, x = min((laws.least_drift(start, limit) for start in (x, starts[1])), key=lambda reached: reached[0])
     found = best_guarantee(task, laws.held(x))
+    if isinstance(found, NoGuarantee) and seen is not None and isinstance(seen.bounds, Bounds) and found.pressed:
+        leaner = best_guarantee(task, laws.held(laws.least_pressure(x)[1]))
+        found = leaner if isinstance(leaner, Guarantee) else found
     noise = {name: v for name, v in laws.template.noise.items() if v}
     if isinstance(found, Guarantee) or not noise:
         return found
@@ -271,7 +276,7 @@ class _Laws:
     def of(cls, task: Task, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
         """Laws for a T_s [s] and what is around them, or why there are none."""
         require_surroundings(around)
-        if (none := _unpredictable(task, step)) is not None:
+        if (none := unpredictable(task, step)) is not None:
             return none
         if reason := why_no_law(step, measured, around):
             return NoGuarantee(reason=reason, small_gain=None)
@@ -300,7 +305,7 @@ class _Laws:
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _FAILED * min(self.close(x)[0], 9.0)) / _FAILED
 
-        return _search_once(
+        return search_near(
             ("closest", *self.question), cost, start, enough=_SURE, evaluations=evaluations, far=1 + _FAR, wide=True
         )
 
@@ -312,9 +317,13 @@ class _Laws:
             peak = _FAILED * min(found, 9.0) if bounds is None else _decibels(bounds, self.family.period)
             return self.quiet(x, peak)
 
-        return _search_once(("near peak", *self.question), cost, start, evaluations=_FEW, wide=True)[1]
+        return search_near(("near peak", *self.question), cost, start, evaluations=_FEW, wide=True)[1]
 
     def close(self, x: np.ndarray) -> tuple[float, Bounds | None]:
+        """Closeness to a guarantee, and the bounds where one is to be expected."""
+        if self.template.longest_step:
+            seen = self.seen(x)
+            return (inf, None) if seen is None else told_closeness(seen.bounds)
         try:
             return closeness(self.task, self.held(x)) if self.family.admits(x) else (inf, None)
         except LinAlgError:  # of a Riccati equation
@@ -336,7 +345,19 @@ class _Laws:
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _peak_cost(self.seen(x), self.family.period))
 
-        return _search_once(("peak", *self.question), cost, start, far=far, **settings)
+        return search_near(("peak", *self.question), cost, start, far=far, **settings)
+
+    def least_pressure(self, start: Sequence[float] | np.ndarray) -> tuple[float, np.ndarray]:
+        """Smallest change of the pressure that is estimated near a start, in decibels, and where."""
+
+        def cost(x: np.ndarray) -> float:
+            seen = self.seen(x)
+            if seen is None or isinstance(seen.bounds, NoGuarantee):
+                return 10 * _FAILED
+            most = seen.bounds.push if seen.bounds.asked is None else seen.bounds.asked
+            return self.quiet(x, 10 * log10(float(most)))
+
+        return search_near(("pressure", *self.question), cost, start, **self._effort)
 
     def least_drift(self, start: Sequence[float] | np.ndarray, limit: float) -> tuple[float, np.ndarray]:
         """Smallest cost of a drift near a start, and where, within a limit of the slip-rate error [m/s]."""
@@ -344,7 +365,7 @@ class _Laws:
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _drift_cost(self.seen(x), limit))
 
-        return _search_once(("drift", limit, *self.question), cost, start, **self._effort)
+        return search_near(("drift", limit, *self.question), cost, start, **self._effort)
 
     @property
     def room(self) -> float:
@@ -370,7 +391,7 @@ def _hopeless(cost: float) -> bool:
     return _HOPELESS * _FAILED < cost < 9 * _FAILED
 
 
-def _unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
+def unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
     """No law of samples, where the errors of the model outgrow within a period what a prediction can hold."""
     require_ordinary(step=step)
     rate, slip = float(task.model.rate), max(float(task.model.slip), 0.0)
@@ -380,7 +401,7 @@ def _unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
     return NoGuarantee(reason=f"errors grow by e^{growth:.3g} within T_s = {float(step):.4g} s", small_gain=None)
 
 
-def _search_once(
+def search_near(
     question: tuple[Any, ...], cost: Callable[[np.ndarray], float], start: Sequence[float] | np.ndarray, **settings: Any
 ) -> tuple[float, np.ndarray]:
     """What `_search` finds, or has found for a question that says all about the cost, see `quakedesign.cache`."""
@@ -449,7 +470,6 @@ def _drift_cost(found: BoundsEstimate | None, limit: float) -> float:
 # ----------------------------------------------------------------------
 # How long a sampling time and a delay may be for a designed loop to have a guarantee.
 
-Search = Callable[[Fraction, np.ndarray | None], Closest | NoGuarantee]
 Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
 _ATTEMPTS = 12
 _NEAR = Fraction(1, 16)  # share of the longest time by which the end of the reach is left open
@@ -462,9 +482,9 @@ _LEAST = 0.01  # small gain that is counted with
 _LONGEST_TIMES_FAR = 2.0  # small gain from which a time is halved
 
 
-RATE = "rate_limit"
-LIMITING = (RATE, "delay_jitter", "jitter", "averaging", "delay", "lag", "diffusion")
-"""What of a setup may be too much for any design, what is easiest to change first."""
+RATE, SATURATION, LONGEST, BOX, AMPLITUDE = "rate_limit", "saturation", "longest_step", "box", "amplitude"
+LIMITING = (RATE, LONGEST, "delay_jitter", "jitter", "averaging", "delay", "lag", "diffusion", BOX)
+"""What may be too much for any design, what is easiest to change first; pressures go before."""
 _LONGEST_TIMES_FEWER = 8  # attempts, each of which begins anew where its first law fails
 _ANY_RATE = Fraction(10**30)  # [Pa/s]
 
@@ -477,7 +497,52 @@ class Longest:
     numbers: np.ndarray
 
 
-def longest_step(task: Task, *, measured: str = MEASURED[0], **around: Unpack[Around]) -> Longest | None:
+Asked = tuple[Task, Fraction, Around]
+"""Task, T_s [s] and what is around a law, of a design."""
+
+
+class Kind(ABC):
+    """A kind of laws, as far as a search for the most that one of them stands knows it."""
+
+    @abstractmethod
+    def closest(self, task: Task, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
+        """`Closest` to a guarantee, or `NoGuarantee`; near the numbers of another law if they are given."""
+
+    @abstractmethod
+    def proved(self, task: Task, found: Closest) -> Guarantee | NoGuarantee:
+        """Proof about a law that is near enough."""
+
+    @abstractmethod
+    def leanest(self, task: Task, step: Fraction, **around: Unpack[Around]) -> Held | None:
+        """The loop of a law whose pressure changes little; None where no law is known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Linear(Kind):
+    """Laws with an estimate of the disturbance, told what is measured."""
+
+    measured: str = MEASURED[0]
+
+    def closest(self, task: Task, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
+        """By a search over the numbers of the family."""
+        return closest(task, step, near=near, measured=self.measured, **around)
+
+    def proved(self, task: Task, found: Closest) -> Guarantee | NoGuarantee:
+        """With a slow input gain where that helps."""
+        return best_guarantee(task, found.held)
+
+    def leanest(self, task: Task, step: Fraction, **around: Unpack[Around]) -> Held | None:
+        """That with the smallest change of pressure near the smallest peak."""
+        laws = _Laws.of(task, step, self.measured, around)
+        if isinstance(laws, NoGuarantee):
+            return None
+        peak = min((laws.least_peak(start) for start in laws.family.starts), key=lambda reached: reached[0])[1]
+        return laws.held(laws.least_pressure(peak)[1])
+
+
+def longest_step(
+    task: Task, *, measured: str = MEASURED[0], kind: Kind | None = None, **around: Unpack[Around]
+) -> Longest | None:
     """A guarantee at nearly the longest T_s that has one, whatever the T_s of the fault; None where none is found.
 
     Laws are those that come nearest to a guarantee, each sought near that of the T_s before.
@@ -487,20 +552,12 @@ def longest_step(task: Task, *, measured: str = MEASURED[0], **around: Unpack[Ar
     task : Task
     measured, **around
         As in `design_held`.
+    kind : Kind, optional
+        Of the laws; linear ones unless given.
     """
-
-    def search(step: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
-        return closest(task, step, near=near, measured=measured, **around)
-
     path: dict[str, Any] = {**around}
     late = sum(float(path.get(name) or 0) for name in ("delay", "lag", "diffusion"))
-    return _farthest(task, search, _first_step(task, late), None)
-
-
-def reached_step(task: Task, attempt: Attempt, most: Fraction | None = None) -> Guarantee | None:
-    """The same for any kind of design, an attempt at a T_s [s]."""
-    first = _first_step(task)
-    return _last(reached(attempt, first if most is None else min(first, most), most=most))
+    return _farthest(kind or Linear(measured), lambda step: (task, step, around), _first_step(task, late), None)
 
 
 def _first_step(task: Task, late: float = 0.0) -> Fraction:
@@ -531,14 +588,14 @@ def design_at(task: Task, longest: Longest) -> Guarantee:
 
 
 def longest_delay(
-    task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: Task, step: Fraction, *, measured: str = MEASURED[0], kind: Kind | None = None, **around: Unpack[Around]
 ) -> Guarantee | None:
     """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
 
-    def search(delay: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
-        return closest(task, step, near=near, measured=measured, **(around | {"delay": delay}))
+    def ask(delay: Fraction) -> Asked:
+        return task, step, {**around, "delay": delay}
 
-    found = _farthest(task, search, Fraction(0), MOST_DELAY * step, unit=step / 2)
+    found = _farthest(kind or Linear(measured), ask, Fraction(0), MOST_DELAY * step, unit=step / 2)
     return None if found is None else found.guarantee
 
 
@@ -547,44 +604,101 @@ def farthest_rock(
 ) -> Guarantee | None:
     """A guarantee through nearly the largest L²/D of rock that has one; None where none is found."""
 
-    def search(time: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
-        return closest(task, step, near=near, measured=measured, **(around | {"diffusion": time}))
+    def ask(time: Fraction) -> Asked:
+        return task, step, {**around, "diffusion": time}
 
-    found = _farthest(task, search, max(_first_step(task), step), None)
+    found = _farthest(Linear(measured), ask, max(_first_step(task), step), None)
     return None if found is None else found.guarantee
 
 
 def nearest_setup(
-    task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: Task,
+    step: Fraction,
+    *,
+    measured: str = MEASURED[0],
+    kind: Kind | None = None,
+    pressed: bool = False,
+    **around: Unpack[Around],
 ) -> tuple[str, Guarantee] | None:
-    """Of a loop without a guarantee: a quantity of its setup, and a guarantee with nearly the most of it that has one.
+    """Of a loop without a guarantee: a quantity that fails, and a guarantee with nearly the most of it that has one.
 
-    It is the first of `LIMITING` without which a design has a guarantee at T_s and with all else as it is; None without
-    one. Of a pump it is the rate, with nearly the lowest that will do.
+    Where `pressed`, where a pressure fails that the pump would have to hold or that opens the fault, a design that no
+    pump limits tells the smallest that will do, else the largest disturbance is told. Else it is the first of
+    `LIMITING` without which a design has a guarantee at T_s and with all else as it is; None without one. Of a pump it
+    is the rate, with nearly the lowest that will do; of the box the share of all of its half-widths.
     """
-    pump, told = around.get("pump"), measured
+    laws = kind or Linear(measured)
+    if pressed and (less := _less_pressed(laws, task, step, around)) is not None:
+        return less
+    pump = around.get("pump")
     for name in LIMITING:
-        rated = name == RATE
-        asked: Any = (pump.rate if pump else None) if rated else around.get(name)
+        asked: Any = around.get(name)
+        if name in (RATE, BOX, LONGEST):
+            asked = {RATE: pump and pump.rate, BOX: Fraction(any(task.spreads)), LONGEST: _slack(step, around)}[name]
         if not asked:
             continue
 
-        def search(value: Fraction, near: np.ndarray | None, name: str = name, rated: bool = rated) -> Any:
-            other: Any = {"pump": _ramped(pump, value), "ramp": value} if rated else {name: value}
-            return closest(task, step, near=near, measured=told, **(around | other))
+        def ask(value: Fraction, name: str = name) -> Asked:
+            other: Any = {name: value}
+            if name == BOX:
+                return replace(task, spreads=_narrowed(task, value)), step, around
+            if name == RATE:
+                other = {"pump": _ramped(pump, value), "ramp": value}
+            elif name == LONGEST:
+                other = {LONGEST: step + value}
+            return task, step, {**around, **other}
 
-        most = step / 2 if rated else asked
+        most = step / 2 if name == RATE else asked
         first, unit = Fraction(0), min(asked, step) / 2
-        if rated or "jitter" in name:
+        if name == RATE or "jitter" in name:
             unit = min(most, step) / 16
         elif name == "diffusion":
             first, unit = min(max(_first_step(task), step), asked), Fraction(0)
-        found = _farthest(task, search, first, most, unit=unit, attempts=_LONGEST_TIMES_FEWER)
-        if found is not None and rated:
-            return name, with_lowest_rate(found.guarantee)
+        elif name == LONGEST:
+            first, unit = asked / 2, Fraction(0)
+        elif name == BOX:
+            unit = Fraction(1, 2)
+        found = _farthest(laws, ask, first, most, unit=unit, attempts=_LONGEST_TIMES_FEWER)
         if found is not None:
-            return name, found.guarantee
+            return name, with_lowest_rate(found.guarantee) if name == RATE else found.guarantee
     return None
+
+
+def _slack(step: Fraction, around: Around) -> Fraction:
+    """By how much the longest interval from sample to sample is longer than T_s [s]."""
+    return max(around.get("longest_step", step) - step, Fraction(0))
+
+
+def _narrowed(task: Task, share: Fraction) -> tuple[Fraction, Fraction, Fraction]:
+    """Half-widths of a box that is smaller."""
+    first, second, third = (share * width for width in task.spreads)
+    return first, second, third
+
+
+def _less_pressed(laws: Kind, task: Task, step: Fraction, around: Around) -> tuple[str, Guarantee] | None:
+    """The smallest pump, or the largest disturbance, for which a law of little pressure is proved."""
+    pump, held = around.get("pump"), laws.leanest(task, step, **around)
+    if held is None:
+        return None
+    if pump is not None and pump.limits is not None:
+        found = best_guarantee(task, replace(held, pump=_unlimited(pump)))
+        if isinstance(found, Guarantee):
+            low, high = map(Fraction, found.claims.pressures[-1])
+            wider = replace(pump, least=min(pump.limits[0], low), largest=max(pump.limits[1], high))
+            return SATURATION, replace(found, held=replace(found.held, pump=wider))
+
+    def attempt(amplitude: Fraction) -> Guarantee | NoGuarantee:
+        return best_guarantee(replace(task, amplitude=amplitude), held)
+
+    if not task.amplitude:
+        return None
+    less = reached(attempt, task.amplitude / 2, most=task.amplitude, attempts=_LONGEST_TIMES_FEWER)
+    return (AMPLITUDE, less[-1]) if less else None
+
+
+def _unlimited(pump: Pump) -> Pump | None:
+    """The same pump with any pressure."""
+    return None if pump.rate is None else replace(pump, least=None, largest=None)
 
 
 def _ramped(pump: Pump | None, ramp: Fraction) -> Pump | None:
@@ -603,19 +717,20 @@ def with_lowest_rate(found: Guarantee) -> Guarantee:
 
 
 def _farthest(
-    task: Task,
-    search: Search,
+    laws: Kind,
+    ask: Callable[[Fraction], Asked],
     first: Fraction,
     most: Fraction | None,
     unit: Fraction = Fraction(0),
     attempts: int = _ATTEMPTS,
 ) -> Longest | None:
-    """A proof at nearly the longest time for which laws come near enough to a guarantee.
+    """A proof at nearly the longest time, or the most of another quantity, for which laws come near to a guarantee.
 
     Parameters
     ----------
-    search : callable
-        Of a time [s] and the numbers of a law for another one.
+    laws : Kind
+    ask : callable
+        What is asked of a design, of a time [s].
     first : Fraction
         Time to try first [s].
     most : Fraction, optional
@@ -625,6 +740,12 @@ def _farthest(
     attempts : int
         Number of times at most.
     """
+
+    def search(time: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
+        task, step, around = ask(time)
+        found: Closest | NoGuarantee = laws.closest(task, step, near, **around)
+        return found
+
     good: Closest | None = None
     time, at, bad, before = first, first, None, None
     for _ in range(attempts):
@@ -643,30 +764,29 @@ def _farthest(
         if good is not None and (at == most or edge or (bad is not None and bad[0] - at <= open_end)):
             break
         time = _time_between(good, at, bad, most, unit)
-    return None if good is None else _proved_near(task, search, good, at)
+    for _ in range(_ATTEMPTS if good is not None else 0):
+        assert good is not None
+        proof = laws.proved(ask(at)[0], good)
+        if isinstance(proof, Guarantee):
+            return Longest(proof, good.numbers)
+        at = Fraction(f"{float(at * _BACK):.3g}")
+        nearer = search(at, good.numbers)
+        if isinstance(nearer, Closest):
+            good = nearer
+    return None
 
 
 def _within(found: Closest | NoGuarantee) -> bool:
     return isinstance(found, Closest) and found.closeness < 1
 
 
-def _proved_near(task: Task, search: Search, good: Closest, time: Fraction) -> Longest | None:
-    """A proof at a time or a little below."""
-    for _ in range(_ATTEMPTS):
-        found = best_guarantee(task, good.held)
-        if isinstance(found, Guarantee):
-            return Longest(found, good.numbers)
-        time = Fraction(f"{float(time * _BACK):.3g}")
-        nearer = search(time, good.numbers)
-        if isinstance(nearer, Closest):
-            good = nearer
-    return None
-
-
 def _time_between(
     good: Closest | None, at: Fraction, bad: tuple[Fraction, float | None] | None, most: Fraction | None, unit: Fraction
 ) -> Fraction:
-    """Time to try next [s], in three digits: where the small gain, drawn straight, is that of the end of the reach."""
+    """Time to try next [s], in three digits: where the small gain, drawn straight, is that of the end of the reach.
+
+    Half way where it is far from that, or where a nominal loop is unstable.
+    """
     if good is None:
         assert bad is not None
         time, small = bad
@@ -681,47 +801,9 @@ def _time_between(
         time = Fraction(f"{ahead:.3g}")
         return time if most is None else min(time, most)
     width, share = float(bad[0] - at), 0.5
-    if bad[1] is not None and bad[1] > max(1.0, good.small_gain):
+    if bad[1] is not None and max(1.0, good.small_gain) < bad[1] <= _LONGEST_TIMES_FAR:
         share = min(max((_AIM - good.small_gain) / (bad[1] - good.small_gain), 0.2), 0.8)
     return Fraction(f"{float(at) + share * width:.3g}")
-
-
-def reached_delay(step: Fraction, attempt: Attempt, first: Fraction) -> Guarantee | None:
-    """The same for any kind of design, an attempt at a delay [s], and the one to try first."""
-    return _last(reached(attempt, first, most=MOST_DELAY * step))
-
-
-def reached_again(attempt: Attempt, search: Callable[[Attempt], Guarantee | None], *question: Any) -> Guarantee | None:
-    """What a search for the longest time ends with, tried at once where it ended before; each attempt is for itself.
-
-    Parameters
-    ----------
-    attempt : callable
-        What it answers depends on the time [s] and the question alone.
-    search : callable
-        Of an attempt.
-    *question
-        Values that say everything, see `quakedesign.cache`.
-    """
-    made: dict[Fraction, Guarantee | NoGuarantee] = {}
-
-    def once(time: Fraction) -> Guarantee | NoGuarantee:
-        if time not in made:
-            made[time] = attempt(time)
-        return made[time]
-
-    def ended() -> list[str]:
-        last = search(once)
-        return [str(time) for time, found in made.items() if found is last]
-
-    for time in search_once(ended, "reach", *question):
-        if isinstance(found := once(Fraction(time)), Guarantee):
-            return found
-    return search(once)
-
-
-def _last(found: tuple[Guarantee, ...]) -> Guarantee | None:
-    return found[-1] if found else None
 
 
 def reached(

@@ -51,7 +51,7 @@ def unproved(monkeypatch):
 @pytest.fixture
 def unreached(monkeypatch):
     """Without how far other designs would go, which is another test's."""
-    for name in ("reached_step", "reached_delay"):
+    for name in ("longest_step", "longest_delay"):
         monkeypatch.setattr(f"quakedesign.guarantees.search.defaults.{name}", lambda *_, **__: None)
 
 
@@ -113,18 +113,15 @@ def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for():
 
 @pytest.mark.usefixtures("unproved")
 def test_how_far_other_designs_go_is_asked_with_the_same_noise(monkeypatch):
-    asked, noise = [], {"slip_noise": F(1, 10**6), "rate_noise": F(0)}
-    made = DEFAULT.design_compensated
+    asked = []
 
-    def seen(*asks, **around):
-        asked.append({name: around.get(name) for name in noise})
-        return made(*asks, **around)
+    def seen(task, *_, kind, **around):
+        asked.append((type(kind).__name__, around.get("slip_noise")))
 
-    monkeypatch.setattr(DEFAULT, "design_compensated", seen)
-    monkeypatch.setattr(DEFAULT, "reached_step", lambda task, attempt, most: attempt(STEP) and None)
-    monkeypatch.setattr(DEFAULT, "reached_delay", lambda step, attempt, first: attempt(first) and None)
+    for name in ("longest_step", "longest_delay"):
+        monkeypatch.setattr(DEFAULT, name, seen)
     qd.design(REAL, "dia", slip_noise="1e-6")
-    assert asked == 3 * [noise]
+    assert asked == 2 * [("Deadbeat", F(1, 10**6))]
 
 
 def test_what_runs_is_what_is_guaranteed():

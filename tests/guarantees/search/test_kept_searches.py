@@ -54,33 +54,3 @@ def test_a_design_is_searched_once(task, tmp_path, monkeypatch):
     assert adversary.worst_found(first) == worst
     with pytest.raises(TypeError):
         adversary.worst_found(first, sticks=True)
-
-
-def test_where_a_reach_ended_is_tried_at_once_and_no_more_is_believed(tmp_path, monkeypatch):
-    """Guarantees up to 5 s; what a file says of 9 s is tried like all else."""
-    tried = []
-
-    def attempt(time):
-        tried.append(time)
-        return object.__new__(Guarantee) if time <= 5 else NoGuarantee(reason="too long", small_gain=None)
-
-    def end():
-        tried.clear()
-        assert isinstance(
-            longest_times.reached_again(attempt, lambda once: longest_times.reached_delay(STEP, once, Fraction(1)), 1),
-            Guarantee,
-        )
-        return tried[-1]
-
-    monkeypatch.setattr(longest_times, "MOST_DELAY", 100)
-    monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
-    end()
-    searched = list(tried)
-    longest = max(time for time in searched if time <= 5)
-    assert len(searched) > 3
-    assert longest > Fraction(15, 16) * min(time for time in searched if time > 5)
-    assert end() == longest
-    assert tried == [longest]
-    monkeypatch.setattr(longest_times, "search_once", lambda _search, *_question: ["9"])
-    end()
-    assert tried == [9, *searched]

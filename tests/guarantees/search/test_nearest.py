@@ -1,0 +1,136 @@
+"""Where a design is not proved: which quantity fails, and the nearest value of it that will do."""
+
+from dataclasses import replace
+from fractions import Fraction as F
+from itertools import product
+
+import numpy as np
+import pytest
+
+import quakedesign as qd
+from quakedesign.fault import load_fault
+from quakedesign.guarantees import Guarantee, LoopAnswer, NoGuarantee, best_guarantee, task_of
+from quakedesign.guarantees.search.compensated_search import design_compensated
+from quakedesign.guarantees.search.defaults import deadbeat, sampled_sliding_mode
+from quakedesign.guarantees.search.estimate import closeness
+from quakedesign.guarantees.search.linear_design import Linear, design_held, longest_delay, longest_step, nearest_setup
+from quakedesign.laws import control_law
+from quakedesign.loop.loop_setup import Pump
+from quakedesign.lyapunov import Verdict
+
+REAL = load_fault("real-fault")
+STEP = F("0.184")
+
+
+@pytest.fixture(scope="module")
+def task():
+    return task_of(REAL)
+
+
+@pytest.fixture(scope="module")
+def sliding(task):
+    return deadbeat(task, control_law("cta"))
+
+
+def lines(found):
+    return [line for line in found.lines() if line.startswith("with ")]
+
+
+@pytest.mark.parametrize("controller", ["elqr", "dia"])
+def test_the_smallest_pump_that_will_do_is_named(controller):
+    asked = Pump(least=F(-20 * 10**6), largest=F(3 * 10**6))
+    found = qd.guarantee(REAL, controller=controller, step=STEP, saturation="3 MPa", withdrawal="20 MPa")
+    assert not found.proved
+    name, near = found.nearest
+    assert (name, near.check()) == ("saturation", Verdict.PROVED)
+    low, high = near.held.pump.limits
+    assert low == asked.least  # which was not too little
+    assert asked.largest < high <= F(101, 100) * REAL_REST
+    tighter = replace(near, held=replace(near.held, pump=replace(near.held.pump, largest=high * F(999, 1000))))
+    assert tighter.check() is Verdict.UNDECIDED
+    assert "a pump from -20 MPa or less to 14." in lines(found)[0]
+    assert found.to_dict()["nearest"]["value"] == [str(low), str(high)]
+
+
+REAL_REST = task_of(REAL).rest_pressure[1] + F(3, 10) * 10**6  # p* at most, and what no design needs more than that
+
+
+@pytest.mark.slow
+def test_the_largest_disturbance_that_does_not_open_the_fault_is_named():
+    pushed = replace(REAL, disturbance=replace(REAL.disturbance, amplitude=2000 * REAL.disturbance.amplitude))
+    found = qd.guarantee(pushed, step=F("0.1"))
+    assert found.found.reason.endswith(": the fault may open")
+    name, near = found.nearest
+    assert (name, near.check()) == ("amplitude", Verdict.PROVED)
+    assert 0 < near.task.amplitude < task_of(pushed).amplitude
+    more = best_guarantee(replace(near.task, amplitude=near.task.amplitude * F(9, 8)), near.held)
+    assert isinstance(more, NoGuarantee)
+    assert more.pressed
+    assert lines(found)[0].startswith("with a disturbance of at most 0.")
+    assert found.to_dict()["nearest"]["value"] == str(near.task.amplitude)
+
+
+def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_much(task):
+    """What the usual one asks for is more than it needs at this T_s."""
+    step = F("0.5")
+    usual = design_held(task, step)
+    low, high = usual.claims.pressures[-1]
+    leaner = best_guarantee(task, Linear().leanest(task, step)).claims.pressures[-1]
+    assert low < leaner[0] <= leaner[1] < high
+    pump = Pump(least=(low + leaner[0]) / 2, largest=(high + leaner[1]) / 2)
+    assert isinstance(best_guarantee(task, replace(usual.held, pump=pump)), NoGuarantee)
+    assert design_held(task, step, pump=pump).check() is Verdict.PROVED
+
+
+def test_the_share_of_the_box_that_will_do_is_named():
+    wide = REAL.with_box("ten-percent")
+    name, near = nearest_setup(task_of(wide), F("0.85"))
+    assert (name, near.check()) == ("box", Verdict.PROVED)
+    assert 0 < near.task.spreads[0] == near.task.spreads[2] < F(1, 10)
+    found = LoopAnswer(fault=wide, found=NoGuarantee(reason="x", small_gain=None), nearest=("box", near))
+    assert "with the box of +-" in lines(found)[0]
+    paper = replace(near, task=replace(near.task, spreads=(F(0), F(0), F(0))))
+    assert lines(replace(found, nearest=("box", paper)))[0].startswith("with the box paper: ")
+    assert found.to_dict()["nearest"]["value"] == [str(v) for v in near.task.spreads]
+
+
+@pytest.mark.slow
+def test_the_longest_interval_that_will_do_is_named():
+    found = qd.guarantee(REAL, step=F("0.2"), longest_step=F("0.9"))
+    assert not found.proved
+    name, near = found.nearest
+    assert (name, near.check()) == ("longest_step", Verdict.PROVED)
+    assert F("0.4") < near.held.longest_step < F("0.9")
+    assert lines(found)[0].startswith("with a longest interval of at most")
+
+
+def test_a_sliding_mode_that_is_late_is_told_the_longest_delay(sliding, task):
+    found = qd.guarantee(REAL, controller="cta", step=STEP, delay=F("0.3"))
+    name, near = found.nearest
+    assert (found.proved, name, near.check()) == (False, "delay", Verdict.PROVED)
+    assert near.held.delay >= F(9, 10) * longest_delay(task, STEP, kind=sliding).held.delay
+    assert found.shorter is None or found.shorter.check() is Verdict.PROVED
+
+
+def test_the_longest_step_of_sliding_modes_is_within_a_tenth_of_the_best_of_all_weights(sliding, task):
+    """No weight and B0 of a fine grid come near to a guarantee at a T_s a tenth longer."""
+    step = longest_step(task, kind=sliding).guarantee.held.step
+    ratios = np.linspace(0.5, 1.2, 15)
+    longer = step * F(10, 9)
+    for weight, ratio in product(np.linspace(0.02, 0.6, 30), ratios):
+        held = sliding.held(task, np.array([weight, ratio]), longer)
+        assert closeness(task, held)[0] >= 1
+    assert isinstance(design_compensated(task, sliding.controller, longer).found, NoGuarantee)
+
+
+def test_every_command_says_the_same_longest_step_of_sliding_modes(sliding, task):
+    longest = longest_step(task, kind=sliding).guarantee.held.step
+    for step in (STEP, F(2)):
+        assert sampled_sliding_mode(task, sliding.controller, step)[1].longest_step == longest
+    found = qd.guarantee(REAL, controller="cta", step=F(2))
+    assert (found.proved, found.shorter.held.step) == (False, longest)
+    assert found.lines()[0].startswith("not guaranteed at T_s = 2 s")
+    between = qd.guarantee(REAL, controller="cta", step=F("0.7"))  # which the usual weights miss
+    assert isinstance(design_compensated(task, sliding.controller, F("0.7")).found, NoGuarantee)
+    assert isinstance(between.found, Guarantee)
+    assert between.compensation.controller.sampling.step == F("0.7")
