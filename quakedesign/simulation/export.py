@@ -153,8 +153,10 @@ _PLATFORMS = {"Linux": ("linux64", "so"), "Darwin": ("darwin64", "dylib")}
 def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
     """Bytes of an FMU of a sampled step, and for which platform it holds a binary or why for none.
 
-    Inputs are the measurement, the output ``pressure`` [Pa] is what is held since the last sample; the samples lie
-    T_s apart from the start of the experiment. The sources lie inside, so that any platform can compile them.
+    Inputs are the measurement and ``applied`` [Pa], what pump or valve let through of the pressure since the last
+    sample: all of it unless it is set after initialisation, and then again before every sample, since a law winds up
+    otherwise. The output ``pressure`` [Pa] is what is asked for since the last sample; the samples lie T_s apart from
+    the start of the experiment. The sources lie inside, so that any platform can compile them.
 
     Parameters
     ----------
@@ -204,7 +206,7 @@ def _description(exported: ControllerStep, guid: str) -> bytes:
     listed = ET.SubElement(ET.SubElement(root, "CoSimulation", kind), "SourceFiles")
     for file in (SOURCE, "fmu.c"):
         ET.SubElement(listed, "File", name=file)
-    signals = dict(exported.measurement) | {"pressure": "Pa"}
+    signals = dict(exported.measurement) | {"pressure": "Pa", "applied": "Pa"}
     units = ET.SubElement(root, "UnitDefinitions")
     for unit in dict.fromkeys(signals.values()):
         ET.SubElement(ET.SubElement(units, "Unit", name=unit), "BaseUnit", _UNITS[unit])
@@ -217,7 +219,7 @@ def _description(exported: ControllerStep, guid: str) -> bytes:
         variable |= {"causality": "output", "initial": "exact"} if is_output else {"causality": "input"}
         ET.SubElement(ET.SubElement(variables, "ScalarVariable", variable), "Real", unit=unit, start="0")
     outputs = ET.SubElement(ET.SubElement(root, "ModelStructure"), "Outputs")
-    ET.SubElement(outputs, "Unknown", index=str(len(signals)), dependencies="")
+    ET.SubElement(outputs, "Unknown", index=str(len(exported.measurement) + 1), dependencies="")
     ET.indent(root)
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
 

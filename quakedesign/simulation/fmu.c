@@ -1,6 +1,8 @@
 /* A sampled controller as a model unit of FMI 2.0 for co-simulation: one instance owns its memory and its signals.
    The samples lie at start + k CONTROLLER_STEP. A step from t to t + h takes every sample in [t, t + h) with the
-   measurement that was set before, and the pressure is held from each sample to the next. */
+   measurement that was set before, and the pressure is held from each sample to the next. A sample is told the applied
+   pressure that was set last, once one was set after initialisation; before that, all that was asked for counts as
+   applied. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,8 +15,9 @@
 #else
 #define EXPORTED __attribute__((visibility("default")))
 #endif
-#define SIGNALS (CONTROLLER_MEASUREMENTS + 1)
+#define SIGNALS (CONTROLLER_MEASUREMENTS + 2)
 #define PRESSURE CONTROLLER_MEASUREMENTS
+#define APPLIED (CONTROLLER_MEASUREMENTS + 1)
 #define EARLY (1e-6 * CONTROLLER_STEP)
 
 typedef void* fmi2Component;
@@ -38,9 +41,10 @@ typedef struct {
 
 typedef struct {
   double memory[CONTROLLER_MEMORY];
-  double signals[SIGNALS]; /* measurement, then the pressure */
+  double signals[SIGNALS]; /* measurement, then the pressure, then what was applied of it */
   double start, time;
   long long samples;
+  int running, told; /* whether initialisation is over, and an applied pressure was set since */
 } State;
 
 typedef struct {
@@ -95,7 +99,10 @@ EXPORTED fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, f
 }
 
 EXPORTED fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return c ? fmi2OK : fmi2Error; }
-EXPORTED fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return c ? fmi2OK : fmi2Error; }
+EXPORTED fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+  if (c) ((Unit*)c)->state.running = 1;
+  return c ? fmi2OK : fmi2Error;
+}
 EXPORTED fmi2Status fmi2Terminate(fmi2Component c) { return c ? fmi2OK : fmi2Error; }
 EXPORTED fmi2Status fmi2Reset(fmi2Component c) {
   begin(c);
@@ -116,8 +123,9 @@ EXPORTED fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], s
   Unit* unit = c;
   size_t i;
   for (i = 0; i < n; ++i) {
-    if (r[i] >= PRESSURE) return refuse(unit, "only the measurement is set");
+    if (r[i] >= SIGNALS || r[i] == PRESSURE) return refuse(unit, "only measurement and applied pressure are set");
     unit->state.signals[r[i]] = value[i];
+    if (r[i] == APPLIED) unit->state.told = unit->state.running;
   }
   return fmi2OK;
 }
@@ -131,8 +139,9 @@ EXPORTED fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real step, fmi
     return refuse(unit, "a step must begin where the last one ended, and not go back");
   for (i = 0; i < CONTROLLER_MEASUREMENTS; ++i)
     if (!isfinite(state->signals[i])) return refuse(unit, "the measurement must be finite");
+  if (state->told && !isfinite(state->signals[APPLIED])) return refuse(unit, "the applied pressure must be finite");
   for (; state->start + state->samples * CONTROLLER_STEP < now + step - EARLY; ++state->samples)
-    controller_step(state->signals, 0, state->memory, &state->signals[PRESSURE]);
+    controller_step(state->signals, state->told ? &state->signals[APPLIED] : 0, state->memory, &state->signals[PRESSURE]);
   state->time = now + step;
   return isfinite(state->signals[PRESSURE]) ? fmi2OK : refuse(unit, "the pressure is not finite");
 }

@@ -13,17 +13,21 @@ import pytest
 
 from quakedesign.errors import OutputError, ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees.exact.guarantee_files import load_guarantee
-from quakedesign.guarantees.search.compensated_search import recovered
+from quakedesign.guarantees import NoGuarantee, compensated, design_compensated, task_of
+from quakedesign.guarantees.exact.guarantee_files import load_guarantee, save_guarantee
+from quakedesign.guarantees.search.compensated_search import implicit_pull, recovered
 from quakedesign.laws import (
     ErrorPrediction,
+    ImplicitRoot,
     Prediction,
     RestLimit,
     SampledController,
+    control_law,
     disturbance_estimate,
     published,
     slip_observer,
 )
+from quakedesign.laws import compensated as compensated_law
 from quakedesign.laws.feed_forward import feed_forward
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.actuators.chain import Actuator
@@ -310,6 +314,47 @@ def test_gains_of_another_step_are_not_read_off():
         replace(claim.held.law, update=((F(0), F(0), F(1, 9)), *claim.held.law.update[1:])),
         replace(claim.held.law, feedback=(*claim.held.law.feedback[:2], F(0))),
     ):
-        with pytest.raises(UnsupportedError, match="read off the implicit step of a 2-CTA"):
+        with pytest.raises(UnsupportedError, match="read off the implicit step of a 2-CTA or a 2-DIA"):
             recovered(replace(claim, held=replace(claim.held, law=law)))
     assert recovered(claim).weight == F(7, 20)
+
+
+@pytest.mark.parametrize(
+    ("gains", "scale"), [(("25/16", "27/5", "6/5", "0"), "1/64"), (("2", "3", "1.1", "0.3"), "64/729")]
+)
+def test_the_gains_of_a_2_dia_stand_in_powers_and_are_read_off_too(gains, scale, tmp_path):
+    """The same pressures as those of the controller itself, of other gains with λ = 1 and the divisor B0."""
+    real, step, weight, authority = load_fault("real-fault"), F("0.184"), F("0.3"), F("2.25e-8")
+    own = control_law("dia").from_values(gains, scale=F(scale), divisor=F(2353, 125000000000))
+    claim = compensated(task_of(real), own, weight, authority, step)
+    if isinstance(claim, NoGuarantee):  # the step is that of the law, proved or not
+        claim = load_guarantee(STORED)
+        root = ImplicitRoot(pull=implicit_pull(own, step, authority))
+        claim = replace(claim, held=replace(claim.held, law=compensated_law(root, weight, step * authority)))
+    found = recovered(claim).controller
+    assert found.name == "dia"
+    assert implicit_pull(found, step, authority) == implicit_pull(own, step, authority)
+    scheme = simulation_scheme("compensated", weight=float(weight), authority=float(authority))
+    one = controller_step(real, own, step=float(step), scheme=scheme)
+    two = controller_step(real, found)
+    first, second, random = list(one.start.values()), list(two.start.values()), np.random.default_rng(5)
+    pressures = [0.0, 0.0]
+    for seen in random.uniform(-1, 1, (30, 2)) * (1e-4, 1e-4):
+        first, pressures[0] = one.function(seen, pressures[0], first)
+        second, pressures[1] = two.function(seen, pressures[1], second)
+        assert float(pressures[0]) == pytest.approx(float(pressures[1]), rel=1e-9, abs=1e-6)
+    scaled = replace(claim.held.law.root.pull[0], factor=tuple(2 * v for v in claim.held.law.root.pull[0].factor))
+    other = replace(claim.held.law.root, pull=(*claim.held.law.root.pull, scaled))
+    with pytest.raises(UnsupportedError):
+        recovered(replace(claim, held=replace(claim.held, law=replace(claim.held.law, root=other))))
+
+
+def test_a_certificate_of_a_2_dia_is_exported(tmp_path):
+    real = load_fault("real-fault")
+    made = design_compensated(task_of(real), control_law("dia").base_gains()[0].law, F("0.184"), objective="peak")
+    path = tmp_path / "dia.json"
+    save_guarantee(made.found, path)
+    chosen = certified_choice(real, path)
+    found = export_controller(real, chosen.controller, tmp_path / "c")
+    assert found.facts["law"] == "2-DIA"
+    assert (tmp_path / "c" / "controller.c").exists()

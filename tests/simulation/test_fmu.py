@@ -11,7 +11,10 @@ from fmpy.validation import validate_fmu
 from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.loop import simulation_scheme
+from quakedesign.loop.actuators.chain import Actuator
+from quakedesign.loop.actuators.sampled_stages import Saturation
 from quakedesign.loop.sensing import Differentiator, OutputFeedback
+from quakedesign.simulation import simulate
 from quakedesign.simulation.export import controller_step, export_controller
 
 LAB = load_fault("lab-fault")
@@ -56,7 +59,7 @@ def run(path, found, starts, ends, measured):
     return asked
 
 
-def loaded(path, start=0.0):
+def loaded(path, start=0.0, before=()):
     description = fmpy.read_model_description(path)
     slave = FMU2Slave(
         guid=description.guid,
@@ -67,6 +70,8 @@ def loaded(path, start=0.0):
     slave.instantiate()
     slave.setupExperiment(startTime=start)
     slave.enterInitializationMode()
+    for name, value in before:  # start values, as importers set them
+        slave.setReal([name], [value])
     slave.exitInitializationMode()
     return slave
 
@@ -78,6 +83,7 @@ def test_the_description_follows_the_standard_and_names_units(unit):
     assert {v.name: (v.causality, v.unit) for v in told.modelVariables} == {
         **{name: ("input", measured) for name, measured in found.measurement.items()},
         "pressure": ("output", "Pa"),
+        "applied": ("input", "Pa"),
     }
     assert float(told.defaultExperiment.stepSize) == STEP
     assert "lab-fault" in told.description
@@ -111,6 +117,37 @@ def test_samples_lie_a_period_apart_whatever_the_communication_steps(unit, of_a_
     assert (held == held[:, :1]).all()
 
 
+@pytest.mark.parametrize("name", ["cta", "elqr"])
+def test_behind_a_pump_that_tells_what_it_applied_it_asks_for_what_simulate_does(name, tmp_path):
+    """Of slip and slip rate as simulated; without being told, the law winds up and asks for something else."""
+    law = published("lab-fault")[name]
+    around = {"step": STEP, "method": "rk4", "duration": 0.2, "samples": 200, "compiled": False}
+    most = float(np.abs(simulate(LAB, law, scheme="explicit", **around).pressure).max()) / 4
+    pump = simulation_scheme("explicit", actuator=Actuator(stages=(Saturation(lowest=-most, highest=most),)))
+    seen = simulate(LAB, law, scheme=pump, **around)
+    found = export_controller(LAB, law, tmp_path / "c", step=STEP, fmu=True)
+    measured = {"slip": seen.slip, "slip_rate": seen.slip_rate}
+    rows = np.array([measured[signal] for signal in found.measurement]).T
+    told, untold = (pumped(tmp_path / "c" / "controller.fmu", rows, most, told) for told in (True, False))
+    assert np.sum(np.abs(told) == most) > 3
+    assert seen.pressure == pytest.approx(told, rel=1e-9, abs=1e-9 * most)
+    assert not np.allclose(untold, seen.pressure, atol=1e-6 * most) or name == "cta"
+
+
+def pumped(path, rows, most, told):
+    """What a pump applies of the pressure of a unit at every sample, and says if it is told."""
+    names = list(range(rows.shape[1]))
+    slave, applied = loaded(path, before=[(len(names) + 1, 9.0)]), []
+    for i, row in enumerate(rows):
+        slave.setReal(names, row)
+        if told and applied:
+            slave.setReal([len(names) + 1], applied[-1:])
+        slave.doStep(i * STEP, STEP)
+        applied.append(float(np.clip(slave.getReal([len(names)])[0], -most, most)))
+    slave.freeInstance()
+    return applied
+
+
 def test_a_state_can_be_kept_and_set(unit):
     path, found = unit
     slave, names = loaded(path, 5.0), list(range(len(found.measurement)))
@@ -127,7 +164,7 @@ def test_a_state_can_be_kept_and_set(unit):
     slave.freeInstance()
 
 
-@pytest.mark.parametrize("wrong", ["gap", "back", "measurement", "variable", "pressure"])
+@pytest.mark.parametrize("wrong", ["gap", "back", "measurement", "variable", "no variable", "pressure", "applied"])
 def test_what_cannot_be_is_an_error_of_the_standard(unit, wrong):
     path, found = unit
     slave, names = loaded(path), list(range(len(found.measurement)))
@@ -135,7 +172,9 @@ def test_what_cannot_be_is_an_error_of_the_standard(unit, wrong):
         "gap": lambda: slave.doStep(STEP, STEP),
         "back": lambda: slave.doStep(0.0, -STEP),
         "measurement": lambda: (slave.setReal(names, [np.nan] * len(names)), slave.doStep(0.0, STEP)),
-        "variable": lambda: slave.getReal([len(names) + 1]),
+        "variable": lambda: slave.getReal([len(names) + 2]),
+        "no variable": lambda: slave.setReal([len(names) + 2], [0.0]),
+        "applied": lambda: (slave.setReal([len(names) + 1], [np.nan]), slave.doStep(0.0, STEP)),
         "pressure": lambda: slave.setReal([len(names)], [1.0]),
     }
     with pytest.raises(fmpy.fmi1.FMICallException, match="status 3"):

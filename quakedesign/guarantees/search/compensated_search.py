@@ -5,6 +5,7 @@ authority are chosen by their certified bounds.
 """
 
 from bisect import bisect_left
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import lru_cache, partial
@@ -37,6 +38,7 @@ from quakedesign.guarantees.search.linear_design import (
 from quakedesign.laws import Controller, ImplicitRoot, Power, Sampling, SlidingMode
 from quakedesign.laws import compensated as compensated_law
 from quakedesign.laws.cta import ContinuousTwisting
+from quakedesign.laws.dia import DiscontinuousIntegral
 from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw
 from quakedesign.loop.schemes.compensated import Compensated
@@ -48,6 +50,7 @@ from quakedesign.symbolic import SignedPower
 
 _NAMES = {end_slip: "slip", end_rate: "rate"}
 _DIGITS = 60
+_MOST_DENOMINATOR = 10**18  # of a gain that is read off a power of it
 _WIDTH = Fraction(1, 10**40)  # relative, around numbers that are no fractions
 
 
@@ -355,37 +358,57 @@ def _settled(task: Task, numbers: np.ndarray) -> tuple[Fraction, Fraction]:
 
 
 def recovered(found: Guarantee) -> Compensation:
-    """The sliding mode whose implicit step a guarantee is about, its gains read off the step; of 2-CTA alone.
+    """The sliding mode whose implicit step a guarantee is about, its gains read off the step; of 2-CTA and 2-DIA.
+
+    Whatever is read, the law that it makes must be that of the guarantee.
 
     Raises
     ------
     UnsupportedError
-        For the step of another law, whose gains stand inside of powers.
+        For the step of another law, or of gains that with λ = 1 are not rational.
     """
     held, law, root = found.held, found.held.law, found.held.law.root
-    refusal = UnsupportedError(
-        "gains are read off the implicit step of a 2-CTA in the scheme compensated. Received a certificate of another "
-        "law. Take the controller of its design, or its gains, scale, weight and authority in that scheme."
+    if root is not None and len(law.measured) == 3 and law.feedback[2] > 0 and 0 < law.measured[2][1] <= 1:
+        gain, weight = 1 / law.feedback[2], law.measured[2][1]
+        authority = gain / held.step
+        settings = ("weight", weight), ("authority", authority)
+        sampling = Sampling(step=held.step, scheme=GUARANTEED, settings=settings, **held.path)
+        for base in _with_gains(root.pull, held.step, authority):
+            controller = replace(base, gains=dict(base.gains), sampling=sampling)
+            again = replace(root, pull=implicit_pull(controller, held.step, authority))
+            if compensated_law(again, weight, gain) == law:
+                return Compensation(controller=controller, found=found)
+    raise UnsupportedError(
+        "gains are read off the implicit step of a 2-CTA or a 2-DIA in the scheme compensated. Received a certificate "
+        "of another law. Take the controller of its design, or its gains, scale, weight and authority in that scheme."
     )
-    if root is None or len(law.measured) != 3 or not (law.feedback[2] > 0 and 0 < law.measured[2][1] <= 1):
-        raise refusal
-    gain, weight = 1 / law.feedback[2], law.measured[2][1]
-    authority = gain / held.step
+
+
+def _with_gains(pull: tuple[Power, ...], step: Fraction, authority: Fraction) -> Iterator[SlidingMode]:
+    """Laws that may have an implicit step, with λ = 1 and the divisor B0: of a 2-DIA, or of a 2-CTA."""
+    terms: dict[Any, Power] = {term.exponent: term for term in pull}
+    root, jump = terms.get(Fraction(1, 3)), terms.get(Fraction(0))
+    if root is not None and jump is not None and len(terms) == len(pull) and not isinstance(root.argument, str):
+        inner = {term.argument: term.factor for term in root.argument}
+        late = () if isinstance(jump.argument, str) else jump.argument
+        fourth = next((term.factor[0] for term in late if term.argument == "rate"), Fraction(0))
+        third = _of_few_digits(sum(inner.get("slip", ()), Fraction(0)) / 2, Fraction(2, 3))
+        values = third, root.factor[0] / step, jump.factor[0] / step**2, fourth
+        yield DiscontinuousIntegral.from_values(tuple(map(str, values)), divisor=authority)
     one = ContinuousTwisting.from_values(("1",) * 4, divisor=authority)
-    units = implicit_pull(one, held.step, authority)
-    if [(t.exponent, t.argument) for t in units] != [(t.exponent, t.argument) for t in root.pull]:
-        raise refusal
-    sizes = [t.factor[0] / unit.factor[0] for t, unit in zip(root.pull, units, strict=True)]
-    doubled = {name: replace(one, gains={**one.gains, name: Fraction(2)}) for name in one.gains}
-    pulls = {name: implicit_pull(other, held.step, authority) for name, other in doubled.items()}
-    gains = {name: sizes[next(i for i, t in enumerate(pulls[name]) if t != units[i])] for name in one.gains}
-    settings = ("weight", weight), ("authority", authority)
-    sampling = Sampling(step=held.step, scheme=GUARANTEED, settings=settings, **held.path)
-    controller = replace(one, gains=gains, sampling=sampling)
-    again = replace(root, pull=implicit_pull(controller, held.step, authority))
-    if compensated_law(again, weight, gain) != law:
-        raise refusal
-    return Compensation(controller=controller, found=found)
+    units = implicit_pull(one, step, authority)
+    if [(t.exponent, t.argument) for t in units] == [(t.exponent, t.argument) for t in pull]:
+        sizes = [t.factor[0] / unit.factor[0] for t, unit in zip(pull, units, strict=True)]
+        doubled = {name: replace(one, gains={**one.gains, name: Fraction(2)}) for name in one.gains}
+        pulls = {name: implicit_pull(other, step, authority) for name, other in doubled.items()}
+        gains = {name: sizes[next(i for i, t in enumerate(pulls[name]) if t != units[i])] for name in one.gains}
+        yield replace(one, gains=gains)
+
+
+def _of_few_digits(value: Fraction, power: Fraction) -> Fraction:
+    """Rational of the smallest denominator near a power of a number."""
+    near = sp.Pow(to_sympy(value), to_sympy(power)).evalf(_DIGITS)
+    return fraction_of(sp.Rational(str(near))).limit_denominator(_MOST_DENOMINATOR)
 
 
 def _settings(law: SlidingMode) -> dict[str, Fraction]:
