@@ -46,9 +46,9 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def read_text(path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError]) -> str:
-    """Text of a file in UTF-8; parameters as in `read_bytes`."""
+    """Text of a file in UTF-8, without a byte-order mark; parameters as in `read_bytes`."""
     try:
-        return read_bytes(path, what, largest=largest, refusal=refusal).decode()
+        return read_bytes(path, what, largest=largest, refusal=refusal).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise refusal(f"{what} cannot be read: {path}: its text is not UTF-8. Give a readable file.") from None
 

@@ -28,6 +28,7 @@ face(
     prove=f"{_SEARCH}.engine",
     decide=f"{_SEARCH}.engine",
     Program=f"{_SEARCH}.program",
+    NoSolution=f"{_SEARCH}.program",
     largest=f"{_SEARCH}.program",
     Membership=f"{_SEARCH}.program",
     stability=f"{_SEARCH}.attraction_search",

@@ -401,3 +401,9 @@ def test_all_values_of_a_friction_law_that_are_wrong_are_said_at_once():
     with pytest.raises(ParameterError) as refused:
         friction_law("slip-rate-weakening")(residual=-0.4, drop=0.1, critical_rate=0.0)
     assert len(refused.value.parts) == 2
+
+
+def test_a_byte_order_mark_is_no_part_of_the_file(tmp_path):
+    text = (files("quakedesign.fault") / "presets" / "lab-fault.toml").read_text(encoding="utf-8")
+    (tmp_path / "marked.toml").write_text(text, encoding="utf-8-sig")
+    assert load_fault(tmp_path / "marked.toml").stiffness == load_fault("lab-fault").stiffness

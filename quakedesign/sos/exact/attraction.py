@@ -70,6 +70,8 @@ class Attraction:
         μ.
     proof : LyapunovProof, Point or None
         A point refutes: V < level there, and V <= 0 or V̇ >= 0, though it is not the origin.
+    reason : str
+        Why nothing was decided; empty otherwise.
     """
 
     variables: tuple[str, ...]
@@ -78,6 +80,7 @@ class Attraction:
     level: Fraction | None
     multiplier: Polynomial
     proof: LyapunovProof | Point | None = None
+    reason: str = ""
 
     def __post_init__(self) -> None:
         size = len(self.variables)
@@ -179,7 +182,7 @@ class Region:
     def of(claim: Attraction) -> "Region":
         """Region of a single claim, about everywhere."""
         proved, refuted = (claim if claim.verdict == verdict else None for verdict in ("proved", "refuted"))
-        remark = "" if proved or refuted else "neither a proof nor a counterexample was found"
+        remark = "" if proved or refuted else claim.reason or "neither a proof nor a counterexample was found"
         return Region(proved=proved, refuted=refuted, remark=remark)
 
     @property

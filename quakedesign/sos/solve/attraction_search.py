@@ -4,6 +4,7 @@ Chapters: lowest points where V̇ ≥ 0; expansion of a region by alternation (W
 Trans. Automat. Contr. 53, 2008); stability and the largest proved level.
 """
 
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -33,6 +34,7 @@ from quakedesign.sos.exact.polynomial import (
 from quakedesign.sos.exact.polynomial_statement import Statement, statement
 from quakedesign.sos.exact.polynomial_text import read
 from quakedesign.sos.exact.proofs import Point, SumOfSquares, form, integer_gram
+from quakedesign.sos.exact.words import polynomial_words
 from quakedesign.sos.solve.decide import strict_proof
 from quakedesign.sos.solve.engine import decide
 from quakedesign.sos.solve.facial_reduction import just_below, simplest, simplest_between
@@ -336,12 +338,19 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
     claim = _claim(field, V)
     if V is not None:
         refuted = _refuted(claim)
-        return _proved(claim) or (replace(refuted, level=None) if refuted else claim)
+        neither = "V - sum of squares and -dV/dt have no proof that was found, and no point refutes V"
+        return _proved(claim) or (replace(refuted, level=None) if refuted else replace(claim, reason=neither))
     rest = other_equilibrium(claim)
     if rest is not None:
         return replace(claim, proof=rest)
-    searched = filter(None, (_searched(claim, top) for top in degrees))
-    return next(filter(None, map(_proved, searched)), claim)
+    reasons = []
+    for top in degrees:
+        found = _searched(claim, top)
+        if isinstance(found, Attraction) and (proved := _proved(found)) is not None:
+            return proved
+        why = found.reason if isinstance(found, NoSolution) else "the V that was found has no exact proof"
+        reasons.append(f"no V of degree {top}: {why}")
+    return replace(claim, reason="; ".join(reasons) or "no degree of V was tried")
 
 
 def region_of_attraction(
@@ -508,8 +517,8 @@ def _of_linearised(claim: Attraction) -> dict[Exponents, Fraction] | None:
     return found if strict_proof(replace(claim, lyapunov=found).positive) is not None else None
 
 
-def _searched(claim: Attraction, top: int) -> Attraction | None:
-    """Claim with a V of some degree for which V − Σ x_i² and −V̇ have squares; None if none is found."""
+def _searched(claim: Attraction, top: int) -> Attraction | NoSolution:
+    """Claim with a V of some degree for which V − Σ x_i² and −V̇ have squares, or why none is found."""
     size = len(claim.variables)
     terms = list(monomials(size, top, 2))
     program = Program(claim.variables, decision_names(claim.variables, len(terms)))
@@ -518,6 +527,8 @@ def _searched(claim: Attraction, top: int) -> Attraction | None:
     program.require(affine({}, [combination([(Fraction(-1), along(claim.field, p))]) for p in powers]))
     solution = program.solve()
     if isinstance(solution, NoSolution):
-        return None
+        told = (polynomial_words({e: Fraction(1)}, claim.variables) for e in terms)
+        named = dict(zip(program.decisions, told, strict=True))
+        return NoSolution(reason=re.sub(r"\bc+\d+\b", lambda m: f"the coefficient of {named[m[0]]}", solution.reason))
     values = zip(terms, solution.values.values(), strict=True)
     return replace(claim, lyapunov={e: c for e, c in values if c})

@@ -18,9 +18,10 @@ from scipy.integrate import solve_ivp
 from quakedesign import sos
 from quakedesign.cli import main
 from quakedesign.errors import PolynomialError
-from quakedesign.sos.exact.attraction import load, read_field, text
+from quakedesign.sos.exact.attraction import Region, load, read_field, text
 from quakedesign.sos.exact.polynomial_files import load as load_polynomial
 from quakedesign.sos.exact.proofs import Point
+from quakedesign.sos.exact.words import region_facts, region_words
 from quakedesign.sos.solve import attraction_search as attraction
 
 ROOT = Path(__file__).parents[3]
@@ -263,7 +264,20 @@ def test_what_is_not_proved_says_why():
     found = sos.region_of_attraction({"x": "x"}, "x^2")
     assert (found.verdict, found.level, found.remark) == ("undecided", None, "no level below was proved")
     claim = sos.stability(VAN_DER_POL, degrees=())
-    assert (claim.verdict, claim.check()) == ("undecided", True)
+    assert (claim.verdict, claim.check(), claim.reason) == ("undecided", True, "no degree of V was tried")
+    given = sos.stability({"x": "-x^3"}, "x^2 + x^4 - x^6")
+    assert given.verdict == "refuted"
+    assert given.reason == ""
+
+
+def test_a_search_for_v_that_ends_without_one_says_which_degree_and_why():
+    searched = sos.stability({"x": "-x + y", "y": "-x*y^2 - y^3"}, degrees=(2,))
+    assert searched.verdict == "undecided"
+    assert searched.reason == "no V of degree 2: the programme is infeasible in floating point"
+    forced = sos.stability({"x": "-x + x*y", "y": "-y"}, degrees=(2,)).reason
+    assert "so the coefficient of x^2 = 0" in forced  # -dV/dt has 2*c*x^2*y, which no square produces
+    assert region_words(Region.of(searched))[-1] == searched.reason
+    assert region_facts(Region.of(searched))["remark"] == searched.reason
 
 
 @pytest.mark.parametrize(
