@@ -13,6 +13,7 @@ import io
 import json
 import pkgutil
 import resource
+import signal
 import time
 import warnings
 from enum import Enum
@@ -231,10 +232,61 @@ def command_lines(draw):
     return line
 
 
+CHANGED = {
+    "--controller": "cta dia elqr",
+    "--step": "1ms 2ms 1/500",
+    "--substeps": "1 2",
+    "--drift": "0 1e-9",
+    "--initial-slip": "1um 0",
+}
+CHANGED |= {"--delay": "1ms 0.002", "--lag": "5ms", "--saturation": "1MPa 2e5", "--quantum": "1kPa", "--seed": "0 7"}
+CHANGED |= {"--slip-noise-deviation": "1um 0", "--plant": "smooth coulomb", "--method": "rk4 dormand-prince"}
+SOUND = {
+    "fault": (["short.toml", "lab-fault", "crustal-patch"], {"--box": "paper ten-percent"}),
+    "derive": (["short.toml", "real-fault"], {"--latex": ""}),
+    "scale": (["lab-fault real-fault"], {"--controller": "cta dia elqr", "--clock": "natural-period operation-time"}),
+    "errata": (["1", "5 12"], {}),
+    "init": (["new.toml --force"], {"--law": "exponential-slip-weakening rate-and-state-aging"}),
+    "check": ([f"FILE{i}" for i in range(8)], {"--quiet": "", "--log-level": "info debug"}),
+    "sos": (
+        ["x^2+1", "x^4-2*x^2+1", "x^2-y", "x^4+y^4-x*y+1"],
+        {"--degree": "2 4", "--verbose": "", "--margin": "1/10"},
+    ),
+    "simulate": (["lab-fault --scheme explicit", "lab-fault --scheme implicit"], CHANGED),
+    "export": (
+        ["lab-fault"],
+        {"--controller": "cta dia elqr", "--gains": "published", "--scheme": "explicit implicit"},
+    ),
+}
+"""Places, a line each, and options with values of quick commands; most of their lines succeed."""
+
+
+@st.composite
+def sound_lines(draw):
+    """A quick command with options that fit; a third of the lines have one word replaced, lost or doubled."""
+    name = draw(st.sampled_from(sorted(SOUND)))
+    subjects, options = SOUND[name]
+    line = [name, *draw(st.sampled_from(subjects)).split()]
+    line = [str(SMALL[int(word[4:]) % len(SMALL)]) if word.startswith("FILE") else word for word in line]
+    known = {**options, "--json": ""}
+    for option in draw(st.lists(st.sampled_from(sorted(known)), max_size=4, unique=True)):
+        line += [option, *([draw(st.sampled_from(known[option].split()))] if known[option] else [])]
+    line += ["--duration", "20ms"] if name == "simulate" else ["--out", "made", "--force"] if name == "export" else []
+    if draw(st.integers(0, 2)) == 0:
+        at = draw(st.integers(1, len(line)))
+        line[at : at + draw(st.integers(0, 1))] = [draw(JUNK)] if draw(st.booleans()) else line[at : at + 1] * 2
+    return line
+
+
+SMALL = [path for path in PROOFS if path.stat().st_size < 6000]
+ENDED = {0: 0, 1: 0, 2: 0}
+
+
 def test_every_command_is_drawn():
     assert {"guarantee", "limits", "check", "campaign"} <= COMMANDS.keys()
     assert QUICK <= COMMANDS.keys()
     assert all(places and "--json" in options for places, options in COMMANDS.values())
+    assert SOUND.keys() < COMMANDS.keys()
 
 
 @pytest.mark.parametrize("which", PROFILES)
@@ -243,18 +295,24 @@ def test_command_lines(which, tmp_path, monkeypatch):
     (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
     (tmp_path / "guarantee.json").write_text(guaranteed(), encoding="utf-8")
 
-    @profile((30, 10_000), which)
-    @given(command_lines())
+    ENDED.update({code: 0 for code in ENDED})
+
+    @profile((60, 10_000), which)
+    @given(sound_lines() | sound_lines() | command_lines())
     def check(line):
         before = {p.name for p in tmp_path.iterdir()}
         code, out, _ = answer(*line)
+        ENDED[code] += 1
         after = {p.name for p in tmp_path.iterdir()}
         assert code != 2 or after == before
         assert not any(name.startswith(".") for name in after)
-        if code != 2 and "--json" in line:
+        if code != 2 and "--json" in line and "--quiet" not in line:
             json.loads(out)
 
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     check()
+    assert ENDED[0] + ENDED[1] > sum(ENDED.values()) / 4, ENDED  # of one process, one after the other
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
 
 
 # Certificates
@@ -365,7 +423,8 @@ MINUTES = {"design", "compare", "certify", "assess", "natural_earthquake", "run_
 MINUTES |= {"decide", "largest", "accuracy", "gain_sensitivity", "noise_sensitivity", "velocity_step"}
 
 
-MINUTES |= {"limits", "answer", "design_held", "worst_found"}
+MINUTES |= {"limits", "guarantee", "design_held", "worst_found", "judge", "gain_map", "settling", "natural_run"}
+MINUTES |= {"largest_lipschitz", "stability_map", "gain_map_figure", "uncertainty_bounds", "check_files"}
 
 
 @cache
