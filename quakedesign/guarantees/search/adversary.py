@@ -576,7 +576,7 @@ def _widened(jump: Any, size: int) -> np.ndarray:
 # ----------------------------------------------------------------------
 # The worst that a search finds on the loop of a guarantee of slow sliding: what is seen, beside what is proved.
 
-_SLIDING_PIECES = 4  # of a part of the period
+_SLIDING_PIECES, _FINE_PIECES = 4, 16  # of a part of the period
 _SLOPES = (1.0, 1.15)  # of e^y − 1 over y, in the linear loop that a course is found for
 _NEWTON = 4
 _AXES = ("direct_effect", "evolution_effect", "critical_slip")
@@ -604,19 +604,29 @@ def worst_sliding(claim: SlidingGuarantee) -> WorstSliding:
     For every corner and every piece at which a course may end, the stress, and the rate of the reference within its
     swing, are at their ends as the impulse response of the loop, linearised, says, which is the worst for the linear
     loop; what it comes to is seen on the exponentials themselves, with four Runge–Kutta steps a part of the period.
-    Both may jump at every end of a piece. The normal stress is that at the start; noise is none. A rate below V counts
-    by its logarithm as one above it.
+    Both may jump at every end of a piece; where the rate is largest, pieces are shorter in the end. The normal stress
+    is that at the start, or what p* leaves of it at the end of the way, where a stress moves the rate more; noise is
+    none. A rate below V counts by its logarithm as one above it.
     """
     rate, slip = search_once(lambda: _searched_sliding(claim), "worst sliding", claim)
     return WorstSliding(log_rate=rate, slip_error=slip)
 
 
 def _searched_sliding(claim: SlidingGuarantee) -> list[float]:
-    found = [[0.0, 0.0]]
-    for corner in corners(claim.task):
-        plant = SlidingPieces(claim, corner)
-        found += [plant.largest(*course).tolist() for course in courses(claim, plant)]
+    gone = dict.fromkeys((Fraction(0), claim.task.distance))
+    places = list(product(corners(claim.task), gone))
+    found = [_largest_sliding(claim, SlidingPieces(claim, *place)) for place in places]
+    worst = max(range(len(places)), key=lambda number: found[number][0])
+    corner, slip = places[worst]
+    found.append(_largest_sliding(claim, SlidingPieces(claim, corner, slip, _FINE_PIECES), _SLOPES[:1]))
     return [max(values) for values in zip(*found, strict=True)]
+
+
+def _largest_sliding(
+    claim: SlidingGuarantee, plant: "SlidingPieces", slopes: tuple[float, ...] = _SLOPES
+) -> list[float]:
+    reached = [plant.largest(*course).tolist() for course in courses(claim, plant, slopes)]
+    return [max(values) for values in zip(*reached, strict=True)]
 
 
 def corners(task: SlidingTask) -> list[SlidingTask]:
@@ -626,9 +636,11 @@ def corners(task: SlidingTask) -> list[SlidingTask]:
     return [replace(task, ranges={**task.ranges, **point}) for point in points]
 
 
-def courses(claim: SlidingGuarantee, plant: "SlidingPieces") -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def courses(
+    claim: SlidingGuarantee, plant: "SlidingPieces", slopes: tuple[float, ...] = _SLOPES
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Stresses [Pa] and r′/V − 1 [-] for every piece, shape (pieces, courses): worst for the linear loop."""
-    for slope in _SLOPES:
+    for slope in slopes:
         loop, maps = plant.linear(slope)
         aims = np.array([np.array(loop.outputs["log_rate"], dtype=float), np.eye(len(loop.states))[0]])
         count = len(maps)
@@ -650,13 +662,18 @@ def _remembered(maps: list[tuple[Any, Any, Any]]) -> int:
 
 
 class SlidingPieces:
-    """The plant at a corner, in pieces of its periods: exact pressures, Runge–Kutta steps of slip and state."""
+    """The plant at a corner, in pieces of its periods: exact pressures, Runge–Kutta steps of slip and state.
 
-    def __init__(self, claim: SlidingGuarantee, corner: SlidingTask) -> None:
-        self._claim, self._corner = claim, corner
+    After some slip of the reference [m] p* has taken its share of the normal stress.
+    """
+
+    def __init__(
+        self, claim: SlidingGuarantee, corner: SlidingTask, slip: Fraction = Fraction(0), pieces: int = _SLIDING_PIECES
+    ) -> None:
+        self._claim, self._corner, self._pieces = claim, corner, pieces
         model: Any = model_of(claim.task, claim.claims)
         self._loop = loop_of(claim.held, model, claim.task)
-        normal = float(corner.ranges["normal_stress"][0])
+        normal = float(corner.ranges["normal_stress"][0] - corner.pressure_per_slip * slip)
         self._strength, self._weakening = (normal * float(corner.ranges[a][0]) for a in _AXES[:2])
         self._rate, self._stiffness = float(corner.rate), float(corner.stiffness)
         self._radiation, self._coefficient = float(corner.radiation), float(corner.ranges["coefficient"][0])
@@ -678,11 +695,11 @@ class SlidingPieces:
         loop = loop_of(self._claim.held, plain, self._corner)
         flow, pushes = np.array(loop.flow, dtype=float), np.zeros((len(loop.states), 2))
         pushes[:, 0], pushes[0, 1] = np.array(loop.inputs["stress"], dtype=float), -self._rate
-        return loop, [(*moved(flow, pushes, length), jump) for length, jump in _parts(loop)]
+        return loop, [(*moved(flow, pushes, length), jump) for length, jump in _parts(loop, self._pieces)]
 
     def largest(self, stress: np.ndarray, ahead: np.ndarray) -> np.ndarray:
         """Largest |ln(v/V)| and slip error [m] of courses of the stress [Pa] and of r′/V − 1, (pieces, courses)."""
-        parts, size = _parts(self._loop), len(self._loop.states)
+        parts, size = _parts(self._loop, self._pieces), len(self._loop.states)
         flow, row = np.array(self._loop.flow, dtype=float)[2:, 2:], np.array(self._loop.outputs["push"], float)[2:]
         halves = [expm(flow * length / 2) for length, _ in parts]
         state, found = np.zeros((size, stress.shape[1])), np.zeros(2)
@@ -725,10 +742,10 @@ class SlidingPieces:
         return y
 
 
-def _parts(loop: PeriodicLoop) -> list[tuple[float, np.ndarray]]:
+def _parts(loop: PeriodicLoop, pieces: int) -> list[tuple[float, np.ndarray]]:
     """Length [s] of every piece of a period, and the jump before it."""
     still, found = np.eye(len(loop.states)), []
     for segment in loop.segments:
-        jumps = [np.array(segment.jump, dtype=float), *[still] * (_SLIDING_PIECES - 1)]
-        found += [(float(segment.duration) / _SLIDING_PIECES, jump) for jump in jumps]
+        jumps = [np.array(segment.jump, dtype=float), *[still] * (pieces - 1)]
+        found += [(float(segment.duration) / pieces, jump) for jump in jumps]
     return found

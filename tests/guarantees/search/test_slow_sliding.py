@@ -12,9 +12,11 @@ from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from quakedesign.exact import UpperBound
+from quakedesign.fault import load_fault
 from quakedesign.guarantees import Held, SlidingClaims, SlidingTask
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.sliding_small_gain import cell_bounds
+from quakedesign.guarantees.guarantee_result import answer_sliding
 from quakedesign.guarantees.search import sliding_design as slow_sliding
 from quakedesign.guarantees.search.adversary import SlidingPieces, corners, courses, worst_sliding
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
@@ -78,13 +80,13 @@ def test_a_stress_that_the_law_does_not_stand_has_no_claims():
     assert proved_sliding(task("0.02", 80000), HELD).reason.startswith("a stress of 8e+04 Pa is not shown")
 
 
-def replayed(plant_task, stress, ahead, pieces=4):
+def replayed(plant_task, stress, ahead, pieces=4, normal=50e6):
     """Largest |ln(v/V)| of one course, by Lambert's function and LSODA, the stress at either end at every instant.
 
     The slip is that from the reference Vt; what the law is told, and p - p*, are about r with r' = V(1 + ahead).
     """
     a, b, d = (float(plant_task.ranges[n][0]) for n in ("direct_effect", "evolution_effect", "critical_slip"))
-    normal, stiffness, damping, speed, mu, lag = 50e6, 6e6, 2e7, 1.2e-6, 0.6, 10.0
+    stiffness, damping, speed, mu, lag = 6e6, 2e7, 1.2e-6, 0.6, 10.0
     own, fed, output = (np.array(part, float) for part in (HELD.law.update, HELD.law.measured, HELD.law.output))
 
     def log_rate(x, z, p, s):
@@ -132,12 +134,34 @@ def test_what_the_search_finds_is_reached_by_another_integrator_and_stays_below_
     assert np.all(np.abs(stress) == 8000)
     assert np.all(np.abs(ahead) == float(swing))
     assert replayed(found.task, stress[:, best], ahead[:, best]) == pytest.approx(every[best], rel=2e-3)
-    assert every[best] == pytest.approx(worst.log_rate, rel=1e-9)
+    assert every[best] <= worst.log_rate < 1.01 * every[best]  # after 1 cm there is hardly less normal stress
     assert worst.log_rate < found.claims.log_rate < 2.5 * worst.log_rate
     assert worst.slip_error < found.claims.slip_error
     swings = 8000 * np.sin(2 * math.pi * np.arange(len(stress))[:, None] / np.array([[8, 40, 200]]))
     pushed = np.where(swings < 0, -8000.0, 8000.0)
     assert plant.largest(pushed, pushed / 8000 * float(swing))[0] <= worst.log_rate
+
+
+def test_where_the_way_has_taken_normal_stress_the_same_stress_does_more():
+    """40 cm of it leave 46 of 50 MPa: what is found is reached there by another integrator."""
+    found = proved_sliding(replace(task("0", 8000), distance=F("0.4")), HELD)
+    here, there = (SlidingPieces(found, found.task, slip) for slip in (F(0), F("0.4")))
+    stress, ahead = next(courses(found, there))
+    every = [there.largest(stress[:, [k]], ahead[:, [k]])[0] for k in range(stress.shape[1])]
+    best = int(np.argmax(every))
+    seen = replayed(found.task, stress[:, best], ahead[:, best], normal=46e6)
+    assert seen == pytest.approx(every[best], rel=2e-3)
+    assert seen > 1.05 * here.largest(*next(courses(found, here)))[0]
+    assert seen <= worst_sliding(found).log_rate * 1.002
+    assert worst_sliding(found).log_rate < found.claims.log_rate
+
+
+@pytest.mark.slow
+def test_on_a_preset_the_search_comes_to_what_an_adversary_with_inertia_found():
+    """1.220 V, by an ascent along the adjoint of the plant with inertia; 1.202 V before the way counted."""
+    found = answer_sliding(load_fault("crustal-patch"), diffusion=F(833))
+    assert 1.2195 < math.exp(worst_sliding(found.found).log_rate)
+    assert worst_sliding(found.found).log_rate < found.found.claims.log_rate
 
 
 def followed(stress, corner, pieces=4):
