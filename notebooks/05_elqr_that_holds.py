@@ -34,7 +34,7 @@ from scipy.linalg import expm
 # %matplotlib inline
 import quakedesign as qd
 from quakedesign.lyapunov import Verdict
-from quakedesign.guarantees import task_of
+from quakedesign.plant import (uncertain_plant)
 from quakedesign.report import verdict_lines
 from quakedesign.simulation import natural_earthquake
 from quakedesign.guarantees import design_held, worst_found
@@ -141,7 +141,7 @@ print("\n".join(verdict_lines(printed)))
 design = qd.design(fault, "elqr", continuous=True)
 free = judge(fault, design.controller)
 print("\n".join(verdict_lines(free)))
-sampled = design_held(task_of(fault), Fraction("0.184"))
+sampled = design_held(uncertain_plant(fault), Fraction("0.184"))
 print(sampled.sentence())
 
 # %% [markdown]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign import fault as faults
 from quakedesign import guarantees, lyapunov
+from quakedesign import plant as plants
 from quakedesign.arguments import check_arguments
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.lyapunov.exact.certificate import Certificate
@@ -29,8 +30,8 @@ from quakedesign.symbolic.terms import written
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
-    from quakedesign.guarantees import SlidingTask, Task
     from quakedesign.guarantees.exact.guarantee_files import Claim
+    from quakedesign.plant import SlidingPlant, UncertainPlant
 
 
 __all__ = ["check_files"]
@@ -103,12 +104,12 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     return str(Verdict.PROVED), lines
 
 
-def _task(claim: "Claim", fault: "Fault") -> "Task | SlidingTask":
+def _task(claim: "Claim", fault: "Fault") -> "UncertainPlant | SlidingPlant":
     """What a claim of the kind would be about on a fault."""
     if not isinstance(claim, guarantees.SlidingGuarantee):
-        return guarantees.task_of(fault, rate_limited=claim.task.change is not None)
+        return plants.uncertain_plant(fault, rate_limited=claim.task.change is not None)
     low, high = claim.task.ranges["direct_effect"]
-    return guarantees.sliding_task(fault, claim.task.stress, (high - low) / (high + low))
+    return plants.slow_sliding_plant(fault, claim.task.stress, (high - low) / (high + low))
 
 
 def _other_step(claim: "Claim", fault: "Fault") -> str:

@@ -37,11 +37,12 @@ from quakedesign.cli.app import app
 from quakedesign.errors import QuakedesignError
 from quakedesign.exact import rational
 from quakedesign.fault import parse_fault
-from quakedesign.guarantees import Held, guarantee, task_of
+from quakedesign.guarantees import Held, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.laws import summed_integrals
 from quakedesign.laws.sampled_law import RestLimit
+from quakedesign.plant import uncertain_plant
 from quakedesign.report import Comparison
 from quakedesign.simulation.campaign import Space, campaign_problem
 from quakedesign.studies import Entry
@@ -326,7 +327,7 @@ def guaranteed():
     fault = qd.load_fault("real-fault")
     step = rational(fault.sampling_time)
     held = Held(law=summed_integrals(tuple(map(Fraction, GAINS)), step), step=step)
-    return guarantee_text(guarantee(task_of(fault), held))
+    return guarantee_text(guarantee(uncertain_plant(fault), held))
 
 
 @cache

@@ -12,7 +12,8 @@ from scipy.optimize import minimize_scalar
 
 from quakedesign import load_fault
 from quakedesign.laws import Signals, control_law
-from quakedesign.lyapunov.exact.fault_bounds import effective_stress, least_authority
+from quakedesign.lyapunov.exact.fault_bounds import least_authority
+from quakedesign.plant import uncertain_plant
 from quakedesign.studies.errata import ErrataRow, Finding
 from quakedesign.symbolic import plant
 
@@ -136,7 +137,7 @@ def row_08(rest: Callable = correct_rest_pressure) -> Finding:
     lowest = float(
         rest(friction, FAULT.authority, FAULT.effective_normal_stress, SPRING, r, law.bounds[1], 0 * r).min()
     )
-    enclosed = float(effective_stress(FAULT)[0]) >= FAULT.effective_normal_stress - lowest
+    enclosed = float(uncertain_plant(FAULT).stress[1]) >= FAULT.effective_normal_stress - lowest
     straight = law.bounds[1] - law.slip_slope * 0.2
     far = float(rest(straight, FAULT.authority, FAULT.effective_normal_stress, SPRING, 0.2, law.bounds[1], 0))
     return Finding(

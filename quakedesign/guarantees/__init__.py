@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING
 from quakedesign.faces import face
 
 if TYPE_CHECKING:
-    from quakedesign.guarantees.exact.fault_data import sliding_task as sliding_task
-    from quakedesign.guarantees.exact.fault_data import task_of as task_of
     from quakedesign.guarantees.exact.guarantee_files import guarantee_document as guarantee_document
     from quakedesign.guarantees.exact.guarantee_files import load_guarantee as load_guarantee
     from quakedesign.guarantees.exact.guarantee_files import read_guarantee as read_guarantee
@@ -14,11 +12,6 @@ if TYPE_CHECKING:
     from quakedesign.guarantees.exact.loop import Held as Held
     from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims as SlidingClaims
     from quakedesign.guarantees.exact.sliding_small_gain import cell_bounds as cell_bounds
-    from quakedesign.guarantees.exact.sliding_task import WHOLE as WHOLE
-    from quakedesign.guarantees.exact.sliding_task import Cuts as Cuts
-    from quakedesign.guarantees.exact.sliding_task import SlidingTask as SlidingTask
-    from quakedesign.guarantees.exact.sliding_task import cells as cells
-    from quakedesign.guarantees.exact.sliding_task import parts as parts
     from quakedesign.guarantees.exact.small_gain import Bounds as Bounds
     from quakedesign.guarantees.exact.small_gain import NoGuarantee as NoGuarantee
     from quakedesign.guarantees.exact.small_gain import SlowGain as SlowGain
@@ -29,7 +22,6 @@ if TYPE_CHECKING:
     from quakedesign.guarantees.exact.statement import SlidingGuarantee as SlidingGuarantee
     from quakedesign.guarantees.exact.statement import continuous_peaks as continuous_peaks
     from quakedesign.guarantees.exact.statement import guarantee as guarantee
-    from quakedesign.guarantees.exact.task import Task as Task
     from quakedesign.guarantees.guarantee_result import LoopAnswer as LoopAnswer
     from quakedesign.guarantees.guarantee_result import answer_sliding as answer_sliding
     from quakedesign.guarantees.guarantee_result import attacked as attacked

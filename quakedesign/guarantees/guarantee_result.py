@@ -16,10 +16,8 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound, exact_text, float_above, rational, shortly
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS
-from quakedesign.guarantees.exact.fault_data import sliding_task
 from quakedesign.guarantees.exact.impossibility import SlidingPush, SmallestPeak, longest_diffusion, smallest_peak
 from quakedesign.guarantees.exact.loop import Around, Held
-from quakedesign.guarantees.exact.sliding_task import SlidingTask
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.statement import Guarantee, SlidingGuarantee, guarantee
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding, worst_found, worst_sliding
@@ -43,6 +41,8 @@ from quakedesign.laws import LinearLaw, RestLimit
 from quakedesign.loop.loop_setup import MEASURED, Pump
 from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant.of_fault import slow_sliding_plant
+from quakedesign.plant.sliding_plant import SlidingPlant
 from quakedesign.sos.exact.strict import texts
 
 # ----------------------------------------------------------------------
@@ -363,13 +363,13 @@ class SlidingAnswer:
     Attributes
     ----------
     found : SlidingGuarantee or NoGuarantee
-    task : SlidingTask
+    task : SlidingPlant
     held : Held or None
         The law as it runs; None where no law was found.
     """
 
     found: SlidingGuarantee | NoGuarantee
-    task: SlidingTask
+    task: SlidingPlant
     held: Held | None
     compensation: ClassVar[None] = None
 
@@ -463,7 +463,7 @@ def answer_sliding(
             "--diffusion, such as '833 s', or --lag."
         )
     held_over = rational(fault.sampling_time) if step is None else step
-    task = sliding_task(fault, stress or _TRIFLE, spread)
+    task = slow_sliding_plant(fault, stress or _TRIFLE, spread)
     pump = around.pop("pump", None)
     if pump is not None and pump.rate is not None:
         raise ParameterError(
@@ -517,7 +517,7 @@ def _under_less(answer: SlidingAnswer) -> str:
 
 
 def _remedy(
-    fault: Fault, task: SlidingTask, step: Fraction, reach: WellReach, around: Around, prove: Prove, spread: Fraction
+    fault: Fault, task: SlidingPlant, step: Fraction, reach: WellReach, around: Around, prove: Prove, spread: Fraction
 ) -> str:
     """Which T_s, V or path would do; empty where a law was followed through all of the path at the T_s asked for."""
     if reach.share < 1:
@@ -530,14 +530,14 @@ def _remedy(
 def _proof(pump: Pump | None, tell: Tell, *, given: bool) -> Prove:
     """Proofs whose pressures the pump can hold, under the task's stress if that is given, or about the largest."""
 
-    def tried(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+    def tried(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
         under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
         tell(f"{under}: proof", _SEARCHED)
         found = _held_by(pump, proved_sliding(task, held, log_rate=log_rate))
         tell(f"{under}: {'proved' if isinstance(found, SlidingGuarantee) else 'not proved'}", _SEARCHED)
         return found
 
-    def about_the_largest(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+    def about_the_largest(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
         most = largest_stress(task, held, log_rate=log_rate)
         found: SlidingGuarantee | NoGuarantee
         for share in _SHARES if most else _SHARES[:1]:
@@ -550,7 +550,7 @@ def _proof(pump: Pump | None, tell: Tell, *, given: bool) -> Prove:
 
 
 def _answer(
-    task: SlidingTask,
+    task: SlidingPlant,
     step: Fraction,
     log_rate: Fraction,
     around: Around,

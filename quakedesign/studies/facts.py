@@ -19,10 +19,10 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault, fault_toml
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, mean_rate, sliding_step
-from quakedesign.guarantees import task_of
 from quakedesign.guarantees.exact.impossibility import longest_reaction
 from quakedesign.guarantees.search.lqg import sliding_model, sliding_poles
 from quakedesign.laws import Controller, Signals
+from quakedesign.plant import uncertain_plant
 from quakedesign.simulation.state_plant import spring_acceleration, stretch
 from quakedesign.studies.comparison import need_sentence, needed_pressure, ways
 from quakedesign.symbolic import derive, plant, rate_and_state_plant
@@ -314,7 +314,7 @@ def _box_poles(fault: Fault) -> list[complex]:
         When no finite range of s is found, or friction has a state.
     """
     fault.require_memoryless("the range of unstable poles")
-    task = task_of(fault)
+    task = uncertain_plant(fault)
     poles = []
     for slope in map(float, task.slip_chord):
         for damping in map(float, task.rate_chord):
@@ -424,7 +424,7 @@ def _sliding_sentence(fault: Fault) -> list[str]:
 def beyond_control(fault: Fault) -> list[str]:
     """That no controller can hold a fault at its T_s, where that is proved."""
     try:
-        task = task_of(fault)
+        task = uncertain_plant(fault)
         longest = longest_reaction(task, task.normal_stress)
     except (ParameterError, UnsupportedError):  # friction with a state, or that nothing can be proved with
         return []

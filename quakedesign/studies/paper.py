@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from quakedesign.fault import Fault
-from quakedesign.guarantees import Guarantee, design_held, task_of
+from quakedesign.guarantees import Guarantee, design_held
+from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.studies.comparison import Compared, Entry, Run
@@ -131,7 +132,7 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
     step : Fraction
         T_s [s].
     """
-    task = task_of(fault)
+    task = uncertain_plant(fault)
     designs = {"peak": design_held(task, step, objective="peak")}
     designs |= {f"tracking, {room:g} times the peak": design_held(task, step, room=room) for room in ROOMS}
     length = min(_PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)

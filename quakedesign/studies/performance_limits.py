@@ -12,14 +12,12 @@ from quakedesign.guarantees import (
     Guarantee,
     NoGuarantee,
     SlidingGuarantee,
-    Task,
     continued,
     design_at,
     design_held,
     farthest_rock,
     longest_delay,
     longest_step,
-    task_of,
 )
 from quakedesign.guarantees.exact.impossibility import (
     Noise,
@@ -34,6 +32,7 @@ from quakedesign.guarantees.exact.impossibility import (
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
 from quakedesign.guarantees.search.lqg import near_path, sliding_model
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Quantity
+from quakedesign.plant import UncertainPlant, uncertain_plant
 from quakedesign.simulation.natural import natural_peak
 
 # ----------------------------------------------------------------------
@@ -236,7 +235,7 @@ class Limits:
 
         Of controllers that are `told` no more than these, or that know everything.
         """
-        task, noise = task_of(self.fault), (self.told if told else Told()).bounds
+        task, noise = uncertain_plant(self.fault), (self.told if told else Told()).bounds
         peaks = [(step, smallest_peak(task, step, **noise)) for step in self._steps()]
         return [(step, peak.slip_rate_error) for step, peak in peaks if peak is not None]
 
@@ -363,7 +362,7 @@ def limits(
             f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Leave it "
             "out: the box and the disturbance of the fault are meant."
         )
-    task, step = task_of(fault), rational(fault.sampling_time)
+    task, step = uncertain_plant(fault), rational(fault.sampling_time)
     withdrawal, spread = _given(fault, pressure, diffusivity)
     held, own = _proved_steps(task, step, told) if prove else ((), None)
     late = told.around.get("delay", Fraction(0))
@@ -391,7 +390,7 @@ def limits(
 
 
 def _impossible(
-    push: Task | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
+    push: UncertainPlant | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
 ) -> dict[str, Bound | None]:
     """What no controller can do, by name; nothing where no limit is known."""
     reaction, path = longest_reaction(push, withdrawal), longest_diffusion(push, withdrawal, step)
@@ -502,7 +501,7 @@ def _why(answer: SlidingAnswer | None) -> str:
     return f": {answer.found.reason}" if answer is not None and isinstance(answer.found, NoGuarantee) else ""
 
 
-def _proved_steps(task: Task, step: Fraction, told: Told) -> tuple[tuple[Guarantee, ...], Guarantee | None]:
+def _proved_steps(task: UncertainPlant, step: Fraction, told: Told) -> tuple[tuple[Guarantee, ...], Guarantee | None]:
     """Guarantees at growing T_s up to nearly the longest, and that at the fault's own, if there is one."""
     own: Guarantee | NoGuarantee | None = design_held(task, step, objective="peak", **told.around)
     longest = longest_step(task, **told.around)
@@ -523,12 +522,12 @@ def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
     return min(found, key=lambda g: g.claims.slip_rate_error)
 
 
-def _proved_delay(task: Task, step: Fraction, told: Told) -> LowerBound | None:
+def _proved_delay(task: UncertainPlant, step: Fraction, told: Told) -> LowerBound | None:
     longest = longest_delay(task, step, **told.around)
     return LowerBound(longest.held.delay) if longest else None
 
 
-def _proved_rock(task: Task, step: Fraction, told: Told) -> LowerBound | None:
+def _proved_rock(task: UncertainPlant, step: Fraction, told: Told) -> LowerBound | None:
     """L²/D [s] behind which a law that is told of a clock is proved."""
     farthest = farthest_rock(task, step, **told.around)
     return LowerBound(farthest.held.diffusion) if farthest else None

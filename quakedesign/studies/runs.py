@@ -19,7 +19,7 @@ from quakedesign.errors import CertificateError, ParameterError, SimulationError
 from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, Fault, SlidingReference
 from quakedesign.fault.model import require_positive
-from quakedesign.guarantees import ContinuousPeaks, Guarantee, SlidingGuarantee, load_guarantee, sliding_task, task_of
+from quakedesign.guarantees import ContinuousPeaks, Guarantee, SlidingGuarantee, load_guarantee
 from quakedesign.guarantees.exact.statement import differences
 from quakedesign.guarantees.search.compensated_search import recovered
 from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_model
@@ -43,6 +43,7 @@ from quakedesign.loop.sensing.measurement import EXACT, Measurement
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.fault_bounds import least_authority
 from quakedesign.lyapunov.exact.premises import Premise
+from quakedesign.plant import slow_sliding_plant, uncertain_plant
 from quakedesign.simulation import (
     Load,
     PressureCourse,
@@ -645,8 +646,8 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
 def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee) -> list[str]:
     """What of a fault a certificate does not cover."""
     if isinstance(claim, SlidingGuarantee):
-        return claim.task.differences(sliding_task(fault, claim.task.stress))
-    return differences(claim.task, task_of(fault, rate_limited=claim.task.change is not None))
+        return claim.task.differences(slow_sliding_plant(fault, claim.task.stress))
+    return differences(claim.task, uncertain_plant(fault, rate_limited=claim.task.change is not None))
 
 
 def optional_choice(fault: Fault, name: str, gains: tuple[str, ...], **more: Any) -> Choice | None:

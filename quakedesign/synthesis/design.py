@@ -20,7 +20,6 @@ from quakedesign.guarantees import (
     Guarantee,
     NoGuarantee,
     SlidingGuarantee,
-    task_of,
 )
 from quakedesign.guarantees.guarantee_result import SlidingAnswer
 from quakedesign.guarantees.search.defaults import REACH
@@ -33,6 +32,7 @@ from quakedesign.lyapunov import Certificate, Verdict
 from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.fault_bounds import least_authority
 from quakedesign.lyapunov.exact.premises import Premise, Variant
+from quakedesign.plant import uncertain_plant
 from quakedesign.synthesis.method import GainProblem, SlowSlidingDesign, method_of
 
 # ----------------------------------------------------------------------
@@ -166,7 +166,7 @@ class Design:
             return self.runs
         if law is None:
             return NoGuarantee(reason=f"no gains of {self.title} are known", small_gain=None)
-        task = task_of(self.fault, rate_limited=self.disturbance_class == "rate")
+        task = uncertain_plant(self.fault, rate_limited=self.disturbance_class == "rate")
         return method_of(type(law)).guarantee(self.fault, task, law, self.setup)
 
     @property

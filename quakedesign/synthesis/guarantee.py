@@ -10,13 +10,14 @@ from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.exact import exact_text, rational
 from quakedesign.fault import Fault
 from quakedesign.fault.units import exact_value
-from quakedesign.guarantees import CLASSES, OBJECTIVES, LoopAnswer, NoGuarantee, Task, task_of
+from quakedesign.guarantees import CLASSES, OBJECTIVES, LoopAnswer, NoGuarantee
 from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
 from quakedesign.guarantees.search.linear_design import nearest_setup
 from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
+from quakedesign.plant import UncertainPlant, uncertain_plant
 from quakedesign.synthesis.method import Wanted, method_of
 
 Found = TypeVar("Found")
@@ -153,12 +154,12 @@ def guarantee(
             f"stress and spread need friction with a state. Received {fault.friction.name}. Leave them out."
         )
     require_known(disturbance_class, CLASSES, "class")
-    task, law = task_of(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
+    task, law = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
     wanted = Wanted(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
     return _sampled(fault, task, law, wanted)
 
 
-def _sampled(fault: Fault, task: Task, law: type[Controller], wanted: Wanted) -> LoopAnswer:
+def _sampled(fault: Fault, task: UncertainPlant, law: type[Controller], wanted: Wanted) -> LoopAnswer:
     """Guarantee on a moving reference; none without given gains where no controller within σ′ can hold the fault."""
     setup, most = wanted.setup, rational(fault.effective_normal_stress)
     step = rational(fault.sampling_time) if setup.step is None else setup.step

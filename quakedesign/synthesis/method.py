@@ -25,9 +25,7 @@ from quakedesign.guarantees import (
     LoopAnswer,
     NoGuarantee,
     SlidingGuarantee,
-    Task,
     best_guarantee,
-    task_of,
 )
 from quakedesign.laws import Controller, SampledController, Signals, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
@@ -39,6 +37,7 @@ from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.exact.premises import Premise, Variant, linear_premises
 from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.plant import UncertainPlant, uncertain_plant
 
 # ----------------------------------------------------------------------
 # What is asked of every family of laws, and what is answered of a law that belongs to none.
@@ -99,9 +98,9 @@ class GainProblem(Generic[Designed]):
     tell: Callable[[str, float], None] = lambda what, done: None
 
     @property
-    def task(self) -> Task:
+    def task(self) -> UncertainPlant:
         """What a guarantee uses of the fault."""
-        return task_of(self.fault, rate_limited=self.disturbance_class == "rate")
+        return uncertain_plant(self.fault, rate_limited=self.disturbance_class == "rate")
 
     def require_exact_in_continuous_time(self) -> None:
         """Refuse a design in continuous time that is told less than slip and slip rate as they are.
@@ -239,7 +238,7 @@ class DesignMethod(Generic[L]):
         known = linear_about_a_reference(controller)
         return tuple(linear_premises(fault, controller, certificate)) if known else (), None
 
-    def guarantee(self, fault: Fault, task: Task, controller: L, setup: LoopSetup) -> Guarantee | NoGuarantee:
+    def guarantee(self, fault: Fault, task: UncertainPlant, controller: L, setup: LoopSetup) -> Guarantee | NoGuarantee:
         """What is proved of the law as it runs on a task of the fault, with the noise of a loop setup."""
         return NoGuarantee(
             reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
@@ -261,7 +260,7 @@ class DesignMethod(Generic[L]):
         """Premises and domain of the same gains with every named feed-forward; none for laws without."""
         return ()
 
-    def sampled(self, fault: Fault, task: Task, law: type[L], step: Fraction, wanted: Wanted) -> LoopAnswer:
+    def sampled(self, fault: Fault, task: UncertainPlant, law: type[L], step: Fraction, wanted: Wanted) -> LoopAnswer:
         """Guarantee of given gains, or of a design, as they run once every T_s [s]."""
         reason = f"no analysis of {law.title} under a held pressure is known here"
         return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
@@ -313,7 +312,7 @@ class Samples(DesignMethod[SampledController]):
         return (), None
 
     def guarantee(
-        self, fault: Fault, task: Task, controller: SampledController, setup: LoopSetup
+        self, fault: Fault, task: UncertainPlant, controller: SampledController, setup: LoopSetup
     ) -> Guarantee | NoGuarantee:
         """At its own T_s, behind its own delay, lag and diffusion path."""
         own, noise = controller.sampling.path, setup.noise

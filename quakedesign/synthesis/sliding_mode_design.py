@@ -13,7 +13,6 @@ from quakedesign.guarantees import (
     Guarantee,
     LoopAnswer,
     NoGuarantee,
-    Task,
     attacked,
     guarantee_of,
     sampled_sliding_mode,
@@ -29,6 +28,7 @@ from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.fault_bounds import Errors, coefficient_range, largest_matched_rate, least_authority
 from quakedesign.lyapunov.exact.premises import Premise, Variant, feedforward_variants, sliding_mode_premises
 from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.plant import UncertainPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
 
 _HEADROOM = Fraction(11, 10)
@@ -93,7 +93,9 @@ class SlidingModes(DesignMethod[SlidingMode]):
         premises, domain = sliding_mode_premises(fault, controller, certificate)
         return tuple(premises), domain
 
-    def guarantee(self, fault: Fault, task: Task, controller: SlidingMode, setup: LoopSetup) -> Guarantee | NoGuarantee:
+    def guarantee(
+        self, fault: Fault, task: UncertainPlant, controller: SlidingMode, setup: LoopSetup
+    ) -> Guarantee | NoGuarantee:
         """In the scheme ``compensated``, and in no other."""
         return guarantee_of(task, controller, **setup.noise)
 
@@ -105,7 +107,9 @@ class SlidingModes(DesignMethod[SlidingMode]):
         """Every named feed-forward, its own first; takes a few seconds."""
         return feedforward_variants(fault, controller, certificate)
 
-    def sampled(self, fault: Fault, task: Task, law: type[SlidingMode], step: Fraction, wanted: Wanted) -> LoopAnswer:
+    def sampled(
+        self, fault: Fault, task: UncertainPlant, law: type[SlidingMode], step: Fraction, wanted: Wanted
+    ) -> LoopAnswer:
         """In a scheme, with given base gains or the first ones known."""
         wanted.require_all_measured()
         options: Any = {"gains": wanted.gains, "scheme": wanted.scheme or GUARANTEED, "objective": wanted.objective}

@@ -15,7 +15,6 @@ from quakedesign.guarantees import (
     Held,
     LoopAnswer,
     NoGuarantee,
-    Task,
     attacked,
     best_guarantee,
     certified_peaks,
@@ -38,6 +37,7 @@ from quakedesign.loop.sensing.differentiator import told_by_differences
 from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.search.search import claims_of, find_certificate, finish, quadratic_margin
+from quakedesign.plant import UncertainPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
 
 
@@ -66,7 +66,9 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         loop = sector_loop(controller, sectors(problem.fault))
         return _judged(problem, controller, quadratic_certificate(loop), {})
 
-    def guarantee(self, fault: Fault, task: Task, controller: ExtendedLQR, setup: LoopSetup) -> Guarantee | NoGuarantee:
+    def guarantee(
+        self, fault: Fault, task: UncertainPlant, controller: ExtendedLQR, setup: LoopSetup
+    ) -> Guarantee | NoGuarantee:
         """With integrals summed over the T_s of the fault."""
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
             return super().guarantee(fault, task, controller, setup)
@@ -83,7 +85,9 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         """The law as it is, over the fault's T_s."""
         return held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
 
-    def sampled(self, fault: Fault, task: Task, law: type[ExtendedLQR], step: Fraction, wanted: Wanted) -> LoopAnswer:
+    def sampled(
+        self, fault: Fault, task: UncertainPlant, law: type[ExtendedLQR], step: Fraction, wanted: Wanted
+    ) -> LoopAnswer:
         """Integrals of given gains are summed; without gains, a law with an estimate of the disturbance."""
         setup, differs = wanted.setup, wanted.setup.measured == MEASURED[2]
         if wanted.gains and not differs:

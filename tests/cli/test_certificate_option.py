@@ -9,8 +9,9 @@ import xarray as xr
 
 import quakedesign as qd
 from quakedesign.cli import main
-from quakedesign.guarantees import Guarantee, Held, guarantee, save_guarantee, task_of
+from quakedesign.guarantees import Guarantee, Held, guarantee, save_guarantee
 from quakedesign.laws import Prediction, disturbance_estimate
+from quakedesign.plant import uncertain_plant
 
 REAL = qd.load_fault("real-fault")
 STEP = F(3, 20)
@@ -21,7 +22,7 @@ LAW = disturbance_estimate(
     F("2.282e-8"),
 )
 HELD = Held(law=LAW, step=STEP, lag=F(1, 50), slip_noise=F(1, 10**7))
-CLAIM = guarantee(task_of(REAL), HELD)
+CLAIM = guarantee(uncertain_plant(REAL), HELD)
 SHORT = ("--duration", "30 s")
 
 
@@ -89,7 +90,7 @@ def test_a_run_that_is_not_what_is_proved_says_so(file, capsys, more, outside):
 
 def test_a_start_for_which_a_law_is_proved_is_in_what_is_proved(capsys, tmp_path):
     held = replace(HELD, initial_slip=F(1, 10**5))
-    claim = guarantee(task_of(REAL), held)
+    claim = guarantee(uncertain_plant(REAL), held)
     save_guarantee(claim, tmp_path / "law.json")
     run = ("simulate", "real-fault", "--certificate", tmp_path / "law.json", *SHORT, "--json", "--initial-slip")
     assert json.loads(told(capsys, *run, "10 um")[1])["outside"] == []

@@ -19,11 +19,12 @@ from quakedesign.cli.options import SetupOptions
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.fault.fault_toml import source_text as load_text
-from quakedesign.guarantees import Held, LoopAnswer, NoGuarantee, guarantee, task_of
+from quakedesign.guarantees import Held, LoopAnswer, NoGuarantee, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.loop.loop_setup import LoopSetup
+from quakedesign.plant import uncertain_plant
 from quakedesign.synthesis.state_feedback import StateFeedback
 
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
@@ -83,8 +84,8 @@ def test_given_gains_for_people(call):
 def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks():
     """A design one period late with larger gains, run on a fault at rest whatever it asks for: its own recursion."""
     fault, late = load_fault("real-fault"), F("0.184")
-    law = family_of(task_of(fault), late, "slip-and-rate", {"delay": late}).law(np.array((0.6, 1.0, 0.1)))
-    found = LoopAnswer(fault=fault, found=guarantee(task_of(fault), Held(law=law, step=late, delay=late)))
+    law = family_of(uncertain_plant(fault), late, "slip-and-rate", {"delay": late}).law(np.array((0.6, 1.0, 0.1)))
+    found = LoopAnswer(fault=fault, found=guarantee(uncertain_plant(fault), Held(law=law, step=late, delay=late)))
     assert found.proved
     rows, seen = (np.array(m, dtype=float) for m in (law.update, law.measured))
     states, sizes = np.zeros(len(rows)), []

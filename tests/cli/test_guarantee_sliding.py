@@ -11,13 +11,14 @@ from quakedesign.cli import main
 from quakedesign.exact import UpperBound
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.fault.fault_toml import fault_toml
-from quakedesign.guarantees import WHOLE, Held, NoGuarantee, SlidingClaims, SlidingGuarantee
+from quakedesign.guarantees import Held, NoGuarantee, SlidingClaims, SlidingGuarantee
 from quakedesign.guarantees import guarantee_result as sliding_answer
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.sliding_design import WellReach, proved_sliding
 from quakedesign.laws import LinearLaw
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import WHOLE
 from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis import state_feedback
 

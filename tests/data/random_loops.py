@@ -7,14 +7,15 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, SlowGain, Task, task_of
+from quakedesign.guarantees import Held, SlowGain
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import summed_integrals
+from quakedesign.plant import UncertainPlant, uncertain_plant
 
-REAL = task_of(load_fault("real-fault"))
+REAL = uncertain_plant(load_fault("real-fault"))
 
 
-def random_task(number: int) -> tuple[Task, F]:
+def random_task(number: int) -> tuple[UncertainPlant, F]:
     """A fault near the preset real-fault, and T_s."""
     random = np.random.default_rng(number)
 
@@ -35,7 +36,7 @@ def random_task(number: int) -> tuple[Task, F]:
     ), F(f"{random.uniform(0.05, 0.3):.3f}")
 
 
-def random_loop(number: int) -> tuple[Task, Held, SlowGain | None] | None:
+def random_loop(number: int) -> tuple[UncertainPlant, Held, SlowGain | None] | None:
     """A loop of any kind, with a delay, a lag, rock, noise and a start or without; None where there is no law."""
     random = np.random.default_rng(10**6 + number)
     task, step = random_task(number)

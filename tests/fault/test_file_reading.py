@@ -12,7 +12,7 @@ from quakedesign.errors import ParameterError, ScenarioError, UnitError, Unknown
 from quakedesign.exact import rational
 from quakedesign.fault import friction_law, load_fault, parse_fault, presets
 from quakedesign.fault.fault_toml import fault_toml
-from quakedesign.guarantees import task_of
+from quakedesign.plant import uncertain_plant
 
 REAL = (files("quakedesign.fault") / "presets" / "real-fault.toml").read_text(encoding="utf-8")
 LENGTH, BOX, DROP = 'length = "5 km"', 'uncertainty = "paper"', "drop = 0.1"
@@ -322,7 +322,7 @@ def test_a_stress_is_covered_for_every_area_per_mass_of_the_box(amplitude, const
             (("amplitude", amplitude), ("constant", constant))}  # fmt: skip
     assert fault.disturbance.stresses == stresses
     assert fault.disturbance_bounds == (sum(wide.values()), wide["amplitude"] * F("0.69"))
-    assert task_of(fault).amplitude == sum(wide.values())
+    assert uncertain_plant(fault).amplitude == sum(wide.values())
     assert fault.disturbance.largest_explicit == pytest.approx(float(sizes[amplitude] + sizes[constant]))
 
 

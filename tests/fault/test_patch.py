@@ -9,7 +9,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault, parse_fault, scaled_fault
 from quakedesign.fault.fault_toml import fault_toml
 from quakedesign.fault.similarity import similarity
-from quakedesign.guarantees import task_of
+from quakedesign.plant import uncertain_plant
 from quakedesign.symbolic.plant import plant_values
 
 SQUARE = load_fault("real-fault")
@@ -18,7 +18,7 @@ ROW = replace(SQUARE, length=15e3, width=5e3, damping=3 * SQUARE.damping)
 
 def test_a_row_of_squares_moves_as_one_of_them():
     assert plant_values(ROW) == plant_values(SQUARE)
-    assert replace(task_of(ROW), name="") == replace(task_of(SQUARE), name="")
+    assert replace(uncertain_plant(ROW), name="") == replace(uncertain_plant(SQUARE), name="")
     assert ROW.natural_frequency == pytest.approx(SQUARE.natural_frequency, rel=1e-15)
     assert ROW.rest_slip == pytest.approx(SQUARE.rest_slip, rel=1e-12)
     assert ROW.authority == pytest.approx(SQUARE.authority, rel=1e-15)
@@ -42,7 +42,7 @@ def test_the_sides_have_no_order():
 def test_a_patch_shares_its_damping():
     half = replace(ROW, damping=SQUARE.damping)
     assert half.specific_damping == pytest.approx(SQUARE.specific_damping / 3, rel=1e-15)
-    assert task_of(half).damping == Fraction(5 * 10**14, 3)
+    assert uncertain_plant(half).damping == Fraction(5 * 10**14, 3)
 
 
 def test_a_square_of_two_sides_is_the_papers():

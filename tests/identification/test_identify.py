@@ -14,7 +14,6 @@ from quakedesign.errors import ParameterError, RecordError
 from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, friction_law, load_fault
 from quakedesign.fault.fault_toml import step_assumed, template
-from quakedesign.guarantees import sliding_task
 from quakedesign.identification.fault_file import (
     cover,
     identified_fault,
@@ -27,6 +26,7 @@ from quakedesign.identification.fault_file import (
 from quakedesign.identification.identification_result import ParameterEstimate, Rival
 from quakedesign.identification.identify import identify, set_up
 from quakedesign.identification.record import Record
+from quakedesign.plant import slow_sliding_plant
 from quakedesign.report.identification_page import identification_lines
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
@@ -198,7 +198,9 @@ def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, nam
     assert next_command(replace(weak, law=law, estimates=estimates), "my own.toml") == (
         "quakedesign design 'my own.toml' --spread 0.063"
     )
-    low, high = sliding_task(replace(patch, friction=law), Fraction(0), Fraction("0.063")).ranges["evolution_effect"]
+    low, high = slow_sliding_plant(replace(patch, friction=law), Fraction(0), Fraction("0.063")).ranges[
+        "evolution_effect"
+    ]
     assert low < Fraction(b.value) * Fraction("0.9377") < high
 
 

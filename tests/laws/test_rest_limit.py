@@ -13,7 +13,7 @@ from quakedesign import simulate
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, guarantee, task_of
+from quakedesign.guarantees import Held, guarantee
 from quakedesign.guarantees.search.adversary import _Limit, _searched, worst_found
 from quakedesign.laws import (
     ErrorPrediction,
@@ -28,6 +28,7 @@ from quakedesign.laws import (
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag
 from quakedesign.loop.layer import Layer
 from quakedesign.loop.schemes.compensated import Compensated
+from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Variation, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
@@ -56,7 +57,7 @@ LOOSE = RestLimit(width=F(100), per_slip=F(7), resolution=F(10**9))  # wherever 
 def proved():
     prediction = Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),))
     law = disturbance_estimate(GAINS, F("0.57"), prediction, GAIN)
-    return guarantee(task_of(REAL), Held(law=law, step=STEP))
+    return guarantee(uncertain_plant(REAL), Held(law=law, step=STEP))
 
 
 def stepped(controller, z, slip_error, rate_error, reference):

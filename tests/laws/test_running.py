@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from quakedesign import assess, simulate
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, Held, guarantee, task_of
+from quakedesign.guarantees import Guarantee, Held, guarantee
 from quakedesign.laws import (
     ErrorPrediction,
     Prediction,
@@ -25,6 +25,7 @@ from quakedesign.laws import (
 )
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag
 from quakedesign.loop.sensing.measurement import Measurement
+from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Variation, export_controller, to_casadi, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.simulation.campaign.space import Sample
@@ -55,7 +56,7 @@ def test_a_run_asks_for_the_pressure_of_the_matrices():
 
 def test_the_whole_task_stays_far_inside_the_guarantee():
     fault = load_fault("real-fault")
-    claim = guarantee(task_of(fault), HELD)
+    claim = guarantee(uncertain_plant(fault), HELD)
     assert isinstance(claim, Guarantee)
     found = simulate(fault, HELD.controller).metrics
     assert found.max_slip_error <= 6e-6 < claim.claims.slip_error

@@ -11,10 +11,11 @@ import pytest
 
 from quakedesign.checking import check_files
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import design_compensated, design_held, sliding_task, task_of, tightened
+from quakedesign.guarantees import design_compensated, design_held, tightened
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, read_guarantee
 from quakedesign.laws import family, law
 from quakedesign.lyapunov import Verdict, certificate_text, load_certificate, loop_of
+from quakedesign.plant import slow_sliding_plant, uncertain_plant
 from quakedesign.sos.exact import polynomial_files
 
 ROOT = Path(__file__).parents[2] / "proofs"
@@ -113,7 +114,7 @@ def test_linear_certificates_cover_their_faults(fault):
 def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
     stored, fault = parse_guarantee(path.read_text()), load_fault(path.stem.split("_")[-1])
     assert check_files([path], fault.name)[str(path)][0] == "proved"
-    assert stored.task == task_of(fault)
+    assert stored.task == uncertain_plant(fault)
     assert stored.held.step == F(str(fault.sampling_time))
     if stored.held.longest_step:
         return  # its search is tested in tests/guarantees/search/test_unclocked.py
@@ -147,7 +148,7 @@ def test_a_smaller_claim_of_a_guarantee_is_refused_by_both(path, key, tmp_path):
 def test_a_patch_of_the_crust_is_held_below_1_2_times_its_rate_under_25_kpa():
     path = ROOT / "certificates" / "sliding_crustal-patch.json"
     claim = parse_guarantee(path.read_text())
-    assert claim.task == sliding_task(load_fault("crustal-patch"), F(25000))
+    assert claim.task == slow_sliding_plant(load_fault("crustal-patch"), F(25000))
     assert claim.peak_slip_rate < F("1.2e-6")
     raw = json.loads(path.read_text())
     raw["stress"] = "80000"

@@ -9,16 +9,17 @@ import pytest
 from standalone_guarantee import checker
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, Held, SlowGain, guarantee, task_of
+from quakedesign.guarantees import Guarantee, Held, SlowGain, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.norms import norms
 from quakedesign.guarantees.exact.small_gain import grown
 from quakedesign.guarantees.search.estimate import gains_of
 from quakedesign.laws import Prediction, disturbance_estimate
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 
 STEP = F("0.184")
-TASK = task_of(load_fault("real-fault"))
+TASK = uncertain_plant(load_fault("real-fault"))
 LAW = disturbance_estimate(
     (F("3.9e8"), F("1.5e8")),
     F("0.1"),

@@ -15,15 +15,16 @@ from standalone_guarantee import checker
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, Held, NoGuarantee, SlowGain, guarantee, task_of
+from quakedesign.guarantees import Guarantee, Held, NoGuarantee, SlowGain, guarantee
 from quakedesign.guarantees.exact import statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import Bounds, grown, slow_gains
 from quakedesign.laws import NominalModel, Prediction, disturbance_estimate
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 
 STEP, SLOW = F("0.184"), SlowGain(parts=2, growth=F(1, 4))
-TASK = task_of(load_fault("real-fault"))
+TASK = uncertain_plant(load_fault("real-fault"))
 GAIN = F("2.282e-8")
 LAW = disturbance_estimate(
     (F("7.8e8"), F("2.38e8")), F("0.1"), Prediction(of_slip=F("0.07"), of_rate=F("0.752"), of_pushes=(F("0.16"),)), GAIN

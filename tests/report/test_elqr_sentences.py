@@ -8,10 +8,11 @@ import pytest
 
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, ContinuousPeaks, NoGuarantee, task_of
+from quakedesign.guarantees import Bounds, Claims, ContinuousPeaks, NoGuarantee
 from quakedesign.linear.sampled_stability import HeldLoop, LargestVaryingStep, VaryingVerdict
 from quakedesign.loop import exact_integrals
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import uncertain_plant
 from quakedesign.report.sentences import held_sentences, margin_lines, peaks_sentence
 
 LONGEST = LargestVaryingStep(proved=LowerBound("0.15769"), refuted=UpperBound("0.15822"), proofs=())
@@ -38,7 +39,7 @@ def test_a_held_pressure(loop, said):
 
 def test_peaks_of_one_or_no_class():
     bounds = Bounds(slip_error=F("0.5"), slip_rate_error=F(1, 10**5), push=F(1), small_gain=F(1, 2))
-    task, law = task_of(load_fault("real-fault")), exact_integrals((F(1),) * 4)
+    task, law = uncertain_plant(load_fault("real-fault")), exact_integrals((F(1),) * 4)
     claims = replace(
         Claims.of(task, bounds), peak_slip_rate=UpperBound("8.33542235e-5"), slip_error=UpperBound("0.50001")
     )

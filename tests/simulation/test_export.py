@@ -13,7 +13,7 @@ import pytest
 
 from quakedesign.errors import OutputError, ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoGuarantee, compensated, design_compensated, task_of
+from quakedesign.guarantees import NoGuarantee, compensated, design_compensated
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee, save_guarantee
 from quakedesign.guarantees.search.compensated_search import implicit_pull, recovered
 from quakedesign.laws import (
@@ -35,6 +35,7 @@ from quakedesign.loop.actuators.flow_stages import Lag
 from quakedesign.loop.actuators.sampled_stages import Delay, RateLimit, Saturation
 from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Transducer
 from quakedesign.loop.sensing.measurement import Measurement
+from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import simulate
 from quakedesign.simulation.export import controller_step, export_controller
 from quakedesign.studies.runs import certified_choice
@@ -326,7 +327,7 @@ def test_the_gains_of_a_2_dia_stand_in_powers_and_are_read_off_too(gains, scale,
     """The same pressures as those of the controller itself, of other gains with λ = 1 and the divisor B0."""
     real, step, weight, authority = load_fault("real-fault"), F("0.184"), F("0.3"), F("2.25e-8")
     own = control_law("dia").from_values(gains, scale=F(scale), divisor=F(2353, 125000000000))
-    claim = compensated(task_of(real), own, weight, authority, step)
+    claim = compensated(uncertain_plant(real), own, weight, authority, step)
     if isinstance(claim, NoGuarantee):  # the step is that of the law, proved or not
         claim = load_guarantee(STORED)
         root = ImplicitRoot(pull=implicit_pull(own, step, authority))
@@ -351,7 +352,9 @@ def test_the_gains_of_a_2_dia_stand_in_powers_and_are_read_off_too(gains, scale,
 
 def test_a_certificate_of_a_2_dia_is_exported(tmp_path):
     real = load_fault("real-fault")
-    made = design_compensated(task_of(real), control_law("dia").base_gains()[0].law, F("0.184"), objective="peak")
+    made = design_compensated(
+        uncertain_plant(real), control_law("dia").base_gains()[0].law, F("0.184"), objective="peak"
+    )
     path = tmp_path / "dia.json"
     save_guarantee(made.found, path)
     chosen = certified_choice(real, path)

@@ -10,10 +10,11 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Disturbance
-from quakedesign.guarantees import Claims, Guarantee, Held, NoGuarantee, task_of
+from quakedesign.guarantees import Claims, Guarantee, Held, NoGuarantee
 from quakedesign.guarantees.exact.impossibility import longest_reaction
 from quakedesign.guarantees.search.linear_design import Longest
 from quakedesign.laws import summed_integrals
+from quakedesign.plant import uncertain_plant
 from quakedesign.report.limits_table import limits_figure, limits_lines
 from quakedesign.studies import limits as study
 from quakedesign.studies.facts import beyond_control
@@ -73,7 +74,7 @@ def designs(monkeypatch):
 def test_both_sides_of_the_real_fault(designs):
     found = study(REAL, pressure=2e7)
     assert found.to_dict()["largest_step"]["impossible_beyond"] == "15.8694"
-    assert found.largest_step.impossible_beyond == longest_reaction(task_of(REAL), F(2 * 10**7))
+    assert found.largest_step.impossible_beyond == longest_reaction(uncertain_plant(REAL), F(2 * 10**7))
     assert found.largest_delay.impossible_beyond == found.largest_step.impossible_beyond - F(184, 1000)
     assert found.farthest_well.to_dict()["impossible_beyond"] == "11.7421"
     assert found.peak_slip_rate_error.proved_up_to == CLAIMS.slip_rate_error

@@ -14,15 +14,15 @@ from quakedesign.files import write_whole
 from quakedesign.guarantees.exact.invariant_set import MOST_FACETS, MOST_PIECES, InvariantPolytope, require_fit
 from quakedesign.guarantees.exact.loop import Held
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
-from quakedesign.guarantees.exact.sliding_task import AXES, MOST_CELLS, Cuts, SlidingTask, cells
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.guarantees.exact.statement import Claims, ContinuousPeaks, Guarantee, SlidingGuarantee
-from quakedesign.guarantees.exact.task import Friction, Task
 from quakedesign.laws import ImplicitRoot, LinearLaw, Power
 from quakedesign.laws.implicit_root import MOST_TERMS
 from quakedesign.loop import ContinuousLaw
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.certificate_files import GUARANTEE, SLOW_SLIDING, kind_of, read_json
+from quakedesign.plant.sliding_plant import AXES, MOST_CELLS, Cuts, SlidingPlant, cells
+from quakedesign.plant.uncertain_plant import Friction, UncertainPlant
 from quakedesign.sos.exact.strict import (
     headed,
     listed,
@@ -265,7 +265,7 @@ def _name(fault: dict[str, Any]) -> str:
     return str(name)
 
 
-def _task(raw: dict[str, Any]) -> Task:
+def _task(raw: dict[str, Any]) -> UncertainPlant:
     rock = (*_ROCK, "normal_stress")
     fault = with_keys(raw["fault"], {"name", *rock, "spreads", "friction"})
     reference = with_keys(raw["reference"], {"shape", "target_slip", "operation_time"})
@@ -274,7 +274,7 @@ def _task(raw: dict[str, Any]) -> Task:
     with_keys(given, {"amplitude", "growths"} | ({"change"} if limited else set()))
     stiffness, damping, authority = read_exactly(fault["spreads"], _SPREADS).values()
     slip, rate = read_exactly(given["growths"], _NOISE).values()
-    return Task(
+    return UncertainPlant(
         name=_name(fault),
         **{name: read_rational(fault[name]) for name in rock},
         spreads=(stiffness, damping, authority),
@@ -288,7 +288,7 @@ def _task(raw: dict[str, Any]) -> Task:
     )
 
 
-def _sliding_task(raw: dict[str, Any]) -> SlidingTask:
+def _sliding_task(raw: dict[str, Any]) -> SlidingPlant:
     told = {"state_law": "slip", "regularised": True}
     more: Any = {name: raw["fault"][name] for name in told if isinstance(raw["fault"], dict) and name in raw["fault"]}
     fault = with_keys(raw["fault"], {"name", *_ROCK, *AXES, *more})
@@ -299,10 +299,10 @@ def _sliding_task(raw: dict[str, Any]) -> SlidingTask:
     more |= read_exactly(raw["reference"], (*_SLIDING_REFERENCE, *swings))
     need(not swings or more["swing"] > 0, "swing must be positive where it is told")
     ranges = {name: read_ends(fault[name], name) for name in AXES}
-    return SlidingTask(name=_name(fault), ranges=ranges, stress=read_rational(raw["stress"]), **more)
+    return SlidingPlant(name=_name(fault), ranges=ranges, stress=read_rational(raw["stress"]), **more)
 
 
-def _slow_gain(raw: Any, task: Task) -> SlowGain:
+def _slow_gain(raw: Any, task: UncertainPlant) -> SlowGain:
     with_keys(raw, {"parts", "growth"})
     need(type(raw["parts"]) is int, "parts must be an integer")
     slow_gain = SlowGain(parts=raw["parts"], growth=read_rational(raw["growth"]))

@@ -61,9 +61,9 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, shortly
 from quakedesign.guarantees.exact.loop import Channel, Gains, Held
 from quakedesign.guarantees.exact.norms import norms
-from quakedesign.guarantees.exact.sliding_task import Range, SlidingTask
 from quakedesign.guarantees.exact.small_gain import NoGuarantee, channel_bounds
 from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop
+from quakedesign.plant.sliding_plant import Range, SlidingPlant
 
 _TERMS = 24  # of Taylor's series
 _LARGEST = 3  # logarithm of a ratio: beyond that nothing is slow sliding
@@ -108,7 +108,7 @@ class SlidingClaims:
             )
 
 
-def cell_bounds(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | NoGuarantee:
+def cell_bounds(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[str, Any] | NoGuarantee:
     """What follows from the claims for a box of constants as one cell, by the names of the claims; ``small_gain`` too.
 
     Raises
@@ -128,7 +128,7 @@ def cell_bounds(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[st
 
 
 def bounds_from(
-    task: SlidingTask,
+    task: SlidingPlant,
     held: Held,
     claims: SlidingClaims,
     loop: PeriodicLoop,
@@ -168,7 +168,7 @@ def follows(bounds: Mapping[str, Any], claims: SlidingClaims) -> bool:
     return all(bounds[name] < getattr(claims, name) for name in SlidingClaims.__dataclass_fields__)
 
 
-def loop_of(held: Held, model: SlidingModel, task: SlidingTask) -> PeriodicLoop:
+def loop_of(held: Held, model: SlidingModel, task: SlidingPlant) -> PeriodicLoop:
     """The nominal loop; without the drift where the plan is exact, and without a reference where its rate is V.
 
     Raises
@@ -193,12 +193,12 @@ def loop_of(held: Held, model: SlidingModel, task: SlidingTask) -> PeriodicLoop:
     return loop
 
 
-def _moving(task: SlidingTask) -> dict[str, Fraction]:
+def _moving(task: SlidingPlant) -> dict[str, Fraction]:
     """Bounds of what comes of the reference, by its inputs of the loop."""
     return {"drift": task.drift, "reference": task.swing}
 
 
-def model_of(task: SlidingTask, claims: SlidingClaims) -> SlidingModel | None:
+def model_of(task: SlidingPlant, claims: SlidingClaims) -> SlidingModel | None:
     """Middle of all that may be; None where the normal stress, or regularised friction, may come near 0."""
     low, high = task.normal_stress(claims.push)
     if low <= 0 or (task.regularised and _least_exponent(task, claims) < 1):
@@ -220,14 +220,14 @@ def model_of(task: SlidingTask, claims: SlidingClaims) -> SlidingModel | None:
     )
 
 
-def _left(task: SlidingTask, claims: SlidingClaims) -> str:
+def _left(task: SlidingPlant, claims: SlidingClaims) -> str:
     """Why there is no model."""
     if task.normal_stress(claims.push)[0] <= 0:
         return "the pressure may open the fault"
     return "regularised friction may come near 0"
 
 
-def channels_of(task: SlidingTask, held: Held, claims: SlidingClaims, loop: PeriodicLoop) -> tuple[Channel, ...]:
+def channels_of(task: SlidingPlant, held: Held, claims: SlidingClaims, loop: PeriodicLoop) -> tuple[Channel, ...]:
     """Inputs of the loop and what bounds them."""
     low, high = task.normal_stress(claims.push)
     rates, states = chords(claims.log_rate), _state_slopes(task, claims)
@@ -257,7 +257,7 @@ def channels_of(task: SlidingTask, held: Held, claims: SlidingClaims, loop: Peri
     return tuple(channels)
 
 
-def inertia(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fraction:
+def inertia(task: SlidingPlant, held: Held, claims: SlidingClaims) -> Fraction:
     """By how much the mass makes the stress larger, sup|r|/λ₀ [Pa]."""
     low, high = task.normal_stress(claims.push)
     (a_low, a), (_, b), (_, mu) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
@@ -267,7 +267,7 @@ def inertia(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fraction:
     return rest * task.inertia * task.rate * grown / (low * a_low)
 
 
-def regularisation(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+def regularisation(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
     """By how much regularised friction makes the stress larger, N_max·ε [Pa]."""
     if not task.regularised:
         return _ZERO
@@ -275,25 +275,25 @@ def regularisation(task: SlidingTask, claims: SlidingClaims) -> Fraction:
     return task.normal_stress(claims.push)[1] * 4 * a / _partial(_least_exponent(task, claims))
 
 
-def _least_exponent(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+def _least_exponent(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
     """2m/a of the least friction coefficient m that may be, without regularisation."""
     (_, a), (_, b), (mu, _) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
     return 2 * (mu - a * claims.log_rate - b * claims.log_state) / a
 
 
-def _fastest_push(task: SlidingTask, held: Held, claims: SlidingClaims) -> Fraction:
+def _fastest_push(task: SlidingPlant, held: Held, claims: SlidingClaims) -> Fraction:
     """Bound of |q′| [Pa/s]."""
     late = held.diffusion / 2 + held.lag
     speed = Fraction(5, 2) / held.diffusion if held.diffusion else 1 / held.lag
     return speed * (claims.asked + task.drift * late + claims.push) + task.drift
 
 
-def _fastest_pull(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+def _fastest_pull(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
     """Bound of K|x′| [Pa/s]."""
     return task.stiffness * task.rate * (exponential(claims.log_rate) - 1 + task.swing)
 
 
-def _fastest_state(task: SlidingTask, claims: SlidingClaims) -> Fraction:
+def _fastest_state(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
     """Bound ζ of |z′| [1/s]."""
     grown, aged = exponential(claims.log_rate), exponential(claims.log_state)
     if task.state_law == "slip":
@@ -302,7 +302,7 @@ def _fastest_state(task: SlidingTask, claims: SlidingClaims) -> Fraction:
 
 
 def _moved(
-    task: SlidingTask, held: Held, claims: SlidingClaims, model: SlidingModel, time: Fraction
+    task: SlidingPlant, held: Held, claims: SlidingClaims, model: SlidingModel, time: Fraction
 ) -> dict[str, Fraction]:
     """How far y and what is made of it can move within a time [s], but for what the stress adds at once."""
     of_state = _fastest_state(task, claims)
@@ -323,7 +323,7 @@ def chords(size: Fraction) -> Range:
     return (1 - 1 / _partial(size)) / size, (grown - 1) / size
 
 
-def _state_slopes(task: SlidingTask, claims: SlidingClaims) -> Range:
+def _state_slopes(task: SlidingPlant, claims: SlidingClaims) -> Range:
     """What c_z stands in place of: of ageing (1 − e^{−z})/z, of the slip law (ρ/ρ₀)e^y."""
     if task.state_law == "ageing":
         return chords(claims.log_state)
@@ -350,13 +350,13 @@ def _partial(size: Fraction) -> Fraction:
     return total
 
 
-def _ageing(task: SlidingTask) -> Range:
+def _ageing(task: SlidingPlant) -> Range:
     """ρ = V/D [1/s]."""
     low, high = task.ranges["critical_slip"]
     return task.rate / high, task.rate / low
 
 
-def _off(task: SlidingTask) -> Fraction:
+def _off(task: SlidingPlant) -> Fraction:
     """r, how far ρ may be from the middle of its range, over that."""
     slow, fast = _ageing(task)
     return (fast - slow) / (fast + slow)

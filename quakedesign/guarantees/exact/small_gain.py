@@ -16,10 +16,10 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, shortly
 from quakedesign.guarantees.exact.loop import NOISELESS, Channel, Gains, GainSpread, beside, channels_of, through_layer
 from quakedesign.guarantees.exact.norms import ball, flow_norms, norms
-from quakedesign.guarantees.exact.task import Task
 from quakedesign.laws import ImplicitRoot, NominalModel, Power
 from quakedesign.loop import PeriodicLoop
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant.uncertain_plant import UncertainPlant
 
 # ----------------------------------------------------------------------
 # The robust small-gain theorem for a loop that runs: bounds for ever, in exact arithmetic.
@@ -216,7 +216,7 @@ class NoGuarantee:
 
 
 def certified_bounds(
-    task: Task,
+    task: UncertainPlant,
     loop: PeriodicLoop,
     root: ImplicitRoot | None = None,
     noise: Mapping[str, Fraction] = NOISELESS,
@@ -236,7 +236,7 @@ def certified_bounds(
 
 
 def best_bounds(
-    task: Task,
+    task: UncertainPlant,
     gains: Gains,
     root: ImplicitRoot | None,
     step: Fraction,
@@ -256,7 +256,7 @@ def best_bounds(
 
 
 def bounds_from(
-    task: Task,
+    task: UncertainPlant,
     gains: Gains,
     root: ImplicitRoot | None,
     step: Fraction,
@@ -344,7 +344,7 @@ def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
     return [row[size] for row in rows]
 
 
-def unshifted(task: Task) -> Fraction:
+def unshifted(task: UncertainPlant) -> Fraction:
     """What b·(p − p*) is more than the push of the loop, p* being shifted in the class ``rate`` [m/s²]."""
     if task.change is None:
         return _ZERO
@@ -394,7 +394,7 @@ class SlowGain:
                 f"{shortly(self.growth)} 1/s. Change them."
             )
 
-    def models(self, task: Task) -> tuple[NominalModel, ...]:
+    def models(self, task: UncertainPlant) -> tuple[NominalModel, ...]:
         """Nominal model of every part.
 
         Raises
@@ -410,7 +410,7 @@ class SlowGain:
         middles = (task.beta[0] + (2 * number + 1) * half for number in range(self.parts))
         return tuple(replace(task.model, gain=middle * task.authority) for middle in middles)
 
-    def spread(self, task: Task, slip_error: Fraction) -> GainSpread:
+    def spread(self, task: UncertainPlant, slip_error: Fraction) -> GainSpread:
         """How far the gain is off while the slip error stays below a bound [m]."""
         law = task.friction
         slope = max(law.weakening, law.strengthening) * task.area_per_mass[1] / task.authority
@@ -419,7 +419,7 @@ class SlowGain:
             aged=slope * task.reference_rates[0] * _ONE_OVER_E / self.growth,
         )
 
-    def _half(self, task: Task) -> Fraction:
+    def _half(self, task: UncertainPlant) -> Fraction:
         return (task.beta[1] - task.beta[0]) / (2 * self.parts)
 
 

@@ -16,7 +16,6 @@ from quakedesign.guarantees.exact import small_gain
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope, reached_bounds
 from quakedesign.guarantees.exact.loop import Gains, Held
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, cell_bounds, exponential, follows
-from quakedesign.guarantees.exact.sliding_task import Cuts, SlidingTask, cells
 from quakedesign.guarantees.exact.small_gain import (
     Bounds,
     NoGuarantee,
@@ -25,10 +24,11 @@ from quakedesign.guarantees.exact.small_gain import (
     certified_bounds,
     slow_gains,
 )
-from quakedesign.guarantees.exact.task import Friction, Task
 from quakedesign.laws import RestLimit
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant.sliding_plant import Cuts, SlidingPlant, cells
+from quakedesign.plant.uncertain_plant import Friction, UncertainPlant
 
 if TYPE_CHECKING:
     from quakedesign.laws import SampledController
@@ -74,7 +74,7 @@ class Claims:
     largest_step: UpperBound | None = None
 
     @classmethod
-    def of(cls, task: Task, bounds: Bounds) -> "Claims":
+    def of(cls, task: UncertainPlant, bounds: Bounds) -> "Claims":
         """Tightest claims that bounds support."""
         low, high = task.rest_pressure
         push = bounds.push / task.authority
@@ -123,12 +123,12 @@ class Claims:
             **dict(zip(_ENDS, ends, strict=False)),
         )
 
-    def verdict(self, task: Task, bounds: Bounds) -> Verdict:
+    def verdict(self, task: UncertainPlant, bounds: Bounds) -> Verdict:
         """PROVED if the claims follow from bounds under which the fault stays closed, else UNDECIDED."""
         tightest = Claims.of(task, bounds)
         return Verdict.PROVED if self.covers(tightest) and not tightest.opens(task) else Verdict.UNDECIDED
 
-    def opens(self, task: Task) -> str:
+    def opens(self, task: UncertainPlant) -> str:
         """Why the fault may open, where the plant is another one; empty where the pressure stays below σ′."""
         if self.largest_pressure < task.normal_stress:
             return ""
@@ -190,7 +190,7 @@ class Guarantee:
 
     Attributes
     ----------
-    task : Task
+    task : UncertainPlant
     held : Held
     claims : Claims
     slow_gain : SlowGain, optional
@@ -201,7 +201,7 @@ class Guarantee:
         For what it holds, and for how long, in short.
     """
 
-    task: Task
+    task: UncertainPlant
     held: Held
     claims: Claims
     slow_gain: SlowGain | None = None
@@ -308,7 +308,7 @@ class Guarantee:
         return sentence_of(self.task, self.claims, when, _start(*held.start))
 
 
-def sentence_of(task: Task, claims: Claims, when: str, start: str = "from rest") -> str:
+def sentence_of(task: UncertainPlant, claims: Claims, when: str, start: str = "from rest") -> str:
     """What is claimed of a task, for people; `when` says how the pressure follows the law.
 
     Bounds of what is claimed are rounded up, those of the disturbances and starts for which it is claimed down.
@@ -331,7 +331,7 @@ def sentence_of(task: Task, claims: Claims, when: str, start: str = "from rest")
 
 
 def guarantee(
-    task: Task, held: Held, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
+    task: UncertainPlant, held: Held, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
 ) -> Guarantee | NoGuarantee:
     """Tightest rounded claims about a loop, or why there are none; of a pump of some rate, with a ramp that will do.
 
@@ -361,13 +361,17 @@ def guarantee(
     return found
 
 
-def _proved(task: Task, held: Held, slow_gain: SlowGain | None) -> Guarantee | NoGuarantee:
+def _proved(task: UncertainPlant, held: Held, slow_gain: SlowGain | None) -> Guarantee | NoGuarantee:
     claims = _claims(task, held) if slow_gain is None else _slow_claims(task, held, slow_gain)
     return claims if isinstance(claims, NoGuarantee) else _of_claims(task, held, claims, slow_gain)
 
 
 def _of_claims(
-    task: Task, held: Held, claims: Claims, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
+    task: UncertainPlant,
+    held: Held,
+    claims: Claims,
+    slow_gain: SlowGain | None = None,
+    reach: InvariantPolytope | None = None,
 ) -> Guarantee | NoGuarantee:
     """What is claimed, or what speaks against it."""
     if not _root_within(task, held, claims):
@@ -381,16 +385,16 @@ def _of_claims(
     return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
 
 
-def _claims(task: Task, held: Held) -> Claims | NoGuarantee:
+def _claims(task: UncertainPlant, held: Held) -> Claims | NoGuarantee:
     bounds = _bounds(task, held, held.loop(task))
     return bounds if isinstance(bounds, NoGuarantee) else _rounded(task, bounds)
 
 
-def _rounded(task: Task, bounds: Bounds) -> Claims:
+def _rounded(task: UncertainPlant, bounds: Bounds) -> Claims:
     return Claims.of(task, bounds).rounded()
 
 
-def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
+def _slow_claims(task: UncertainPlant, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
     """Claims on whose slip error the gain's spread rests that they follow from."""
     gains, slip_error = _slow_gains(task, held, slow_gain), Fraction(0)
     if isinstance(gains, NoGuarantee):
@@ -407,7 +411,7 @@ def _slow_claims(task: Task, held: Held, slow_gain: SlowGain) -> Claims | NoGuar
     return NoGuarantee(reason=reason, small_gain=None)
 
 
-def _slow_gains(task: Task, held: Held, slow_gain: SlowGain) -> Gains | NoGuarantee:
+def _slow_gains(task: UncertainPlant, held: Held, slow_gain: SlowGain) -> Gains | NoGuarantee:
     if held.longest_step:
         return NoGuarantee(reason="samples that follow no clock have no slow gain", small_gain=None)
     loops = tuple(held.loop(task, model) for model in slow_gain.models(task))
@@ -418,13 +422,13 @@ def _slow_gains(task: Task, held: Held, slow_gain: SlowGain) -> Gains | NoGuaran
 
 
 def _slow_bounds(
-    task: Task, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
+    task: UncertainPlant, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
 ) -> Bounds | NoGuarantee:
     spread = slow_gain.spread(task, slip_error)
     return best_bounds(task, gains, held.law.root, held.step, held.noise, spread, held.off)
 
 
-def _root_within(task: Task, held: Held, claims: Claims) -> bool:
+def _root_within(task: UncertainPlant, held: Held, claims: Claims) -> bool:
     """Whether an implicit root, if there is one, is as said wherever the claims hold."""
     root = held.law.root
     errors = held.told(task, (claims.slip_error, claims.slip_rate_error))
@@ -438,7 +442,9 @@ def _beyond_the_pump(held: Held, claims: Claims) -> str:
     return held.pump.exceeded(*claims.pressures[-1]) or held.pump.too_slow(claims.largest_step, held.ramp)
 
 
-def _bounds(task: Task, held: Held, loop: PeriodicLoop, reach: InvariantPolytope | None = None) -> Bounds | NoGuarantee:
+def _bounds(
+    task: UncertainPlant, held: Held, loop: PeriodicLoop, reach: InvariantPolytope | None = None
+) -> Bounds | NoGuarantee:
     if reach is not None and not held.longest_step:
         return NoGuarantee(reason="samples that follow a clock need no set", small_gain=None)
     if reach is not None:
@@ -491,12 +497,12 @@ class ContinuousPeaks:
 
     Attributes
     ----------
-    task : Task
+    task : UncertainPlant
     law : ContinuousLaw
     claims : Claims
     """
 
-    task: Task
+    task: UncertainPlant
     law: ContinuousLaw
     claims: Claims
 
@@ -524,7 +530,7 @@ class ContinuousPeaks:
         return sentence_of(self.task, self.claims, WHEN)
 
 
-def continuous_peaks(task: Task, law: ContinuousLaw) -> ContinuousPeaks | NoGuarantee:
+def continuous_peaks(task: UncertainPlant, law: ContinuousLaw) -> ContinuousPeaks | NoGuarantee:
     """Tightest rounded claims about a law in continuous time, or why there are none.
 
     Raises
@@ -541,7 +547,7 @@ def continuous_peaks(task: Task, law: ContinuousLaw) -> ContinuousPeaks | NoGuar
     return ContinuousPeaks(task=task, law=law, claims=claims)
 
 
-def _loop(task: Task, law: ContinuousLaw) -> PeriodicLoop:
+def _loop(task: UncertainPlant, law: ContinuousLaw) -> PeriodicLoop:
     """Nominal error loop, of a law that fits the reference."""
     loop = continuous_loop(law, task.model, task.authority)
     if any(law.of_reference):
@@ -549,7 +555,7 @@ def _loop(task: Task, law: ContinuousLaw) -> PeriodicLoop:
     return loop
 
 
-def _continuous_bounds(task: Task, law: ContinuousLaw) -> Bounds | NoGuarantee:
+def _continuous_bounds(task: UncertainPlant, law: ContinuousLaw) -> Bounds | NoGuarantee:
     loop = _loop(task, law)
     try:
         return certified_bounds(task, loop)
@@ -573,7 +579,7 @@ _SAME = {
 _SPREADS = ("stiffness", "damping", "authority")
 
 
-def differences(proved: Task, asked: Task) -> list[str]:
+def differences(proved: UncertainPlant, asked: UncertainPlant) -> list[str]:
     """What of a task is not covered by the task of a proof, each with both values, SI; empty if everything is.
 
     Constants of the fault and its reference must be the same; friction, ranges and disturbance lie within those of the
@@ -582,7 +588,7 @@ def differences(proved: Task, asked: Task) -> list[str]:
     return [*_other(proved, asked), *_wider_than_needed(proved, asked), *_rougher(proved.friction, asked.friction)]
 
 
-def _other(proved: Task, asked: Task) -> list[str]:
+def _other(proved: UncertainPlant, asked: UncertainPlant) -> list[str]:
     """Constants that are not the same."""
     pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(asked, name)) for name, unit in _SAME.items()}
     pairs["static friction [-]"] = proved.friction.static, asked.friction.static
@@ -596,7 +602,7 @@ def _other(proved: Task, asked: Task) -> list[str]:
     return found + ([] if proved.shape == asked.shape else ["the shape of the reference"])
 
 
-def _wider_than_needed(proved: Task, asked: Task) -> list[str]:
+def _wider_than_needed(proved: UncertainPlant, asked: UncertainPlant) -> list[str]:
     """Ranges and disturbances beyond those of the proof."""
     pairs = {f"spread of {name} [-]": both for name, *both in zip(_SPREADS, proved.spreads, asked.spreads, strict=True)}
     pairs["disturbance [m/s^2]"] = [proved.amplitude, asked.amplitude]
@@ -632,14 +638,14 @@ class SlidingGuarantee:
 
     Attributes
     ----------
-    task : SlidingTask
+    task : SlidingPlant
     held : Held
     cuts : Cuts
         How the box of constants falls into cells.
     claims : SlidingClaims
     """
 
-    task: SlidingTask
+    task: SlidingPlant
     held: Held
     cuts: Cuts
     claims: SlidingClaims
@@ -664,7 +670,7 @@ class SlidingGuarantee:
         return self.held.controller
 
     @cached_property
-    def cells(self) -> tuple[SlidingTask, ...]:
+    def cells(self) -> tuple[SlidingPlant, ...]:
         """The task on every cell."""
         return cells(self.task, self.cuts)
 
@@ -736,19 +742,19 @@ def _path(held: Held) -> str:
     return said + (f", with any noise of at most {noise:.6g} m in the measured slip" if held.slip_noise else "")
 
 
-def _along(task: SlidingTask) -> str:
+def _along(task: SlidingPlant) -> str:
     """The references, where there is more than one."""
     slow, fast = UpperBound(1 - task.swing), LowerBound(1 + task.swing)
     return f"every reference whose rate stays between {slow:.6g} V and {fast:.6g} V, " if task.swing else ""
 
 
-def _friction(task: SlidingTask) -> list[str]:
+def _friction(task: SlidingPlant) -> list[str]:
     """What a reader would not expect, who expects ageing."""
     said = ["friction regularised"] if task.regularised else []
     return said + (["state by the slip law"] if task.state_law == "slip" else [])
 
 
-def _box(task: SlidingTask) -> str:
+def _box(task: SlidingPlant) -> str:
     said = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
     wide = [
         f"{short} from {_inside(*task.ranges[axis])}"

@@ -16,14 +16,14 @@ from scipy.linalg import expm
 from quakedesign.cache import search_once
 from quakedesign.guarantees.exact.loop import Held
 from quakedesign.guarantees.exact.sliding_small_gain import loop_of, model_of
-from quakedesign.guarantees.exact.sliding_task import SlidingTask
 from quakedesign.guarantees.exact.statement import ContinuousPeaks, Guarantee, SlidingGuarantee
-from quakedesign.guarantees.exact.task import Task
 from quakedesign.guarantees.search.estimate import PERIODS, moved, periods_to_forget
 from quakedesign.laws import NOISES
 from quakedesign.laws.implicit_root import root_of
 from quakedesign.loop import PeriodicLoop
 from quakedesign.loop.periodic import Matrix, Row
+from quakedesign.plant.sliding_plant import SlidingPlant
+from quakedesign.plant.uncertain_plant import UncertainPlant
 
 # ----------------------------------------------------------------------
 # The worst that a search finds on the loop of a guarantee: what is seen, beside what is proved.
@@ -245,7 +245,7 @@ class _Limit:
         self.rest = np.clip(self.rest - drifted, *self.ends)
 
 
-def _of_asked(task: Task, held: Held) -> list[float]:
+def _of_asked(task: UncertainPlant, held: Held) -> list[float]:
     """What the first jump of a period makes of what is asked for, [m/s²] and all states: of a law that asks for e1."""
     zero = Fraction(0)
     still = tuple((zero, zero) for _ in held.law.states)
@@ -514,7 +514,7 @@ def _pushes(added: np.ndarray, costates: np.ndarray) -> np.ndarray:
     return np.reshape(found, (len(costates), vertices, inputs))
 
 
-def _with_disturbance(task: Task, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
+def _with_disturbance(task: UncertainPlant, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
     """Flow and columns of all inputs at full size; a disturbance of bounded rate is one more state."""
     flow = np.array(loop.flow, dtype=float)
     push, drift = (np.array(loop.inputs[name], dtype=float) for name in ("acceleration", "drift"))
@@ -529,7 +529,7 @@ def _with_disturbance(task: Task, loop: PeriodicLoop) -> tuple[np.ndarray, np.nd
     return wide, columns
 
 
-def _at(task: Task, flow: np.ndarray, push: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
+def _at(task: UncertainPlant, flow: np.ndarray, push: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
     """Flow at a vertex, from the nominal one: slopes act on the errors, the input gain on the push."""
     found, model = flow.copy(), task.model
     found[1] += (beta - float(model.gain / task.authority)) * push
@@ -629,7 +629,7 @@ def _largest_sliding(
     return [max(values) for values in zip(*reached, strict=True)]
 
 
-def corners(task: SlidingTask) -> list[SlidingTask]:
+def corners(task: SlidingPlant) -> list[SlidingPlant]:
     """The task at every corner of the box of a, b and D_c."""
     ends = [dict.fromkeys(task.ranges[axis]) for axis in _AXES]
     points = [dict(zip(_AXES, ((v, v) for v in corner), strict=True)) for corner in product(*ends)]
@@ -668,7 +668,7 @@ class SlidingPieces:
     """
 
     def __init__(
-        self, claim: SlidingGuarantee, corner: SlidingTask, slip: Fraction = Fraction(0), pieces: int = _SLIDING_PIECES
+        self, claim: SlidingGuarantee, corner: SlidingPlant, slip: Fraction = Fraction(0), pieces: int = _SLIDING_PIECES
     ) -> None:
         self._claim, self._corner, self._pieces = claim, corner, pieces
         model: Any = model_of(claim.task, claim.claims)

@@ -23,7 +23,6 @@ from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, holds
 from quakedesign.guarantees.exact.statement import Guarantee, guarantee
-from quakedesign.guarantees.exact.task import Task
 from quakedesign.guarantees.search.estimate import BoundsEstimate, closeness, estimated
 from quakedesign.guarantees.search.linear_design import (
     MOST_DELAY,
@@ -43,6 +42,7 @@ from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.implicit import end_rate, end_slip
+from quakedesign.plant.uncertain_plant import UncertainPlant
 from quakedesign.symbolic import SignedPower
 
 # ----------------------------------------------------------------------
@@ -196,7 +196,7 @@ class Compensation:
 
 
 def compensated(
-    task: Task,
+    task: UncertainPlant,
     controller: SlidingMode,
     weight: Fraction,
     authority: Fraction,
@@ -237,7 +237,7 @@ def compensated(
 
 
 def design_compensated(
-    task: Task,
+    task: UncertainPlant,
     controller: SlidingMode,
     step: Fraction,
     *,
@@ -262,7 +262,7 @@ def design_compensated(
 
 
 def _made(
-    task: Task,
+    task: UncertainPlant,
     controller: SlidingMode,
     step: Fraction,
     chosen: tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None],
@@ -289,7 +289,7 @@ class Deadbeat(Kind):
     controller: SlidingMode
 
     def closest(
-        self, task: Task, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]
+        self, task: UncertainPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]
     ) -> Closest | NoGuarantee:
         """The weight and B0 with which a deadbeat step comes nearest to a guarantee, whatever the gains."""
         if (none := unpredictable(task, step)) is not None:
@@ -310,15 +310,15 @@ class Deadbeat(Kind):
                 break
         return Closest(least, x, self.held(task, x, step, **around))
 
-    def held(self, task: Task, numbers: np.ndarray, step: Fraction, **around: Unpack[Around]) -> Held:
+    def held(self, task: UncertainPlant, numbers: np.ndarray, step: Fraction, **around: Unpack[Around]) -> Held:
         """The loop with a deadbeat step, of any gains."""
         return _held(_DEADBEAT, *_settled(task, numbers), step, around)
 
-    def proved(self, task: Task, found: Closest) -> Guarantee | NoGuarantee:
+    def proved(self, task: UncertainPlant, found: Closest) -> Guarantee | NoGuarantee:
         """Of the smallest λ for which the step is deadbeat."""
         return self.made(task, found.held.step, found.numbers, **found.held.around).found
 
-    def made(self, task: Task, step: Fraction, numbers: np.ndarray, **around: Unpack[Around]) -> Compensation:
+    def made(self, task: UncertainPlant, step: Fraction, numbers: np.ndarray, **around: Unpack[Around]) -> Compensation:
         """The controller with these numbers, and what is guaranteed of it."""
         (weight, authority), held = _settled(task, numbers), self.held(task, numbers, step, **around)
         bounds = closeness(task, held)[1]
@@ -326,7 +326,7 @@ class Deadbeat(Kind):
         errors = None if bounds is None else (bounds.slip_error + noise[0], bounds.slip_rate_error + noise[1])
         return _made(task, self.controller, step, (weight, authority, errors), around)
 
-    def leanest(self, task: Task, step: Fraction, **around: Unpack[Around]) -> Held | None:
+    def leanest(self, task: UncertainPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
         """That with the smallest peak."""
         weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, **around)
         law = _made(task, self.controller, step, (weight, authority, errors), around).controller
@@ -334,7 +334,7 @@ class Deadbeat(Kind):
         return None if errors is None else _held(root, weight, authority, step, around)
 
     def continued(
-        self, task: Task, step: Fraction, longest: Longest | None, **around: Unpack[Around]
+        self, task: UncertainPlant, step: Fraction, longest: Longest | None, **around: Unpack[Around]
     ) -> Compensation | None:
         """Design for a T_s [s] up to the longest, of numbers near those; None where none is proved."""
         if longest is None or longest.guarantee.held.step < step:
@@ -343,7 +343,7 @@ class Deadbeat(Kind):
         made = None if isinstance(near, NoGuarantee) else self.made(task, step, near.numbers, **around)
         return made if made is not None and isinstance(made.found, Guarantee) else None
 
-    def at(self, task: Task, longest: Longest, objective: str = "peak") -> Compensation:
+    def at(self, task: UncertainPlant, longest: Longest, objective: str = "peak") -> Compensation:
         """Design for the longest T_s and all else of a guarantee: as others are made, else that of the search."""
         held = longest.guarantee.held
         made = design_compensated(task, self.controller, held.step, objective=objective, **held.around)
@@ -352,7 +352,7 @@ class Deadbeat(Kind):
         return self.made(task, held.step, longest.numbers, **held.around)
 
 
-def _settled(task: Task, numbers: np.ndarray) -> tuple[Fraction, Fraction]:
+def _settled(task: UncertainPlant, numbers: np.ndarray) -> tuple[Fraction, Fraction]:
     """Weight and B0 in few digits."""
     return Fraction(f"{numbers[0]:.3g}"), _short(Fraction(float(numbers[1])) * task.model.gain)
 
@@ -417,7 +417,7 @@ def _settings(law: SlidingMode) -> dict[str, Fraction]:
 
 @lru_cache(maxsize=64)
 def _deadbeat(
-    task: Task, step: Fraction, objective: str, weights: tuple[Fraction, ...], **around: Unpack[Around]
+    task: UncertainPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], **around: Unpack[Around]
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
     """Weight and authority for a deadbeat step, of any law, and the errors that it leaves, if it has a guarantee."""
     require_known(objective, OBJECTIVES, "objective")
@@ -428,7 +428,7 @@ def _deadbeat(
 
 
 def _deadbeat_search(
-    task: Task, step: Fraction, objective: str, weights: tuple[Fraction, ...], around: Around
+    task: UncertainPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], around: Around
 ) -> list[str]:
     """The same, as texts."""
     seen = dict[tuple[Fraction, Fraction], BoundsEstimate]()

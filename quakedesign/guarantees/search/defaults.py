@@ -12,7 +12,6 @@ from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.loop import Around
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.statement import Guarantee
-from quakedesign.guarantees.exact.task import Task
 from quakedesign.guarantees.search.compensated_search import (
     GUARANTEED,
     Compensation,
@@ -32,6 +31,7 @@ from quakedesign.laws import SlidingMode
 from quakedesign.loop import schemes
 from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.lyapunov.exact.premises import Premise
+from quakedesign.plant.uncertain_plant import UncertainPlant
 
 # ----------------------------------------------------------------------
 # The default designs of a fault: for its own T_s, else for the longest T_s that has a guarantee.
@@ -86,7 +86,12 @@ class SampledDesign:
 
 
 def sampled_design(
-    task: Task, step: Fraction, objective: str = "tracking", *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: UncertainPlant,
+    step: Fraction,
+    objective: str = "tracking",
+    *,
+    measured: str = MEASURED[0],
+    **around: Unpack[Around],
 ) -> SampledDesign:
     """e-LQR for a T_s [s], or for the longest shorter one that has a guarantee; the rest as in `design_held`.
 
@@ -116,7 +121,7 @@ def sampled_design(
 
 
 def sampled_sliding_mode(
-    task: Task, law: SlidingMode, step: Fraction, objective: str = "tracking", **noise: Unpack[Around]
+    task: UncertainPlant, law: SlidingMode, step: Fraction, objective: str = "tracking", **noise: Unpack[Around]
 ) -> tuple[Compensation, SampledDesign]:
     """Sliding mode with the base gains of a law for a T_s [s], or for the longest shorter one that has a guarantee.
 
@@ -153,7 +158,7 @@ def sampled_sliding_mode(
 # What is guaranteed of a sliding mode as a scheme runs it, and why most schemes have nothing.
 
 
-def guarantee_of(task: Task, law: SlidingMode, **noise: Unpack[Around]) -> Guarantee | NoGuarantee:
+def guarantee_of(task: UncertainPlant, law: SlidingMode, **noise: Unpack[Around]) -> Guarantee | NoGuarantee:
     """What is guaranteed of a sliding mode as it runs: something only of one for the scheme ``compensated``."""
     own = law.sampling
     if own is None or own.scheme != GUARANTEED:
@@ -168,7 +173,7 @@ def guarantee_of(task: Task, law: SlidingMode, **noise: Unpack[Around]) -> Guara
 
 
 def sliding_mode(
-    task: Task,
+    task: UncertainPlant,
     law: type[SlidingMode],
     step: Fraction,
     *,
@@ -181,7 +186,7 @@ def sliding_mode(
 
     Parameters
     ----------
-    task : Task
+    task : UncertainPlant
     law : type
     step : Fraction
         T_s [s].
@@ -206,13 +211,13 @@ def sliding_mode(
     return replace(made, found=tightened(made.found))
 
 
-def deadbeat(task: Task, law: type[SlidingMode], gains: tuple[str, ...] = ()) -> Deadbeat:
+def deadbeat(task: UncertainPlant, law: type[SlidingMode], gains: tuple[str, ...] = ()) -> Deadbeat:
     """Sliding modes of a law with given base gains, or the first ones known for it."""
     base = law.from_values(gains) if gains else law.base_gains()[0].law
     return Deadbeat(replace(base, gains=dict(base.gains), divisor=task.authority))
 
 
-def _why_none(task: Task, law: type[SlidingMode], scheme: str, step: Fraction) -> str:
+def _why_none(task: UncertainPlant, law: type[SlidingMode], scheme: str, step: Fraction) -> str:
     if scheme == "continuous":
         return f"a pressure that follows {law.title} at every instant is run by no sampled controller{_REMEDY}"
     if scheme == "implicit":

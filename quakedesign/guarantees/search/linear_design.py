@@ -21,11 +21,9 @@ from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
-from quakedesign.guarantees.exact.fault_data import task_of
 from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, SlowGain
 from quakedesign.guarantees.exact.statement import ContinuousPeaks, Guarantee, above, continuous_peaks, guarantee
-from quakedesign.guarantees.exact.task import Task
 from quakedesign.guarantees.search.estimate import (
     BoundsEstimate,
     closeness,
@@ -48,6 +46,8 @@ from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.loop import PeriodicLoop, exact_integrals
 from quakedesign.loop.loop_setup import MEASURED, Pump
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant.of_fault import uncertain_plant
+from quakedesign.plant.uncertain_plant import UncertainPlant
 
 # ----------------------------------------------------------------------
 # Guarantees that use how slowly the input gain changes, where friction depends on the slip alone.
@@ -56,7 +56,7 @@ _PARTS = 8
 _SHARE = 0.5  # of the slowest decay, for what is past to grow by
 
 
-def best_guarantee(task: Task, held: Held) -> Guarantee | NoGuarantee:
+def best_guarantee(task: UncertainPlant, held: Held) -> Guarantee | NoGuarantee:
     """Guarantee with an input gain that is slow, where the friction's is and it helps, else with any.
 
     Where samples follow no clock that is one with a set that the loop never leaves.
@@ -83,7 +83,7 @@ def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee:
     return better if isinstance(better, Guarantee) else found
 
 
-def slow_gain(task: Task, held: Held) -> SlowGain | None:
+def slow_gain(task: UncertainPlant, held: Held) -> SlowGain | None:
     """Parts and growth for a proof; None where friction depends on the slip rate or a nominal loop is not stable."""
     if task.friction.rate_slope:
         return None
@@ -140,7 +140,7 @@ class Closest:
 
 
 def closest(
-    task: Task,
+    task: UncertainPlant,
     step: Fraction,
     *,
     near: np.ndarray | None = None,
@@ -166,7 +166,7 @@ def closest(
 
 
 def nearby(
-    task: Task, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: UncertainPlant, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], **around: Unpack[Around]
 ) -> Guarantee | NoGuarantee:
     """Design for the smallest certified slip-rate error, sought near the numbers of a law for another T_s or delay.
 
@@ -180,7 +180,7 @@ def nearby(
 
 
 def design_held(
-    task: Task,
+    task: UncertainPlant,
     step: Fraction,
     *,
     objective: str = "tracking",
@@ -199,7 +199,7 @@ def design_held(
 
     Parameters
     ----------
-    task : Task
+    task : UncertainPlant
     step : Fraction
         T_s [s].
     objective : str
@@ -267,13 +267,13 @@ def _with_noise(without: Guarantee, noise: Mapping[str, Fraction]) -> Guarantee 
 class _Laws:
     """Laws among which a search chooses for one loop, and what is seen of each."""
 
-    task: Task
+    task: UncertainPlant
     family: LawFamily
     template: Held
     question: tuple[Any, ...]
 
     @classmethod
-    def of(cls, task: Task, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
+    def of(cls, task: UncertainPlant, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
         """Laws for a T_s [s] and what is around them, or why there are none."""
         require_surroundings(around)
         if (none := unpredictable(task, step)) is not None:
@@ -391,7 +391,7 @@ def _hopeless(cost: float) -> bool:
     return _HOPELESS * _FAILED < cost < 9 * _FAILED
 
 
-def unpredictable(task: Task, step: Fraction) -> NoGuarantee | None:
+def unpredictable(task: UncertainPlant, step: Fraction) -> NoGuarantee | None:
     """No law of samples, where the errors of the model outgrow within a period what a prediction can hold."""
     require_ordinary(step=step)
     rate, slip = float(task.model.rate), max(float(task.model.slip), 0.0)
@@ -497,7 +497,7 @@ class Longest:
     numbers: np.ndarray
 
 
-Asked = tuple[Task, Fraction, Around]
+Asked = tuple[UncertainPlant, Fraction, Around]
 """Task, T_s [s] and what is around a law, of a design."""
 
 
@@ -505,15 +505,15 @@ class Kind(ABC):
     """A kind of laws, as far as a search for the most that one of them stands knows it."""
 
     @abstractmethod
-    def closest(self, task: Task, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
+    def closest(self, task: UncertainPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
         """`Closest` to a guarantee, or `NoGuarantee`; near the numbers of another law if they are given."""
 
     @abstractmethod
-    def proved(self, task: Task, found: Closest) -> Guarantee | NoGuarantee:
+    def proved(self, task: UncertainPlant, found: Closest) -> Guarantee | NoGuarantee:
         """Proof about a law that is near enough."""
 
     @abstractmethod
-    def leanest(self, task: Task, step: Fraction, **around: Unpack[Around]) -> Held | None:
+    def leanest(self, task: UncertainPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
         """The loop of a law whose pressure changes little; None where no law is known."""
 
 
@@ -523,15 +523,15 @@ class Linear(Kind):
 
     measured: str = MEASURED[0]
 
-    def closest(self, task: Task, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
+    def closest(self, task: UncertainPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
         """By a search over the numbers of the family."""
         return closest(task, step, near=near, measured=self.measured, **around)
 
-    def proved(self, task: Task, found: Closest) -> Guarantee | NoGuarantee:
+    def proved(self, task: UncertainPlant, found: Closest) -> Guarantee | NoGuarantee:
         """With a slow input gain where that helps."""
         return best_guarantee(task, found.held)
 
-    def leanest(self, task: Task, step: Fraction, **around: Unpack[Around]) -> Held | None:
+    def leanest(self, task: UncertainPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
         """That with the smallest change of pressure near the smallest peak."""
         laws = _Laws.of(task, step, self.measured, around)
         if isinstance(laws, NoGuarantee):
@@ -541,7 +541,7 @@ class Linear(Kind):
 
 
 def longest_step(
-    task: Task, *, measured: str = MEASURED[0], kind: Kind | None = None, **around: Unpack[Around]
+    task: UncertainPlant, *, measured: str = MEASURED[0], kind: Kind | None = None, **around: Unpack[Around]
 ) -> Longest | None:
     """A guarantee at nearly the longest T_s that has one, whatever the T_s of the fault; None where none is found.
 
@@ -549,7 +549,7 @@ def longest_step(
 
     Parameters
     ----------
-    task : Task
+    task : UncertainPlant
     measured, **around
         As in `design_held`.
     kind : Kind, optional
@@ -560,7 +560,7 @@ def longest_step(
     return _farthest(kind or Linear(measured), lambda step: (task, step, around), _first_step(task, late), None)
 
 
-def _first_step(task: Task, late: float = 0.0) -> Fraction:
+def _first_step(task: UncertainPlant, late: float = 0.0) -> Fraction:
     """T_s to begin with [s], where a pressure acts late [s]: of the fastest pole, of a stable fault of its spring."""
     slip, rate = float(task.slip_chord[1]), float(task.rate_chord[0])
     pole = (sqrt(max(rate**2 + 4 * slip, 0.0)) - rate) / 2 if slip > 0 or rate < 0 else 0.0
@@ -569,7 +569,12 @@ def _first_step(task: Task, late: float = 0.0) -> Fraction:
 
 
 def continued(
-    task: Task, step: Fraction, longest: Longest | None, *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: UncertainPlant,
+    step: Fraction,
+    longest: Longest | None,
+    *,
+    measured: str = MEASURED[0],
+    **around: Unpack[Around],
 ) -> Guarantee | None:
     """Design for a T_s [s] near one for a longer T_s, where a search at T_s alone found none; None without one."""
     if longest is None or longest.guarantee.held.step < step:
@@ -578,7 +583,7 @@ def continued(
     return found if isinstance(found, Guarantee) else None
 
 
-def design_at(task: Task, longest: Longest) -> Guarantee:
+def design_at(task: UncertainPlant, longest: Longest) -> Guarantee:
     """Design for a small slip-rate error at T_s and all else of a guarantee, which stays where there is none."""
     held = longest.guarantee.held
     found = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), **held.around)
@@ -588,7 +593,12 @@ def design_at(task: Task, longest: Longest) -> Guarantee:
 
 
 def longest_delay(
-    task: Task, step: Fraction, *, measured: str = MEASURED[0], kind: Kind | None = None, **around: Unpack[Around]
+    task: UncertainPlant,
+    step: Fraction,
+    *,
+    measured: str = MEASURED[0],
+    kind: Kind | None = None,
+    **around: Unpack[Around],
 ) -> Guarantee | None:
     """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
 
@@ -600,7 +610,7 @@ def longest_delay(
 
 
 def farthest_rock(
-    task: Task, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: UncertainPlant, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
 ) -> Guarantee | None:
     """A guarantee through nearly the largest L²/D of rock that has one; None where none is found."""
 
@@ -612,7 +622,7 @@ def farthest_rock(
 
 
 def nearest_setup(
-    task: Task,
+    task: UncertainPlant,
     step: Fraction,
     *,
     measured: str = MEASURED[0],
@@ -669,13 +679,13 @@ def _slack(step: Fraction, around: Around) -> Fraction:
     return max(around.get("longest_step", step) - step, Fraction(0))
 
 
-def _narrowed(task: Task, share: Fraction) -> tuple[Fraction, Fraction, Fraction]:
+def _narrowed(task: UncertainPlant, share: Fraction) -> tuple[Fraction, Fraction, Fraction]:
     """Half-widths of a box that is smaller."""
     first, second, third = (share * width for width in task.spreads)
     return first, second, third
 
 
-def _less_pressed(laws: Kind, task: Task, step: Fraction, around: Around) -> tuple[str, Guarantee] | None:
+def _less_pressed(laws: Kind, task: UncertainPlant, step: Fraction, around: Around) -> tuple[str, Guarantee] | None:
     """The smallest pump, or the largest disturbance, for which a law of little pressure is proved."""
     pump, held = around.get("pump"), laws.leanest(task, step, **around)
     if held is None:
@@ -890,7 +900,10 @@ def certified_peaks(
     if len(law.states) < needed:
         few = f"too few integrals for feedback of the {controller.feedback}: {needed} needed, {len(law.states)} in use"
         return NoGuarantee(reason=few, small_gain=None)
-    found, limits = continuous_peaks(task_of(fault, rate_limited=disturbance_class == "rate"), law), controller.limits
+    found, limits = (
+        continuous_peaks(uncertain_plant(fault, rate_limited=disturbance_class == "rate"), law),
+        controller.limits,
+    )
     if limits is None or isinstance(found, NoGuarantee):
         return found
     low, high = found.claims.least_pressure, found.claims.largest_pressure

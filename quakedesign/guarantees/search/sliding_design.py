@@ -17,7 +17,6 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, rational
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, sliding_step
-from quakedesign.guarantees.exact.fault_data import sliding_task
 from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.sliding_small_gain import (
     SlidingClaims,
@@ -28,7 +27,6 @@ from quakedesign.guarantees.exact.sliding_small_gain import (
     loop_of,
     model_of,
 )
-from quakedesign.guarantees.exact.sliding_task import MOST_CELLS, Cuts, SlidingTask, parts
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.statement import SlidingGuarantee
 from quakedesign.guarantees.search.estimate import gains_of, short, spectral_radius
@@ -36,6 +34,8 @@ from quakedesign.guarantees.search.lqg import Weights, sliding_law
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop, SlidingModel
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant.of_fault import slow_sliding_plant
+from quakedesign.plant.sliding_plant import MOST_CELLS, Cuts, SlidingPlant, parts
 
 # ----------------------------------------------------------------------
 # A law that holds slow sliding, chosen by what can be guaranteed of it, and cells that cover a box of constants.
@@ -68,7 +68,7 @@ _NAMES = tuple(SlidingClaims.__dataclass_fields__)
 
 
 def proved_sliding(
-    task: SlidingTask, held: Held, *, log_rate: Fraction = LOG_RATES[0]
+    task: SlidingPlant, held: Held, *, log_rate: Fraction = LOG_RATES[0]
 ) -> SlidingGuarantee | NoGuarantee:
     """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or why there are none."""
     corner = worst_corner(task)
@@ -119,7 +119,7 @@ def _followed(found: SlidingGuarantee, claims: SlidingClaims, room: Mapping[str,
     return claims
 
 
-def largest_stress(task: SlidingTask, held: Held, *, log_rate: Fraction = LOG_RATES[0]) -> Fraction:
+def largest_stress(task: SlidingPlant, held: Held, *, log_rate: Fraction = LOG_RATES[0]) -> Fraction:
     """About the largest stress [Pa] for which `proved_sliding` may succeed, with two digits; 0 for none."""
     corner = worst_corner(task)
     claims, some = _guess(corner, log_rate), _SMALL * corner.ranges["normal_stress"][0]
@@ -138,7 +138,7 @@ def two_digits(value: Fraction) -> Fraction:
 
 
 def designed_sliding(
-    task: SlidingTask,
+    task: SlidingPlant,
     step: Fraction,
     *,
     log_rate: Fraction = LOG_RATES[0],
@@ -167,7 +167,7 @@ def _path(around: Around) -> dict[str, Fraction]:
 
 
 def searched_sliding(
-    task: SlidingTask,
+    task: SlidingPlant,
     step: Fraction,
     log_rate: Fraction,
     around: Around,
@@ -180,7 +180,7 @@ def searched_sliding(
 
     Parameters
     ----------
-    task : SlidingTask
+    task : SlidingPlant
     step, log_rate, around
         As of `designed_sliding`.
     near : array, optional
@@ -232,13 +232,13 @@ def searched_sliding(
     return (held(reached.x) if reached.fun < _FAILED / 2 else None), reached.x
 
 
-def worst_corner(task: SlidingTask) -> SlidingTask:
+def worst_corner(task: SlidingPlant) -> SlidingPlant:
     """Small a, large b, small D: where the fault is least stable."""
     fixed = {axis: (task.ranges[axis][end],) * 2 for axis, end in _ENDS.items()}
     return replace(task, ranges={**task.ranges, **fixed})
 
 
-def _law(corner: SlidingTask, task: SlidingTask, step: Fraction, around: Around, x: np.ndarray) -> LinearLaw | None:
+def _law(corner: SlidingPlant, task: SlidingPlant, step: Fraction, around: Around, x: np.ndarray) -> LinearLaw | None:
     sizes = map(float, np.exp(np.clip(x[:6], -30, 30)))
     weights = Weights(**dict(zip(Weights.__dataclass_fields__, sizes, strict=True)))
     a, b, d = (_middle(task, axis) * short(float(np.exp(v)), _DIGITS) for axis, v in zip(_AXES, x[6:], strict=True))
@@ -261,12 +261,12 @@ def _law(corner: SlidingTask, task: SlidingTask, step: Fraction, around: Around,
         return None
 
 
-def _middle(task: SlidingTask, axis: str) -> Fraction:
+def _middle(task: SlidingPlant, axis: str) -> Fraction:
     low, high = task.ranges[axis]
     return (low + high) / 2
 
 
-def _guess(task: SlidingTask, log_rate: Fraction) -> SlidingClaims:
+def _guess(task: SlidingPlant, log_rate: Fraction) -> SlidingClaims:
     pressure = 2 * task.ranges["direct_effect"][1] * task.ranges["normal_stress"][0] * log_rate
     return _as_claims(
         {
@@ -283,7 +283,7 @@ def _as_claims(values: Mapping[str, Any]) -> SlidingClaims:
     return SlidingClaims(**{name: UpperBound(short(float(v), _SHORT)) for name, v in values.items()})
 
 
-def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims | None:
+def _claims(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingClaims | None:
     """Claims that follow from themselves, by the estimate, with the bound of y as told; None for none."""
     claims = _guess(task, log_rate)
     for _ in range(_TURNS):
@@ -302,12 +302,12 @@ def _claims(task: SlidingTask, held: Held, log_rate: Fraction) -> SlidingClaims 
     return claims if float(found["log_rate"]) < float(log_rate) else None
 
 
-def _estimate(task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
+def _estimate(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
     model = model_of(task, claims)
     return None if model is None else _estimate_of(loop_of(held, model, task), task, held, claims)
 
 
-def _estimate_of(loop: PeriodicLoop, task: SlidingTask, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
+def _estimate_of(loop: PeriodicLoop, task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
     gains = gains_of(loop)
     if gains is None:
         return None
@@ -320,7 +320,7 @@ def _estimate_of(loop: PeriodicLoop, task: SlidingTask, held: Held, claims: Slid
     return None if isinstance(found, NoGuarantee) else found
 
 
-def _cut(task: SlidingTask, held: Held, claims: SlidingClaims, left: list[int], *, exactly: bool = False) -> Cuts:
+def _cut(task: SlidingPlant, held: Held, claims: SlidingClaims, left: list[int], *, exactly: bool = False) -> Cuts:
     """Cuts of a box until the claims follow on every cell; `left` counts the cuts that there may still be.
 
     By the estimate, or `exactly`.
@@ -347,7 +347,7 @@ def _cut(task: SlidingTask, held: Held, claims: SlidingClaims, left: list[int], 
     return ((axis, middles[axis]), *below, *above)
 
 
-def _excess(task: SlidingTask, held: Held, claims: SlidingClaims) -> float:
+def _excess(task: SlidingPlant, held: Held, claims: SlidingClaims) -> float:
     """How much larger than the claims the bounds may be, by the estimate."""
     found = _estimate(task, held, claims)
     if found is None:
@@ -355,7 +355,7 @@ def _excess(task: SlidingTask, held: Held, claims: SlidingClaims) -> float:
     return max(float(found[k]) / float(getattr(claims, k)) for k in _NAMES)
 
 
-def _too_much(task: SlidingTask, log_rate: Fraction) -> str:
+def _too_much(task: SlidingPlant, log_rate: Fraction) -> str:
     return (
         f"a stress of {float(task.stress):.3g} Pa is not shown to leave |ln(v/V)| below {float(log_rate):.3g} with the "
         "laws that were tried"
@@ -368,7 +368,7 @@ def _too_much(task: SlidingTask, log_rate: Fraction) -> str:
 # Times in D_c/V, the loop hardly depends on V: a proof for a share of the rock's L²/D is nearly one for that share of
 # V.
 
-Prove = Callable[[SlidingTask, Held, Fraction], SlidingGuarantee | NoGuarantee]
+Prove = Callable[[SlidingPlant, Held, Fraction], SlidingGuarantee | NoGuarantee]
 """Of a task, a law as it runs and a bound of |ln(v/V)|."""
 
 PATH = {"diffusion": "L^2/D", "lag": "the lag"}
@@ -405,20 +405,20 @@ class WellReach:
     log_rate: Fraction = LOG_RATES[-1]
 
 
-def suitable(task: SlidingTask, step: Fraction) -> Fraction:
+def suitable(task: SlidingPlant, step: Fraction) -> Fraction:
     """T_s [s] if it is within twice D_c/(20 V), or else that."""
     suits = task.ranges["critical_slip"][0] / task.rate / int(AGEINGS)
     return step if suits / _SUITABLE <= step <= _SUITABLE * suits else two_digits(suits)
 
 
 def farthest(
-    task: SlidingTask, step: Fraction, around: Around, *, stressed: bool, most: Fraction = Fraction(1)
+    task: SlidingPlant, step: Fraction, around: Around, *, stressed: bool, most: Fraction = Fraction(1)
 ) -> WellReach:
     """How much of a path, lag and rock, a law can be followed along, from where one is easily found.
 
     Parameters
     ----------
-    task : SlidingTask
+    task : SlidingPlant
     step : Fraction
         T_s [s].
     around : Fraction
@@ -449,7 +449,7 @@ def farthest(
 
 
 def _followed_well(
-    task: SlidingTask, step: Fraction, around: Around, share: Fraction, before: WellReach, rates: tuple[Fraction, ...]
+    task: SlidingPlant, step: Fraction, around: Around, share: Fraction, before: WellReach, rates: tuple[Fraction, ...]
 ) -> WellReach:
     """A law for a share of the path, near the one before, or that one where none is found."""
     for log_rate in rates:
@@ -472,14 +472,14 @@ def shortened(around: Around, share: Fraction) -> Around:
 
 
 def what_would_do(
-    fault: Fault, task: SlidingTask, reach: WellReach, around: Around, prove: Prove, *, spread: Fraction
+    fault: Fault, task: SlidingPlant, reach: WellReach, around: Around, prove: Prove, *, spread: Fraction
 ) -> str:
     """For which part of a path, and for which V through all of it, a proof was found; in words, for a `reach` below 1.
 
     Parameters
     ----------
     fault : Fault
-    task : SlidingTask
+    task : SlidingPlant
         Of the fault.
     reach : WellReach
     around : Fraction
@@ -499,12 +499,12 @@ def what_would_do(
     return f"a proof was found {found}" if found else "a smaller spread, stress or noise may do"
 
 
-def _slower(fault: Fault, task: SlidingTask, reach: WellReach, around: Around, prove: Prove, spread: Fraction) -> str:
+def _slower(fault: Fault, task: SlidingPlant, reach: WellReach, around: Around, prove: Prove, spread: Fraction) -> str:
     """A task with the same target slip that takes longer, through the whole path; empty where none is proved."""
     time = float(short(_SLOWER * fault.reference.operation_time / float(reach.share), _WELL_DIGITS))
     reference = replace(fault.reference, operation_time=time)
     slow = replace(fault, reference=reference, sampling_time=sliding_step(fault.friction, reference))
-    asked, step = sliding_task(slow, task.stress, spread), rational(slow.sampling_time)
+    asked, step = slow_sliding_plant(slow, task.stress, spread), rational(slow.sampling_time)
     held, _ = searched_sliding(asked, step, reach.log_rate, around, near=reach.numbers, enough=_ENOUGH, most=_LAWS)
     proof = None if held is None else prove(asked, held, reach.log_rate)
     if not isinstance(proof, SlidingGuarantee):

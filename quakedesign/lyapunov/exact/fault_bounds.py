@@ -16,6 +16,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import end_of, fraction_of, rational, to_sympy
 from quakedesign.fault import Fault
 from quakedesign.laws.feed_forward import NONE, FeedForward
+from quakedesign.plant import static_friction, uncertain_plant
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.enclosure import enclose, upper_bound
 from quakedesign.symbolic.friction_bounds import friction_bounds
@@ -135,12 +136,6 @@ def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
     }
 
 
-def static_friction(fault: Fault) -> Fraction:
-    """μ* [-], friction at rest where the fault starts, exact or rounded."""
-    start = sp.nsimplify(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)), rational=True)
-    return fraction_of(start) if start.is_Rational else rational(str(sp.N(start, 50)))
-
-
 @lru_cache(maxsize=256)
 def largest_matched_rate(
     fault: Fault,
@@ -238,55 +233,20 @@ class Sectors:
 
 
 def sectors(fault: Fault) -> Sectors:
-    """Sector bounds of a fault over its uncertainty box, exact or rounded outwards."""
-    ranges, b = plant_ranges(fault), least_authority(fault)
-    friction, disturbance = friction_bounds(fault.friction), fault.disturbance
-    stress, positive = effective_stress(fault)
-    load = ranges[plant.N_hat][1] * stress
-    slip_chord = load * friction.slip_slope
-    rate_chord = load * friction.rate_slope
-    slip_growth, rate_growth = (rational(g) for g in (disturbance.slip_growth, disturbance.rate_growth))
-    k, eta = ranges[plant.k_hat], ranges[plant.eta_hat]
-    one_sided = positive and friction.weakens
-    slip = ((Fraction(0) if one_sided else -slip_chord) - k[1] + slip_growth, slip_chord - k[0] + slip_growth)
-    rate = (eta[0] - rate_chord - rate_growth, eta[1] + rate_chord - rate_growth)
+    """Sector bounds of a fault over its uncertainty box: the ranges of its uncertain plant, exact."""
+    known = uncertain_plant(fault)
     nominal = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
     return Sectors(
-        authority=b,
-        beta=coefficient_range(fault, b),
-        slip=slip,
-        rate=rate,
+        authority=known.authority,
+        beta=known.beta,
+        slip=known.slip_chord,
+        rate=known.rate_chord,
         row_bounds=(
-            max(abs(s + nominal[plant.k_hat]) for s in slip) / b,
-            max(abs(w - nominal[plant.eta_hat]) for w in rate) / b,
+            max(abs(s + nominal[plant.k_hat]) for s in known.slip_chord) / known.authority,
+            max(abs(w - nominal[plant.eta_hat]) for w in known.rate_chord) / known.authority,
         ),
-        largest_effective_stress=stress,
+        largest_effective_stress=max(map(abs, known.stress)),
     )
-
-
-def effective_stress(fault: Fault) -> tuple[Fraction, bool]:
-    """Rigorous bound on |σ' − p*(r0)| [Pa] for 0 ≤ r0 ≤ target slip, and whether σ' − p* stays positive.
-
-    p* balances friction, spring and the disturbance's growth at rest at r0 (ERRATA 8); friction there is anything that
-    the box allows.
-    """
-    ranges, start = plant_ranges(fault), to_sympy(static_friction(fault))
-    known = {_growth: to_sympy(rational(fault.disturbance.slip_growth)), _drift: 0, plant.mu_star: start}
-    numerator = sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r)
-    target = rational(fault.reference.target_slip)
-    least = sp.Max(
-        to_sympy(friction_range(fault)[0]), start - to_sympy(friction_bounds(fault.friction).slip_slope) * _r
-    )
-    box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)} | {_r: (Fraction(0), target)}
-    stress = upper_bound(numerator / least, box, pieces=400)
-    lowest = numerator.subs(_r, to_sympy(target)).subs(
-        {
-            plant.k_hat: to_sympy(box[plant.k_hat][1]),
-            plant.N_hat: to_sympy(box[plant.N_hat][0]),
-            plant.sigma: to_sympy(box[plant.sigma][0]),
-        }
-    )
-    return stress, bool(lowest > 0)
 
 
 def rest_pressure(

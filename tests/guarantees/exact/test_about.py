@@ -6,10 +6,10 @@ from fractions import Fraction as F
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import task_of
 from quakedesign.guarantees.exact.statement import differences
+from quakedesign.plant import uncertain_plant
 
-TASK = task_of(load_fault("real-fault", box="ten-percent"), rate_limited=True)
+TASK = uncertain_plant(load_fault("real-fault", box="ten-percent"), rate_limited=True)
 FRICTION = TASK.friction
 
 

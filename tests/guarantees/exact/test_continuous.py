@@ -8,13 +8,14 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, ContinuousPeaks, NoGuarantee, task_of
+from quakedesign.guarantees import Bounds, Claims, ContinuousPeaks, NoGuarantee
 from quakedesign.guarantees.exact import statement as continuous
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee, save_guarantee
 from quakedesign.loop import exact_integrals
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 
-TASK = task_of(load_fault("real-fault"))
+TASK = uncertain_plant(load_fault("real-fault"))
 LAW = exact_integrals(tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5"))))
 BOUNDS = Bounds(slip_error=F(1, 3), slip_rate_error=F(1, 7), push=F(1, 9), small_gain=F(1, 2))
 NONE = NoGuarantee(reason="none", small_gain=None)

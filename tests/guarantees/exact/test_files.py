@@ -16,7 +16,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, continuous_peaks, guarantee, task_of
+from quakedesign.guarantees import Held, continuous_peaks, guarantee
 from quakedesign.guarantees.exact import task as package_task
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, save_guarantee
 from quakedesign.guarantees.search.lqg import family_of
@@ -33,6 +33,7 @@ from quakedesign.laws import (
 from quakedesign.loop import exact_integrals
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("guarantee_check", PATH)
@@ -93,7 +94,7 @@ PATHS_OF = {
     "late rock": {"diffusion": F("0.5"), "delay": F("0.02")},
 }
 for name, path in PATHS_OF.items():
-    through = family_of(task_of(load_fault("real-fault")), STEP, "slip-and-rate", path).law
+    through = family_of(uncertain_plant(load_fault("real-fault")), STEP, "slip-and-rate", path).law
     LOOPS[name] = Held(law=through(np.array([0.94, -8.28, 0.1237])), step=STEP, **path)
 CONTINUOUS_GAINS = tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5")))
 CONTINUOUS = exact_integrals(CONTINUOUS_GAINS)
@@ -102,7 +103,7 @@ EVERY = (*(name for name in LOOPS if name != "late rock"), "continuous")
 
 @cache
 def claim(name="estimate", rate_limited=False):
-    task = task_of(load_fault("real-fault"), rate_limited=rate_limited)
+    task = uncertain_plant(load_fault("real-fault"), rate_limited=rate_limited)
     return continuous_peaks(task, CONTINUOUS) if name == "continuous" else guarantee(task, LOOPS[name])
 
 
@@ -164,7 +165,7 @@ def test_the_statement_says_what_is_measured_and_how_well():
     said = "law with 3 states of the slip alone, every 23/125 s, 0 s late, lag 0 s, measured slip within 1/1000000 m of"
     assert f"{said} the true one" in checker.check(guarantee_text(claim("observer"))).statement
     third = replace(LOOPS["noisy"], slip_noise=F(1, 3 * 10**6))
-    found = guarantee(task_of(load_fault("real-fault")), third).sentence()
+    found = guarantee(uncertain_plant(load_fault("real-fault")), third).sentence()
     said = "held over 0.184 s, with any noise of at most 3.33333e-07 m in the measured slip, with any noise of at most"
     assert f"{said} 1e-05 m/s in the measured slip rate, for every disturbance" in found
     said = (
@@ -211,7 +212,7 @@ STATE = exact_integrals(CONTINUOUS_GAINS, of_state=True)
 
 def test_feedback_of_the_state_is_accepted_by_both_and_needs_a_smooth_reference():
     """A cubic reference starts and ends with an acceleration, which the law would pass on as a jump."""
-    text = guarantee_text(continuous_peaks(task_of(load_fault("real-fault")), STATE))
+    text = guarantee_text(continuous_peaks(uncertain_plant(load_fault("real-fault")), STATE))
     assert parse_guarantee(text).law == STATE
     assert package(text) == standalone(text) == "proved"
     raw = json.loads(text)
@@ -228,7 +229,9 @@ def test_feedback_of_the_state_is_accepted_by_both_and_needs_a_smooth_reference(
 def test_a_slower_disturbance_is_never_bounded_worse():
     """The published integrals are so slow that the shifted pressure drifts too much; the larger class bounds them."""
     law = exact_integrals(tuple(map(F, ("1880000000", "579000000", "1020000", "18.52"))))
-    any_, slow = (continuous_peaks(task_of(load_fault("real-fault"), rate_limited=k), law) for k in (False, True))
+    any_, slow = (
+        continuous_peaks(uncertain_plant(load_fault("real-fault"), rate_limited=k), law) for k in (False, True)
+    )
     assert slow.claims == any_.claims
     assert package(guarantee_text(slow)) == standalone(guarantee_text(slow)) == "proved"
 
@@ -336,7 +339,7 @@ IMPLICIT = [
 
 @pytest.mark.parametrize(("place", "new"), IMPLICIT, ids=str)
 def test_another_implicit_step_under_the_same_claims_is_refused_by_both(place, new):
-    raw = json.loads(guarantee_text(guarantee(task_of(load_fault("real-fault")), implicit("3/5", "97/100"))))
+    raw = json.loads(guarantee_text(guarantee(uncertain_plant(load_fault("real-fault")), implicit("3/5", "97/100"))))
     text = json.dumps(changed(raw, ("loop", "root", *place), new))
     assert standalone(text).startswith("invalid")
     assert package(text) != "proved"
@@ -347,7 +350,7 @@ def test_larger_claims_are_refused_where_the_root_leaves_its_lines(factor):
     """The claims say where the lines must hold: what is weaker about the errors asks more of the step."""
     raw = json.loads(guarantee_text(claim("deadbeat")))
     raw["loop"]["root"] = json.loads(
-        guarantee_text(guarantee(task_of(load_fault("real-fault")), implicit("4/5", "1")))
+        guarantee_text(guarantee(uncertain_plant(load_fault("real-fault")), implicit("4/5", "1")))
     )["loop"]["root"]
     assert standalone(json.dumps(raw)) == package(json.dumps(raw)) == "proved"
     for name in ("slip_error", "slip_rate_error", "peak_slip_rate"):

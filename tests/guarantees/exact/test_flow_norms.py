@@ -8,9 +8,9 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import task_of
 from quakedesign.guarantees.exact.norms import flow_norms, norms
 from quakedesign.loop import PeriodicLoop, Segment, continuous_loop, exact_integrals
+from quakedesign.plant import uncertain_plant
 
 GAINS = tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5")))
 
@@ -67,7 +67,7 @@ def test_a_loop_that_is_not_stable_has_no_gain(flow):
 
 def test_the_e_lqr_has_the_gains_of_a_loop_with_jumps_that_do_nothing():
     """Another algorithm: periods of 40 ms, all their phases, summed in the past."""
-    task = task_of(load_fault("real-fault"))
+    task = uncertain_plant(load_fault("real-fault"))
     loop = continuous_loop(exact_integrals(GAINS), task.model, task.authority)
     still = tuple(tuple(F(i == j) for j in range(4)) for i in range(4))
     other = norms(replace(loop, segments=(Segment(jump=still, duration=F(1, 25)),)))

@@ -16,7 +16,7 @@ from scipy.special import erfc
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, Held, guarantee, task_of
+from quakedesign.guarantees import Guarantee, Held, guarantee
 from quakedesign.guarantees.exact.impossibility import (
     farthest_well,
     longest_diffusion,
@@ -25,8 +25,9 @@ from quakedesign.guarantees.exact.impossibility import (
     smallest_withdrawal,
 )
 from quakedesign.laws import Prediction, disturbance_estimate
+from quakedesign.plant import uncertain_plant
 
-REAL = task_of(load_fault("real-fault"))
+REAL = uncertain_plant(load_fault("real-fault"))
 STEP = F(184, 1000)
 # κ = 0 and friction that never changes: e2′ = −w·e2 + u + φ with w = 1.6 1/s
 STEADY = replace(

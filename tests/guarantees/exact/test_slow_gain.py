@@ -11,24 +11,25 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, Guarantee, Held, NoGuarantee, SlowGain, guarantee, task_of
+from quakedesign.guarantees import Bounds, Claims, Guarantee, Held, NoGuarantee, SlowGain, guarantee
 from quakedesign.guarantees.exact import small_gain as module
 from quakedesign.guarantees.exact import statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.guarantees.exact.loop import GainSpread, channels_of
-from quakedesign.guarantees.exact.task import Friction, Task
 from quakedesign.laws import summed_integrals
 from quakedesign.loop import PeriodicLoop
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
+from quakedesign.plant.uncertain_plant import Friction, UncertainPlant
 
 SLOW = SlowGain(parts=2, growth=F(1, 9))
 FRICTION = Friction(static=F(4), least=F(4), largest=F(4), weakening=F(5), strengthening=F(2), rate_slope=F(0))
-BY_HAND = Task(  # N̂ from 1/2 to 3/2, b = 2, β from 1 to 3, r′ up to 2
+BY_HAND = UncertainPlant(  # N̂ from 1/2 to 3/2, b = 2, β from 1 to 3, r′ up to 2
     name="by hand", density=F(1), shear_modulus=F(1), length=F(1), damping=F(0), normal_stress=F(1),
     spreads=(F(0), F(0), F(1, 2)), friction=FRICTION, shape=(F(0), F(0), F(3), F(-2)), target_slip=F(4),
     operation_time=F(3), amplitude=F(0), change=None, growths=(F(0), F(0)),
 )  # fmt: skip
-TASK = task_of(load_fault("real-fault"))
+TASK = uncertain_plant(load_fault("real-fault"))
 HELD = Held(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10), slip_noise=F(1, 10**6))
 BOUNDS = Bounds(slip_error=F(1, 2), slip_rate_error=F(1, 7), push=TASK.authority, small_gain=F(1, 2))
 NONE = NoGuarantee(reason="none", small_gain=None)

@@ -16,16 +16,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError, UnsupportedError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import friction_law, load_fault
-from quakedesign.guarantees import (
-    Held,
-    NoGuarantee,
-    SlidingClaims,
-    SlidingGuarantee,
-    SlidingTask,
-    cell_bounds,
-    cells,
-    sliding_task,
-)
+from quakedesign.guarantees import Held, NoGuarantee, SlidingClaims, SlidingGuarantee, cell_bounds
 from quakedesign.guarantees.exact import sliding_small_gain as small_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
@@ -33,6 +24,7 @@ from quakedesign.laws import LinearLaw
 from quakedesign.loop import SlidingModel, sliding_loop
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import SlidingPlant, cells, slow_sliding_plant
 
 PROOFS = Path(__file__).parents[3] / "proofs"
 SPECIFICATION = importlib.util.spec_from_file_location("sliding_check", PROOFS / "check.py")
@@ -60,7 +52,7 @@ def task(half="0.02", stress=25000, **changes):
         "damping": F(5 * 10**14), "ranges": ranges, "rate": RATE, "distance": F("0.01"), "ramp": F(12),
         "stress": F(stress), "swing": F(0),
     }  # fmt: skip
-    return SlidingTask(**(given | changes))
+    return SlidingPlant(**(given | changes))
 
 
 MODEL = SlidingModel(
@@ -421,9 +413,9 @@ def test_what_is_proved_of_ageing_is_not_proved_of_the_slip_law():
 def test_the_task_of_a_fault_has_its_law(law, more, expected):
     patch = load_fault("crustal-patch")
     quantities = {n: getattr(patch.friction, n) for n in patch.friction.quantities()}
-    found = sliding_task(replace(patch, friction=friction_law(law)(**quantities, **more)), F(1000))
+    found = slow_sliding_plant(replace(patch, friction=friction_law(law)(**quantities, **more)), F(1000))
     assert (found.state_law, found.regularised) == expected
-    known = sliding_task(patch, F(1000))
+    known = slow_sliding_plant(patch, F(1000))
     assert [float(v) for v in found.ranges["coefficient"]] == pytest.approx(
         [float(v) for v in known.ranges["coefficient"]]
     )
@@ -573,12 +565,12 @@ def test_a_swing_that_is_none_or_stops_the_reference_is_refused_by_both(swing):
 def test_the_task_of_a_fault_has_the_rates_of_its_ramp():
     patch = load_fault("crustal-patch")
     ramped = replace(patch, reference=replace(patch.reference, ramp=0.05))
-    found, plain = sliding_task(ramped, F(1000)), sliding_task(patch, F(1000))
+    found, plain = slow_sliding_plant(ramped, F(1000)), slow_sliding_plant(patch, F(1000))
     assert found.rate == F(95, 100) * plain.rate
     assert found.fastest == plain.rate * F(104375, 100000)  # 1 - 0.05 + 15/8 of 0.05, at half of the time
     assert (found.distance, plain.swing) == (plain.distance, 0)
     with pytest.raises(UnsupportedError, match="a ramp below 8/23"):
-        sliding_task(replace(patch, reference=replace(patch.reference, ramp=0.35)), F(1000))
+        slow_sliding_plant(replace(patch, reference=replace(patch.reference, ramp=0.35)), F(1000))
 
 
 def test_what_is_proved_of_one_swing_is_not_proved_of_a_larger_one():
@@ -756,7 +748,7 @@ def test_a_law_of_the_slip_rate_or_a_pressure_that_jumps_is_refused():
 
 def test_the_task_is_that_of_the_fault():
     """Crustal patch: K = 32.04 GPa/15 km, V = 1 m in 1e6 s, and μ* from a − b over three decades of rate."""
-    found = sliding_task(load_fault("crustal-patch"), F(25000), F("0.1"))
+    found = slow_sliding_plant(load_fault("crustal-patch"), F(25000), F("0.1"))
     assert found.stiffness == F(32040, 15) * 1000
     assert found.ranges["direct_effect"] == (F("0.009"), F("0.011"))
     low, high = found.ranges["coefficient"]
@@ -765,10 +757,10 @@ def test_the_task_is_that_of_the_fault():
     assert float(high) == pytest.approx(0.63454 - (0.005 - 0.0025) * decades, rel=1e-9)
     middle = 0.63454 - 0.005 * decades
     assert float(found.ramp) == pytest.approx(2.136e6 * 1e-6 / middle, rel=1e-9)
-    exact = sliding_task(load_fault("crustal-patch"), F(25000))
+    exact = slow_sliding_plant(load_fault("crustal-patch"), F(25000))
     assert exact.drift < F(1, 10**8)
     with pytest.raises(UnsupportedError):
-        sliding_task(load_fault("real-fault"), F(1))
+        slow_sliding_plant(load_fault("real-fault"), F(1))
 
 
 @pytest.mark.parametrize("changes", [{"jitter": F(1)}, {"delay_jitter": F(1)}, {"pump": Pump(rate=F(1)), "ramp": F(1)}])

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, NoGuarantee, task_of
+from quakedesign.guarantees import Bounds, NoGuarantee
 from quakedesign.guarantees.exact.loop import channels_of
 from quakedesign.guarantees.exact.small_gain import bounds_from, spectral_radius
 from quakedesign.laws import ImplicitRoot, Power
+from quakedesign.plant import uncertain_plant
 
 STEP = F("0.184")
 PULL = (Power(factor=(F(1), F(1)), exponent=F(0), argument="slip"),)
-TASK, LIMITED = (task_of(load_fault("real-fault"), rate_limited=limited) for limited in (False, True))
+TASK, LIMITED = (uncertain_plant(load_fault("real-fault"), rate_limited=limited) for limited in (False, True))
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 5])

@@ -8,7 +8,7 @@ import pytest
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, Guarantee, Held, NoGuarantee, guarantee, task_of
+from quakedesign.guarantees import Bounds, Claims, Guarantee, Held, NoGuarantee, guarantee
 from quakedesign.guarantees.exact import statement
 from quakedesign.guarantees.exact import statement as continuous
 from quakedesign.guarantees.exact.statement import above, sentence_of
@@ -16,8 +16,9 @@ from quakedesign.laws import ImplicitRoot, LinearLaw, Power, compensated, summed
 from quakedesign.loop import ContinuousLaw, Instants
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 
-TASK = task_of(load_fault("real-fault"))
+TASK = uncertain_plant(load_fault("real-fault"))
 CLAIMS = Claims(
     slip_error=UpperBound(F(1, 3)),
     slip_rate_error=UpperBound(F(1, 7)),

@@ -9,9 +9,9 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, friction_law, load_fault
 from quakedesign.fault.friction.weakening import ExponentialSlipWeakening
-from quakedesign.guarantees import task_of
 from quakedesign.lyapunov.exact import fault_bounds as matched
 from quakedesign.lyapunov.exact.fault_bounds import rest_pressure, sectors
+from quakedesign.plant import uncertain_plant
 from quakedesign.symbolic import plant
 
 FAULTS = [("real-fault", None), ("lab-fault", None), ("real-fault", "ten-percent"), ("lab-fault", "ten-percent")]
@@ -20,7 +20,7 @@ FAULTS = [("real-fault", None), ("lab-fault", None), ("real-fault", "ten-percent
 @pytest.mark.parametrize(("name", "box"), FAULTS)
 def test_closed_forms_are_inside_the_bounds_found_by_subdivision_and_close(name, box):
     fault = load_fault(name, box=box)
-    task, other = task_of(fault), sectors(fault)
+    task, other = uncertain_plant(fault), sectors(fault)
     assert (task.authority, task.beta) == (other.authority, other.beta)
     assert task.rate_chord == other.rate
     assert other.slip[0] <= task.slip_chord[0]
@@ -34,7 +34,7 @@ def test_closed_forms_are_inside_the_bounds_found_by_subdivision_and_close(name,
 def test_reference_rates_are_those_of_the_quintic(name):
     """15/8·d/t and 10/√3·d/t²."""
     fault = load_fault(name)
-    task = task_of(fault)
+    task = uncertain_plant(fault)
     first, second = task.reference_rates
     assert F(15, 8) <= first * task.operation_time / task.target_slip <= F(15, 8) * F(1001, 1000)
     assert F(100, 3) <= (second * task.operation_time**2 / task.target_slip) ** 2 <= F(100, 3) * F(1001, 1000)
@@ -44,7 +44,7 @@ def test_reference_rates_are_those_of_the_quintic(name):
 def test_the_fault_s_own_law_stays_inside_the_ranges(name):
     """Chords, β and p* of the exponential law at 20 000 pairs of slip and reference, from its own formula."""
     fault = load_fault(name)
-    task, law, random = task_of(fault), fault.friction, np.random.default_rng(1)
+    task, law, random = uncertain_plant(fault), fault.friction, np.random.default_rng(1)
     r = fault.reference.target_slip * random.random(20_000)
     x = np.abs(r + fault.reference.target_slip * random.standard_normal(20_000) * 10.0 ** random.uniform(-6, 0, 20_000))
     mu = lambda slip: law.residual + law.drop * np.exp(-slip / law.critical_slip)  # noqa: E731
@@ -65,7 +65,7 @@ def test_the_fault_s_own_law_stays_inside_the_ranges(name):
 
 def test_the_jerk_is_that_of_the_quintic():
     """60·d/t³ at both ends."""
-    task = task_of(load_fault("real-fault"))
+    task = uncertain_plant(load_fault("real-fault"))
     assert F(60) <= task.reference_jerk * task.operation_time**3 / task.target_slip <= F(60) * F(1001, 1000)
     task.require_smooth_reference()
     with pytest.raises(ParameterError, match="without acceleration"):
@@ -84,13 +84,13 @@ def test_the_drift_is_that_of_the_worst_friction_but_for_a_tenth():
     spring = fault.specific_stiffness - fault.disturbance.slip_growth
     rest = ((mu - mu[0]) * N * sigma + spring * r) / (mu * N)
     worst = np.abs(np.gradient(rest, s * task.operation_time)).max()
-    bound = float(task_of(fault).drift / task_of(fault).authority)
+    bound = float(uncertain_plant(fault).drift / uncertain_plant(fault).authority)
     assert 0.9 * bound < worst <= bound
 
 
 def test_friction_that_strengthens_or_depends_on_the_rate_widens_the_ranges():
     fault = load_fault("real-fault")
-    plain = task_of(fault)
+    plain = uncertain_plant(fault)
     both = replace(plain, friction=replace(plain.friction, strengthening=plain.friction.weakening, rate_slope=F(1, 10)))
     assert both.slip_chord[0] < plain.slip_chord[0]
     assert both.rate_chord[0] < plain.rate_chord[0] == plain.rate_chord[1] < both.rate_chord[1]
@@ -109,24 +109,24 @@ def test_friction_that_strengthens_or_depends_on_the_rate_widens_the_ranges():
 )
 def test_data_that_the_derivation_does_not_cover_are_refused(change, match):
     with pytest.raises(ParameterError, match=match):
-        replace(task_of(load_fault("real-fault")), **change)
+        replace(uncertain_plant(load_fault("real-fault")), **change)
 
 
 def test_the_class_rate_needs_a_start_at_zero():
     fault = load_fault("real-fault").with_disturbance(Disturbance(constant=1e-4, amplitude=1e-4, frequency=0.5))
-    assert task_of(fault).amplitude == F(2, 10**4)
+    assert uncertain_plant(fault).amplitude == F(2, 10**4)
     with pytest.raises(ParameterError, match="starts at 0"):
-        task_of(fault, rate_limited=True)
+        uncertain_plant(fault, rate_limited=True)
 
 
 def test_bounds_of_the_disturbance_are_those_of_the_decimals():
     """3.2e-4·0.69; and 0.1 + 0.7 and 0.7·0.1, which floats make less than 0.8 and 0.07."""
     fault = load_fault("real-fault")
-    assert (task_of(fault).change, task_of(fault, rate_limited=True).change) == (None, F("2.208e-4"))
+    assert (uncertain_plant(fault).change, uncertain_plant(fault, rate_limited=True).change) == (None, F("2.208e-4"))
     constant = fault.with_disturbance(Disturbance(constant=-0.1, amplitude=0.7))
-    assert task_of(constant).amplitude == F("0.8")
+    assert uncertain_plant(constant).amplitude == F("0.8")
     shaken = fault.with_disturbance(Disturbance(amplitude=0.7, frequency=0.1))
-    assert task_of(shaken, rate_limited=True).change == F("0.07")
+    assert uncertain_plant(shaken, rate_limited=True).change == F("0.07")
     assert matched.known_ranges(constant)[plant.phi] == (F("-0.8"), F("0.8"))
     assert matched.known_ranges(shaken)[plant.phi_t] == (F("-0.07"), F("0.07"))
 
@@ -149,10 +149,10 @@ def test_friction_that_grows_with_slip_strengthens_by_its_slope():
     fault = load_fault("real-fault")
     law = fault.friction
     rising = Hardening(residual=law.residual, drop=law.drop, critical_slip=law.critical_slip)
-    assert task_of(fault).friction.strengthening == 0
+    assert uncertain_plant(fault).friction.strengthening == 0
     slope = F(str(law.drop)) / F(str(law.critical_slip))
     for one, strengthening in ((law, 0), (rising, slope)):
-        found = task_of(replace(fault, friction=one)).friction
+        found = uncertain_plant(replace(fault, friction=one)).friction
         assert slope <= found.weakening <= slope * (1 + F(1, 10**8))
         assert strengthening <= found.strengthening <= strengthening * (1 + F(1, 10**8))
 
@@ -163,4 +163,4 @@ def test_friction_with_a_state_is_refused():
         reference_rate=1e-6, slowest_rate=1e-9, fastest_rate=1e-3,
     )  # fmt: skip
     with pytest.raises(ParameterError, match="guarantee of tracking needs"):
-        task_of(replace(load_fault("real-fault"), friction=law))
+        uncertain_plant(replace(load_fault("real-fault"), friction=law))

@@ -11,11 +11,12 @@ import pytest
 from scipy.linalg import expm
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import design_compensated, design_held, task_of, tightened
+from quakedesign.guarantees import design_compensated, design_held, tightened
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.guarantee_result import attacked as beside_searches
 from quakedesign.laws import control_law
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -53,7 +54,7 @@ def designed(row):
     """A guarantee and the numbers of its loop."""
     name, step, around, _ = ROWS[row]
     fault, kind = load_fault(name), row.split(",")[0]
-    task = task_of(fault, rate_limited=kind == "rate")
+    task = uncertain_plant(fault, rate_limited=kind == "rate")
     if kind in GAINS:
         law = control_law(kind).from_values(GAINS[kind], scale=F(1), divisor=task.authority)
         made = design_compensated(task, law, step, **around)

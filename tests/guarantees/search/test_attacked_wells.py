@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import design_held, task_of
+from quakedesign.guarantees import design_held
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import uncertain_plant
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -23,7 +24,7 @@ WELLS = {1: (1.2e-4, 1.5), 2: (2.0e-4, 1.5), 5: (6e-4, 2)}  # L²/D [s]: certifi
 
 @cache
 def through(rock):
-    return design_held(task_of(REAL), STEP, objective="peak", diffusion=F(rock))
+    return design_held(uncertain_plant(REAL), STEP, objective="peak", diffusion=F(rock))
 
 
 def worst(held, periods, pieces, *chosen):
@@ -87,7 +88,7 @@ LAGS = {("0.184", "0.2"): 2.3e-4, ("0.05", "0.2"): 6.6e-5, ("0.184", "0.001"): 1
 @pytest.mark.parametrize("times", LAGS)
 def test_no_course_violates_a_guarantee_behind_a_lag(times, count):
     step, lag = map(F, times)
-    claim = design_held(task_of(REAL), step, lag=lag)
+    claim = design_held(uncertain_plant(REAL), step, lag=lag)
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= LAGS[times]
     held, periods, pieces = attacker.numbers(claim), 60, 6
@@ -109,7 +110,7 @@ SLIP_ALONE = {
 @pytest.mark.parametrize("behind", ["lag", pytest.param("rock", marks=pytest.mark.slow)])
 def test_no_course_with_noise_violates_a_guarantee_of_the_slip_alone(behind):
     around, step, most, count = SLIP_ALONE[behind]
-    claim = design_held(task_of(REAL), step, measured="slip", slip_noise=F(1, 10**6), **around)
+    claim = design_held(uncertain_plant(REAL), step, measured="slip", slip_noise=F(1, 10**6), **around)
     assert claim.held.law.of_slip_alone
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= most
@@ -128,7 +129,7 @@ def test_no_course_with_noise_violates_a_guarantee_of_the_slip_alone(behind):
 
 @pytest.mark.slow
 def test_behind_a_short_lag_a_design_holds_as_well_as_behind_none():
-    task, step = task_of(REAL), F("0.184")
+    task, step = uncertain_plant(REAL), F("0.184")
     short, none = design_held(task, step, lag=F("0.001")), design_held(task, step)
     for name in ("slip_error", "slip_rate_error"):
         assert getattr(short.claims, name) == pytest.approx(getattr(none.claims, name), rel=0.1)
@@ -137,7 +138,7 @@ def test_behind_a_short_lag_a_design_holds_as_well_as_behind_none():
 @pytest.mark.slow
 @pytest.mark.parametrize("objective", ["peak", "tracking"])
 def test_no_course_of_ten_thousand_violates_a_guarantee_of_the_class_rate(objective):
-    task = task_of(REAL, rate_limited=True)
+    task = uncertain_plant(REAL, rate_limited=True)
     claim = design_held(task, F("0.184"), objective=objective)
     assert claim.check() is Verdict.PROVED
     held, periods, pieces = attacker.numbers(claim, task.amplitude), 60, 6

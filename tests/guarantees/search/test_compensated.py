@@ -18,7 +18,6 @@ from quakedesign.guarantees import (
     compensated,
     design_compensated,
     guarantee_of,
-    task_of,
     tightened,
     worst_found,
 )
@@ -26,6 +25,7 @@ from quakedesign.guarantees.search.compensated_search import implicit_pull
 from quakedesign.laws import Power, Sampling, control_law, published
 from quakedesign.laws.feed_forward import feed_forward
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
 attacker = importlib.util.module_from_spec(SPECIFICATION)
@@ -34,7 +34,7 @@ SPECIFICATION.loader.exec_module(attacker)
 STEP, DIVISOR = F("0.184"), F(2353, 125000000000)
 CTA, DIA = ("7", "5", "2.3", "1.1"), ("25/16", "27/5", "6/5", "0")
 SETTINGS = F("0.3"), F("2.25e-8")  # weight, authority
-TASK = task_of(load_fault("real-fault"))
+TASK = uncertain_plant(load_fault("real-fault"))
 CTA_GAINS = dict(zip(("k1", "k2", "k3", "k4"), map(F, CTA), strict=True))
 
 

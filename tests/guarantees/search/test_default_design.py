@@ -14,8 +14,9 @@ from quakedesign.cli.design_commands import positive
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, design_held, guarantee, reached, task_of
+from quakedesign.guarantees import Guarantee, NoGuarantee, design_held, guarantee, reached
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import uncertain_plant
 from quakedesign.report import page
 from quakedesign.report import page as account
 from quakedesign.report import sentences as headlines
@@ -79,7 +80,7 @@ def test_both_objectives_are_what_they_are_called(unreached):
 @pytest.mark.slow
 def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works(monkeypatch):
     design = designed("slow")
-    assert not isinstance(design_held(task_of(SLOW), F(1, 10)), Guarantee)
+    assert not isinstance(design_held(uncertain_plant(SLOW), F(1, 10)), Guarantee)
     step = design.controller.step
     assert F(2, 100) < step < F(1, 10)
     assert design.guarantee.check() is Verdict.PROVED
@@ -112,12 +113,12 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert account.badge(real) == "guaranteed as it runs"
     assert grade(real).startswith("guaranteed: slip rate <= ")
     # the same law held over the fault's own T_s has none
-    assert guarantee(task_of(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
+    assert guarantee(uncertain_plant(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize("step", ["0.01", pytest.param("0.02", marks=pytest.mark.slow)])
 def test_sampled_faster_that_fault_is_guaranteed(step):
-    claim = design_held(task_of(SLOW), F(step))
+    claim = design_held(uncertain_plant(SLOW), F(step))
     assert claim.check() is Verdict.PROVED
     assert claim.claims.peak_slip_rate < 1e-5  # its natural earthquake: 0.31 m/s
 
@@ -150,7 +151,7 @@ def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
     ],
 )
 def test_unusual_faults_are_designed_or_refused_with_a_reason(fault):
-    found = design_held(task_of(fault), F(repr(fault.sampling_time)))
+    found = design_held(uncertain_plant(fault), F(repr(fault.sampling_time)))
     if isinstance(found, Guarantee):
         assert found.check() is Verdict.PROVED
     else:

@@ -16,10 +16,11 @@ import quakedesign as qd
 from quakedesign.cli.design_commands import positive
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, design_compensated, task_of
+from quakedesign.guarantees import Guarantee, NoGuarantee, design_compensated
 from quakedesign.laws import Sampling
 from quakedesign.loop import simulation_scheme
 from quakedesign.lyapunov import Verdict, load_certificate
+from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import controller_step, simulate, to_casadi, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.studies.comparison import Entry
@@ -205,7 +206,7 @@ def test_a_guarantee_needs_no_certificate_in_continuous_time(unproved, unreached
 def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works(unproved):
     design = qd.design(SLOW, "cta")
     base = replace(design.controller, gains=dict(design.controller.gains), sampling=None)
-    assert isinstance(design_compensated(task_of(SLOW), base, F(1, 10)).found, NoGuarantee)
+    assert isinstance(design_compensated(uncertain_plant(SLOW), base, F(1, 10)).found, NoGuarantee)
     step = design.controller.sampling.step
     assert F(2, 100) < step < F(1, 10)
     assert (design.verdict, design.guarantee.check(), design.guarantee.held.step) == (Verdict.PROVED,) * 2 + (step,)

@@ -12,13 +12,14 @@ import pytest
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, LoopAnswer, NoGuarantee, design_held, guarantee, task_of, worst_found
+from quakedesign.guarantees import Guarantee, LoopAnswer, NoGuarantee, design_held, guarantee, worst_found
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.adversary import WorstFound
 from quakedesign.guarantees.search.linear_design import _with_noise, closest
 from quakedesign.laws import published
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 from quakedesign.synthesis import Design, state_feedback
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
@@ -41,7 +42,7 @@ DELAYS = {"real one period late": F("0.184")}
 @cache
 def designed(row):
     name, step, objective, *_ = ROWS[row]
-    return design_held(task_of(load_fault(name)), step, objective=objective, delay=DELAYS.get(row, F(0)))
+    return design_held(uncertain_plant(load_fault(name)), step, objective=objective, delay=DELAYS.get(row, F(0)))
 
 
 @cache
@@ -74,14 +75,14 @@ def test_designs_are_guaranteed_within_the_targets(row):
 
 
 def test_the_class_rate_is_guaranteed_far_lower():
-    claim = guarantee(task_of(load_fault("real-fault"), rate_limited=True), designed("real tracking").held)
+    claim = guarantee(uncertain_plant(load_fault("real-fault"), rate_limited=True), designed("real tracking").held)
     assert claim.claims.slip_rate_error <= F(7, 10**5)
     assert claim.claims.slip_error <= F(5, 10**5)
 
 
 @pytest.mark.parametrize("objective", [pytest.param("tracking", marks=pytest.mark.slow), "peak"])
 def test_a_law_for_the_class_rate_is_chosen_for_that_class(objective):
-    claim = design_held(task_of(load_fault("real-fault"), rate_limited=True), F("0.184"), objective=objective)
+    claim = design_held(uncertain_plant(load_fault("real-fault"), rate_limited=True), F("0.184"), objective=objective)
     assert claim.claims.slip_rate_error <= F(7, 10**5)
     assert claim.claims.slip_error <= F(1, 10**5)
 
@@ -163,7 +164,7 @@ def test_the_worst_found_is_below_the_bound_and_no_less_than_the_attacker_s(row)
 
 @pytest.mark.parametrize("delay", [F("0.03"), F("0.1")])
 def test_a_delay_is_attacked_too(delay):
-    task = task_of(load_fault("real-fault"))
+    task = uncertain_plant(load_fault("real-fault"))
     claim = guarantee(task, replace(designed("real peak").held, delay=delay))
     if delay == F("0.03"):
         assert isinstance(claim, Guarantee)
@@ -186,7 +187,7 @@ def test_sharper_claims_are_not_proved():
 
 
 def test_a_step_far_too_long_has_no_guarantee_and_says_why():
-    found = design_held(task_of(load_fault("real-fault")), F(2), objective="peak")
+    found = design_held(uncertain_plant(load_fault("real-fault")), F(2), objective="peak")
     assert isinstance(found, NoGuarantee)
     assert "is not stable" in found.reason
 
@@ -194,12 +195,12 @@ def test_a_step_far_too_long_has_no_guarantee_and_says_why():
 def test_a_step_beyond_all_sizes_is_refused():
     for search in (closest, design_held):
         with pytest.raises(ParameterError, match=r"step must be of a size between 1e-40 and 1e\+40 in SI units\."):
-            search(task_of(load_fault("real-fault")), F(10) ** 400)
+            search(uncertain_plant(load_fault("real-fault")), F(10) ** 400)
 
 
 def test_a_step_in_which_errors_outgrow_all_numbers_has_none_either():
     """The pole (√(w² + 4s) − w)/2 with s = 0.4493 1/s² and w = 1.6 1/s is 0.2437 1/s, for an hour: e^877."""
-    task = task_of(load_fault("real-fault"))
+    task = uncertain_plant(load_fault("real-fault"))
     for found in (design_held(task, F(3600)), closest(task, F(3600))):
         assert isinstance(found, NoGuarantee)
         assert found.reason == "errors grow by e^877 within T_s = 3600 s"
@@ -207,7 +208,7 @@ def test_a_step_in_which_errors_outgrow_all_numbers_has_none_either():
 
 def test_another_objective_is_refused():
     with pytest.raises(ParameterError, match="tracking, peak"):
-        design_held(task_of(load_fault("real-fault")), F(1), objective="speed")
+        design_held(uncertain_plant(load_fault("real-fault")), F(1), objective="speed")
 
 
 def test_designs_say_what_is_guaranteed_of_them_as_they_run():

@@ -9,9 +9,10 @@ import pytest
 import quakedesign as qd
 from quakedesign.cli.design_commands import DesignOptions
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.guarantees import Held, guarantee, task_of
+from quakedesign.guarantees import Held, guarantee
 from quakedesign.guarantees.search.defaults import SampledDesign
 from quakedesign.laws import Prediction, disturbance_estimate
+from quakedesign.plant import uncertain_plant
 from quakedesign.studies import comparison
 from quakedesign.synthesis import state_feedback
 
@@ -23,7 +24,7 @@ LAW = disturbance_estimate(
     F("2.282e-8"),
 )
 LAG = F(1, 50)
-CLAIM = guarantee(task_of(REAL), Held(law=LAW, step=F(23, 125), lag=LAG))
+CLAIM = guarantee(uncertain_plant(REAL), Held(law=LAW, step=F(23, 125), lag=LAG))
 
 
 @pytest.fixture

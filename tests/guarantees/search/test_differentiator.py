@@ -12,11 +12,12 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import LoopAnswer, NoGuarantee, design_held, task_of
+from quakedesign.guarantees import LoopAnswer, NoGuarantee, design_held
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.guarantees.search.lqg import measured_by
 from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import uncertain_plant
 from quakedesign.studies import limits
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
@@ -35,7 +36,7 @@ ROWS = {("peak", F(0)): (2.0e-4, 9e-5), ("tracking", F(0)): (2.6e-4, 7e-5), ("pe
 @cache
 def designed(row):
     objective, noise = row
-    return design_held(task_of(REAL), STEP, objective=objective, measured="differentiator", slip_noise=noise)
+    return design_held(uncertain_plant(REAL), STEP, objective=objective, measured="differentiator", slip_noise=noise)
 
 
 @pytest.mark.parametrize("courses", [300, pytest.param(10_000, marks=pytest.mark.slow)])

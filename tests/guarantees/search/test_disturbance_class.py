@@ -13,10 +13,11 @@ import quakedesign as qd
 from quakedesign.cli.design_commands import DesignOptions
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
-from quakedesign.guarantees import design_held, task_of, tightened, worst_found
+from quakedesign.guarantees import design_held, tightened, worst_found
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.adversary import _steepest
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import uncertain_plant
 from quakedesign.studies.comparison import Entry
 
 REAL = qd.load_fault("real-fault")
@@ -43,8 +44,8 @@ def test_a_design_is_proved_for_the_class_that_it_is_asked_for(tide):
 
 def test_a_design_whose_proof_is_asked_for_later_is_judged_by_its_class(tide):
     later = replace(tide, runs=None)
-    assert later.guarantee.task == task_of(REAL, rate_limited=True)
-    assert replace(later, disturbance_class="amplitude").guarantee.task == task_of(REAL)
+    assert later.guarantee.task == uncertain_plant(REAL, rate_limited=True)
+    assert replace(later, disturbance_class="amplitude").guarantee.task == uncertain_plant(REAL)
 
 
 @pytest.mark.parametrize("law", ["elqr", "cta"])
@@ -95,7 +96,7 @@ def test_the_steepest_disturbance_keeps_its_rate_in_short_pieces_too():
 )
 def test_the_worst_found_is_near_what_is_proved_of_the_class_rate(objective, most):
     """For the smallest peak a search that takes the disturbance by the sign of its costate stays at 1.62."""
-    claim = design_held(task_of(REAL, rate_limited=True), F("0.184"), objective=objective)
+    claim = design_held(uncertain_plant(REAL, rate_limited=True), F("0.184"), objective=objective)
     found, claims = worst_found(tightened(claim)), tightened(claim).claims
     assert found.slip_error <= claims.slip_error <= most[0] * found.slip_error
     assert found.slip_rate_error <= claims.slip_rate_error <= most[1] * found.slip_rate_error

@@ -6,18 +6,19 @@ import pytest
 
 from quakedesign import cache
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, task_of
+from quakedesign.guarantees import Guarantee, NoGuarantee
 from quakedesign.guarantees.search import adversary
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search import linear_design as longest_times
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import uncertain_plant
 
 STEP = Fraction("0.184")
 
 
 @pytest.fixture(scope="module")
 def task():
-    return task_of(load_fault("real-fault"))
+    return uncertain_plant(load_fault("real-fault"))
 
 
 def test_what_a_search_proposes_is_decided_each_time(task, monkeypatch):

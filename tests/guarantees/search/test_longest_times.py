@@ -10,7 +10,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, design_held, guarantee, task_of
+from quakedesign.guarantees import Guarantee, NoGuarantee, design_held, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search import linear_design as longest_times
 from quakedesign.guarantees.search.linear_design import (
@@ -23,6 +23,7 @@ from quakedesign.guarantees.search.linear_design import (
 )
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import uncertain_plant
 
 REAL = load_fault("real-fault")
 LAGGING = Path(__file__).parents[2] / "data" / "lagging_fault.toml"
@@ -30,7 +31,7 @@ LAGGING = Path(__file__).parents[2] / "data" / "lagging_fault.toml"
 
 @pytest.fixture(scope="module")
 def task():
-    return task_of(REAL)
+    return uncertain_plant(REAL)
 
 
 @pytest.fixture(scope="module")
@@ -129,9 +130,9 @@ def test_the_longest_step_of_the_real_fault_is_that_of_the_theorem(longest):
 
 def test_it_does_not_depend_on_the_sampling_time_of_the_fault(longest):
     for other in (0.01, 3.0):
-        assert longest_times._first_step(task_of(replace(REAL, sampling_time=other))) == longest_times._first_step(
-            longest.guarantee.task
-        )
+        assert longest_times._first_step(
+            uncertain_plant(replace(REAL, sampling_time=other))
+        ) == longest_times._first_step(longest.guarantee.task)
 
 
 def test_a_design_that_is_missed_at_its_step_is_continued_from_a_longer_one(task, longest):
@@ -155,7 +156,7 @@ def test_every_command_proves_what_the_longest_step_says(task, longest):
 @pytest.mark.slow
 def test_behind_a_lag_with_noise_what_was_proved_at_0_22_s_is_found():
     setup = {"measured": "slip", "lag": F("0.3"), "slip_noise": F(5, 10**6)}
-    found = longest_step(task_of(load_fault(LAGGING)), **setup)
+    found = longest_step(uncertain_plant(load_fault(LAGGING)), **setup)
     assert found.guarantee.held.step >= F("0.22")
     assert found.guarantee.check() is Verdict.PROVED
 

@@ -9,7 +9,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, LoopAnswer, NoGuarantee, best_guarantee, task_of
+from quakedesign.guarantees import Guarantee, LoopAnswer, NoGuarantee, best_guarantee
 from quakedesign.guarantees.search.compensated_search import design_compensated
 from quakedesign.guarantees.search.defaults import deadbeat, sampled_sliding_mode
 from quakedesign.guarantees.search.estimate import closeness
@@ -17,6 +17,7 @@ from quakedesign.guarantees.search.linear_design import Linear, design_held, lon
 from quakedesign.laws import control_law
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import uncertain_plant
 
 REAL = load_fault("real-fault")
 STEP = F("0.184")
@@ -24,7 +25,7 @@ STEP = F("0.184")
 
 @pytest.fixture(scope="module")
 def task():
-    return task_of(REAL)
+    return uncertain_plant(REAL)
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,9 @@ def test_the_smallest_pump_that_will_do_is_named(controller):
     assert found.to_dict()["nearest"]["value"] == [str(low), str(high)]
 
 
-REAL_REST = task_of(REAL).rest_pressure[1] + F(3, 10) * 10**6  # p* at most, and what no design needs more than that
+REAL_REST = (
+    uncertain_plant(REAL).rest_pressure[1] + F(3, 10) * 10**6
+)  # p* at most, and what no design needs more than that
 
 
 @pytest.mark.slow
@@ -62,7 +65,7 @@ def test_the_largest_disturbance_that_does_not_open_the_fault_is_named():
     assert found.found.reason.endswith(": the fault may open")
     name, near = found.nearest
     assert (name, near.check()) == ("amplitude", Verdict.PROVED)
-    assert 0 < near.task.amplitude < task_of(pushed).amplitude
+    assert 0 < near.task.amplitude < uncertain_plant(pushed).amplitude
     more = best_guarantee(replace(near.task, amplitude=near.task.amplitude * F(9, 8)), near.held)
     assert isinstance(more, NoGuarantee)
     assert more.pressed
@@ -84,7 +87,7 @@ def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_muc
 
 def test_the_share_of_the_box_that_will_do_is_named():
     wide = REAL.with_box("ten-percent")
-    name, near = nearest_setup(task_of(wide), F("0.85"))
+    name, near = nearest_setup(uncertain_plant(wide), F("0.85"))
     assert (name, near.check()) == ("box", Verdict.PROVED)
     assert 0 < near.task.spreads[0] == near.task.spreads[2] < F(1, 10)
     found = LoopAnswer(fault=wide, found=NoGuarantee(reason="x", small_gain=None), nearest=("box", near))

@@ -12,11 +12,12 @@ import pytest
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, best_guarantee, design_held, guarantee, task_of, worst_found
+from quakedesign.guarantees import Guarantee, NoGuarantee, best_guarantee, design_held, guarantee, worst_found
 from quakedesign.guarantees.search.linear_design import Longest, closest, design_at
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 from quakedesign.studies import comparison
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))
@@ -33,7 +34,7 @@ def designed(name):
         "slip alone": {"measured": "slip", "slip_noise": NOISE},
         "both": {"slip_noise": NOISE, "rate_noise": F(1, 10**5)},
     }[name]
-    return design_held(task_of(REAL), STEP, objective="peak", **around)
+    return design_held(uncertain_plant(REAL), STEP, objective="peak", **around)
 
 
 def within(largest, claim):
@@ -111,7 +112,7 @@ def test_with_stick_no_course_is_found_that_leaves_the_bounds():
 
 def test_more_noise_is_guaranteed_less():
     claim = designed("slip alone")
-    more = guarantee(task_of(REAL), replace(claim.held, slip_noise=2 * NOISE))
+    more = guarantee(uncertain_plant(REAL), replace(claim.held, slip_noise=2 * NOISE))
     assert more.claims.slip_rate_error > claim.claims.slip_rate_error
     assert more.claims.slip_error > claim.claims.slip_error
 
@@ -168,9 +169,9 @@ def test_the_noisy_run_of_a_design_stays_within_its_guarantee():
 
 
 def test_a_delay_is_designed_for_with_the_slip_alone():
-    near = closest(task_of(REAL), STEP, measured="slip", slip_noise=NOISE, delay=F("0.1"))
+    near = closest(uncertain_plant(REAL), STEP, measured="slip", slip_noise=NOISE, delay=F("0.1"))
     assert near.closeness < 1
-    found = best_guarantee(task_of(REAL), near.held)
+    found = best_guarantee(uncertain_plant(REAL), near.held)
     assert found.held.law.of_slip_alone
     assert (found.held.slip_noise, found.held.delay) == (NOISE, F("0.1"))
     assert found.held.law.states[-1] == "asked_1_ago"

@@ -7,9 +7,10 @@ import pytest
 
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault, Reference, friction_law
-from quakedesign.guarantees import WHOLE, NoGuarantee, SlidingClaims, SlidingGuarantee, sliding_task
+from quakedesign.guarantees import NoGuarantee, SlidingClaims, SlidingGuarantee
 from quakedesign.guarantees.guarantee_result import _beyond
 from quakedesign.guarantees.search.sliding_design import LOG_RATES, farthest, searched_sliding, suitable, what_would_do
+from quakedesign.plant import WHOLE, slow_sliding_plant
 from quakedesign.studies.performance_limits import limits
 
 GOUGE = friction_law("rate-and-state-aging")(
@@ -33,7 +34,7 @@ FAULT = Fault(
     sampling_time=33.0,
     source="a test",
 )
-TASK, STEP = sliding_task(FAULT, Fraction(1)), Fraction(33)
+TASK, STEP = slow_sliding_plant(FAULT, Fraction(1)), Fraction(33)
 CLAIMS = SlidingClaims(**{name: UpperBound(Fraction(1)) for name in SlidingClaims.__dataclass_fields__})
 
 

@@ -13,7 +13,7 @@ from scipy.special import lambertw
 
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, SlidingClaims, SlidingTask
+from quakedesign.guarantees import Held, SlidingClaims
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.sliding_small_gain import cell_bounds
 from quakedesign.guarantees.guarantee_result import answer_sliding
@@ -23,6 +23,7 @@ from quakedesign.guarantees.search.lqg import Weights, sliding_law
 from quakedesign.guarantees.search.sliding_design import LOG_RATES, proved_sliding
 from quakedesign.loop import SlidingModel
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import SlidingPlant
 
 PROOFS = Path(__file__).parents[3] / "proofs"
 SPECIFICATION = importlib.util.spec_from_file_location("smallest_check", PROOFS / "check.py")
@@ -44,7 +45,7 @@ def task(half, stress):
     exact = {"coefficient": (F("0.6"),) * 2, "normal_stress": (F(50 * 10**6),) * 2}
     plant = {"density": F(2700), "shear_modulus": F(30 * 10**9), "length": F(5000), "damping": F(5 * 10**14)}
     moved = {"rate": F("1.2e-6"), "distance": F("0.01"), "ramp": F(12), "stress": F(stress)}
-    return SlidingTask(name="a patch", ranges=ranges | exact, **plant, **moved)
+    return SlidingPlant(name="a patch", ranges=ranges | exact, **plant, **moved)
 
 
 def sizes(claims):

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, best_guarantee, design_held, guarantee, task_of, tightened
+from quakedesign.guarantees import Guarantee, NoGuarantee, best_guarantee, design_held, guarantee, tightened
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search import unclocked
 from quakedesign.guarantees.search.unclocked import unclocked_estimate, unclocked_guarantee
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import uncertain_plant
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"
 
@@ -25,7 +26,7 @@ def stored():
 
 
 def found(rate_limited=False, **changes):
-    task = replace(task_of(load_fault("lab-fault"), rate_limited=rate_limited))
+    task = replace(uncertain_plant(load_fault("lab-fault"), rate_limited=rate_limited))
     return unclocked_guarantee(task, replace(stored().held, **changes))
 
 
@@ -82,7 +83,7 @@ def test_the_estimate_of_a_search_is_near_what_is_proved():
 
 def test_a_design_has_a_law_for_the_middle_of_the_range(monkeypatch):
     monkeypatch.setattr(design, "_FEWER", 12)
-    task, around = task_of(load_fault("lab-fault")), {"longest_step": F(1, 500)}
+    task, around = uncertain_plant(load_fault("lab-fault")), {"longest_step": F(1, 500)}
     claim = design_held(task, F(1, 1000), objective="peak", **around)
     assert isinstance(claim, Guarantee)
     assert claim.claims.slip_rate_error < F("1.6") * stored().claims.slip_rate_error
@@ -90,7 +91,7 @@ def test_a_design_has_a_law_for_the_middle_of_the_range(monkeypatch):
 
 
 def test_a_law_of_the_slip_alone_has_too_many_states():
-    task, around = task_of(load_fault("lab-fault")), {"longest_step": F(1, 500)}
+    task, around = uncertain_plant(load_fault("lab-fault")), {"longest_step": F(1, 500)}
     assert "slip and slip rate" in design_held(task, F(1, 1000), measured="slip", **around).reason
     held = replace(stored().held, law=longer(stored().held.law))
     assert "too many states" in unclocked_guarantee(task, held).reason

@@ -16,7 +16,6 @@ from quakedesign.lyapunov.exact.claim import Equilibrium
 from quakedesign.lyapunov.exact.fault_bounds import (
     Errors,
     coefficient_range,
-    effective_stress,
     largest_matched_rate,
     least_authority,
     sectors,
@@ -32,6 +31,7 @@ from quakedesign.lyapunov.exact.premises import (
     sliding_mode_premises,
 )
 from quakedesign.lyapunov.exact.robustness import LevelSets
+from quakedesign.plant import uncertain_plant
 
 ZERO = Errors(slip=F(0), rate=F(0), acceleration=F(0))
 
@@ -166,9 +166,9 @@ def test_a_certificate_of_other_gains_is_refused(real, proof):
 
 def test_the_effective_stress_covers_the_withdrawal_of_the_errata(real):
     # ERRATA 8: p* down to −5.67 MPa for the fault's own law, so σ' − p* reaches 55.67 MPa; the box allows more
-    stress, positive = effective_stress(real)
-    assert positive
-    assert 55.67e6 < stress < 80e6
+    least, largest = uncertain_plant(real).stress
+    assert least > 0
+    assert 55.67e6 < largest < 80e6
 
 
 def test_sectors_of_the_paper_box_by_hand(real):

@@ -46,7 +46,7 @@ class Friction:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class UncertainPlant:
     """A fault, its reference and its disturbance, as a certificate states them. SI units.
 
     Attributes

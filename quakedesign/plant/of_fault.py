@@ -7,10 +7,9 @@ import sympy as sp
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import fraction_of, rational
 from quakedesign.fault import Fault, SlidingReference
-from quakedesign.guarantees.exact.sliding_task import AXES, SlidingTask
-from quakedesign.guarantees.exact.task import Friction, Task
 from quakedesign.loop import StateLaw
-from quakedesign.lyapunov.exact.fault_bounds import static_friction
+from quakedesign.plant.sliding_plant import AXES, SlidingPlant
+from quakedesign.plant.uncertain_plant import Friction, UncertainPlant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 
 _LAWS: dict[str, tuple[StateLaw, bool]] = {
@@ -23,7 +22,13 @@ _DIGITS = 12
 _LARGEST_RAMP = Fraction(8, 23)
 
 
-def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingTask:
+def static_friction(fault: Fault) -> Fraction:
+    """μ* [-], friction at rest where the fault starts, exact or rounded."""
+    start = sp.nsimplify(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)), rational=True)
+    return fraction_of(start) if start.is_Rational else rational(str(sp.N(start, 50)))
+
+
+def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingPlant:
     """The task of a fault that slides at V, the first rate of its reference, under a stress of at most `stress` [Pa].
 
     The ranges of a, b and D are their values and `spread` of them to both sides [-]; that of μ* follows from a − b.
@@ -60,7 +65,7 @@ def sliding_task(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0))
     ends = {name: (value * (1 - spread), value * (1 + spread)) for name, value in named.items()}
     normal = rational(fault.effective_normal_stress)
     stiffness = rational(fault.shear_modulus) / rational(fault.side)
-    return SlidingTask(
+    return SlidingPlant(
         name=fault.name,
         density=rational(fault.density),
         shear_modulus=rational(fault.shear_modulus),
@@ -87,7 +92,7 @@ def _near(expression: sp.Expr) -> Fraction:
 # The data of a fault that a guarantee uses.
 
 
-def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
+def uncertain_plant(fault: Fault, *, rate_limited: bool = False) -> UncertainPlant:
     """What a guarantee uses of a fault, exactly.
 
     Parameters
@@ -111,7 +116,7 @@ def task_of(fault: Fault, *, rate_limited: bool = False) -> Task:
         )
     stage = sp.Symbol("s")
     shape = sp.Poly(fault.reference.shape(stage), stage).all_coeffs()[::-1]
-    return Task(
+    return UncertainPlant(
         name=fault.name,
         density=rational(fault.density),
         shear_modulus=rational(fault.shear_modulus),

@@ -41,7 +41,7 @@ _WITHIN = {"distance": "m", "swing": "-", "stress": "Pa"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SlidingTask:
+class SlidingPlant:
     """A fault, its box of constants, the reference and the stress disturbance.
 
     Attributes
@@ -93,7 +93,7 @@ class SlidingTask:
             )
         require_known(self.state_law, get_args(StateLaw), "state_law")
 
-    def differences(self, asked: "SlidingTask") -> list[str]:
+    def differences(self, asked: "SlidingPlant") -> list[str]:
         """What of another task a proof for this one does not cover, each with both values, SI; empty if everything is.
 
         Constants of the fault, V, the plan and the law of friction must be the same; constants of friction, distance,
@@ -167,7 +167,7 @@ Cuts = tuple[tuple[str, Fraction] | None, ...]
 WHOLE: Cuts = (None,)
 
 
-def cells(task: SlidingTask, cuts: Cuts) -> tuple[SlidingTask, ...]:
+def cells(task: SlidingPlant, cuts: Cuts) -> tuple[SlidingPlant, ...]:
     """The same task on every cell.
 
     Raises
@@ -192,7 +192,7 @@ def cells(task: SlidingTask, cuts: Cuts) -> tuple[SlidingTask, ...]:
     return tuple(leaves)
 
 
-def parts(task: SlidingTask, axis: str, at: Fraction) -> tuple[SlidingTask, SlidingTask]:
+def parts(task: SlidingPlant, axis: str, at: Fraction) -> tuple[SlidingPlant, SlidingPlant]:
     """Both parts of a box, below and above a cut.
 
     Raises
