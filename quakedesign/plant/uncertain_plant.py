@@ -111,27 +111,27 @@ class UncertainPlant:
     def _spread(self, value: Fraction, number: int) -> Range:
         return value * (1 - self.spreads[number]), value * (1 + self.spreads[number])
 
-    @property
+    @cached_property
     def stiffness(self) -> Range:
         """k̂ = G/(ρL²) [1/s²]."""
         return self._spread(self.shear_modulus / (self.density * self.length**2), 0)
 
-    @property
+    @cached_property
     def specific_damping(self) -> Range:
         """η̂ = η/(ρL³) [1/s]."""
         return self._spread(self.damping / (self.density * self.length**3), 1)
 
-    @property
+    @cached_property
     def area_per_mass(self) -> Range:
         """N̂ = 1/(ρL) [m²/kg]."""
         return self._spread(1 / (self.density * self.length), 2)
 
-    @property
+    @cached_property
     def authority(self) -> Fraction:
         """b = μ_res·N̂_min [m²/kg]."""
         return self.friction.least * self.area_per_mass[0]
 
-    @property
+    @cached_property
     def beta(self) -> Range:
         """β = μN̂/b [-]."""
         return Fraction(1), self.friction.largest * self.area_per_mass[1] / self.authority
@@ -153,7 +153,7 @@ class UncertainPlant:
                        min(law.largest, law.static + law.strengthening * r))
         )  # fmt: skip
 
-    @property
+    @cached_property
     def rest_pressure(self) -> Range:
         """p* [Pa]."""
         return self.normal_stress - self.stress[1], self.normal_stress - self.stress[0]
@@ -186,7 +186,7 @@ class UncertainPlant:
             bounds.append(bound * self.target_slip / self.operation_time**order)
         return bounds[0], bounds[1]
 
-    @property
+    @cached_property
     def reference_jerk(self) -> Fraction:
         """Bound of |r‴| [m/s³] within the task; where r″ jumps at its ends there is none."""
         bound = max(map(abs, _range_of(_derived(self.shape, 3))))
@@ -206,13 +206,13 @@ class UncertainPlant:
                 f"Received one of {self.name} that does not. Feed back the errors."
             )
 
-    @property
+    @cached_property
     def model(self) -> NominalModel:
         """Middle of the ranges."""
         s, w, beta = ((low + high) / 2 for low, high in (self.slip_chord, self.rate_chord, self.beta))
         return NominalModel(slip=s, rate=w, gain=beta * self.authority)
 
-    @property
+    @cached_property
     def half_ranges(self) -> dict[str, Fraction]:
         """Half the ranges of s, w and β by the output that they multiply."""
         return {
@@ -224,13 +224,13 @@ class UncertainPlant:
             )
         }
 
-    @property
+    @cached_property
     def reference_force(self) -> Fraction:
         """Bound of |w·r′ + r″| [m/s²]."""
         first, second = self.reference_rates
         return max(map(abs, self.rate_chord)) * first + second
 
-    @property
+    @cached_property
     def drift(self) -> Fraction:
         """Bound of b·|dp*/dt| [m/s³], β being at least 1."""
         return max(map(abs, self.slip_chord)) * self.reference_rates[0]

@@ -23,7 +23,7 @@ from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, holds
 from quakedesign.guarantees.exact.statement import Guarantee, guarantee
-from quakedesign.guarantees.search.estimate import BoundsEstimate, closeness, estimated
+from quakedesign.guarantees.search.estimate import BoundsEstimate, closeness, estimated, spectral_radius
 from quakedesign.guarantees.search.linear_design import (
     MOST_DELAY,
     OBJECTIVES,
@@ -298,8 +298,11 @@ class Deadbeat(Kind):
             return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
 
         def cost(x: np.ndarray) -> float:
-            known = 0 < x[0] <= 1 and _BESIDE[0] <= x[1] <= _BESIDE[1]
-            return min(closeness(task, self.held(task, x, step, **around))[0], _WORST) if known else _WORST
+            if not (0 < x[0] <= 1 and _BESIDE[0] <= x[1] <= _BESIDE[1]):
+                return 2 * _WORST
+            held = self.held(task, x, step, **around)
+            found = closeness(task, held)[0]
+            return found if found < _WORST else _WORST + min(spectral_radius(held.loop(task)), 1.0)
 
         question = "nearly deadbeat", task, step, tuple(sorted(around.items()))
         least, x = inf, np.array(_STARTS[0])
