@@ -45,10 +45,12 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise ValueError("its values are nested too deeply") from None
 
 
-def read_text(path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError]) -> str:
-    """Text of a file in UTF-8, without a byte-order mark; parameters as in `read_bytes`."""
+def read_text(
+    path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError], marked: bool = True
+) -> str:
+    """Text of a file in UTF-8, without the byte-order mark that it may be `marked` with; others as in `read_bytes`."""
     try:
-        return read_bytes(path, what, largest=largest, refusal=refusal).decode("utf-8-sig")
+        return read_bytes(path, what, largest=largest, refusal=refusal).decode("utf-8-sig" if marked else "utf-8")
     except UnicodeDecodeError:
         raise refusal(f"{what} cannot be read: {path}: its text is not UTF-8. Give a readable file.") from None
 

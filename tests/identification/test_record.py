@@ -19,6 +19,12 @@ def written(tmp_path, *lines):
     return path
 
 
+def test_a_byte_order_mark_is_no_part_of_the_first_column(tmp_path):
+    path = tmp_path / "marked.csv"
+    path.write_text("\n".join([HEAD, *ROWS]) + "\n", encoding="utf-8-sig")
+    np.testing.assert_array_equal(read_record(path).time, read_record(written(tmp_path, HEAD, *ROWS)).time)
+
+
 def test_units_become_si(tmp_path):
     record = read_record(written(tmp_path, "# a remark", HEAD, *ROWS))
     np.testing.assert_allclose(record.time, [0, 0.1, 0.3])

@@ -10,6 +10,7 @@ from quakedesign.errors import CertificateError
 from quakedesign.lyapunov import parse_certificate
 from quakedesign.lyapunov.exact import certificate as checking
 from quakedesign.lyapunov.exact import certificate_files as term_files
+from quakedesign.lyapunov.exact.certificate_files import read_json
 from quakedesign.sos.exact import polynomial_files as files
 from quakedesign.sos.exact import reduction, strict, work
 from quakedesign.sos.exact.polynomial_files import load
@@ -24,6 +25,7 @@ def by_hand(name):
     return module
 
 
+FILES = Path(__file__).parents[2] / "proofs" / "certificates"
 LOOPS, POLYNOMIALS = by_hand("test_check"), by_hand("test_check_polynomials")
 REFUTATIONS = LOOPS.REFUTATIONS + POLYNOMIALS.FUNCTIONALS + POLYNOMIALS.POINTS
 MADE = [(LOOPS, make) for make in LOOPS.PROOFS + LOOPS.REFUTATIONS] + [(POLYNOMIALS, make) for make in POLYNOMIALS.ALL]
@@ -77,6 +79,17 @@ def test_a_changed_number_is_decided_alike(kind, make):
         for new in kind.other_numbers(value):
             changed = kind.edited(document, (*path, new))
             assert by_package(changed) == by_itself(kind, changed), (path, new)
+
+
+@pytest.mark.parametrize(
+    "path", sorted(FILES.glob("*.json"), key=lambda file: file.stat().st_size)[:3], ids=lambda file: file.name
+)
+def test_a_byte_order_mark_is_refused_by_both(path, tmp_path, capsys):
+    marked = tmp_path / "marked.json"
+    marked.write_text(path.read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert LOOPS.checker.report(str(marked)) != 0
+    with pytest.raises(CertificateError, match="JSON"):
+        read_json(marked)
 
 
 LIMITS = {

@@ -103,7 +103,7 @@ def read_json(path: str | Path) -> Any:
     CertificateError
         When it cannot be read, or is no strict JSON.
     """
-    text = read_text(path, "certificate", largest=LARGEST_FILE, refusal=CertificateError)
+    text = read_text(path, "certificate", largest=LARGEST_FILE, refusal=CertificateError, marked=False)
     return parse(text)
 
 
