@@ -9,7 +9,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.simulation.campaign import Campaign, SampleResult, campaign_problem
-from quakedesign.simulation.campaign.campaign_result import LEVELS, Failure
+from quakedesign.simulation.campaign.campaign_result import LEVELS, Failure, figure
 
 PROBLEM = campaign_problem(load_fault("lab-fault"), published("lab-fault")["elqr"], duration=0.1)
 RANDOM = np.random.default_rng(0)
@@ -80,6 +80,24 @@ def test_the_figure_shows_the_share_of_all_samples():
     assert heights.tolist() == [0.25, 0.5, 0.75]
     assert axis.get_xscale() == "log"
     assert "[m]" in axis.get_xlabel()
+
+
+def test_the_figure_marks_the_quantiles_of_all_samples():
+    values = RANDOM.lognormal(size=40).tolist()
+    marks = [line.get_xdata()[0] for line in campaign(values).plot().axes[0].lines[1:]]
+    assert marks == np.quantile(values, (0.05, 0.5, 0.95), method="inverted_cdf").tolist()
+    assert len(campaign([1.0, None]).plot().axes[0].lines) == 3  # of 0.95 there is no value to mark
+
+
+@pytest.mark.parametrize(("count", "places"), [(0, 3), (1, 3), (3, 3), (4, 6), (6, 6), (7, 9)])
+def test_a_figure_has_rows_of_three_and_hides_what_is_left(count, places):
+    axes = figure("title", "caption", {f"{i} [m]": (np.array([1.0, 2.0]), {}) for i in range(count)}).axes
+    assert (len(axes), sum(axis.get_visible() for axis in axes)) == (places, count)
+
+
+def test_a_campaign_has_resumed_nothing_unless_told():
+    found = campaign([1.0])
+    assert (found.to_dict()["resumed"], found.seconds, found.to_dict()["search"]) == (0, 0.0, None)
 
 
 @pytest.mark.parametrize("index", ["7", "search-0", "search-x"])
