@@ -10,6 +10,7 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.simulation.campaign import Campaign, SampleResult, campaign_problem
 from quakedesign.simulation.campaign.campaign_result import LEVELS, Failure, figure
+from quakedesign.simulation.campaign.space import Worst
 
 PROBLEM = campaign_problem(load_fault("lab-fault"), published("lab-fault")["elqr"], duration=0.1)
 RANDOM = np.random.default_rng(0)
@@ -98,6 +99,23 @@ def test_a_figure_has_rows_of_three_and_hides_what_is_left(count, places):
 def test_a_campaign_has_resumed_nothing_unless_told():
     found = campaign([1.0])
     assert (found.to_dict()["resumed"], found.seconds, found.to_dict()["search"]) == (0, 0.0, None)
+
+
+@pytest.mark.parametrize(("metric", "sign"), [("max_slip_error", 1), ("min_pressure", -1)])
+def test_what_the_search_found_is_told_with_its_sign(metric, sign):
+    samples = PROBLEM.sample(0), PROBLEM.sample(1)
+    worst = Worst(metric=metric, value=3.0, sample=samples[1], index=1, looked_at=samples)
+    told = campaign([1.0], search=worst).to_dict()["search"]
+    assert (told["value"], told["index"], told["looked_at"]) == (3.0 * sign, "search-1", 2)
+    assert told["sample"] == samples[1].numbers
+
+
+def test_every_sample_has_its_outcome_and_five_are_named():
+    found = campaign([None] * 7 + [math.nan])
+    told = found.to_dict()
+    assert [outcome and outcome.kind for outcome in found.outcomes] == ["diverged"] * 7 + [None]
+    assert {kind: len(which) for kind, which in found.kinds.items() if which} == {"diverged": 7}
+    assert told["outcomes"]["diverged"] == told["events"]["diverged"] == {"count": 7, "first": [0, 1, 2, 3, 4]}
 
 
 @pytest.mark.parametrize("index", ["7", "search-0", "search-x"])
