@@ -95,6 +95,6 @@ def require_known(
         Of the type `refusal`.
     """
     names = list(known)
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         listed = f"{what} must be one of {', '.join(names) or 'none'}. Received {shown(name)}."
         raise refusal(listed + nearest_name(str(name), names))

@@ -37,13 +37,13 @@ from quakedesign.cli.app import app
 from quakedesign.errors import QuakedesignError
 from quakedesign.exact import rational
 from quakedesign.fault import parse_fault
-from quakedesign.guarantees import Held, guarantee
+from quakedesign.guarantees import Held, guarantee, longest_delay
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.laws import summed_integrals
-from quakedesign.laws.sampled_law import RestLimit
+from quakedesign.laws.sampled_law import PathModel, RestLimit
 from quakedesign.plant import uncertain_plant
-from quakedesign.report import Comparison
+from quakedesign.report import Comparison, scale_lines
 from quakedesign.simulation.campaign import Space, campaign_problem
 from quakedesign.studies import Entry
 from quakedesign.symbolic.term_expressions import real_symbols
@@ -536,6 +536,12 @@ FOUND = [
     (sos.Program(["x"], ["a"]).proposal, (float("nan"),)),
     (partial(SlowGain, parts=10**400, growth=Fraction(1)), ()),
     (partial(SlowGain, parts=-1, growth=Fraction(10**400)), ()),
+    (partial(RestLimit, width=3, per_slip=10**400, resolution=0, least=1, largest=10**400), ()),
+    (PathModel, {"of_errors": (), "of_pressures": (), "of_asked": (), "kept": ()}),
+    (longest_delay, (uncertain_plant(qd.load_fault("real-fault")), Fraction(0))),
+    (scale_lines, ({},)),
+    (qd.LoopSetup, {"measured": np.array([])}),
+    (partial(sos.prove, multiplier=np.array([])), (object(),)),
     (partial(RestLimit, width=Fraction(-1), per_slip=Fraction(10**400), resolution=Fraction(1)), ()),
 ]
 
@@ -543,4 +549,4 @@ FOUND = [
 @pytest.mark.parametrize("call", FOUND, ids=lambda call: getattr(call[0], "__qualname__", None))
 def test_what_was_found_is_refused(call):
     with pytest.raises(QuakedesignError):
-        call[0](*call[1])
+        call[0](**call[1]) if isinstance(call[1], dict) else call[0](*call[1])

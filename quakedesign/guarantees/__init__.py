@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from quakedesign.guarantees.search.linear_design import farthest_rock as farthest_rock
     from quakedesign.guarantees.search.linear_design import longest_delay as longest_delay
     from quakedesign.guarantees.search.linear_design import longest_step as longest_step
-    from quakedesign.guarantees.search.linear_design import reached as reached
     from quakedesign.guarantees.search.linear_design import tightened as tightened
     from quakedesign.loop.loop_setup import MEASURED as MEASURED
 

@@ -454,7 +454,7 @@ def answer_sliding(
         )
     if not 0 <= spread < 1:
         meant = f": {float(spread):g} % is {float(spread) / 100:g}" if 1 <= spread < 100 else ""
-        raise ParameterError(f"a spread must be from 0 to below 1. Received {float(spread):g}. Change it{meant}.")
+        raise ParameterError(f"a spread must be from 0 to below 1. Received {shortly(spread)}. Change it{meant}.")
     if stress is not None and stress <= 0:
         raise ParameterError(f"a stress must be above 0. Received {shortly(stress)} Pa. Change it, or leave it out.")
     if not (around.get("lag") or around.get("diffusion")):

@@ -397,9 +397,9 @@ class PathModel:
     kept: Matrix
 
     def __post_init__(self) -> None:
-        n = len(self.of_pressures[0])
+        n = len(self.kept)
         sizes = [len(row) for row in (*self.kept, *self.of_pressures)]
-        if sizes != [n] * (n + 2) or not self.of_constant[1]:
+        if sizes != [n] * (n + 2) or len(self.of_asked) != 2 or not self.of_constant[1]:
             raise ParameterError(
                 f"a model of {n} pressures needs {n} × {n} numbers of how they are kept, and a constant pressure must "
                 "move the fault. Received another one. Complete it."
@@ -553,7 +553,7 @@ class RestLimit:
 
     def __post_init__(self) -> None:
         if (self.least is None) != (self.largest is None) or not (self.least or 0) <= 0 <= (self.largest or 0):
-            ends = [None if end is None else f"{float(end):.4g} Pa" for end in (self.least, self.largest)]
+            ends = [None if end is None else f"{shortly(end)} Pa" for end in (self.least, self.largest)]
             raise ParameterError(
                 "least and largest pressure of a limit at rest must have 0 between them, both or none of them given. "
                 f"Received {ends[0]} and {ends[1]}. Change them."

@@ -221,7 +221,7 @@ class LoopSetup:
                 )
             object.__setattr__(self, name, exact)
         if self.step is not None and not Fraction(1, 10**9) <= self.step <= 10**9:
-            raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {float(self.step):.4g} s.")
+            raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {shortly(self.step)} s.")
         if self.withdrawal is not None and self.saturation is None:
             raise ParameterError(
                 "withdrawal needs saturation, the largest pressure of the pump. Received withdrawal alone. Give both."

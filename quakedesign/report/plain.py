@@ -4,16 +4,20 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
+from quakedesign.errors import ParameterError
 from quakedesign.studies.scaling import SCALED
 
 # ----------------------------------------------------------------------
 # Gains carried between faults, in lines for people.
 
 _THREE_DIGITS = 0.005
+_KEYS = {"scale_factors", "title", "from", "to", "source_gains", "gains", "published", "exponents", "unrounded"}
 
 
 def scale_lines(answer: Mapping[str, Any]) -> list[str]:
     """The answer of `scale_answer` for people."""
+    if lacking := _KEYS - answer.keys():
+        raise ParameterError(f"answer must be one of scale_answer. Received one without {', '.join(sorted(lacking))}.")
     factors = ", ".join(f"{SCALED[n][0]} = {_short(v)}" for n, v in answer["scale_factors"].items())
     lines = [f"{answer['title']}: {answer['from']} → {answer['to']}"]
     lines += _gain_lines(answer["source_gains"], answer["gains"], answer["published"], answer["exponents"])

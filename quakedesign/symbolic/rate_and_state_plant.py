@@ -12,7 +12,7 @@ from functools import cache, cached_property
 import sympy as sp
 
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.exact import rational
+from quakedesign.exact import rational, shortly
 from quakedesign.fault import Fault, FrictionLaw
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, kept, mu_star, p, sigma
@@ -374,11 +374,11 @@ def operating_rate(fault: Fault, rate: float | str | Fraction | None = None) -> 
     if value < 0 or not low <= value <= high:
         raise ParameterError(
             f"loading_rate must be zero or positive and in the working range {low!r} to {high!r} m/s of {law.name}. "
-            f"Received {float(value)!r} m/s. Change it, or widen the range of the law."
+            f"Received {shortly(value)} m/s. Change it, or widen the range of the law."
         )
     if value > 0 and not is_steady(law.symbolic()):
         raise ParameterError(
             f"loading_rate must be zero for {law.name}, whose friction changes with slip, so that sliding is never "
-            f"steady. Received {float(value)!r} m/s."
+            f"steady. Received {shortly(value)} m/s."
         )
     return value

@@ -15,7 +15,7 @@ import sympy as sp
 from flint import arb, ctx
 
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.exact import end_of, fraction_of, rational, to_sympy
+from quakedesign.exact import end_of, fraction_of, rational, shortly, to_sympy
 from quakedesign.fault import Fault, require_fault
 from quakedesign.symbolic import plant, rate_and_state_plant
 from quakedesign.symbolic import rate_and_state_plant as state_plant
@@ -160,7 +160,7 @@ def _interval(pressure: Pressure, fault: Fault) -> Interval:
     if not ends[0] <= ends[1] < rational(fault.effective_normal_stress):
         raise ParameterError(
             f"pressure must be below the effective normal stress {fault.effective_normal_stress!r} Pa, and a range "
-            f"must ascend. Received {float(ends[0])!r} to {float(ends[1])!r} Pa. Above it the fault opens."
+            f"must ascend. Received {shortly(ends[0])} to {shortly(ends[1])} Pa. Above it the fault opens."
         )
     return ends
 

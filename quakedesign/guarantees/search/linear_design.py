@@ -18,7 +18,7 @@ from scipy.optimize import OptimizeResult, minimize
 
 from quakedesign.cache import search_once
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
-from quakedesign.exact import UpperBound
+from quakedesign.exact import UpperBound, shortly
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.loop import Around, Held
@@ -276,6 +276,8 @@ class _Laws:
     def of(cls, task: UncertainPlant, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
         """Laws for a T_s [s] and what is around them, or why there are none."""
         require_surroundings(around)
+        if step <= 0:
+            raise ParameterError(f"step must be positive. Received {shortly(step)} s. Give T_s.")
         if (none := unpredictable(task, step)) is not None:
             return none
         if reason := why_no_law(step, measured, around):

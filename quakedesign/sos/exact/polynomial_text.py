@@ -457,13 +457,14 @@ def read(
     """
     if isinstance(on, str):
         on = (on,)
-    inputs = [polynomial, *on, *([] if multiplier in (None, _AUTO) else [multiplier])]
+    told = multiplier is None or (isinstance(multiplier, str) and multiplier == _AUTO)
+    inputs = [polynomial, *on, *([] if told else [multiplier])]
     names = tuple(map(str, variables)) if variables is not None else _names_of_inputs(inputs)
     if len(set(names)) < len(names):
         raise PolynomialError(f"variables must be different. Received {', '.join(names)}. Rename one.")
     exact = _polynomial(polynomial, names)
     constraints = [_constraint(c, names) for c in on]
-    factor = multiplier if multiplier in (None, _AUTO) else _polynomial(multiplier, names)
+    factor = multiplier if told else _polynomial(multiplier, names)
     inequalities = tuple(p for kind, p in constraints if kind == "inequality")
     equalities = tuple(p for kind, p in constraints if kind == "equality")
     return names, exact, inequalities, equalities, factor
