@@ -233,8 +233,10 @@ def _test_of_class(hint: type) -> Callable[[Any], bool]:
     numbers = _NUMBERS.get(hint.__name__)
 
     def test(value: Any) -> bool:
+        if hint.__name__ == "ndarray":  # masked arrays are some as well
+            return isinstance(value, hint) and not _lacks_entries(value)
         if type(value) is hint:
-            return hint.__name__ != "ndarray" or not _lacks_entries(value)
+            return True
         if numbers is not None and isinstance(value, numbers):
             return not isinstance(value, bool) and (hint is not float or _is_float(value))
         return isinstance(value, hint) or (hint is bool and type(value).__name__ == "bool")

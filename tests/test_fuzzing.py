@@ -529,6 +529,7 @@ def test_calls(which, tmp_path, monkeypatch):
 
 FOUND = [
     (Space.of(FAULT).sample, (np.array(0.5), 0)),
+    (Space.of(FAULT).sample, (np.ma.masked, -1)),
     (FAULT.reference.shape, (-1e300,)),
     (FAULT.reference.shape, (np.datetime64(1, "Y"),)),
     (real_symbols, ((i for i in range(3)),)),
