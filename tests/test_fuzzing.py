@@ -499,8 +499,9 @@ def calls(draw):
         if parameter.default is not Parameter.empty and draw(st.booleans()):
             continue
         given[parameter.name] = draw(st.sampled_from([*ANYTHING, *fitting(str(parameter.annotation)) * 4]))
-    if public()[name].__name__ in MINUTES and given:
-        given[draw(st.sampled_from(sorted(given)))] = object()
+    single = sorted(k for k in given if signature(public()[name]).parameters[k].kind is not Parameter.VAR_KEYWORD)
+    if public()[name].__name__ in MINUTES and single:
+        given[draw(st.sampled_from(single))] = object()
     return name, given
 
 

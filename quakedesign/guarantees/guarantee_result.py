@@ -95,11 +95,11 @@ class LoopAnswer:
     @property
     def proved(self) -> bool:
         """Whether there is a guarantee."""
-        return isinstance(self.found, Guarantee)
+        return self.found.proved
 
     def lines(self) -> list[str]:
         """For people: the sentence first, then what was seen."""
-        if not isinstance(self.found, Guarantee):
+        if not self.found.proved:
             said = [self.found.sentence()]
             if self.asked_step is not None:
                 said = [f"not guaranteed at T_s = {float(self.asked_step):g} s: {self.found.reason}"]
@@ -130,7 +130,7 @@ class LoopAnswer:
 
         Then what is measured no longer answers to the pressure, and the law is left to itself.
         """
-        if not isinstance(self.found, Guarantee):
+        if not self.found.proved:
             return None
         held = self.found.held
         growth = float(np.max(np.abs(own_poles(held.law)), initial=0.0))
@@ -139,7 +139,7 @@ class LoopAnswer:
     @property
     def differentiator_bound(self) -> UpperBound | None:
         """λ_d [m/s³] from which on the differentiator tells what is proved; None for a law without one."""
-        if not isinstance(self.found, Guarantee) or measured_by(self.found.held.law) != MEASURED[2]:
+        if not self.found.proved or measured_by(self.found.held.law) != MEASURED[2]:
             return None
         return UpperBound(least_bound(self.found.slip_acceleration, self.found.held.slip_noise, self.found.held.step))
 
@@ -166,7 +166,7 @@ class LoopAnswer:
     def limit_lines(self) -> list[str]:
         """What no controller can do at the same T_s, for people; empty where that is not known."""
         limit = self.limit
-        if limit is None or not isinstance(self.found, Guarantee):
+        if limit is None or not self.found.proved:
             return []
         held = self.found.held
         step = f"{float(max(held.step, held.longest_step)):.6g} s"
@@ -182,7 +182,7 @@ class LoopAnswer:
     def _narrower_class(self) -> list[str]:
         """That the fault's own disturbance belongs to the class ``rate`` as well, for people."""
         given = self.fault.disturbance
-        own = isinstance(self.found, Guarantee) and self.found.task.change is None
+        own = self.found.proved and self.found.task.change is None
         if not own or given.constant or not given.largest_rate:
             return []
         change = UpperBound(self.fault.disturbance_bounds[1])
@@ -194,7 +194,7 @@ class LoopAnswer:
     @property
     def limit(self) -> SmallestPeak | None:
         """What no controller can do at the same T_s and delay, told as much; None for the class ``rate``."""
-        if not isinstance(self.found, Guarantee) or self.found.task.change is not None:
+        if not self.found.proved or self.found.task.change is not None:
             return None
         held = self.found.held
         rate_noise = None if held.law.of_slip_alone else held.rate_noise
@@ -204,7 +204,7 @@ class LoopAnswer:
     @property
     def leaves_with_stick(self) -> bool:
         """Whether a course with stick was found beyond the claims."""
-        if not isinstance(self.found, Guarantee) or self.worst_with_stick is None:
+        if not self.found.proved or self.worst_with_stick is None:
             return False
         claims, seen = self.found.claims, self.worst_with_stick
         (least, largest), ends = claims.pressures[-1], seen.pressures
@@ -214,7 +214,7 @@ class LoopAnswer:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        if not isinstance(self.found, Guarantee):
+        if not self.found.proved:
             gain = self.found.small_gain
             other = self.shorter
             shorter = None if other is None else {"step": str(other.held.step), **other.claims.to_dict()}
@@ -307,7 +307,7 @@ def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> LoopAnswer:
     Where a course with stick leaves a claim of a slow input gain, that of any gain takes its place if it is wider than
     the course.
     """
-    if isinstance(found, NoGuarantee):
+    if not found.proved:
         return LoopAnswer(fault=fault, found=found)
     seen = LoopAnswer(
         fault=fault, found=found, worst=worst_found(found), worst_with_stick=worst_found(found, sticks=True)
@@ -317,7 +317,7 @@ def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> LoopAnswer:
 
 def _with_room(seen: LoopAnswer, found: Guarantee) -> LoopAnswer:
     anyhow, worst = guarantee(found.task, found.held), seen.worst_with_stick
-    if isinstance(anyhow, NoGuarantee) or worst is None:
+    if not anyhow.proved or worst is None:
         return seen
     left = ["slip_error"] if worst.slip_error > found.claims.slip_error else []
     left += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate_error > found.claims.slip_rate_error else []
@@ -376,12 +376,12 @@ class SlidingAnswer:
     @property
     def proved(self) -> bool:
         """Whether there is a guarantee."""
-        return isinstance(self.found, SlidingGuarantee)
+        return self.found.proved
 
     @cached_property
     def worst(self) -> WorstSliding | None:
         """The worst that a search finds, beside a guarantee; some tenths of a second for every corner of the box."""
-        return worst_sliding(self.found) if isinstance(self.found, SlidingGuarantee) else None
+        return worst_sliding(self.found) if self.found.proved else None
 
     def lines(self) -> list[str]:
         """For people."""
@@ -400,7 +400,7 @@ class SlidingAnswer:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        if not isinstance(self.found, SlidingGuarantee):
+        if not self.found.proved:
             return {"verdict": "undecided", "sentence": self.found.sentence(), "reason": self.found.reason}
         held = self.found.held
         return {
@@ -483,13 +483,13 @@ def answer_sliding(
         smaller = _answer(task, held_over, log_rate, around, prove, reach.numbers)
         more = smaller.proved and (not answer.proved or smaller.task.stress > answer.task.stress)
         answer = smaller if more else answer
-    if isinstance(answer.found, NoGuarantee) and not remedy and stress:
+    if not answer.found.proved and not remedy and stress:
         pumped: dict[str, Any] = {} if pump is None else {"pump": pump}
         remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, **around, **pumped))
         if remedy and answer.held is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
             answer = replace(answer, found=NoGuarantee(reason=none, small_gain=None))
-    if isinstance(answer.found, NoGuarantee):
+    if not answer.found.proved:
         why = (stress and _beyond(fault, stress, around)) or answer.found.reason
         return replace(answer, found=replace(answer.found, reason="; ".join(filter(None, (why, remedy)))))
     return answer
@@ -567,7 +567,7 @@ def _answer(
 
 def _held_by(pump: Pump | None, found: SlidingGuarantee | NoGuarantee) -> SlidingGuarantee | NoGuarantee:
     """A guarantee whose pressures at the valve the pump can hold."""
-    if pump is None or isinstance(found, NoGuarantee):
+    if pump is None or not found.proved:
         return found
     too_much = pump.exceeded(*found.valve_pressures)
     return NoGuarantee(reason=too_much, small_gain=None) if too_much else found

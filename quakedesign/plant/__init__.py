@@ -8,11 +8,11 @@ if TYPE_CHECKING:
     from quakedesign.plant.of_fault import slow_sliding_plant as slow_sliding_plant
     from quakedesign.plant.of_fault import static_friction as static_friction
     from quakedesign.plant.of_fault import uncertain_plant as uncertain_plant
+    from quakedesign.plant.ranges import UncertainPlant as UncertainPlant
     from quakedesign.plant.sliding_plant import WHOLE as WHOLE
     from quakedesign.plant.sliding_plant import Cuts as Cuts
     from quakedesign.plant.sliding_plant import SlidingPlant as SlidingPlant
     from quakedesign.plant.sliding_plant import cells as cells
     from quakedesign.plant.sliding_plant import parts as parts
-    from quakedesign.plant.uncertain_plant import UncertainPlant as UncertainPlant
 
 face(__name__)

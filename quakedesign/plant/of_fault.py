@@ -8,8 +8,8 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import fraction_of, rational
 from quakedesign.fault import Fault, SlidingReference
 from quakedesign.loop import StateLaw
+from quakedesign.plant.ranges import Friction, UncertainPlant
 from quakedesign.plant.sliding_plant import AXES, SlidingPlant
-from quakedesign.plant.uncertain_plant import Friction, UncertainPlant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 
 _LAWS: dict[str, tuple[StateLaw, bool]] = {

@@ -200,10 +200,10 @@ def peaks_sentence(peaks: Mapping[str, ContinuousPeaks | NoGuarantee]) -> str:
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
         + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
         for name, proved in peaks.items()
-        if isinstance(proved, ContinuousPeaks)
+        if proved.proved
     ]
     if not said:
-        reasons = {proved.reason for proved in peaks.values() if isinstance(proved, NoGuarantee)}
+        reasons = {proved.reason for proved in peaks.values() if not proved.proved}
         return "; ".join(["no bound on the slip rate is certified", *sorted(reasons)])
     return "certified from rest, p acting at once: slip rate below " + ", ".join(said)
 
@@ -333,7 +333,7 @@ def part_of_task(run: Trajectory, fault: Fault) -> str:
 def _verdict(design: Design) -> list[str]:
     """Of the loop that ran or in continuous time, with the reason where it is not positive."""
     if design.verdict is Verdict.PROVED:
-        lasts = "for ever" if design.runs is None or isinstance(design.runs, NoGuarantee) else design.runs.lasts
+        lasts = "for ever" if design.runs is None or not design.runs.proved else design.runs.lasts
         return [f"proved for the loop that ran, {lasts}" if _sampled(design) else "proved in continuous time"]
     unsaid = {Verdict.REFUTED: "a counterexample checks in exact arithmetic", Verdict.UNDECIDED: "no certificate"}
     return _because(design.verdict, design.details.get("reason", unsaid[design.verdict]))

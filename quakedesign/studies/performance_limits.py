@@ -462,7 +462,7 @@ def _sliding_limits(
     told = setup if setup is not None and setup.path else None
     near = near_path(model)
     answer = None if setup is None else answer_sliding(fault, stress=asked, spread=off, diffusion=near)
-    found = answer.found if answer is not None and isinstance(answer.found, SlidingGuarantee) else None
+    found = answer.found if answer is not None and answer.found.proved else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
         raise ParameterError(
@@ -473,7 +473,7 @@ def _sliding_limits(
     farthest, rock = longest_diffusion(push, withdrawal, step), (told or IDEAL).diffusion
     if told is not None and (farthest is None or rock <= farthest):
         behind = answer_sliding(fault, stress=asked, spread=off, **told.around()).found
-        found = behind if isinstance(behind, SlidingGuarantee) else None
+        found = behind if behind.proved else None
         push = replace(push, amplitude=found.task.stress) if found else push
     impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
     proved: dict[str, Bound | None] = {}
@@ -518,7 +518,7 @@ def _proved_steps(task: UncertainPlant, step: Fraction, told: Told) -> tuple[tup
 def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
     """Of a design for the smallest slip-rate error and one that tracks, that with the smaller one that is proved."""
     tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.around)
-    found = [least_peak, *([tracking] if isinstance(tracking, Guarantee) else [])]
+    found = [least_peak, *([tracking] if tracking.proved else [])]
     return min(found, key=lambda g: g.claims.slip_rate_error)
 
 

@@ -101,15 +101,15 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
                 return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
             summed = told_by_differences(summed, step) if differs else summed
             given = best_guarantee(task, Held(law=summed, step=step, **around))
-            if isinstance(given, Guarantee):
+            if given.proved:
                 return attacked(fault, given)
             other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
-            if isinstance(other.found, Guarantee):
+            if other.found.proved:
                 return LoopAnswer(fault=fault, found=given, nearest=(GAINS, other.found))
             return replace(other, found=given)
         told: Any = {"measured": setup.measured, **around}
         found = design_held(task, step, objective=wanted.objective, **told)
-        if isinstance(found, Guarantee):
+        if found.proved:
             return attacked(fault, found)
         if setup.longest_step or found.pressed:
             nearest = nearest_setup(task, step, pressed=found.pressed, **told)
@@ -162,7 +162,7 @@ def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     wanted, fault = problem.sliding, problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))
     answer = answer_sliding(fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, diffusion=path)
-    reason = answer.found.reason if isinstance(answer.found, NoGuarantee) else None
+    reason = answer.found.reason if not answer.found.proved else None
     if answer.held is None:
         return problem.undecided(law.name, str(reason), sliding=answer)
     assumed = None if wanted.diffusion else f"a well near the fault, L^2/D = {float(path):g} s"

@@ -21,8 +21,8 @@ from quakedesign.laws.implicit_root import MOST_TERMS
 from quakedesign.loop import ContinuousLaw
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.certificate_files import GUARANTEE, SLOW_SLIDING, kind_of, read_json
+from quakedesign.plant.ranges import Friction, UncertainPlant
 from quakedesign.plant.sliding_plant import AXES, MOST_CELLS, Cuts, SlidingPlant, cells
-from quakedesign.plant.uncertain_plant import Friction, UncertainPlant
 from quakedesign.sos.exact.strict import (
     headed,
     listed,

@@ -19,7 +19,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, end_of
 from quakedesign.guarantees.exact.norms import ball, upper
 from quakedesign.loop import SlidingModel
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 
 # ----------------------------------------------------------------------
 # What no controller can do with a fault in slow sliding, of its linearisation: two theorems, in ball arithmetic.

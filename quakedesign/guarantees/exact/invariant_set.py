@@ -35,7 +35,7 @@ from quakedesign.guarantees.exact.loop import Channel, Held, channels_of
 from quakedesign.guarantees.exact.norms import absolute, ball, column, majorant, matrix, upper
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, unshifted
 from quakedesign.loop import PeriodicLoop
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 
 _BITS, _ZERO = 128, Fraction(0)
 SOONEST = 4  # pieces of the shortest interval, for integrals

@@ -17,7 +17,7 @@ from quakedesign.guarantees.exact.norms import START
 from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, NominalModel
 from quakedesign.loop import Instants, Layer, PeriodicLoop, held_loop, starts, with_known_area
 from quakedesign.loop.loop_setup import Pump
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 
 if TYPE_CHECKING:
     from quakedesign.laws import SampledController

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from itertools import chain
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 from flint import arb, ctx
 
@@ -19,7 +19,7 @@ from quakedesign.guarantees.exact.norms import ball, flow_norms, norms
 from quakedesign.laws import ImplicitRoot, NominalModel, Power
 from quakedesign.loop import PeriodicLoop
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 
 # ----------------------------------------------------------------------
 # The robust small-gain theorem for a loop that runs: bounds for ever, in exact arithmetic.
@@ -201,6 +201,7 @@ class NoGuarantee:
         Whether it is the pressure alone that fails: more than a pump can hold, or enough to open the fault.
     """
 
+    proved: ClassVar[Literal[False]] = False
     reason: str
     small_gain: UpperBound | None
     needs: Fraction | None = None

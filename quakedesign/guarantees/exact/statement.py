@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
 from math import ceil, floor, log10
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, six_digits
@@ -27,8 +27,8 @@ from quakedesign.guarantees.exact.small_gain import (
 from quakedesign.laws import RestLimit
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant.ranges import Friction, UncertainPlant
 from quakedesign.plant.sliding_plant import Cuts, SlidingPlant, cells
-from quakedesign.plant.uncertain_plant import Friction, UncertainPlant
 
 if TYPE_CHECKING:
     from quakedesign.laws import SampledController
@@ -201,6 +201,7 @@ class Guarantee:
         For what it holds, and for how long, in short.
     """
 
+    proved: ClassVar[Literal[True]] = True
     task: UncertainPlant
     held: Held
     claims: Claims
@@ -502,6 +503,7 @@ class ContinuousPeaks:
     claims : Claims
     """
 
+    proved: ClassVar[Literal[True]] = True
     task: UncertainPlant
     law: ContinuousLaw
     claims: Claims
@@ -645,6 +647,7 @@ class SlidingGuarantee:
     claims : SlidingClaims
     """
 
+    proved: ClassVar[Literal[True]] = True
     task: SlidingPlant
     held: Held
     cuts: Cuts

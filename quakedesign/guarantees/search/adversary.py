@@ -22,8 +22,8 @@ from quakedesign.laws import NOISES
 from quakedesign.laws.implicit_root import root_of
 from quakedesign.loop import PeriodicLoop
 from quakedesign.loop.periodic import Matrix, Row
+from quakedesign.plant.ranges import UncertainPlant
 from quakedesign.plant.sliding_plant import SlidingPlant
-from quakedesign.plant.uncertain_plant import UncertainPlant
 
 # ----------------------------------------------------------------------
 # The worst that a search finds on the loop of a guarantee: what is seen, beside what is proved.

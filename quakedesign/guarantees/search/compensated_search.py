@@ -42,7 +42,7 @@ from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.implicit import end_rate, end_slip
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 from quakedesign.symbolic import SignedPower
 
 # ----------------------------------------------------------------------
@@ -170,7 +170,7 @@ class Compensation:
         )
 
     def _end(self) -> str:
-        if isinstance(self.found, NoGuarantee) or self.found.held.law.root is None:
+        if not self.found.proved or self.found.held.law.root is None:
             return ""
         root = self.found.held.law.root
         low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
@@ -344,13 +344,13 @@ class Deadbeat(Kind):
             return None
         near = self.closest(task, step, longest.numbers, **around)
         made = None if isinstance(near, NoGuarantee) else self.made(task, step, near.numbers, **around)
-        return made if made is not None and isinstance(made.found, Guarantee) else None
+        return made if made is not None and made.found.proved else None
 
     def at(self, task: UncertainPlant, longest: Longest, objective: str = "peak") -> Compensation:
         """Design for the longest T_s and all else of a guarantee: as others are made, else that of the search."""
         held = longest.guarantee.held
         made = design_compensated(task, self.controller, held.step, objective=objective, **held.around)
-        if isinstance(made.found, Guarantee):
+        if made.found.proved:
             return made
         return self.made(task, held.step, longest.numbers, **held.around)
 

@@ -31,7 +31,7 @@ from quakedesign.laws import SlidingMode
 from quakedesign.loop import schemes
 from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.lyapunov.exact.premises import Premise
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 
 # ----------------------------------------------------------------------
 # The default designs of a fault: for its own T_s, else for the longest T_s that has a guarantee.

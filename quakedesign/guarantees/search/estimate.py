@@ -18,7 +18,7 @@ from quakedesign.guarantees.exact.norms import START
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, SlowGain, bounds_from
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 
 # ----------------------------------------------------------------------
 # The bounds of a guarantee in floats, for searches: proposes, decides nothing.

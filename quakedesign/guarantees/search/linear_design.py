@@ -47,7 +47,7 @@ from quakedesign.loop import PeriodicLoop, exact_integrals
 from quakedesign.loop.loop_setup import MEASURED, Pump
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.of_fault import uncertain_plant
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 
 # ----------------------------------------------------------------------
 # Guarantees that use how slowly the input gain changes, where friction depends on the slip alone.
@@ -65,10 +65,10 @@ def best_guarantee(task: UncertainPlant, held: Held) -> Guarantee | NoGuarantee:
         return unclocked_guarantee(task, held)
     slow = slow_gain(task, held)
     found = guarantee(task, held) if slow is None else guarantee(task, held, slow)
-    if slow is None or isinstance(found, Guarantee):
+    if slow is None or found.proved:
         return found
     anyhow = guarantee(task, held)
-    return anyhow if isinstance(anyhow, Guarantee) else found
+    return anyhow if anyhow.proved else found
 
 
 @overload
@@ -77,10 +77,10 @@ def tightened(found: Guarantee) -> Guarantee: ...
 def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee: ...
 def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee:
     """A guarantee with a slow input gain in place of one with any, where there is one."""
-    if isinstance(found, NoGuarantee) or found.slow_gain is not None or found.reach is not None:
+    if not found.proved or found.slow_gain is not None or found.reach is not None:
         return found
     better = best_guarantee(found.task, found.held)
-    return better if isinstance(better, Guarantee) else found
+    return better if better.proved else found
 
 
 def slow_gain(task: UncertainPlant, held: Held) -> SlowGain | None:
@@ -243,21 +243,21 @@ def design_held(
         leaner = best_guarantee(task, laws.held(laws.least_pressure(x)[1]))
         found = leaner if isinstance(leaner, Guarantee) else found
     noise = {name: v for name, v in laws.template.noise.items() if v}
-    if isinstance(found, Guarantee) or not noise:
+    if found.proved or not noise:
         return found
     quiet = around | dict.fromkeys(noise, Fraction(0))
     without = design_held(task, step, objective=objective, room=room, measured=measured, **quiet)  # type: ignore[arg-type]
-    return found if isinstance(without, NoGuarantee) else _with_noise(without, noise)
+    return found if not without.proved else _with_noise(without, noise)
 
 
 def _with_noise(without: Guarantee, noise: Mapping[str, Fraction]) -> Guarantee | NoGuarantee:
     """What a law that is proved without noise comes to with it: no small gain depends on noise."""
     held = replace(without.held, **noise)  # type: ignore[arg-type]
     found = best_guarantee(without.task, held)
-    if isinstance(found, Guarantee):
+    if found.proved:
         return found
     anyhow = guarantee(without.task, held)  # with an input gain that may jump, which noise does not move
-    why = anyhow.reason if isinstance(anyhow, NoGuarantee) and anyhow.small_gain is None else "nothing is proved"
+    why = anyhow.reason if not anyhow.proved and anyhow.small_gain is None else "nothing is proved"
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     said = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
     return replace(found, reason=f"with {said} {why}; without it a law is proved")
@@ -582,16 +582,14 @@ def continued(
     if longest is None or longest.guarantee.held.step < step:
         return None
     found = nearby(task, step, longest.numbers, measured=measured, **around)
-    return found if isinstance(found, Guarantee) else None
+    return found if found.proved else None
 
 
 def design_at(task: UncertainPlant, longest: Longest) -> Guarantee:
     """Design for a small slip-rate error at T_s and all else of a guarantee, which stays where there is none."""
     held = longest.guarantee.held
     found = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), **held.around)
-    return min(
-        (longest.guarantee, *([found] if isinstance(found, Guarantee) else [])), key=lambda g: g.claims.slip_rate_error
-    )
+    return min((longest.guarantee, *([found] if found.proved else [])), key=lambda g: g.claims.slip_rate_error)
 
 
 def longest_delay(
@@ -694,7 +692,7 @@ def _less_pressed(laws: Kind, task: UncertainPlant, step: Fraction, around: Arou
         return None
     if pump is not None and pump.limits is not None:
         found = best_guarantee(task, replace(held, pump=_unlimited(pump)))
-        if isinstance(found, Guarantee):
+        if found.proved:
             low, high = map(Fraction, found.claims.pressures[-1])
             wider = replace(pump, least=min(pump.limits[0], low), largest=max(pump.limits[1], high))
             return SATURATION, replace(found, held=replace(found.held, pump=wider))
@@ -779,7 +777,7 @@ def _farthest(
     for _ in range(_ATTEMPTS if good is not None else 0):
         assert good is not None
         proof = laws.proved(ask(at)[0], good)
-        if isinstance(proof, Guarantee):
+        if proof.proved:
             return Longest(proof, good.numbers)
         at = Fraction(f"{float(at * _BACK):.3g}")
         nearer = search(at, good.numbers)
@@ -839,7 +837,7 @@ def reached(
     time, good, bad, small_gain = first, None, None, None
     for _ in range(attempts):
         answer = attempt(time)
-        if isinstance(answer, Guarantee):
+        if answer.proved:
             found.append(answer)
             good = time
         else:
@@ -906,7 +904,7 @@ def certified_peaks(
         continuous_peaks(uncertain_plant(fault, rate_limited=disturbance_class == "rate"), law),
         controller.limits,
     )
-    if limits is None or isinstance(found, NoGuarantee):
+    if limits is None or not found.proved:
         return found
     low, high = found.claims.least_pressure, found.claims.largest_pressure
     if limits.lowest < low and high < limits.highest:

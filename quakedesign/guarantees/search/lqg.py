@@ -37,7 +37,7 @@ from quakedesign.loop import SHORTEST, Layer, SlidingModel
 from quakedesign.loop.layer import MODES
 from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.loop.sensing.differentiator import ORDER, names_before, told_by_differences
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_rate
 
 # ----------------------------------------------------------------------

@@ -13,7 +13,7 @@ from quakedesign.guarantees.exact.loop import Held, channels_of
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee
 from quakedesign.guarantees.exact.statement import Guarantee, guarantee
 from quakedesign.guarantees.search.estimate import BoundsEstimate, gains_of, short
-from quakedesign.plant.uncertain_plant import UncertainPlant
+from quakedesign.plant.ranges import UncertainPlant
 
 MOST_SIZE = 3  # entries of the state at a sample: hulls of more take too long
 _SAMPLE_PIECES, _BETWEEN_PIECES = 6, 8
@@ -37,7 +37,7 @@ def unclocked_guarantee(task: UncertainPlant, held: Held) -> Guarantee | NoGuara
         if not isinstance(reach, InvariantPolytope):
             return reach or found
         found = guarantee(task, held, reach=reach)
-        if isinstance(found, Guarantee):
+        if found.proved:
             break
     return found
 

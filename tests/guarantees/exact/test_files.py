@@ -17,7 +17,6 @@ from quakedesign.errors import CertificateError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Held, continuous_peaks, guarantee
-from quakedesign.guarantees.exact import task as package_task
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, save_guarantee
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import (
@@ -33,6 +32,7 @@ from quakedesign.laws import (
 from quakedesign.loop import exact_integrals
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import ranges as package_task
 from quakedesign.plant import uncertain_plant
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"

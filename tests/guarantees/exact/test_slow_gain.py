@@ -20,7 +20,7 @@ from quakedesign.laws import summed_integrals
 from quakedesign.loop import PeriodicLoop
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
-from quakedesign.plant.uncertain_plant import Friction, UncertainPlant
+from quakedesign.plant.ranges import Friction, UncertainPlant
 
 SLOW = SlowGain(parts=2, growth=F(1, 9))
 FRICTION = Friction(static=F(4), least=F(4), largest=F(4), weakening=F(5), strengthening=F(2), rate_slope=F(0))

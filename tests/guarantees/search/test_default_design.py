@@ -14,7 +14,8 @@ from quakedesign.cli.design_commands import positive
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, design_held, guarantee, reached
+from quakedesign.guarantees import Guarantee, NoGuarantee, design_held, guarantee
+from quakedesign.guarantees.search.linear_design import reached
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
 from quakedesign.report import page

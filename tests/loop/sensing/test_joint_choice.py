@@ -16,7 +16,7 @@ from quakedesign.simulation import simulate
 
 LAB = load_fault("lab-fault")
 PUBLISHED = published("lab-fault")
-IDLE = control_law("elqr")(gains=dict.fromkeys(PUBLISHED["elqr"].gain_units, 0.0))
+IDLE = control_law("elqr")(gains=dict.fromkeys(PUBLISHED["elqr"].gain_units, 0))
 ACCELERATION = {1e-5: 0.073, 1e-4: 3.0}  # of the sampled 2-CTA with exact states [m/s²]
 
 
@@ -32,7 +32,7 @@ def test_the_swing_of_a_linear_law_is_its_gains_times_the_errors():
 
 @pytest.mark.parametrize("signs", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
 def test_errors_of_either_sign_are_thought_of(signs):
-    gains = dict.fromkeys(PUBLISHED["elqr"].gain_units, 0.0)
+    gains = dict.fromkeys(PUBLISHED["elqr"].gain_units, 0)
     slip, rate, *_ = gains
     law = control_law("elqr")(gains=gains | {slip: 3e8 * signs[0], rate: 7e5 * signs[1]})
     assert pressure_swing(law, 1e-6, 1e-3) == pytest.approx(300 + 700, rel=1e-12)
