@@ -34,7 +34,7 @@ def test_the_swing_of_a_linear_law_is_its_gains_times_the_errors():
 def test_errors_of_either_sign_are_thought_of(signs):
     gains = dict.fromkeys(PUBLISHED["elqr"].gain_units, 0)
     slip, rate, *_ = gains
-    law = control_law("elqr")(gains=gains | {slip: 3e8 * signs[0], rate: 7e5 * signs[1]})
+    law = control_law("elqr")(gains=gains | {slip: 3 * 10**8 * signs[0], rate: 7 * 10**5 * signs[1]})
     assert pressure_swing(law, 1e-6, 1e-3) == pytest.approx(300 + 700, rel=1e-12)
 
 
