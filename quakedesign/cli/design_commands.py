@@ -40,38 +40,39 @@ _SHARED = ("objective", "continuous", "stress", "spread", "disturbance_class")
 @of_the_setup("delay", "lag", "diffusion", "slip_noise", "rate_noise")
 @dataclass(frozen=True, kw_only=True)
 class DesignOptions(WellOptions):
-    """Which controllers are designed for a fault, and how.
+    """Controllers to design for a fault, and the design options.
 
     Parameters
     ----------
     controller
-        Law to design: cta, dia, elqr or all.
+        Control law to design: cta, dia, elqr or all.
     objective
-        tracking, or peak for the smallest guaranteed slip-rate error.
+        tracking, or peak for the smallest certified slip-rate error.
     continuous
-        Design in continuous time, as in the paper, in place of the loop that samples and holds with a guarantee.
+        Design in continuous time, as in the paper, instead of for the sampled loop with a guarantee.
     measured
-        What the e-LQR that samples is told: slip-and-rate, or slip, from which it estimates the slip rate; with slip
-        sliding modes are told both as they are.
+        Measurement of the sampled e-LQR: slip-and-rate, or slip, from which it estimates the slip rate. Sliding modes
+        measure both.
     disturbance_class
-        Of the guarantee: amplitude, any disturbance as large as the fault's; rate, one that starts at 0 and is no
-        faster either, such as a tide.
+        Disturbances of the guarantee: amplitude, any of the fault's amplitude; rate, also with the fault's rate of
+        change, starting at 0, such as a tide.
     scheme
-        Of the runs of gains designed with --continuous: continuous (unless given), as in the paper, or sampled and
-        held: explicit, implicit, semi-implicit, compensated. Others run as they were designed.
+        Scheme of the runs of gains from --continuous: continuous (default, as in the paper), or sampled with a
+        zero-order hold: explicit, implicit, semi-implicit, compensated. Other designs run as designed.
     well
         Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
     diffusivity
-        Of the rock between well and fault, such as '0.5 m^2/s'.
+        Hydraulic diffusivity of the rock between well and fault, such as '0.5 m^2/s'.
     stress
-        Of such a fault: bound of the shear stress disturbance, such as '25 kPa'; the largest that the design stands
-        unless given.
+        Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; by default the largest that the
+        design withstands.
     spread
-        Of such a fault: by how much of their values a, b and D_c may be off, such as 0.1.
+        Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     published_scheme
-        Of the runs of published gains, see --scheme.
+        Scheme of the runs of published gains, see --scheme.
     whole_task
-        Of such a fault: run all of a slow task, not 500 D_c/V of it; the proof is about all of it either way.
+        Rate-and-state faults: simulate the whole task instead of 500 D_c/V of it. The proof covers the whole task in
+        either case.
     """
 
     controller: str = "all"
@@ -155,18 +156,18 @@ def design(
     verbose: Annotated[bool, Parameter(negative="")] = False,
     output: Output = PLAIN,
 ) -> int:
-    """Derive, synthesise, prove, simulate, compare with the published gains, and write a report.
+    """Design, prove and simulate controllers, compare them with published gains, and write a report.
 
-    Every designed controller runs as it is guaranteed: sampled, held over T_s. Exit code 0 if every one is proved, for
-    the fault's T_s, and its run is neither an earthquake nor diverges nor opens the fault; with --continuous, if its
-    premise along the reference holds as well; 1 otherwise.
+    Every designed controller runs as it is guaranteed: sampled, with a zero-order hold over T_s. Exit code 0 if every
+    design is proved at the fault's T_s and no run is an earthquake, diverges or opens the fault; with --continuous, if
+    the premise along the reference holds too. Exit code 1 otherwise.
 
     Parameters
     ----------
     out
-        Folder to write; ./quakedesign-FAULT unless given.
+        Output folder; ./quakedesign-FAULT by default.
     verbose
-        Print every premise, certified domain and feed-forward too, as they stand in the report.
+        Also print premises, certified domains and feed-forward terms, as in the report.
     """
     from quakedesign.report.folder import prepare
 
@@ -242,9 +243,9 @@ def compare(
     options: DesignOptions = _FIGURES_AS_USUAL,
     output: Output = PLAIN,
 ) -> int:
-    """Design, prove, simulate and compare with the published gains as `design` does, and write nothing.
+    """Run the same work as `design` and print the comparison without writing files.
 
-    Exit code as `design`.
+    Exit code as for `design`.
     """
     from quakedesign.report.comparison_table import designed_comparison
     from quakedesign.report.folder import results
@@ -276,14 +277,14 @@ def figures(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Draw the figures of the paper that show simulations, for any fault, published gains beside designed ones.
+    """Draw the paper's figures of simulations for any fault, with published and designed gains.
 
-    Writes a folder as `design` does, with these figures in addition, and their numbers in numbers.csv and results.json.
+    Writes the folder of `design`, these figures, and their numbers in numbers.csv and results.json.
 
     Parameters
     ----------
     out
-        Folder to write; ./quakedesign-FAULT-figures unless given.
+        Output folder; ./quakedesign-FAULT-figures by default.
     """
     from quakedesign.report.folder import prepare, write_folder
 

@@ -83,20 +83,20 @@ def scale(
     clock: Literal["operation-time", "natural-period"] | None = None,
     output: Output = PLAIN,
 ) -> int:
-    """Carry gains from one fault to a similar one, and say which dimensionless groups differ.
+    """Scale gains from one fault to a similar one, and list the dimensionless groups that differ.
 
     Parameters
     ----------
     source
-        Fault that the gains are for: preset or path of a .toml file.
+        Fault of the gains: preset or path of a .toml file.
     target
-        Fault to carry them to.
+        Fault to scale them to.
     controller
         cta, dia or elqr.
     gains
         published, or the gains of the law (λ = 1, divisor μ_res·N̂_min of the source).
     clock
-        What fixes the scale of time: operation-time or natural-period; chosen by their agreement unless given.
+        Time scale from operation-time or natural-period; by default the one on which both faults agree.
     """
     from quakedesign.report.plain import scale_lines
     from quakedesign.studies.scaling import scale_answer
@@ -109,12 +109,12 @@ def scale(
 
 @app.command
 def errata(*rows: int, output: Output = PLAIN) -> int:
-    """Show where the paper cannot be taken literally, each row checked again now.
+    """List where the paper cannot be taken literally; every row is recomputed.
 
     Parameters
     ----------
     rows
-        Numbers of rows; all unless given.
+        Row numbers; all by default.
     """
     from quakedesign.studies.errata import errata_rows, run_rows
 
@@ -148,7 +148,7 @@ def init(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Write a commented fault file to start from: every key with its unit, and what happens if it is left out.
+    """Write a commented fault file: every key with its unit and its default.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def init(
     law
         Friction law.
     schema
-        Write a JSON Schema beside it too, with which editors complete and check TOML.
+        Also write a JSON Schema, with which editors complete and check the file.
     """
     import json
 
@@ -201,29 +201,29 @@ def identify(
 ) -> int:
     """Identify friction parameters, with confidence regions, from a laboratory record.
 
-    Velocity steps and slide-hold-slide give the laws with state, slip or a stiffly drawn block those that weaken with
-    slip. Exit code 1 where the record cannot tell every parameter.
+    Velocity steps and slide-hold-slide tests give rate-and-state parameters; slip or a test with a stiff machine gives
+    slip-weakening parameters. Exit code 1 if the record does not determine every parameter.
 
     Parameters
     ----------
     data
         CSV file with units in its first line, such as 'time [s], load_point_displacement [um], shear_stress [MPa],
-        normal_stress [MPa]'; load_point_rate, shear_force, normal_force, friction and slip are known, too.
+        normal_stress [MPa]'; load_point_rate, shear_force, normal_force, friction and slip are accepted too.
     law
-        Friction law: rate-and-state-aging and rate-and-state-slip are both fitted, and the better one taken, unless
-        told; regularised-rate-and-state, exponential-slip-weakening or linear-slip-weakening, say, are others.
+        Friction law. By default rate-and-state-aging and rate-and-state-slip are fitted and the better one is taken;
+        others are regularised-rate-and-state, exponential-slip-weakening and linear-slip-weakening.
     stiffness
-        Of the machine, such as '5 GPa/m' ('2 kN/um' for forces, '1e-3 1/um' for friction); fitted unless given.
+        Machine stiffness, such as '5 GPa/m' ('2 kN/um' for forces, '1e-3 1/um' for friction); fitted by default.
     normal_stress
-        Constant, such as '5 MPa', where there is no such column.
+        Constant normal stress, such as '5 MPa', if the record has no such column.
     seed
-        Of the draw of the starts.
+        Seed of the random starting points.
     fault
-        Preset or .toml file that gives all but the friction to the file that is written.
+        Preset or .toml file for everything but the friction in the file to write.
     out
-        Fault file to write, with a friction that covers every law of the box where a fault file can hold it.
+        Fault file to write; its friction covers the whole confidence region where a fault file can express that.
     figure
-        Figure of the residuals to write: .svg, .png or .pdf.
+        Figure of data, fit and residuals to write: .svg, .png or .pdf.
     """
     from quakedesign.fault import load_fault
     from quakedesign.identification.fault_file import law_remarks, next_command, other_parts, save_fault, task_remarks

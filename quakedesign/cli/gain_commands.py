@@ -42,43 +42,43 @@ def synthesise(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Find gains with a proof that are best in one respect, and compare them with those from the literature.
+    """Find proved gains that are optimal in one objective, and compare them with gains from the literature.
 
-    Exit code 0 only if gains were proved. No gains are printed without a proof.
+    Exit code 0 only if gains are proved. No gains are printed without a proof.
 
     Parameters
     ----------
     law
         cta, dia, super-twisting or cta3.
     fault
-        For sampled: preset or path of a .toml file.
+        Objective sampled: preset or path of a .toml file.
     objective
-        norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: fastest certified decay, as one over
-        the settling time from where no error exceeds the bound on |h'|. beta: widest certified range of the control
-        coefficient. sampled: smallest error of a sampled run on a fault, measured, of gains that are proved.
+        norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: fastest certified decay, as the
+        inverse of the settling time from where no error exceeds the bound on |h'|. beta: widest certified range of the
+        control coefficient. sampled: smallest simulated error of proved gains on a fault.
     lipschitz
-        Bound on |h'|, in the unit of ν per second; 1 unless given, for sampled a tenth above what the fault needs.
+        Bound on |h'|, in the unit of ν per second; 1 by default, for sampled a tenth above what the fault needs.
     gain_range
-        b_m and b_M, the range of the control coefficient β; 1 1 unless given, for sampled that of the fault. For beta
-        its middle counts, and it is covered at least.
+        b_m and b_M, the range of the control coefficient β; 1 1 by default, for sampled that of the fault. For beta it
+        must be covered, and its middle is kept.
     bound
-        For decay and beta: largest norm of the gains; the smallest of the sets from the literature unless given.
+        Objectives decay and beta: largest norm of the gains; by default the smallest of the sets from the literature.
     degree
-        Degree of V; repeat for more. The two lowest unless given; higher ones find better gains and take longer.
+        Degree of V; repeat for more. By default the two lowest; higher degrees find better gains and take longer.
     starts
-        Number of starts, 4 unless given; sampled has its own.
+        Number of starting points, 4 by default; sampled has its own.
     seed
-        Of the random starts, 0 unless given.
+        Seed of the random starting points, 0 by default.
     workers
-        Number of processes, 2 unless given; no digit depends on it.
+        Number of processes, 2 by default; results do not depend on it.
     step
-        For sampled: sampling time T_s, in s or with a unit; the fault's unless given.
+        Objective sampled: sampling time T_s, in s or with a unit; the fault's by default.
     scheme
-        For sampled: explicit (the default), implicit, semi-implicit or compensated.
+        Objective sampled: explicit (default), implicit, semi-implicit or compensated.
     metric
-        For sampled: max_slip_rate_error (the default) or another metric that is better when smaller.
+        Objective sampled: max_slip_rate_error (default) or another metric that is better when smaller.
     out
-        File for the certificate, which is written whole or not at all.
+        Certificate file to write.
     """
     from quakedesign.lyapunov.gains.synthesise import OBJECTIVES
 
@@ -201,11 +201,10 @@ def gain_map(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Map where two gains are certified, at one or more levels of |h'|; certificates, a figure and a table.
+    """Map where two gains are certified, at one or more levels of |h'|, with certificates, figure and table.
 
-    Every point of the grid is screened in floating point. All points at the edges and a random sample inside are then
-    proved exactly, with certificates; figure and table keep the two apart. Exit code 0 if something is certified and
-    every edge point is proved.
+    Every grid point is screened in floating point. All points at the edges and a random sample inside are then proved
+    exactly; figure and table distinguish both. Exit code 0 if something is certified and every edge point is proved.
 
     Parameters
     ----------
@@ -214,25 +213,25 @@ def gain_map(
     over
         Names of the two gains that vary, such as k1 k2.
     gains
-        All gains of the law; those that do not vary keep these values. Those of the literature unless given, if known.
+        All gains of the law; those that do not vary keep these values. By default those from the literature.
     range
-        Four numbers: both ends of the first gain, then of the second; a quarter to four times its value unless given.
+        Four numbers: both ends of the first gain, then of the second; by default a quarter to four times the value.
     lipschitz
-        One or more bounds on |h'|; five shares of the necessary limit unless given.
+        One or more bounds on |h'|; by default five fractions of the necessary limit.
     gain_range
         b_m and b_M, the range of the control coefficient β.
     points
-        Along each axis.
+        Grid points along each axis.
     degree
-        Of the Lyapunov functions; the lowest that proves the given gains unless given.
+        Degree of the Lyapunov functions; by default the lowest that proves the given gains.
     interior
-        Number of random points inside that are proved.
+        Number of random inner points to prove.
     seed
-        Of their choice.
+        Seed of the choice of inner points.
     workers
         Number of processes.
     out
-        Folder; ./quakedesign-map-LAW unless given.
+        Output folder; ./quakedesign-map-LAW by default.
     """
     from quakedesign.laws import family
     from quakedesign.lyapunov.maps.gain_map import gain_map as mapped

@@ -64,38 +64,39 @@ def guarantee(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Prove how far slip, slip rate and pressure of the loop that runs can go: sampled, held, late, for ever.
+    """Prove bounds of slip, slip rate and pressure of the sampled loop, for all t >= 0.
 
-    For all friction and constant parameters of the box and every disturbance of a class, from rest or from every start
-    near it, along the reference. Of several faults each has its own answer. Exit code 0 only if all are proved.
+    For every friction law and all constant parameters of the box and every disturbance of the class, along the
+    reference, from rest or from initial errors. The controller is designed for the loop setup unless gains are given.
+    Exit code 0 only if every fault has a proof.
 
     Parameters
     ----------
     controller
         elqr, or a sliding mode: cta, dia.
     objective
-        Of a design: tracking, or peak for the smallest proved slip-rate error.
+        Design objective: tracking, or peak for the smallest certified slip-rate error.
     gains
-        k1 to k4 of an e-LQR whose integrals are summed once per sample; a law with an estimate of the disturbance is
-        designed unless given. Of a sliding mode its base gains, scaled by λ.
+        k1 to k4 of an e-LQR whose integrals are summed once per sample; by default a law with a disturbance estimate is
+        designed. For a sliding mode its base gains, scaled by λ.
     scheme
-        Of a sliding mode: compensated unless given; no other has a guarantee. The e-LQR runs in explicit.
+        Sliding modes: compensated (default); no other scheme has a guarantee. The e-LQR runs in explicit.
     step
-        T_s, such as '184 ms' or 7/50 (s); the fault's unless given.
+        Sampling time T_s, such as '184 ms' or 7/50 (s); the fault's by default.
     measured
-        What the e-LQR is told: slip-and-rate; or slip, from which a designed one estimates the slip rate; or slip with
-        the differentiator, implicit and of n_d = 2 with any n_f, of which the least λ_d is told.
+        Measurement of the e-LQR: slip-and-rate; slip, from which a designed law estimates the slip rate; or
+        differentiator (implicit, n_d = 2, any n_f): its smallest λ_d is printed.
     disturbance_class
-        amplitude: any disturbance as large as the fault's; rate: one that starts at 0 and is no faster either.
+        amplitude: any disturbance of the fault's amplitude; rate: also with the fault's rate of change, starting at 0.
     stress
-        Of a fault with rate-and-state friction, held in slow sliding by an e-LQR through rock or a lag: bound of the
-        shear stress disturbance, such as '25 kPa'; the largest that the design stands unless given.
+        Rate-and-state faults (slow sliding, e-LQR through a diffusion path or a lag): bound of the shear stress
+        disturbance, such as '25 kPa'; by default the largest that the design withstands.
     spread
-        Of such a fault: by how much of their values a, b and D_c may be off, such as 0.1.
+        Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     workers
-        Of several faults: number of processes.
+        Number of processes for several faults.
     out
-        Certificate file to write; of several faults a folder for one each.
+        Certificate file to write; for several faults a folder.
     """
     from quakedesign.fault import load_fault
     from quakedesign.synthesis import answers
@@ -192,28 +193,28 @@ def limits(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Say what no controller whatever can do with a fault, beside what a designed one is proved to do.
+    """Give performance limits of every controller on a fault, and what a designed controller is proved to reach.
 
-    The smallest slip-rate error, the longest T_s, delay and diffusion time, the farthest well and the smallest
-    withdrawal, for any disturbance as large as the fault's.
+    Smallest slip-rate error, longest T_s, delay and diffusion time, farthest well and smallest withdrawal, for any
+    disturbance of the fault's amplitude.
 
     Parameters
     ----------
     pressure
-        Largest withdrawal, such as '20 MPa'; the effective normal stress unless given.
+        Largest withdrawal, such as '20 MPa'; the effective normal stress by default.
     around
-        What designs are proved with. The diffusivity, 1 m²/s unless given, is that of the farthest well too; noise says
-        how far it limits the slip-rate error of any controller as well.
+        Loop setup of the proved designs. The diffusivity, 1 m²/s by default, also gives the farthest well; noise limits
+        the slip-rate error of every controller.
     stress
-        Of a fault with rate-and-state friction, whose limits are those of its linearisation about slow sliding: bound
-        of the shear stress disturbance, such as '25 kPa'; the largest that a design stands unless given.
+        Rate-and-state faults (limits of the plant linearised about slow sliding): bound of the shear stress
+        disturbance, such as '25 kPa'; by default the largest that a design withstands.
     spread
-        Of such a fault: by how much of their values a, b and D_c may be off in what is proved, such as 0.1; what is
-        impossible is so for the nominal ones.
+        Rate-and-state faults: relative uncertainty of a, b and D_c in the proofs, such as 0.1; the limits are those of
+        the nominal values.
     measured
-        What controllers are told: slip-and-rate, or slip.
+        Measurement of all controllers: slip-and-rate, or slip.
     out
-        Folder for a figure and results.json; nothing is written unless given.
+        Folder for a figure and results.json; by default nothing is written.
     """
     from quakedesign.fault import load_fault
 

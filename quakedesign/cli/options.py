@@ -181,20 +181,20 @@ Force = Annotated[bool, Parameter(negative="", help="Replace what an earlier run
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """How an answer is printed.
+    """Form of the output.
 
     Parameters
     ----------
     json
-        Print JSON, in SI units; results.json where that is written.
+        Print JSON in SI units.
     quiet
-        Print nothing for people, not even progress: the exit code is the answer.
+        Print no text and no progress; the exit code is the answer.
     log_level
-        What to say on stderr while it works: info for every step, debug for all progress.
+        Messages on stderr: info for every step, debug for all progress.
     no_cache
-        Neither take nor keep what searches find, compiled code and long runs; as QUAKEDESIGN_CACHE=off.
+        Do not read or write the cache of searches, compiled code and long runs, as QUAKEDESIGN_CACHE=off.
     allow_code
-        Let fault files name friction of your own as module:Class, whose module is run. Only for files that you trust.
+        Allow fault files to run code: friction as module:Class. Only for files that you trust.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
@@ -231,23 +231,23 @@ PLAIN = Output()
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class LawOptions:
-    """Law with its gains.
+    """Control law with its gains.
 
     Parameters
     ----------
     controller
-        cta, dia or elqr, or module:Class of your own; none where a command can do without.
+        cta, dia or elqr, or your own law as module:Class; none where a command runs without control.
     gains
         published, designed (for the T_s, delay, lag and diffusion of the command), continuous (designed in continuous
-        time), or those of the law (λ = 1, divisor μ_res·N̂_min); for friction with a state designed.
+        time), or the gains of the law (λ = 1, divisor μ_res·N̂_min). Rate-and-state faults: designed.
     scale
-        λ of a sliding mode in place of that of the gains, decimal or p/q.
+        λ of a sliding mode instead of that of the gains, decimal or p/q.
     feedforward
-        none, nominal or centred: what a sliding mode adds to ν from what is known of the fault; not to designed gains.
+        none, nominal or centred: feed-forward of a sliding mode from the known plant; not with designed gains.
     certificate
-        File that guarantee --out has written of an e-LQR, in place of the above: its law runs, with its T_s, limit and
-        noise, behind the delay, lag and rock that it is proved for; in slow sliding under a sine of all the stress that
-        it is proved for unless --stress is told.
+        Certificate file of guarantee --out instead of the options above: its law runs with its T_s, limit, noise,
+        delay, lag and diffusion path. In slow sliding the shear stress is a sine of the certified amplitude unless
+        --stress is given.
     """
 
     controller: str = "cta"
@@ -292,29 +292,30 @@ class NoLawOptions(LawOptions):
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class RunOptions:
-    """How a closed loop is run, and what acts on the fault.
+    """Simulation of a closed loop, and loads on the fault.
 
     Parameters
     ----------
     scheme
-        Sampled and held: explicit, implicit, semi-implicit or compensated; or continuous, the law in every stage of the
-        integrator. Unless given, simulate takes continuous, campaign explicit. Designed laws have their own.
+        Sampled with a zero-order hold: explicit, implicit, semi-implicit or compensated; or continuous, with the law in
+        every stage of the integrator. By default continuous in simulate and explicit in campaign. Designed laws have
+        their own scheme.
     method
-        dormand-prince or rk4; for single runs of smooth loops cvodes or idas; for friction with a state cvodes or idas,
-        and for single runs without control radau or dop853.
+        Integrator: dormand-prince or rk4; for single smooth runs also cvodes or idas. Rate-and-state faults: cvodes or
+        idas, for single runs without control also radau or dop853.
     plant
-        smooth (the paper's, for forward slip) or coulomb (set-valued friction: stick, slip, reversal); for friction
-        with a state smooth or quasi-dynamic (without inertia).
+        smooth (as in the paper, for forward slip) or coulomb (set-valued friction: stick, slip, reversal).
+        Rate-and-state faults: smooth or quasi-dynamic (without inertia).
     step
-        Length of one step; the fault's sampling time unless given.
+        Length of one step; the fault's sampling time by default.
     duration
-        The operation time unless given. Without a controller: the fault under its own disturbance.
+        The operation time by default. Without a controller the fault runs under its own disturbance.
     substeps
-        Steps of the integrator per sample.
+        Integrator steps per sample.
     drift
-        Velocity of the far end, such as '3 cm/year'; unless given none, or of friction with a state the reference rate.
+        Velocity of the far end, such as '3 cm/year'; by default none, for rate-and-state faults the reference rate.
     perturbation
-        Of the user's in m/s^2, added to the fault's own: an expression of slip, slip_rate and time.
+        Extra disturbance in m/s^2: an expression of slip, slip_rate and time.
     """
 
     scheme: str | None = None
@@ -342,16 +343,16 @@ class RunOptions:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class StartOptions:
-    """Where a closed loop starts, and where it is to go.
+    """Initial state and target of a closed loop.
 
     Parameters
     ----------
     initial_slip
-        Slip at the start, such as '7.5 mm'; none unless given.
+        Initial slip, such as '7.5 mm'; 0 by default.
     initial_slip_rate
-        Slip rate at the start, such as '1 mm/s'.
+        Initial slip rate, such as '1 mm/s'.
     target_slip
-        Slip at the end of the task, such as '5 cm', instead of the fault's own.
+        Slip at the end of the task, such as '5 cm', instead of the fault's.
     """
 
     initial_slip: Metres = 0.0
@@ -400,14 +401,14 @@ def _exact_option(unit: str, text: str) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class WellOptions:
-    """Diffusion path by the distance of a well.
+    """Diffusion path from the distance of a well.
 
     Parameters
     ----------
     well
         Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
     diffusivity
-        Of the rock between well and fault, such as '0.5 m^2/s'.
+        Hydraulic diffusivity of the rock between well and fault, such as '0.5 m^2/s'.
     """
 
     well: ExactMetres | None = None
@@ -437,7 +438,7 @@ class SetupOptions(WellOptions):
     well
         Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
     diffusivity
-        Of the rock between well and fault, such as '0.5 m^2/s'.
+        Hydraulic diffusivity of the rock between well and fault, such as '0.5 m^2/s'.
     """
 
 
@@ -510,20 +511,20 @@ def _stage(stage: type[Stage], told: Mapping[str, Any], step: float) -> Stage | 
 @Parameter(name="*", group=_SENSORS)
 @dataclass(frozen=True, kw_only=True)
 class EstimateOptions:
-    """How a controller gets slip and slip rate from readings of the slip alone.
+    """Estimation of slip and slip rate from readings of the slip alone.
 
     Parameters
     ----------
     averaging
-        Number of the latest readings whose mean the differentiator gets.
+        Number of latest readings that are averaged for the differentiator.
     differentiator_bound
-        λ_d in m/s^(n_d + 1): tell the law what a differentiator estimates from the slip.
+        λ_d in m/s^(n_d + 1): the law uses estimates of a differentiator.
     differentiator_order
-        n_d; the paper prints 2, for which a held pressure has no λ_d.
+        n_d; for 2, as printed in the paper, no λ_d works with a zero-order hold.
     filter_order
         n_f of the differentiator.
     differentiator_steps
-        Of it inside the controller, for every reading.
+        Steps of the differentiator per reading.
     """
 
     averaging: Whole = 1
@@ -547,19 +548,19 @@ class EstimateOptions:
 @Parameter(name="*", group=_SENSORS)
 @dataclass(frozen=True, kw_only=True)
 class SensorOptions(EstimateOptions):
-    """What a controller is told of slip and slip rate, for schemes that sample.
+    """Measurement of slip and slip rate, for sampled schemes.
 
     Parameters
     ----------
     slip_noise
-        Standard deviation of normal noise of the measured slip, such as '1 um': a third of the readings are off by
-        more. --slip-noise is a bound, of guarantee and design.
+        Standard deviation of Gaussian noise of the measured slip, such as '1 um'. --slip-noise of guarantee and design
+        is a bound.
     rate_noise
-        The same of the slip rate, where it is measured, such as '1 um/s'.
+        The same of the slip rate, such as '1 um/s'.
     bandwidth
-        Of the transducer in front of a differentiator, such as '100 Hz'.
+        Bandwidth of the transducer before a differentiator, such as '100 Hz'.
     slip_quantum
-        Steps in which that transducer reads, such as '0.15 um'.
+        Resolution of this transducer, such as '0.15 um'.
     """
 
     slip_noise: Annotated[Metres, Parameter(name="--slip-noise-deviation")] = 0.0
@@ -623,23 +624,24 @@ _AROUND = ("fault", "controller", "gains", "state", "out", "force", "json")
 @Parameter(name="*", group=_GROUP)
 @dataclass(frozen=True, kw_only=True)
 class StateOptions:
-    """How such a fault starts, and which pressure acts on it; it is loaded at --drift, or the law's reference rate.
+    """Initial state and pressure of a rate-and-state fault; the far end moves at --drift, or at the reference rate.
 
     Parameters
     ----------
     pressure
-        '5 MPa'; or instants, linear between and a step where one stands twice, as '0 s: 0 MPa, 1 day: 0 MPa, 1 day: 5
-        MPa'; or a file FILE.csv with the columns 'time [s]' and 'pressure [Pa]', in any units.
+        '5 MPa'; or times and pressures, linear between them, a time twice for a step: '0 s: 0 MPa, 1 day: 0 MPa, 1 day:
+        5 MPa'; or FILE.csv with columns 'time [s]' and 'pressure [Pa]' in any units.
     start
-        steady (sliding; unless given), locked (held for --hold) or late (in the cycle: --share).
+        Initial state: steady (sliding; default), locked (far end at rest for --hold) or late (in the seismic cycle, see
+        --share).
     hold
-        Time for which the far end has been at rest before the run, such as '100 year'.
+        Time at rest of the far end before the run, such as '100 year'.
     share
-        Of the time between two events that has passed at the start; 0.9 unless given.
+        Fraction of the recurrence interval before the run; 0.9 by default.
     stress
-        With --controller elqr: amplitude of a shear stress on the fault that swings as a sine, such as '20 kPa'.
+        With --controller elqr: amplitude of a sinusoidal shear stress, such as '20 kPa'.
     stress_period
-        Its period; that of the tide, 12.42 hours, unless given.
+        Its period; by default that of the tide, 12.42 hours.
     """
 
     pressure: str | None = None
@@ -716,17 +718,17 @@ def changed_options(command: Any, options: dict[str, Any]) -> dict[str, Any]:
 @Parameter(name="*", group=_GROUP)
 @dataclass(frozen=True, kw_only=True)
 class SpreadOptions:
-    """What varies in a campaign of such a fault.
+    """Variation in a campaign of a rate-and-state fault.
 
     Parameters
     ----------
     spread
-        Held in slow sliding by the e-LQR that design finds: by how much of their values a, b and D_c are off, such as
-        0.1; the effective normal stress, stiffness and damping by the box.
+        In slow sliding under a designed e-LQR: relative deviation of a, b and D_c, such as 0.1; normal stress,
+        stiffness and damping vary within the box.
     stress
-        Bound of a sine of shear stress, such as '25 kPa'; what is proved of the design unless given.
+        Bound of a sinusoidal shear stress, such as '25 kPa'; by default the certified bound of the design.
     stress_period
-        Its period; that of the tide, 12.42 hours, unless given.
+        Its period; by default that of the tide, 12.42 hours.
     """
 
     spread: str = "0"

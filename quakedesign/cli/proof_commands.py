@@ -34,35 +34,35 @@ def certify(
 ) -> int:
     """Prove or refute given gains: of a sliding mode for a bound on |h'|, of the e-LQR on a fault.
 
-    Exit code 0 only if proved, and if the peaks that were asked for are certified.
+    Exit code 0 only if proved, including requested peaks.
 
     Parameters
     ----------
     law
         cta or another sliding mode; or elqr.
     fault
-        For the e-LQR: preset or path of a .toml file.
+        e-LQR: preset or path of a .toml file.
     gains
         Exact numbers: decimals, exponents or p/q; four for cta and elqr (SI).
     lipschitz
-        For a sliding mode: bound on |h'|, in the unit of ν per second.
+        Sliding mode: bound on |h'|, in the unit of ν per second.
     maximize
-        For a sliding mode: lipschitz (the largest bound on |h'|; with --lipschitz also the smallest scale for that),
-        beta (the upper end of its range), beta-factor (f in [b/f, b·f]) or decay (with a bound on the settling time).
+        Sliding mode: lipschitz (largest bound on |h'|; with --lipschitz also the smallest scale for it), beta (upper
+        end of its range), beta-factor (f in [b/f, b·f]) or decay (with a bound of the settling time).
     gain_range
-        For a sliding mode: b_m and b_M, the range of the control coefficient β; 1 1 unless given. One value b twice to
-        maximise the range.
+        Sliding mode: b_m and b_M, the range of the control coefficient β; 1 1 by default. One value b twice to maximise
+        the range.
     box
-        For the e-LQR: uncertainty box, paper or ten-percent.
+        e-LQR: uncertainty box, paper or ten-percent.
     feedback
-        For the e-LQR: error (k1 and k2 act on x1 - r and x2 - r', the default) or state (on x1 and x2, as printed).
+        e-LQR: error (k1 and k2 act on x1 - r and x2 - r', default) or state (on x1 and x2, as printed).
     step
-        For the e-LQR: sampling period for which p is held, such as '140 ms' or 7/50 (s); the fault's unless given.
+        e-LQR: sampling time of the zero-order hold, such as '140 ms' or 7/50 (s); the fault's by default.
     peaks
-        For the e-LQR: certify how fast the fault can slip at most, for every disturbance of a class, amplitude or rate,
-        if the pressure acts at once (see the command guarantee for the loop that runs).
+        e-LQR: certify peak slip and slip rate for every disturbance of a class, amplitude or rate, in continuous time
+        (the sampled loop: command guarantee).
     out
-        File for the certificate. Other proofs of an e-LQR go beside it, with their names added.
+        Certificate file to write. Further proofs of an e-LQR go into files beside it.
     """
     from quakedesign.laws import law as law_of
 
@@ -134,12 +134,12 @@ def check(
     files
         Certificate files (proofs/FORMAT.md).
     fault
-        Preset or .toml file whose constants and ranges the certificates must cover as well.
+        Preset or .toml file: the certificates must also cover its constants and ranges.
     rocq
-        Write a file that Rocq's compiler, coqc, verifies, for every certificate that is not invalid. Exit code 1 if a
-        kind of certificate has none.
+        Write a file that Rocq's compiler, coqc, verifies, for every valid certificate. Exit code 1 if a kind of
+        certificate has none.
     out
-        With --rocq: folder for its files; ./quakedesign-rocq unless given.
+        With --rocq: output folder; ./quakedesign-rocq by default.
     """
     from quakedesign.checking import check_files
 
@@ -195,29 +195,29 @@ def sos(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Decide whether a polynomial is a sum of squares, with proof either way. Exit code 0 only if it is.
+    """Decide whether a polynomial is a sum of squares, with a proof in either case. Exit code 0 only if it is.
 
     Parameters
     ----------
     polynomial
         Such as "x^4*y^2 + x^2*y^4 + 1 - 3*x^2*y^2": numbers, names, + - * ^ ** and parentheses.
     on
-        A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat for more. All of ℝⁿ unless given.
+        A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat for more. By default all of ℝⁿ.
     multiplier
-        Positive polynomial to multiply with, or auto to search one, and to try powers of 1 + x² + y² + … (x² + y² + …
-        for forms).
+        Positive polynomial multiplier, or auto to search one and to try powers of 1 + x² + y² + … (x² + y² + … for
+        forms).
     margin
         Decide polynomial − margin·(1 + Σ x_i^degree) instead (without the 1 for forms).
     degree
-        Largest degree of a summand; the smallest that fits unless given, and the next even one under constraints.
+        Largest degree of a summand; by default the smallest possible, and under constraints also the next even one.
     products
-        Use all products of constraints, or none; unless given, products of variables only.
+        Use all products of constraints, or none; by default products of variables only.
     gram
-        Instead of a polynomial: a file, JSON or .mat, with a polynomial and a Gram matrix from another programme.
+        Instead of a polynomial: JSON or .mat file with a polynomial and a Gram matrix of another program.
     verbose
-        Show the sizes of the Gram matrices before and after the exact reduction.
+        Print sizes of the Gram matrices before and after the exact reduction.
     out
-        File for the proof (proofs/FORMAT.md).
+        Proof file to write (proofs/FORMAT.md).
     """
     from quakedesign.sos import prove, read_gram
     from quakedesign.sos.exact.polynomial_files import plain_proof
@@ -270,9 +270,9 @@ def attraction(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Prove the largest level of a Lyapunov function below which all solutions tend to the origin.
+    """Prove the largest sublevel set of a Lyapunov function from which all solutions converge to the origin.
 
-    Exit code 0 if one is proved.
+    Exit code 0 if a level is proved.
 
     Parameters
     ----------
@@ -281,20 +281,20 @@ def attraction(
         vanish at the origin; before it V = "..." if V is given. Unless it is, V = x'Px with A'P + PA = -1 for the
         linearised field, or one of degree 2 or 4 that is searched (--everywhere).
     everywhere
-        Prove that the solutions from everywhere do, or refute V (without one, all V) by a point.
+        Prove global convergence, or refute V (without V, every V) by a point.
     relative
-        Width of the last step of the bisection, from 1e-6 to below 1.
+        Width of the last bisection step, from 1e-6 to below 1.
     degree
-        Search other V of at most this even degree, for a larger part of the shape in the region.
+        Search V of at most this even degree, for a larger part of the shape in the region.
     shape
-        Polynomial that is positive but at the origin, such as "x^2 + 2*y^2": the largest b is proved for which the part
-        where it is at most b lies in the region. With --degree the sum of squares of the states unless given.
+        Positive definite polynomial, such as "x^2 + 2*y^2": proves the largest b whose sublevel set shape <= b lies in
+        the region. With --degree by default the sum of squares of the states.
     out
-        File for the proof (proofs/FORMAT.md); for the refutation where nothing is proved, unless --above is given.
+        Proof file to write; the refutation if nothing is proved, unless --above is given.
     above
-        File for the point that refutes all levels above that of V there.
+        File for the point that refutes all higher levels.
     inclusion
-        File for the proof that the part of the shape lies in the region.
+        File for the proof that the sublevel set of the shape lies in the region.
     """
     from quakedesign.sos import Answer, Attraction, Region, region_of_attraction, save_attraction, stability
     from quakedesign.sos.exact.attraction import read_field

@@ -69,18 +69,18 @@ def simulate(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Run one closed loop over the whole task, or the natural earthquake without a controller.
+    """Simulate a closed loop over the whole task, or the natural earthquake without a controller.
 
-    Quantities have a unit, as '20 MPa', or are bare numbers in SI units.
+    Quantities have a unit, as '20 MPa', or are numbers in SI units.
 
     Parameters
     ----------
     weight
-        Of the estimate of the disturbance in the scheme compensated, above 0, at most 1.
+        Weight of the disturbance estimate in the scheme compensated, above 0, at most 1.
     authority
-        B0 of a sampled scheme in m^2/kg; guarantee says weight and authority of the sliding modes that it proves.
+        B0 of a sampled scheme in m^2/kg; guarantee prints weight and authority of the sliding modes that it proves.
     seed
-        Of noise and jitter.
+        Seed of noise and jitter.
     out
         NetCDF file to write.
     """
@@ -188,10 +188,10 @@ def sampling(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Show what sampling does: every scheme beside the published controllers, orders of accuracy, sensitivities.
+    """Show effects of sampling: every scheme with the published controllers, orders of accuracy, sensitivities.
 
-    Writes results.json and figures. Errors count after a quarter of each run; those with noise last a sixteenth of
-    the task.
+    Writes results.json and figures. Errors count after a quarter of each run; runs with noise last a sixteenth of the
+    task.
 
     Parameters
     ----------
@@ -202,11 +202,11 @@ def sampling(
     scale
         Further values of λ for a sliding mode, decimal or p/q.
     schemes
-        To run the law with.
+        Schemes of the runs.
     duration
-        Of the runs; the operation time unless given.
+        Duration of the runs; the operation time by default.
     out
-        Folder to write; ./quakedesign-FAULT-sampling unless given.
+        Output folder; ./quakedesign-FAULT-sampling by default.
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare
@@ -252,18 +252,18 @@ def export(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Write a controller as C for the computer of a laboratory: one function, called once per sample.
+    """Write a controller as a C function that is called once per sample.
 
     Parameters
     ----------
     step
-        Sampling period, for which designed gains are designed; the fault's unless given.
+        Sampling time, also of designed gains; the fault's by default.
     scheme
-        explicit (unless given), implicit, semi-implicit or compensated.
+        explicit (default), implicit, semi-implicit or compensated.
     fmu
-        Write controller.fmu as well: the same step for co-simulation (FMI 2.0).
+        Also write controller.fmu for co-simulation (FMI 2.0).
     out
-        Folder to write; ./quakedesign-FAULT-CONTROLLER unless given.
+        Output folder; ./quakedesign-FAULT-CONTROLLER by default.
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.plain import export_lines
@@ -325,30 +325,30 @@ def campaign(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Run many samples over the uncertainty box, disturbances, noise and initial states, and report how bad they get.
+    """Simulate many samples of the uncertainty box, disturbances, noise and initial states, and report the worst.
 
-    Every batch that is done is kept in the folder: interrupted or killed, the same command goes on and gives the same
-    answer. Exit code 0 if all samples have a result (one that diverges has), 1 if a batch failed. Quantities have a
-    unit, as '20 MPa', or are bare numbers in SI units.
+    Finished batches are kept in the folder: after an interruption the same command continues and gives the same result.
+    Exit code 0 if all samples have a result (also a diverged one), 1 if a batch failed. Quantities have a unit, as '20
+    MPa', or are numbers in SI units.
 
     Parameters
     ----------
     samples
         Number of samples.
     initial_slip
-        Largest slip at the start.
+        Largest initial slip.
     initial_rate
-        Largest slip rate at the start.
+        Largest initial slip rate.
     seed
-        Of samples and noise.
+        Seed of samples and noise.
     search
-        Metric whose worst value is searched for, such as max_slip_rate_error.
+        Metric to maximise by search, such as max_slip_rate_error.
     rerun
-        Index of a sample to run again and store as NetCDF in the folder.
+        Index of a sample to simulate again and store as NetCDF in the folder.
     workers
-        Number of processes; one per core unless given.
+        Number of processes; by default one per core.
     out
-        Folder; ./quakedesign-FAULT-campaign unless given.
+        Output folder; ./quakedesign-FAULT-campaign by default.
     """
     from quakedesign.fault import load_fault
     from quakedesign.report.drawing import figure_bytes
