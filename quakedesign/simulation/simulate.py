@@ -1,7 +1,6 @@
 """One closed loop from rest over the whole task."""
 
 from collections.abc import Callable
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +16,11 @@ from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrato
 from quakedesign.simulation.natural import natural_peak
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import RunSetting, by_no_clock, loop_class, own_path, run, run_adaptive, sampled_scheme
-from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
+from quakedesign.simulation.slow_sliding import PLANTS, simulate_sliding
 from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.trajectory import OutcomeCriterion, Trajectory
+
+_METHOD, _RTOL = "dormand-prince", 1e-9
 
 
 def simulate(
@@ -28,7 +29,7 @@ def simulate(
     *,
     step: float | None = None,
     scheme: str | Scheme | None = None,
-    method: str = "dormand-prince",
+    method: str = _METHOD,
     duration: float | None = None,
     samples: int = 2000,
     settled_from: float | None = None,
@@ -37,7 +38,7 @@ def simulate(
     plant: str = "smooth",
     load: Load | None = None,
     variation: Variation | SlidingVariation | None = None,
-    rtol: float = 1e-9,
+    rtol: float = _RTOL,
     checkpoint: str | Path | None = None,
     substeps: int = 1,
     actuator: Actuator | None = None,
@@ -124,9 +125,38 @@ def simulate(
         When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
         cannot go on, or when the checkpoint is that of another run.
     """
-    asked = dict(locals())
     if require_fault(fault).friction.state_names:
-        return _held_in_sliding(**asked)
+        refused = {
+            "compiled": compiled is not None,
+            "load": load is not None,
+            "variation": isinstance(variation, Variation),
+            "rtol": rtol != _RTOL,
+            "checkpoint": checkpoint is not None,
+            "substeps": substeps != 1,
+            "measurement": not isinstance(measurement, Transducer | None),
+            "initial_slip": bool(initial_slip),
+            "initial_slip_rate": bool(initial_slip_rate),
+        }
+        law, path = _sampled_law(fault, controller, actuator, [name for name, given in refused.items() if given])
+        own_way(controller, scheme, step)
+        require_known(plant, PLANTS, "plant of a fault with a state", UnknownNameError)
+        return simulate_sliding(
+            fault,
+            law.of_slip,
+            law.sampling.step,
+            lag=path.lag,
+            diffusion=path.diffusion,
+            stages=path.stages,
+            transducer=measurement if isinstance(measurement, Transducer) else None,
+            variation=variation if isinstance(variation, SlidingVariation) else None,
+            tide=tide,
+            inertia=PLANTS[plant],
+            method="cvodes" if method == _METHOD else method,
+            duration=duration,
+            samples=samples,
+            settled_from=settled_from,
+            progress=progress or (lambda _: None),
+        )
     if tide is not None or isinstance(variation, SlidingVariation) or isinstance(measurement, Transducer):
         raise ParameterError(
             "a tide, a sliding variation and a transducer alone need friction with a state. Received "
@@ -153,39 +183,17 @@ def simulate(
 
 
 _OF_SLIDING = ("duration", "samples", "settled_from", "progress", "variation", "tide")
-_READ = ("fault", "controller", "scheme", "step", "method", "plant", "actuator", "measurement")
 
 
-def _held_in_sliding(**asked: Any) -> SlidingRun:
-    """A fault whose friction has a state, as `simulate` was asked for it."""
-    usual = {name: option.default for name, option in signature(simulate).parameters.items()}
-    changed = {name: value for name, value in asked.items() if value is not usual[name] and value != usual[name]}
-    fault, controller, variation = asked["fault"], asked["controller"], asked["variation"]
-    transducer = asked["measurement"]
-    law, meant = (controller.of_slip, controller.sampling) if controller else (None, None)
-    foreign = [name for name in changed if name not in (*_OF_SLIDING, *_READ)]
-    foreign += ["variation"] if isinstance(variation, Variation) else []
-    foreign += [] if isinstance(transducer, Transducer | None) else ["measurement"]
-    if law is None or meant is None or foreign:
+def _sampled_law(
+    fault: Fault, controller: Controller | None, actuator: Actuator | None, refused: list[str]
+) -> tuple[Any, PressurePath]:
+    """Law of samples that measures the slip alone, with its path; refuses arguments that slow sliding does not have."""
+    if controller is None or controller.of_slip is None or controller.sampling is None or refused:
         raise ParameterError(
             f"friction with a state is held by a law of samples, as design gives it, with {', '.join(_OF_SLIDING)} (a "
             f"SlidingVariation), method, plant, actuator and a Transducer as measurement. Received "
-            f"{', '.join(foreign) or repr(controller)} with {fault.friction.name}. Without a controller use "
+            f"{', '.join(refused) or repr(controller)} with {fault.friction.name}. Without a controller use "
             "simulate_state."
         )
-    own_way(controller, asked["scheme"], asked["step"])
-    require_known(asked["plant"], PLANTS, "plant of a fault with a state", UnknownNameError)
-    path = PressurePath.of(meant, asked["actuator"])
-    told = {name: changed[name] for name in _OF_SLIDING if name in changed} | {"samples": asked["samples"]}
-    return simulate_sliding(
-        fault,
-        law,
-        meant.step,
-        lag=path.lag,
-        diffusion=path.diffusion,
-        stages=path.stages,
-        transducer=transducer,
-        inertia=PLANTS[asked["plant"]],
-        method=changed.get("method", "cvodes"),
-        **told,
-    )
+    return controller, PressurePath.of(controller.sampling, actuator)
