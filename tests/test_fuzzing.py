@@ -11,11 +11,15 @@ import importlib
 import inspect
 import io
 import json
+import os
 import pkgutil
+import re
 import resource
+import shlex
 import signal
 import time
 import warnings
+from collections import Counter
 from enum import Enum
 from fractions import Fraction
 from functools import cache, partial
@@ -42,6 +46,7 @@ from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_g
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.laws import summed_integrals
 from quakedesign.laws.sampled_law import PathModel, RestLimit
+from quakedesign.parallel import SIGNALS
 from quakedesign.plant import uncertain_plant
 from quakedesign.report import Comparison, scale_lines
 from quakedesign.simulation.campaign import Space, campaign_problem
@@ -233,87 +238,144 @@ def command_lines(draw):
     return line
 
 
-CHANGED = {
-    "--controller": "cta dia elqr",
-    "--step": "1ms 2ms 1/500",
-    "--substeps": "1 2",
-    "--drift": "0 1e-9",
-    "--initial-slip": "1um 0",
+SOUND = """
+{fault;fault;derive} {short.toml;lab-fault;real-fault;crustal-patch} | --json
+fault {short.toml;real-fault} | --box {paper;ten-percent} | --quiet | --log-level debug
+derive {short.toml;lab-fault;creeping-patch} | --latex
+scale {lab-fault;real-fault} {short.toml;lab-fault} | --controller {cta;dia;elqr} \
+ | --clock {natural-period;operation-time} | --json
+simulate short.toml --duration {'20 ms';0.1} | --plant {smooth;coulomb} | --method rk4 \
+ | --initial-slip '1 mm' | --json
+simulate lab-fault --controller {cta;dia;elqr} --duration '30 ms' | --plant coulomb | --method rk4 \
+ | --substeps {2;10} | --json
+simulate lab-fault --controller {cta;dia} --duration {'20 ms';'60 ms'} --scheme {explicit;implicit;semi-implicit} \
+ | --delay {'2 ms';'10 ms'} --jitter 1 | --saturation {'1 MPa';'20 MPa'} --withdrawal 0 \
+ | --rate-limit '1 MPa/s' | --seed 3 \
+ | --quantum '1 kPa' | --lag '5 ms' | --slip-noise-deviation '1 um' | --out run.nc --force \
+ | --substeps 10 | --scale 3/2
+simulate lab-fault --controller cta --duration '30 ms' --scheme compensated | --weight {0.5;1} \
+ | --plant coulomb | --drift '1 mm/s'
+simulate {lab-fault;short.toml} --controller elqr --gains 1e8 1e6 1e7 1e5 --duration '30 ms' --scheme explicit \
+ | --quiet | --delay '10 ms' | --averaging 2 | --differentiator-bound 2 --slip-quantum '0.1 um' \
+ | --perturbation '1e-3*sin(time)' | --json
+simulate crustal-patch --duration '1 day' \
+ | --pressure {'1 MPa';'0 s: 0 MPa, 1 hour: 1 MPa';course.csv} | --plant quasi-dynamic
+export lab-fault --out made --force | --controller {cta;dia;elqr} | --scheme {explicit;implicit} \
+ | --step '5 ms' | --json
+check {CTA;SOS;TWIST;CTA TWIST;ELQR} | --json | --quiet | --fault lab-fault
+sos {'x^2 + 1';'x^2 - 1';'x^2*y^2 + x^2 + 1 - y';'2*x^4 + 2*x^3*y - x^2*y^2 + 5*y^4'} | --json \
+ | --degree 4 | --verbose | --out p.json --force
+sos {'1 - x^2';'x*y'} --on {'x >= 0';'1 - x^2 - y^2 >= 0';'x == 1'} | --on 'y >= 0' | --no-products | --json
+attraction field.toml | --everywhere | --json | --out p.json --force
+certify {super-twisting --gains 1.5 1.1;cta --gains 25 15 2.3 1.1} --lipschitz {1/2;1} | --json | --out p.json --force
+{init own.toml --force;init own.toml --force --law rate-and-state-slip;completion zsh} | --quiet
+"""
+RARE = """
+guarantee lab-fault --gains 1546085894 358137872 1490578667 524519950 | --slip-noise '1 um' \
+ | --class rate | --json | --delay '1 ms'
+identify record.csv --stiffness '1e-3 1/um' | --law rate-and-state-aging | --seed 2 \
+ | --out identified.toml --force | --json
+sampling lab-fault --gains published --duration '50 ms' --out made --force | --controller {cta;elqr} | --json
+export lab-fault --certificate GUARANTEE --out made --force | --fmu
+simulate lab-fault --certificate GUARANTEE --duration '0.2 s' | --plant coulomb | --saturation '1 MPa' | --json
+map cta --over k1 k2 --lipschitz 1/2 --points 3 --interior 1 --workers 1 --out made --force | --json
+"""
+"""Lines that are done in a moment, and in seconds: one of {a;b} each, and any of the options after | beside them."""
+NAMES = {
+    "CTA": "cta_7",
+    "TWIST": "super-twisting",
+    "SOS": "motzkin_not",
+    "ELQR": "elqr_lab",
+    "GUARANTEE": "guarantee_lab",
 }
-CHANGED |= {"--delay": "1ms 0.002", "--lag": "5ms", "--saturation": "1MPa 2e5", "--quantum": "1kPa", "--seed": "0 7"}
-CHANGED |= {"--slip-noise-deviation": "1um 0", "--plant": "smooth coulomb", "--method": "rk4 dormand-prince"}
-SOUND = {
-    "fault": (["short.toml", "lab-fault", "crustal-patch"], {"--box": "paper ten-percent"}),
-    "derive": (["short.toml", "real-fault"], {"--latex": ""}),
-    "scale": (["lab-fault real-fault"], {"--controller": "cta dia elqr", "--clock": "natural-period operation-time"}),
-    "errata": (["1", "5 12"], {}),
-    "init": (["new.toml --force"], {"--law": "exponential-slip-weakening rate-and-state-aging"}),
-    "check": ([f"FILE{i}" for i in range(8)], {"--quiet": "", "--log-level": "info debug"}),
-    "sos": (
-        ["x^2+1", "x^4-2*x^2+1", "x^2-y", "x^4+y^4-x*y+1"],
-        {"--degree": "2 4", "--verbose": "", "--margin": "1/10"},
-    ),
-    "simulate": (["lab-fault --scheme explicit", "lab-fault --scheme implicit"], CHANGED),
-    "export": (
-        ["lab-fault"],
-        {"--controller": "cta dia elqr", "--gains": "published", "--scheme": "explicit implicit"},
-    ),
-}
-"""Places, a line each, and options with values of quick commands; most of their lines succeed."""
+NAMED = {name: str(next(p for p in PROOFS if p.name.startswith(begin))) for name, begin in NAMES.items()}
 
 
 @st.composite
-def sound_lines(draw):
-    """A quick command with options that fit; a third of the lines have one word replaced, lost or doubled."""
-    name = draw(st.sampled_from(sorted(SOUND)))
-    subjects, options = SOUND[name]
-    line = [name, *draw(st.sampled_from(subjects)).split()]
-    line = [str(SMALL[int(word[4:]) % len(SMALL)]) if word.startswith("FILE") else word for word in line]
-    known = {**options, "--json": ""}
-    for option in draw(st.lists(st.sampled_from(sorted(known)), max_size=4, unique=True)):
-        line += [option, *([draw(st.sampled_from(known[option].split()))] if known[option] else [])]
-    line += ["--duration", "20ms"] if name == "simulate" else ["--out", "made", "--force"] if name == "export" else []
-    if draw(st.integers(0, 2)) == 0:
-        at = draw(st.integers(1, len(line)))
-        line[at : at + draw(st.integers(0, 1))] = [draw(JUNK)] if draw(st.booleans()) else line[at : at + 1] * 2
-    return line
-
-
-SMALL = [path for path in PROOFS if path.stat().st_size < 6000]
-ENDED = {0: 0, 1: 0, 2: 0}
+def sound_lines(draw, rare=50):
+    """A command whose every option is right, and whether it is; in one of four something is lost, doubled or other."""
+    text = draw(
+        st.sampled_from((RARE if draw(st.integers(1, rare)) == rare else SOUND).replace("\\\n", "").split("\n")[1:-1])
+    )
+    always, *options = text.split("|")
+    chosen = draw(st.lists(st.sampled_from(options), unique=True)) if options else []
+    text = re.sub(r"\{(.*?)\}", lambda found: draw(st.sampled_from(found[1].split(";"))), " ".join([always, *chosen]))
+    line = [NAMED.get(word, word) for word in shlex.split(text)]
+    if draw(st.integers(0, 3)):
+        return line, True
+    at = draw(st.integers(0 if len(line) < 3 else 1, len(line) - 1))
+    swapped = [*line[:at], *line[at : at + 2][::-1], *line[at + 2 :]]
+    changes = [line[:at] + line[at + 1 :], [*line[: at + 1], *line[at:]], swapped]
+    return draw(st.sampled_from(changes) | JUNK.map(lambda word: [*line[:at], word, *line[at + 1 :]])), False
 
 
 def test_every_command_is_drawn():
     assert {"guarantee", "limits", "check", "campaign"} <= COMMANDS.keys()
     assert QUICK <= COMMANDS.keys()
     assert all(places and "--json" in options for places, options in COMMANDS.values())
-    assert SOUND.keys() < COMMANDS.keys()
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    """Folder with the files that lines name."""
+    monkeypatch.chdir(tmp_path)
+    time, load = np.arange(60.0), np.maximum(np.arange(60.0), 10 * np.arange(60.0) - 270)
+    friction = 0.6 + np.where(time > 30, 0.01 * np.exp(-(load - 30) / 10) - 0.005, 0)
+    record = np.column_stack([time, load, friction])
+    np.savetxt(
+        "record.csv", record, delimiter=",", header="time [s],load_point_displacement [um],friction [1]", comments=""
+    )
+    for name, text in {
+        "short.toml": SHORT,
+        "guarantee.json": guaranteed(),
+        "field.toml": '[field]\nx = "-x + y"\ny = "-y - x^3"\n',
+        "course.csv": "time [s],pressure [MPa]\n0,0\n3600,1\n",
+    }.items():
+        Path(name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def leaves_nothing_behind(line, place):
+    """Exit code of a line that is refused without a file, and prints JSON where it is asked to."""
+    before = {p.name for p in place.iterdir()}
+    code, out, _ = answer(*line)
+    after = {p.name for p in place.iterdir()}
+    assert code != 2 or after == before
+    assert not any(name.startswith(".") for name in after)
+    if code != 2 and "--json" in line:
+        json.loads(out)
+    return code
 
 
 @pytest.mark.parametrize("which", PROFILES)
-def test_command_lines(which, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
-    (tmp_path / "guarantee.json").write_text(guaranteed(), encoding="utf-8")
-
-    ENDED.update({code: 0 for code in ENDED})
-
-    @profile((60, 10_000), which)
-    @given(sound_lines() | sound_lines() | command_lines())
+def test_command_lines(which, workplace):
+    @profile((30, 2000), which)
+    @given(command_lines())
     def check(line):
-        before = {p.name for p in tmp_path.iterdir()}
-        code, out, _ = answer(*line)
-        ENDED[code] += 1
-        after = {p.name for p in tmp_path.iterdir()}
-        assert code != 2 or after == before
-        assert not any(name.startswith(".") for name in after)
-        if code != 2 and "--json" in line and "--quiet" not in line:
-            json.loads(out)
+        leaves_nothing_behind(line, workplace)
 
-    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     check()
-    assert ENDED[0] + ENDED[1] > sum(ENDED.values()) / 8, ENDED  # in one process, one after the other
-    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
+
+
+@pytest.mark.parametrize("which", PROFILES)
+def test_sound_command_lines(which, workplace):
+    """Thousands of them in one process, which is as it was before: handlers of signals, folder, open files."""
+    handlers = [signal.getsignal(number) for number in SIGNALS]
+    codes, opened = Counter(), len(os.listdir("/dev/fd"))
+
+    @profile((15, 8000), which)
+    @given(sound_lines(rare=50 if which == 0 else 10**6))
+    def check(drawn):
+        codes[leaves_nothing_behind(drawn[0], workplace), drawn[1]] += 1
+
+    check()
+    print(dict(codes))  # of exit codes, by whether the line is sound
+    assert [signal.getsignal(number) for number in SIGNALS] == handlers
+    assert sum(codes.values()) >= (1000 if which == 0 else 40)
+    assert Path.cwd() == workplace
+    assert len(os.listdir("/dev/fd")) < opened + 20
+    assert codes[0, True] > 2 * codes[2, True]
+    assert codes[2, False] > 0
 
 
 # Certificates

@@ -451,7 +451,8 @@ def called(function: Any, work: Instruction) -> Called:
     name = found[0].name() if len(found) == 1 else ""
     if name.startswith("fold_"):
         inner = name.removeprefix("fold_")
-        return Called(found[0].find_function(inner), int(found[0].find_function(f"mapaccum_{inner}").size2_out(0)))
+        (all_of_them,) = map(found[0].get_function, found[0].get_function())  # for 10, 100, … it has another name
+        return Called(found[0].find_function(inner), int(all_of_them.size2_out(0)))
     if name == "where_needed":
         return Called(found[0].find_function("solved"), 0)
     raise NotPortableError(f"a call in {function.name()} is neither a repetition nor a branch")

@@ -8,7 +8,7 @@ from quakedesign import load_fault, published
 from quakedesign.loop import Actuator, Diffusion, simulation_scheme
 from quakedesign.simulation import integrator
 from quakedesign.simulation.closed_loop import WORKS, Meter, Variation
-from quakedesign.simulation.compiled import _source
+from quakedesign.simulation.compiled import _source, expanded, verbatim
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import _step, loop_class
 
@@ -62,3 +62,13 @@ def test_the_code_does_not_grow_with_the_substeps():
 def test_the_code_of_a_substep_grows_evenly_with_the_cells():
     sizes = [step_of(99, cells).find_function("substep", 9).n_instructions() for cells in (3, 6, 9)]
     assert sizes[2] - sizes[1] == sizes[1] - sizes[0] > 0
+
+
+@pytest.mark.parametrize("times", [2, 9, 10, 11, 100, 110])
+def test_every_number_of_substeps_is_read_back(times):
+    """CasADi names what it repeats otherwise where the number is a power of ten."""
+    x = ca.SX.sym("x")
+    substep = ca.Function("substep", [x], [2 * x + 1])
+    with verbatim():
+        step = ca.Function("step", [x], [substep.fold(times, {"never_inline": True})(x)])
+    assert float(expanded(step)(0)) == float(2**times - 1)

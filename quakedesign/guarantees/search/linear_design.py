@@ -278,6 +278,7 @@ class _Laws:
         require_surroundings(around)
         if step <= 0:
             raise ParameterError(f"step must be positive. Received {shortly(step)} s. Give T_s.")
+        require_ordinary(step=step)
         if (none := unpredictable(task, step)) is not None:
             return none
         if reason := why_no_law(step, measured, around):
