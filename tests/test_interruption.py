@@ -1,5 +1,6 @@
 """Signals that end a command: one line and the exit code of the shell, whatever libraries make of them."""
 
+import json
 import os
 import signal
 import subprocess
@@ -9,6 +10,7 @@ import time
 
 import pytest
 
+from quakedesign.cli import main
 from quakedesign.files import write_whole
 from quakedesign.parallel import SIGNALS, ending, remedy, undisturbed
 
@@ -92,6 +94,17 @@ def test_an_ignored_signal_stays_ignored(capsys):
         time.sleep(0.01)
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     assert capsys.readouterr().err == ""
+
+
+def test_a_process_that_goes_on_runs_the_next_command_as_before(capsys):
+    """A caller that catches `SystemExit` takes an ended command for an answer without JSON; the next one is whole."""
+    code, said = ended(lambda: send(signal.SIGTERM), capsys)
+    assert (code, said) == (143, "quakedesign: terminated; nothing was written.\n")
+    with pytest.raises(SystemExit) as found:
+        main(["fault", "lab-fault", "--json"])
+    out, err = capsys.readouterr()
+    assert (found.value.code, err, json.loads(out)["name"]) == (0, "", "lab-fault")
+    assert signal.set_wakeup_fd(-1) == -1
 
 
 def test_inner_blocks_leave_the_signals_to_the_outer_one(capsys):
