@@ -2,97 +2,66 @@
 
 Usage: ``python proofs/check.py FILE...``. Every file gets one block: ``proved`` or ``refuted`` with the
 statement that was verified, or ``invalid`` with one reason. Exit code 0: all proved; 1: not all; 2: an
-argument cannot be read, or the verdict not be written; 4: out of memory. The modules in `IMPORTS` must
+argument cannot be read, or the verdict not be written; 4: out of memory. The folder ``checker`` must
 stand beside this file.
 
-What has to be read: this file, exact_numbers.py, which reads files and computes, and what the kind of file imports.
+What has to be read: this file, checker/numbers.py, which reads files and computes, and what the kind of file imports.
 """
 
 import os
 import sys
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import spec_from_file_location
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
-IMPORTS = {
-    "exact_numbers": (),
-    "squares": ("exact_numbers",),
-    "loop": ("exact_numbers",),
-    "cells": ("exact_numbers", "loop"),
-    "stability": ("exact_numbers", "squares", "loop", "cells"),
-    "equilibrium": ("exact_numbers", "loop", "cells"),
-    "polynomials": ("exact_numbers", "squares"),
-    "functionals": ("exact_numbers", "squares", "polynomials"),
-    "attraction": ("exact_numbers", "polynomials"),
-    "guarantee_reading": ("exact_numbers",),
-    "guarantee_task": ("guarantee_reading",),
-    "guarantee_numbers": ("guarantee_reading",),
-    "guarantee_root": ("guarantee_reading", "guarantee_numbers"),
-    "guarantee_near_events": ("guarantee_reading", "guarantee_numbers"),
-    "guarantee_loop": (
-        *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
-        *("guarantee_root", "guarantee_near_events"),
-    ),
-    "guarantee_impulse_sums": ("guarantee_reading", "guarantee_numbers", "guarantee_loop", "guarantee_near_events"),
-    "guarantee_gains": (
-        *("guarantee_reading", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_impulse_sums", "guarantee_near_events"),
-    ),
-    "guarantee_start": (
-        *("guarantee_reading", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_impulse_sums", "guarantee_gains"),
-    ),
-    "guarantee_layer": ("guarantee_reading", "guarantee_loop", "guarantee_gains", "guarantee_start"),
-    "guarantee_slow": (
-        *("guarantee_reading", "guarantee_task"),
-        *("guarantee_loop", "guarantee_gains", "guarantee_layer"),
-    ),
-    "guarantee_bounds": (
-        *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_layer", "guarantee_slow"),
-    ),
-    "guarantee_invariant_set": (
-        *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_impulse_sums", "guarantee_bounds"),
-    ),
-    "guarantee": (
-        *("guarantee_reading", "guarantee_task", "guarantee_root"),
-        *("guarantee_loop", "guarantee_slow", "guarantee_bounds", "guarantee_invariant_set"),
-    ),
-    "slow_sliding": (
-        *("guarantee_reading", "guarantee_task", "guarantee_numbers"),
-        *("guarantee_loop", "guarantee_gains", "guarantee_bounds"),
-    ),
-}
-LOADED: dict[str, ModuleType] = {}
+FOLDER = Path(__file__).resolve().with_name("checker")
+PACKAGE = f"{__name__}_checker".replace(".", "_")  # no other module goes by this name
+
+
+class Source(SourceFileLoader):
+    """A module as its source says: compiled files are not believed, nor written."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Compile the source."""
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
+class Finder(MetaPathFinder):
+    """Finds the modules of the folder, and nothing else; none is found in any other place."""
+
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        """Where a module of the package lies; an OSError names the file that is missing."""
+        package, *parts = fullname.split(".")
+        if package != PACKAGE:
+            return None
+        place = FOLDER.joinpath(*parts)
+        file = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+        if not file.is_file():
+            raise OSError(f"{file.relative_to(FOLDER.parent)} must stand beside check.py")
+        within = [str(place)] if place.is_dir() else None
+        loader = Source(fullname, str(file))
+        return spec_from_file_location(fullname, file, loader=loader, submodule_search_locations=within)
+
+
+sys.meta_path.insert(0, Finder())
 
 
 def beside(name: str) -> ModuleType:
-    """Load a module of this folder and what it imports of it: from source, whatever else goes by these names."""
-    if name not in LOADED:
-        path = Path(__file__).resolve().with_name(f"{name}.py")
-        if not path.is_file():
-            raise OSError(f"{path.name} must stand beside check.py")
-        module = ModuleType(name)
-        module.__file__ = str(path)
-        own = {name: module} | {other: beside(other) for other in IMPORTS[name]}
-        others = {key: sys.modules.pop(key) for key in own if key in sys.modules}
-        sys.modules.update(own)
-        exec(compile(path.read_bytes(), path, "exec"), vars(module))
-        for key in own:
-            del sys.modules[key]
-        sys.modules.update(others)
-        LOADED[name] = module
-    return LOADED[name]
+    """Load a module of the folder ``checker``, with what it imports."""
+    return import_module(f"{PACKAGE}.{name}")
 
 
 try:
-    exact_numbers = beside("exact_numbers")
+    numbers = beside("numbers")
 except OSError as missing:
     print(f"{missing}. Copy the whole folder.", file=sys.stderr)
     sys.exit(2)
-Refused, need = exact_numbers.Refused, exact_numbers.need
+Refused, need = numbers.Refused, numbers.need
 
 
 class Outdated(Exception):
@@ -112,8 +81,8 @@ class Result:
 
 def check(text: str) -> Result:
     """Verify the text of a file; it is Refused if a rule is broken, which says nothing about the claim itself."""
-    exact_numbers.budget.renew()
-    document = exact_numbers.read_object(exact_numbers.parse(text), "the file")
+    numbers.budget.renew()
+    document = numbers.read_object(numbers.parse(text), "the file")
     version = document.get("format")
     need(type(version) is int and version == 1, "format", "the integer 1", version)
     if "polynomial" in document:
@@ -126,15 +95,15 @@ def check(text: str) -> Result:
     if "inputs" in document:
         raise Outdated
     if "refutation" in document:
-        return Result("refuted", tuple(beside("equilibrium").refute(document)))
-    return Result("proved", tuple(beside("stability").prove(document)))
+        return Result("refuted", tuple(beside("lyapunov.equilibrium").refute(document)))
+    return Result("proved", tuple(beside("lyapunov.stability").prove(document)))
 
 
 def check_polynomial(document: dict[str, Any]) -> Result:
     """Verify a file about a plain polynomial."""
     polynomials = beside("polynomials")
     given = [kind for kind in ("sos", "not-sos", "negative") if kind in document] or ["sos"]
-    exact_numbers.read_object(document, "the file", (*polynomials.STATEMENT_KEYS, given[0]))
+    numbers.read_object(document, "the file", (*polynomials.STATEMENT_KEYS, given[0]))
     statement = polynomials.read_statement(document)
     if given[0] == "sos":
         lines = polynomials.prove_squares(document["sos"], statement)
@@ -148,9 +117,9 @@ def check_polynomial(document: dict[str, Any]) -> Result:
 
 def check_guarantee(document: dict[str, Any]) -> Result:
     """Verify a file of the kind ``guarantee`` or ``slow_sliding``."""
-    kind = document["kind"]
-    need(kind in ("guarantee", "slow_sliding"), "kind", "guarantee or slow_sliding", kind)
-    return Result("proved", tuple(beside(kind).verify(document)))
+    kind, modules = document["kind"], {"guarantee": "tracking", "slow_sliding": "slow_sliding"}
+    need(kind in tuple(modules), "kind", "guarantee or slow_sliding", kind)
+    return Result("proved", tuple(beside(f"guarantee.{modules[kind]}").verify(document)))
 
 
 # ---------------------------------------------------------------- the command
@@ -160,7 +129,7 @@ def read_file(name: str) -> str:
     """Read a regular file of bounded size as UTF-8."""
     if Path(name).exists() and not Path(name).is_file():
         raise OSError("it is no regular file")
-    most = exact_numbers.MAX_BYTES
+    most = numbers.MAX_BYTES
     with open(name, "rb") as stream:
         content = stream.read(most + 1)
     need(len(content) <= most, "the file", f"at most {most} bytes long", "more")

@@ -1,5 +1,5 @@
 (* The small gain behind guarantees, for itself: coqc small_gain.v. What is eliminated is 1 - M, with the bounds F on the right;
-   positive pivots alone decide, as in proofs/guarantee_bounds.py. *)
+   positive pivots alone decide, as in proofs/checker/guarantee/bounds.py. *)
 
 From Coq Require Import Reals List Lra Lia.
 Import ListNotations.

@@ -26,8 +26,10 @@ def module(name, path):
 LOOPS = module("loops_in_a_folder", Path(__file__).with_name("test_check.py"))
 POLYNOMIALS = module("polynomials_in_a_folder", Path(__file__).with_name("test_check_polynomials.py"))
 ATTRACTIONS = module("attractions_in_a_folder", Path(__file__).with_name("test_check_attraction.py"))
-NAMES = tuple(LOOPS.checker.IMPORTS)
-LOOP = {"exact_numbers", "loop", "cells"}
+CHECKER = PROOFS / "checker"
+NAMES = sorted(".".join(p.relative_to(CHECKER).with_suffix("").parts) for p in CHECKER.rglob("[!_]*.py"))
+LOOP = {"numbers", "lyapunov.loop"}
+SQUARES = {"numbers", "squares", "polynomials"}
 FORGED = 'raise SystemExit("another module")\n'
 
 
@@ -36,23 +38,31 @@ def guarantee():
 
 
 KINDS = {
-    "proof": (LOOPS.relay, LOOP | {"squares", "stability"}),
-    "refutation": (LOOPS.sliding_rest, LOOP | {"equilibrium"}),
-    "sos": (POLYNOMIALS.quadratic, {"exact_numbers", "squares", "polynomials"}),
-    "negative": (POLYNOMIALS.POINTS[0], {"exact_numbers", "squares", "polynomials"}),
-    "not-sos": (POLYNOMIALS.FUNCTIONALS[0], {"exact_numbers", "squares", "polynomials", "functionals"}),
-    "guarantee": (guarantee, {"exact_numbers", *(name for name in NAMES if name.startswith("guarantee"))}),
-    "attraction": (ATTRACTIONS.cubic, {"exact_numbers", "squares", "polynomials", "attraction"}),
+    "proof": (LOOPS.relay, LOOP | {"squares", "lyapunov.stability"}),
+    "refutation": (LOOPS.sliding_rest, LOOP | {"lyapunov.equilibrium"}),
+    "sos": (POLYNOMIALS.quadratic, SQUARES),
+    "negative": (POLYNOMIALS.POINTS[0], SQUARES),
+    "not-sos": (POLYNOMIALS.FUNCTIONALS[0], SQUARES | {"functionals"}),
+    "guarantee": (
+        guarantee,
+        {"numbers", *(n for n in NAMES if n.startswith("guarantee"))} - {"guarantee.slow_sliding"},
+    ),
+    "attraction": (ATTRACTIONS.cubic, SQUARES | {"attraction"}),
 }
 
 
 @pytest.fixture
 def folder(tmp_path):
     """A copy of what the checker consists of."""
-    (tmp_path / "copy").mkdir()
-    for name in ("check", *NAMES):
-        shutil.copy(PROOFS / f"{name}.py", tmp_path / "copy")
+    shutil.copytree(CHECKER, tmp_path / "copy" / "checker", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(PROOFS / "check.py", tmp_path / "copy")
     return tmp_path / "copy"
+
+
+def source(folder, name):
+    """The file of a module of the package, or of a module beside it."""
+    path = folder.joinpath("checker", *name.split(".")).with_suffix(".py")
+    return path if path.is_file() else folder / f"{name}.py"
 
 
 def written(folder, *kinds):
@@ -72,8 +82,10 @@ def test_modules_of_the_working_directory_are_not_taken(folder, tmp_path, option
     """Nor those on Python's path; and no file is written."""
     planted = tmp_path / "planted"
     planted.mkdir()
-    for name in NAMES:
-        (planted / f"{name}.py").write_text(FORGED)
+    (planted / "checker").mkdir()
+    for name in ("__init__", "numbers", "squares"):
+        (planted / "checker" / f"{name}.py").write_text(FORGED)
+    (planted / "__main___checker.py").write_text(FORGED)
     before = sorted(folder.rglob("*"))
     files = written(planted, *KINDS)
     result = run(folder / "check.py", *files, options=options, cwd=planted, PYTHONPATH=str(planted))
@@ -87,7 +99,7 @@ def test_compiled_files_beside_the_source_are_not_taken(folder, tmp_path):
     """Such as Python would believe unread: those that say that they need not be compared with a source."""
     (tmp_path / "forged.py").write_text(FORGED)
     for name in NAMES:
-        cached = importlib.util.cache_from_source(str(folder / f"{name}.py"))
+        cached = importlib.util.cache_from_source(str(source(folder, name)))
         py_compile.compile(
             str(tmp_path / "forged.py"), cached, invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH
         )
@@ -100,32 +112,33 @@ def test_a_kind_of_file_needs_the_kernel_and_its_own_modules(kind, folder):
     make, needed = KINDS[kind]
     for name in NAMES:
         if name not in needed:
-            (folder / f"{name}.py").unlink()
+            source(folder, name).unlink()
     assert run(folder / "check.py", *written(folder, kind), cwd=folder).returncode in (0, 1)
-    checker = module("one_kind", PROOFS / "check.py")
+    checker = module(f"one_kind_{kind}", PROOFS / "check.py")
     try:
         checker.check(json.dumps(make()))
     except checker.Refused:
         assert kind == "guarantee"
-    assert set(checker.LOADED) == needed
+    loaded = {name.removeprefix(f"{checker.PACKAGE}.") for name in sys.modules if name.startswith(checker.PACKAGE)}
+    assert loaded - {checker.PACKAGE, "lyapunov", "guarantee"} == needed
 
 
-@pytest.mark.parametrize("missing", NAMES[:2])
+@pytest.mark.parametrize("missing", ["numbers", "squares"])
 def test_what_is_missing_is_named_in_one_line(folder, missing):
-    (folder / f"{missing}.py").unlink()
+    source(folder, missing).unlink()
     result = run(folder / "check.py", *written(folder, "sos"), cwd=folder)
     assert result.returncode == 2
-    assert f"{missing}.py must stand beside check.py" in result.stderr
+    assert f"checker/{missing}.py must stand beside check.py" in result.stderr
     assert (result.stdout, result.stderr.count("\n")) == ("", 1)
 
 
 def test_the_format_says_what_an_auditor_reads():
     text = (PROOFS / "FORMAT.md").read_text(encoding="utf-8")
-    lines = {name: (PROOFS / f"{name}.py").read_text(encoding="utf-8").count("\n") for name in ("check", *NAMES)}
+    lines = {name: source(PROOFS, name).read_text(encoding="utf-8").count("\n") for name in ("check", *NAMES)}
     said = {("check",): re.search(r"`check.py` \((\d+) lines\)", text)[1]}
-    said |= {("exact_numbers", "squares"): re.search(r"A kernel of (\d+) lines", text)[1]}
-    rows = re.findall(r"^\| [^|]+ \| (`exact_numbers`[^|]*) \| (\d+) \|$", text, flags=re.MULTILINE)
-    said |= {tuple(re.findall(r"`(\w+)`", names)): number for names, number in rows}
+    said |= {("numbers", "squares"): re.search(r"A kernel of (\d+) lines", text)[1]}
+    rows = re.findall(r"^\| [^|]+ \| (`numbers`[^|]*) \| (\d+) \|$", text, flags=re.MULTILINE)
+    said |= {tuple(re.findall(r"`([\w.]+)`", names)): number for names, number in rows}
     assert {frozenset(names) for names in list(said)[2:]} == {frozenset(needed) for _, needed in KINDS.values()}
     for names, number in said.items():
         assert sum(lines[name] for name in names) == pytest.approx(int(number), rel=0.1), names
@@ -137,15 +150,23 @@ def test_a_link_to_the_checker_finds_its_folder(folder, tmp_path):
 
 
 def test_modules_of_the_same_names_in_this_process_are_left_alone(monkeypatch):
-    own, checker = ModuleType("loop"), LOOPS.checker
-    monkeypatch.setitem(sys.modules, "loop", own)
-    monkeypatch.setattr(checker, "LOADED", {})
-    stability, loop = checker.beside("stability"), checker.beside("loop")
+    own = ModuleType("checker")
+    monkeypatch.setitem(sys.modules, "checker", own)
+    checker = module("with_a.namesake", PROOFS / "check.py")
+    stability, loop = checker.beside("lyapunov.stability"), checker.beside("lyapunov.loop")
     assert stability.describe(loop.read_loop(LOOPS.relay()))[-1] == "dx/dt = -2*sign(x)"
     assert stability.read_loop is loop.read_loop
-    assert stability.need is loop.need is checker.beside("exact_numbers").need
-    assert sys.modules["loop"] is own
-    assert not {"exact_numbers", "cells", "stability"} & sys.modules.keys()
+    assert stability.need is loop.need is checker.beside("numbers").need
+    assert sys.modules["checker"] is own
+    assert not {"checker.numbers", "lyapunov.loop"} & sys.modules.keys()
+
+
+def test_a_shipped_certificate_is_verified_from_any_folder(tmp_path):
+    """Without Python's path, its environment and what is installed for the user."""
+    shipped = PROOFS / "certificates" / "super-twisting_1.5_1.1.json"
+    result = run(PROOFS / "check.py", str(shipped), options=("-I", "-S"), cwd=tmp_path)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout.startswith(f"{shipped}: proved\n")
 
 
 def test_every_file_has_all_steps(monkeypatch):

@@ -24,7 +24,7 @@ SPECIFICATION = importlib.util.spec_from_file_location("polynomial_check", ROOT 
 checker = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(checker)
 exact_numbers, squares, polynomials, functionals = map(
-    checker.beside, ("exact_numbers", "squares", "polynomials", "functionals")
+    checker.beside, ("numbers", "squares", "polynomials", "functionals")
 )
 
 REMOVED = object()

@@ -20,8 +20,9 @@ def module(name, path):
 LOOPS = module("loops_by_hand", Path(__file__).with_name("test_check.py"))
 POLYNOMIALS = module("polynomials_by_hand", Path(__file__).with_name("test_check_polynomials.py"))
 checker = LOOPS.checker
-exact_numbers, squares, loops, cells, stability, equilibria, polynomials, functionals, *_ = map(
-    checker.beside, checker.IMPORTS
+exact_numbers, squares, polynomials, functionals, loops, stability, equilibria = map(
+    checker.beside,
+    ("numbers", "squares", "polynomials", "functionals", "lyapunov.loop", "lyapunov.stability", "lyapunov.equilibrium"),
 )
 Term = loops.Term
 
@@ -164,7 +165,7 @@ def test_polynomials_in_words():
 
 
 def cell(equalities=(), inequalities=()):
-    return cells.Cell("", 2, (1, 1), {}, list(equalities), list(inequalities))
+    return loops.Cell("", 2, (1, 1), {}, list(equalities), list(inequalities))
 
 
 @pytest.mark.parametrize(
@@ -188,31 +189,31 @@ def test_signs_alone_tell_whether_a_cell_may_have_an_interior(equalities, inequa
 
 def test_powers_of_lifts_must_be_whole():
     """n of degree 3: n^(1/3) is w, n^(1/2) is none."""
-    one = cells.Cell("", 1, (1, 1), {0: 1, 1: 3}, [], [])
-    assert cells.restrict({((), (2, F(1, 3)), (False, False)): F(5)}, one, {}) == {(2, 1): 5}
+    one = loops.Cell("", 1, (1, 1), {0: 1, 1: 3}, [], [])
+    assert loops.restrict({((), (2, F(1, 3)), (False, False)): F(5)}, one, {}) == {(2, 1): 5}
     for powers in ((2, F(1, 2)), (F(1, 2), F(1))):
         with pytest.raises(checker.Refused, match="powers of lifts"):
-            cells.restrict({((), powers, (False, False)): F(5)}, one, {})
+            loops.restrict({((), powers, (False, False)): F(5)}, one, {})
 
 
 def test_the_reach_of_a_lift_is_that_of_the_lifts_in_it():
     """Of x, y, z and the lifts n(x), m(y): x + n is zero on open sets, y + n and x y + x m are not."""
     reaches = {3: {0}, 4: {1}}
     e = {name: tuple(int(i == k) for i in range(5)) for k, name in enumerate("xyznm")}
-    assert cells.reach_of({e["y"]: 1, e["n"]: 1}, reaches, 3) == {0, 1}
-    assert cells.reach_of({e["z"]: 1, e["m"]: 1}, reaches, 3) == {1, 2}
-    assert cells.reach_of({e["x"]: 1}, reaches, 3) == {0}
-    assert cells.reach_of({e["x"]: 1, e["m"]: 1}, reaches, 3) == {0, 1}
+    assert loops.reach_of({e["y"]: 1, e["n"]: 1}, reaches, 3) == {0, 1}
+    assert loops.reach_of({e["z"]: 1, e["m"]: 1}, reaches, 3) == {1, 2}
+    assert loops.reach_of({e["x"]: 1}, reaches, 3) == {0}
+    assert loops.reach_of({e["x"]: 1, e["m"]: 1}, reaches, 3) == {0, 1}
     for form in ({e["x"]: 1, e["n"]: 1}, {e["n"]: 1}, {e["x"]: 1, e["n"]: 1, e["m"]: 1}):
         with pytest.raises(checker.Refused, match="null set"):
-            cells.reach_of(form, reaches, 3)
+            loops.reach_of(form, reaches, 3)
 
 
 def nested(field, **parts):
     """Cells of a loop in x with a lift n = x, and more."""
     document = LOOPS.relay() | {"gains": {}, "lifts": {"n": LOOPS.X1}} | parts
     document["field"] = {"x": field}
-    return [one.label for one in cells.cells_with_lifts(loops.read_loop(document))]
+    return [one.label for one in loops.cells_with_lifts(loops.read_loop(document))]
 
 
 def test_lifts_are_used_by_sign_or_by_power():
@@ -339,7 +340,7 @@ STEPS_BY_HAND = {
     "an elimination of three rows": (
         lambda: squares.is_positive_definite([[int(i == j) for j in range(3)] for i in range(3)]), 3 + 1,
     ),
-    "the reach of two terms": (lambda: cells.reach_of({(1,): F(1), (0,): F(1)}, {}, 1), 2 * 6),
+    "the reach of two terms": (lambda: loops.reach_of({(1,): F(1), (0,): F(1)}, {}, 1), 2 * 6),
     "a product that is kept": (
         lambda: polynomials.product_expander(plain(inequalities=({(1,): F(1)},)))((0,)), 6 + 300,
     ),
@@ -508,14 +509,6 @@ def test_a_file_of_a_kind_is_a_guarantee():
         checker.check('{"format": 1, "kind": "other"}')
     with pytest.raises(checker.Refused, match="fault, reference"):
         checker.check('{"format": 1, "kind": "guarantee"}')
-
-
-def test_a_guarantee_needs_the_module_beside_the_checker(tmp_path, monkeypatch, capsys):
-    (tmp_path / "guarantee.json").write_text('{"format": 1, "kind": "guarantee"}')
-    monkeypatch.setattr(checker, "__file__", str(tmp_path / "check.py"))
-    monkeypatch.delitem(checker.LOADED, "guarantee", raising=False)
-    assert checker.main([str(tmp_path / "guarantee.json")]) == 2
-    assert "guarantee.py must stand beside check.py" in capsys.readouterr().err
 
 
 def test_a_bound_under_inputs_is_no_longer_read(tmp_path, capsys):

@@ -30,7 +30,7 @@ def beside(name):
 
 LOOPS, POLYNOMIALS = beside("test_check"), beside("test_check_polynomials")
 REGIONS, GUARANTEES = beside("test_check_attraction"), beside("test_guarantee_reading")
-entries = CHECK.beside("guarantee_reading").entries
+entries = CHECK.beside("guarantee.reading").entries
 
 
 def numbers(value, path=()):
@@ -199,10 +199,10 @@ def test_a_proof_on_a_set_without_points_says_so(document, empty, tmp_path):
 def test_a_guarantee_without_disturbance_or_distance_says_so():
     still = GUARANTEES.changed(GUARANTEES.HELD, (("disturbance", "amplitude"), "0"))
     claims = dict.fromkeys(GUARANTEES.CLAIMS, F(1))
-    said = CHECK.beside("guarantee").statement(still, GUARANTEES.checker.read_task(still), claims, F(1, 3))
+    said = CHECK.beside("guarantee.tracking").statement(still, GUARANTEES.checker.read_task(still), claims, F(1, 3))
     assert "disturbance: none (amplitude 0); from rest" in "".join(said)
     assert "without disturbance" in read_guarantee(still).sentence()
-    sliding = CHECK.beside("slow_sliding")
+    sliding = CHECK.beside("guarantee.slow_sliding")
     for distance, stress in (("0", "1"), ("1", "0"), ("1", "1")):
         given = changed(changed(SLIDING, ("reference", "distance"), distance), ("stress",), stress)
         bounds = {name: F(value) for name, value in given["claims"].items()}

@@ -399,7 +399,7 @@ PATHS += [(json.loads(guarantee_text(claim("mean"))), ("loop", "jitter", "mean")
 @pytest.fixture
 def coarse(monkeypatch):
     """Few parts of the unit interval: cheap, and as strict."""
-    monkeypatch.setattr(checker.beside("guarantee_task"), "HALVINGS", 2)
+    monkeypatch.setattr(checker.beside("guarantee.task"), "HALVINGS", 2)
     monkeypatch.setattr(package_task, "_HALVINGS", 2)
 
 

@@ -30,7 +30,7 @@ PROOFS = Path(__file__).parents[3] / "proofs"
 SPECIFICATION = importlib.util.spec_from_file_location("sliding_check", PROOFS / "check.py")
 checker = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(checker)
-standalone = checker.beside("slow_sliding")
+standalone = checker.beside("guarantee.slow_sliding")
 
 RATE = F("1.2e-6")
 

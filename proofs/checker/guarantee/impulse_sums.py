@@ -1,4 +1,4 @@
-"""Upper sums of impulse responses over the pieces of a period, and over all periods before."""
+"""Upper sums of impulse responses over the pieces of a period, near its events, and over all periods before."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,10 +7,54 @@ from functools import lru_cache
 from itertools import pairwise
 from math import ceil
 
-from guarantee_loop import Fade, Loop
-from guarantee_near_events import Near, Pulse, near_of, with_next
-from guarantee_numbers import BITS, Fixed, column, exponentials, fixed, sums_of_product
-from guarantee_reading import Refused, Row, need
+from .loop import Fade, Loop, Pulse
+from .matrices import BITS, Fixed, column, exponential, exponentials, fixed, sums_of_product
+from .reading import Refused, Row, need
+
+
+@dataclass
+class Near:
+    """What it is in one flow: columns that begin with its event, each with a bound of what it is off, in size.
+
+    `soon` bounds in size what is there in the last part, `reach` long, before the next event, beside `ahead` as it is.
+    """
+
+    sides: list[tuple[Fixed, Fixed]]
+    ahead: Fixed | None
+    soon: Fixed | None
+    reach: Fraction
+
+    def halves(self) -> tuple[Fixed, Fixed]:
+        """Half the sum and half the difference of both sides, whose sizes add up to the larger; what both are off."""
+        (one, off), (other, far) = self.sides
+        less = Fixed([[-v for v in line] for line in other.rows], other.error)
+        both = (one + other).beside(one + less).scaled(Fraction(1, 2))
+        return both, Fixed([[max(*a, *b)] for a, b in zip(off.rows, far.rows, strict=True)])
+
+
+def near_of(flow: list[Row], majorant: list[Row], event: Fixed, entry: Fixed, moved: Fixed, pulse: Pulse) -> Near:
+    """Both sides of a pulse after its event; `moved` is A*entry.
+
+    Before it, an impulse is within early*|J|*|e^{A.}|*|A*b| of J*b, after it within late*|e^{A.}|*|e^{-A*late}*A*b|.
+    """
+    before, after = event * entry, entry
+    shifted = ((event.size() * exponential(majorant, pulse.early).size()).size() * moved.size()).size()
+    back = (exponential([[-v for v in line] for line in flow], pulse.late) * moved).size()
+    behind = (exponential(majorant, pulse.late).size() * back).size()
+    sides = [
+        (before.scaled(pulse.before), shifted.scaled(pulse.before * pulse.early).size()),
+        (after.scaled(pulse.after), behind.scaled(pulse.after * pulse.late).size()),
+    ]
+    return Near(sides, None, None, Fraction(0))
+
+
+def with_next(here: Near | None, majorant: list[Row], entry: Fixed, moved: Fixed, pulse: Pulse) -> Near:
+    """What is there before the next event as well: at most |c*b| + early*|c|*|e^{A.}|*|A*b|, over `before`."""
+    soon = (exponential(majorant, pulse.early).size() * moved.size()).size()
+    sides = here.sides if here else []
+    scaled = soon.scaled(pulse.early * pulse.before).size()
+    return Near(sides, entry.scaled(pulse.before), scaled, pulse.early)
+
 
 DOUBLINGS = 12  # at most 4096 periods are summed
 SHARE = 1024  # what is left of the past after those is below a 1024th, but for what the slowest mode leaves

@@ -6,11 +6,10 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from guarantee_near_events import Pulse
-from guarantee_numbers import unit, zeros
-from guarantee_reading import Row, keys, matrix, need, number, numbers, row
-from guarantee_root import Root, read_root
-from guarantee_task import Task
+from .matrices import unit, zeros
+from .reading import Row, keys, matrix, need, number, numbers, row
+from .root import Root, read_root
+from .task import Task
 
 MAX_STATES, MAX_LAW_STATES, MAX_PERIODS = 20, 12, 8
 MODES, PI = 8, Fraction(314159265358979323846, 10**20)  # of a layer of rock; PI is below pi by less than SHORT of it
@@ -20,6 +19,17 @@ EVEN = [Fraction(i, 8) for i in range(9)]  # where a flow between two events is 
 HALVES = [Fraction(i, 2) for i in range(3)]
 BENT = [Fraction(i, 128) for i in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)]  # before a lag or a layer
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
+
+
+@dataclass
+class Pulse:
+    """From `early` before the event with this number until `late` after it; its areas over `before`, `after` are 1."""
+
+    event: int
+    early: Fraction
+    late: Fraction
+    before: Fraction
+    after: Fraction
 
 
 @dataclass

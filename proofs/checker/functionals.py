@@ -6,9 +6,9 @@ from itertools import product
 from math import comb
 from typing import Any
 
-from exact_numbers import Polynomial, add_product, budget, need, read_object, read_polynomial, to_integers
-from polynomials import Product, Statement, product_expander, terms_text
-from squares import MAX_REDUCED, is_positive_definite
+from .numbers import Polynomial, add_product, budget, need, read_object, read_polynomial, to_integers
+from .polynomials import Product, Statement, product_expander, terms_text
+from .squares import MAX_REDUCED, is_positive_definite
 
 MAX_MONOMIALS = 2000  # of a basis before reduction
 DIGIT = 12  # bits of an exponent in a coded monomial; the largest exponent, of multiplier * polynomial, is 1998

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from guarantee_numbers import BITS
-from guarantee_reading import Row, keys, need, number, row
+from .matrices import BITS
+from .reading import Row, keys, need, number, row
 
 MAX_TERMS, MAX_POWER = 16, 6
 CELLS = 10  # how often the range of e1 is halved

@@ -8,13 +8,12 @@ impulse responses in integers, multiples of 2^-BITS, each with a bound of its er
 from fractions import Fraction
 from typing import Any
 
-from guarantee_bounds import bounds
-from guarantee_invariant_set import bounds_within, read_reach
-from guarantee_loop import read_loop
-from guarantee_reading import Row, entries, keys, lower, need, numbers, upper
-from guarantee_root import root_within
-from guarantee_slow import read_slow
-from guarantee_task import Task, read_task
+from .bounds import bounds, read_slow
+from .invariant_set import bounds_within, read_reach
+from .loop import read_loop
+from .reading import Row, entries, keys, lower, need, numbers, upper
+from .root import root_within
+from .task import Task, read_task
 
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
 ASKED = ("least_asked", "largest_asked")  # at the valve

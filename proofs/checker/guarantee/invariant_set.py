@@ -7,12 +7,12 @@ from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any
 
-from guarantee_bounds import inputs
-from guarantee_impulse_sums import majorant
-from guarantee_loop import Loop
-from guarantee_numbers import BITS, Fixed, column, exponential, fixed, unit
-from guarantee_reading import Row, keys, matrix, need, row
-from guarantee_task import Task
+from .bounds import inputs
+from .impulse_sums import majorant
+from .loop import Loop
+from .matrices import BITS, Fixed, column, exponential, fixed, unit
+from .reading import Row, keys, matrix, need, row
+from .task import Task
 
 MAX_FACETS, MAX_PIECES, MAX_ENTRIES, MAX_BASES, TOO_LARGE = 400, 32, 6, 4000, 10**20
 SOONEST = 4  # pieces of the shortest interval

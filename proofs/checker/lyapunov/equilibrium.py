@@ -5,9 +5,8 @@ from fractions import Fraction
 from math import prod
 from typing import Any
 
-from cells import cells_of
-from exact_numbers import Exponents, Number, add, multiply, named, need, read_object, read_rational, to_integers
-from loop import LOOP_KEYS, Loop, Term, describe, read_loop
+from ..numbers import Exponents, Number, add, multiply, named, need, read_object, read_rational, to_integers
+from .loop import LOOP_KEYS, Loop, Term, cells_of, describe, read_loop
 
 
 def read_values(value: Any, where: str, names: Iterable[str]) -> dict[str, Fraction]:

@@ -1,16 +1,19 @@
-"""L1 norms: bounds of every output for an input of size 1, from upper sums of impulse responses."""
+"""L1 norms: bounds of every output for an input of size 1, for a start away from rest, and with a layer's modes.
+
+With R what the modes n < MODES leave out (FORMAT.md, Layer), A its area after a unit step, less it, and Y what of it
+the steps so far will still bring, x2 = e2 - beta0*b*Y takes the place of e2 in the loop.
+"""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from math import ceil
 
-from guarantee_impulse_sums import MAX_WORK, Flow, cut, integral, majorant, past
-from guarantee_loop import Fade, Loop
-from guarantee_near_events import Near, Pulse
-from guarantee_numbers import BITS, Fixed, column, exponential, fixed, unit
-from guarantee_reading import Refused, Row
+from .impulse_sums import DOUBLINGS, MAX_WORK, SHARE, Flow, Near, cut, integral, majorant, past, seen_alone, slowest
+from .loop import MODES, SHORT, Fade, Loop, Pulse, mode_rate, mode_share
+from .matrices import BITS, Fixed, column, exponential, fixed, unit
+from .reading import Refused, Row, need
 
 STRETCHES, PARTS = 128, 6  # of time without samples, each of 2^PARTS pieces
 Sums = list[int]  # one for every output, in units of 2^-BITS
@@ -192,3 +195,158 @@ def input_gains(loop: Loop) -> list[list[list[Fraction]]]:
         gains(loop, entry, place > 1 and place != fades, *[loop.fade] * (place == fades))
         for place, entry in enumerate(loop.inputs)
     ]
+
+
+FAINT = 60  # bits below the largest bound, by which all are raised so that none is 0
+
+
+def start_gains(loop: Loop) -> list[list[Fraction]]:
+    """Bounds of every output on every piece of the period, as those of an input of size 1."""
+    entries = [in_even_units(loop, entry)[1] for entry in loop.start]
+    loop, _ = in_even_units(loop, loop.start[0])
+    flows = cut(loop, loop.cuts, [Fraction(0)] * len(loop.flow), False)
+    start, outputs = fixed([list(line) for line in zip(*entries, strict=True)]), fixed(loop.outputs)
+    now, far, most = followed(flows, start, len(outputs.rows) * len(loop.cuts))
+    even = [1 << BITS] * len(entries)
+    found: list[list[Fraction]] = [[] for _ in loop.outputs]
+    for flow in flows:
+        both = zip(on_pieces(flow, outputs, now, even), on_pieces(flow, outputs, far, most), strict=True)
+        for near, late in both:
+            for bounds, a, b in zip(found, near, late, strict=True):
+                bounds.append(max(a, b) / (1 << BITS))
+        now, far = flow.whole * now, flow.whole * far
+    return found
+
+
+def followed(flows: list[Flow], start: Fixed, rows: int) -> tuple[Fixed, Fixed, list[int]]:
+    """States at the beginning of K periods; W^-1 after them, and what no W times a state exceeds, ever.
+
+    K = 2^j periods, until a 1024th of these bounds is left but for the slowest mode, which has to fall.
+    """
+    size, count = len(start.rows), len(start.rows[0])
+    period = flows[0].whole
+    for flow in flows[1:]:
+        period = flow.whole * period
+    row, columns, even = slowest(period), start, [1 << BITS] * count
+    for _ in range(DOUBLINGS):
+        width = 2 * len(columns.rows[0])
+        need(2 * width * size * (size + rows) <= MAX_WORK, "the loop must forget its start sooner: it takes too long")
+        columns, period = columns.beside(period * columns), period * period
+        place, seen, back = seen_alone(row, largest(columns.size(), even))
+        most = largest((seen * columns).size(), even)
+        most = [v + (max(most) >> FAINT) + 1 for v in most]
+        far = period * back
+        left = (seen * far).size().rows
+        quick = [v * (i != place) for i, v in enumerate(most)]
+        falls = all(product(line, most) <= v for line, v in zip(left, most, strict=True))
+        if falls and all(SHARE * product(line, quick) <= v for line, v in zip(left, most, strict=True)):
+            return columns, far, most
+    raise Refused(f"the nominal loop must be stable, and seen to be within {2**DOUBLINGS} periods")
+
+
+def product(line: list[int], values: list[int]) -> Fraction:
+    """Of a row of sizes and a column."""
+    return Fraction(sum(map(int.__mul__, line, values)), 1 << BITS)
+
+
+def largest(sizes: Fixed, weights: list[int]) -> list[int]:
+    """Of every row, the largest weighted sum of as many columns as there are weights, rounded up."""
+    return [max(sums(line, weights)) for line in sizes.rows]
+
+
+def sums(line: list[int], weights: list[int]) -> list[int]:
+    """Weighted sums of one group of columns after another, rounded up."""
+    count = len(weights)
+    groups = (line[i : i + count] for i in range(0, len(line), count))
+    return [(sum(map(int.__mul__, group, weights)) >> BITS) + 1 for group in groups]
+
+
+def on_pieces(flow: Flow, outputs: Fixed, columns: Fixed, weights: list[int]) -> Iterator[Row]:
+    """Bounds of all outputs in every piece, of the largest group of columns that stand before the event."""
+    now, phase = flow.event * columns, outputs
+    square = flow.generator * flow.generator
+    for step, near, h in zip(flow.steps, flow.nears, flow.pieces, strict=True):
+        following = phase * step
+        bends = (((phase * square).size() * near).size() * now.size()).size().rows
+        first, last = (phase * now).size().rows, (following * now).size().rows
+        yield [
+            max(max(a, b) + c * h**2 / 8 for a, b, c in zip(*(sums(line, weights) for line in lines), strict=True))
+            for lines in zip(first, last, bends, strict=True)
+        ]
+        phase = following
+
+
+@dataclass
+class Awaited:
+    """b*Y over its bound: where it enters the flow, how it fades, what it adds to e2, what the law is told of it."""
+
+    entry: Row
+    fade: Fade | None
+    at_once: Fraction
+    told: Row
+
+
+def loop_gains(loop: Loop, gain: Fraction) -> list[list[Row]]:
+    """Gains of every input: of the loop, of what is awaited and told of it where there is rock, of the start."""
+    found = []
+    if loop.layer:
+        loop, awaited = without_area(loop, gain)
+        lines = gains(loop, awaited.entry, False, awaited.fade)
+        lines[1] = [v + awaited.at_once for v in lines[1]]
+        found = [lines, gains(loop, awaited.told, True)]
+    own = input_gains(loop)
+    if loop.pulse:
+        found = [gains(loop, pulse_entry(loop, gain), False, pulse=loop.pulse)]
+        seen = own[1][3 if loop.asked else 2]  # the steady pressure moves on while one before is at the valve
+        seen[:] = [v + loop.pulse.late for v in seen]
+    return [*own, *found, *([start_gains(loop)] if loop.start else [])]
+
+
+def pulse_entry(loop: Loop, gain: Fraction) -> Row:
+    """Where a pressure at the valve enters: the slip rate, or what that behind a lag is more than the valve's."""
+    entry = [Fraction(0)] * len(loop.flow)
+    if loop.asked:
+        well = len(entry) - 2
+        entry[well] = -loop.flow[well][well]
+    else:
+        entry[1] = gain
+    return entry
+
+
+def without_area(loop: Loop, gain: Fraction) -> tuple[Loop, Awaited]:
+    """The loop in x2, with beta0 = gain times the known kick at every step of the well, or of its flow."""
+    last = next(i for i, v in enumerate(loop.outputs[3]) if v)  # the valve's last step, or the well less the valve
+    kick = gain * area(loop.layer)
+    flow, events = [list(line) for line in loop.flow], [([list(line) for line in jump], t) for jump, t in loop.events]
+    if loop.fade:
+        share, fade = held_share(loop)
+        jump, rest = events[-1]
+        jump[1] = [v - kick * step for v, step in zip(jump[1], jump[last], strict=True)]
+        late = fade.weight(rest)
+    else:
+        share, fade, late = moving_share(loop.layer), None, Fraction(1)
+        flow[1][last] -= kick * flow[last][last]
+    own = gain * share
+    told = [own * late * (line[1] - (i == 1)) for i, line in enumerate(events[0][0])]
+    entry = [own * v for v in (1, flow[1][1], *[Fraction(0)] * (len(flow) - 2))]
+    return replace(loop, flow=flow, events=events), Awaited(entry, fade, own, told)
+
+
+def area(time: Fraction) -> Fraction:
+    """A: time/2 is that of all modes."""
+    return time / 2 - sum(mode_share(n) / mode_rate(n, time) for n in range(MODES))
+
+
+def held_share(loop: Loop) -> tuple[Fraction, Fade]:
+    """Bound of b*Y over that of b*R, for a well that steps once a period; how it fades."""
+    rate, floor = mode_rate(MODES, loop.layer), 6 * MODES * SHORT * (1 + loop.layer / loop.step)
+    height = abs(mode_share(MODES)) * (1 + 1 / (rate * loop.step))
+    most = height / rate + floor * loop.layer
+    fade = Fade(loop.fade.event if loop.fade else 0, height / rate / most, rate, floor * loop.layer / most)
+    return most / (height + floor), fade
+
+
+def moving_share(time: Fraction) -> Fraction:
+    """The same for a well that flows."""
+    high, rate, floor = abs(mode_share(MODES)), mode_rate(MODES, time), 6 * MODES * SHORT
+    return (high / rate**2 + floor * time**2) / (high / rate + floor * time)

@@ -6,8 +6,7 @@ from fractions import Fraction
 from itertools import chain, product
 from typing import Any
 
-from cells import Cell, SignedSum, cells_with_lifts, collect, degree_of, restrict, whole_space, widen
-from exact_numbers import (
+from ..numbers import (
     Polynomial,
     add,
     add_product,
@@ -20,8 +19,25 @@ from exact_numbers import (
     read_polynomials,
     read_rational,
 )
-from loop import LOOP_KEYS, Loop, Term, describe, pad_terms, read_loop, read_terms, sum_text
-from squares import check_identity, read_square
+from ..squares import check_identity, read_square
+from .loop import (
+    LOOP_KEYS,
+    Cell,
+    Loop,
+    SignedSum,
+    Term,
+    cells_with_lifts,
+    collect,
+    degree_of,
+    describe,
+    pad_terms,
+    read_loop,
+    read_terms,
+    restrict,
+    sum_text,
+    whole_space,
+    widen,
+)
 
 PROOF_KEYS = (*LOOP_KEYS, "V", "claims", "witnesses")
 MAX_OBLIGATIONS = 4096

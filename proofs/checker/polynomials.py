@@ -6,7 +6,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-from exact_numbers import (
+from .numbers import (
     MAX_BYTES,
     Exponents,
     Number,
@@ -24,7 +24,7 @@ from exact_numbers import (
     read_polynomials,
     read_rational,
 )
-from squares import check_identity, read_square
+from .squares import check_identity, read_square
 
 MAX_VARIABLES, MAX_CONSTRAINTS, MAX_PRODUCTS = 16, 32, 1024
 KEPT = 300  # steps for a term that is kept, so that memory is bounded too

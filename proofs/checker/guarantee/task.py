@@ -8,7 +8,7 @@ from itertools import pairwise, product
 from math import comb
 from typing import Any
 
-from guarantee_reading import Row, keys, need, number, numbers, row
+from .reading import Row, keys, need, number, numbers, row
 
 MAX_DEGREE = 12
 HALVINGS = 7

@@ -6,7 +6,7 @@ from itertools import chain
 from math import comb
 from typing import Any
 
-from exact_numbers import (
+from .numbers import (
     Polynomial,
     add,
     add_product,

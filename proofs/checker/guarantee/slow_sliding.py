@@ -9,12 +9,12 @@ from fractions import Fraction
 from itertools import accumulate
 from typing import Any
 
-from guarantee_bounds import peaks_of
-from guarantee_gains import gains
-from guarantee_loop import Loop, read_loop
-from guarantee_numbers import unit
-from guarantee_reading import Row, entries, exact, inside, keys, lower, need, number, numbers, row, upper
-from guarantee_task import FAULT, Task
+from .bounds import peaks_of
+from .gains import gains
+from .loop import Loop, read_loop
+from .matrices import unit
+from .reading import Row, entries, exact, inside, keys, lower, need, number, numbers, row, upper
+from .task import FAULT, Task
 
 MAX_CELLS = 64
 MAX_LOGARITHM = 3

@@ -8,7 +8,7 @@ from functools import lru_cache
 from itertools import chain, compress, count
 from math import factorial, lcm
 
-from guarantee_reading import Row, need
+from .reading import Row, need
 
 BITS = 192
 MANY, COARSE, PLACE = 64, 60, 128  # columns that are multiplied at once, bits of their entries and of a product's place

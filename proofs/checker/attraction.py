@@ -4,7 +4,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from exact_numbers import (
+from .numbers import (
     Polynomial,
     add,
     add_product,
@@ -18,7 +18,7 @@ from exact_numbers import (
     read_polynomials,
     read_rational,
 )
-from polynomials import MAX_VARIABLES, Statement, evaluate, prove_squares, terms_text
+from .polynomials import MAX_VARIABLES, Statement, evaluate, prove_squares, terms_text
 
 CLAIM_KEYS = ("format", "kind", "variables", "field", "V", "level")
 PROOF_KEYS = ("multiplier", "positive", "decrease")

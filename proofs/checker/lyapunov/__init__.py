@@ -1,0 +1,1 @@
+"""Closed loops: proofs of stability by a Lyapunov function, and refutations."""
