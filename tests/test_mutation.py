@@ -132,7 +132,10 @@ def test_single_mutants_and_kinds_are_explained():
     assert explanations.of(limit) == "by rule"
     assert explanations.of(("quakedesign/lyapunov/exact/claim.py", *limit[1:])) == ""
     assert (
-        explanations.of(("proofs/checker/lyapunov/loop.py", "need(x <= MAX_ROOTS, where)", "need(x <= MAX_ROOTS, where) → pass")) == ""
+        explanations.of(
+            ("proofs/checker/lyapunov/loop.py", "need(x <= MAX_ROOTS, where)", "need(x <= MAX_ROOTS, where) → pass")
+        )
+        == ""
     )
     assert {explanations.of(key) for key in explanations.single} == {"equivalent"}
 
