@@ -29,7 +29,7 @@ import numpy as np
 
 # %matplotlib inline
 import quakedesign as qd
-from quakedesign.laws import ExtendedLQR
+from quakedesign.laws import control_law
 
 fault = qd.load_fault("real-fault")
 period = fault.sampling_time  # T_s [s]
@@ -64,7 +64,7 @@ print(gains, "closed-loop poles:", np.round(np.abs(poles), 3))
 # until a scheme samples it, and then tolerates less.
 
 # %%
-law = ExtendedLQR(gains={name: Fraction(value) for name, value in gains.items()})
+law = control_law("elqr")(gains={name: Fraction(value) for name, value in gains.items()})
 opened = control.ss(A, B, K, 0, period)
 lower, phase = control.stability_margins(opened)[:2]
 at_once_lower, at_once_phase = control.stability_margins(qd.loop_transfer(fault, law))[:2]

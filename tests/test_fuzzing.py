@@ -352,7 +352,7 @@ def test_command_lines(which, workplace):
     @profile((30, 2000), which)
     @given(command_lines())
     def check(line):
-        leaves_nothing_behind(line, workplace)
+        assert leaves_nothing_behind(line, workplace) in (0, 1, 2)
 
     check()
 
@@ -371,7 +371,7 @@ def test_sound_command_lines(which, workplace):
     check()
     print(dict(codes))  # of exit codes, by whether the line is sound
     assert [signal.getsignal(number) for number in SIGNALS] == handlers
-    assert sum(codes.values()) >= (1000 if which == 0 else 40)
+    assert sum(codes.values()) >= (1000 if which == 0 else 15)
     assert Path.cwd() == workplace
     assert len(os.listdir("/dev/fd")) < opened + 20
     assert codes[0, True] > 2 * codes[2, True]

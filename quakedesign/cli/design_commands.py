@@ -24,6 +24,7 @@ from quakedesign.cli.options import (
     of_the_setup,
 )
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.exact import rational
 from quakedesign.files import hold
 
 if TYPE_CHECKING:
@@ -99,6 +100,9 @@ class DesignOptions(WellOptions):
 
         controllers(self.controller)
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
+        given = vars(self)["diffusion"]
+        if loaded.friction.state_names and given is not None and not rational(given, "diffusion"):
+            raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit it for a well near the fault.")
         laws = "elqr" if self._behind(loaded) and self.controller == "all" else self._laws
         names = controllers(laws, loaded)
         shown = {"published_scheme": self.published_scheme, "whole_task": self.whole_task}

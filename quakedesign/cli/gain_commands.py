@@ -237,7 +237,7 @@ def gain_map(
     from quakedesign.lyapunov.maps.gain_map import gain_map as mapped
     from quakedesign.report.drawing import file_names
     from quakedesign.report.folder import prepare
-    from quakedesign.report.gain_map_figure import gain_map_lines, write_gain_map
+    from quakedesign.report.gain_map_drawing import gain_map_lines, write_gain_map
 
     folder = out or Path(f"quakedesign-map-{law}")
     prepare(folder, force=force)

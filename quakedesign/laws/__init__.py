@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from quakedesign.laws.catalogue import laws as laws
     from quakedesign.laws.catalogue import model_of as model_of
     from quakedesign.laws.catalogue import published as published
-    from quakedesign.laws.elqr import ExtendedLQR as ExtendedLQR
     from quakedesign.laws.implicit_root import ImplicitRoot as ImplicitRoot
     from quakedesign.laws.implicit_root import Power as Power
     from quakedesign.laws.loop_field import LoopField as LoopField

@@ -397,9 +397,9 @@ class PathModel:
     kept: Matrix
 
     def __post_init__(self) -> None:
-        n = len(self.kept)
+        n = max(map(len, self.of_pressures), default=0)
         sizes = [len(row) for row in (*self.kept, *self.of_pressures)]
-        if sizes != [n] * (n + 2) or len(self.of_asked) != 2 or not self.of_constant[1]:
+        if sizes != [n] * (n + 2) or len(self.of_pressures) != 2 or len(self.of_asked) != 2 or not self.of_constant[1]:
             raise ParameterError(
                 f"a model of {n} pressures needs {n} × {n} numbers of how they are kept, and a constant pressure must "
                 "move the fault. Received another one. Complete it."

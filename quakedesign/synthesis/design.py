@@ -286,6 +286,8 @@ def design(
             f"a design knows {', '.join(_DESIGNED_FOR)} of the loop setup. Received {', '.join(sorted(unknown))}. "
             "Use guarantee, which designs for all of them."
         )
+    if fault.friction.state_names and given.get("diffusion") is not None and not setup.diffusion:
+        raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit it for a well near the fault.")
     sliding = _sliding(fault, law, setup, stress, spread)
     added = NONE if feedforward == NONE.name else feed_forward(feedforward, fault, least_authority(fault))
     require_known(objective, OBJECTIVES, "objective")

@@ -100,10 +100,10 @@ def test_people_see_the_units_of_what_flows(run):
 
 
 @pytest.mark.parametrize(("command", "kind", "other"), [
-    ("simulate", "Standard deviation of normal noise of the measured slip", "--slip-noise is a bound"),
-    ("campaign", "Standard deviation of normal noise of the measured slip", "--slip-noise is a bound"),
-    ("guarantee", "Bound of the error of the measured slip", "--slip-noise-deviation of simulate"),
-    ("design", "Bound of the error of the slip", "--slip-noise-deviation of simulate"),
+    ("simulate", "Standard deviation of Gaussian noise of the measured slip", "--slip-noise is a bound"),
+    ("campaign", "Standard deviation of Gaussian noise of the measured slip", "--slip-noise is a bound"),
+    ("guarantee", "Bound of the measurement error of the slip", "--slip-noise-deviation of simulate"),
+    ("design", "Bound of the measurement error of the slip", "--slip-noise-deviation of simulate"),
 ])  # fmt: skip
 def test_help_says_which_kind_of_number_noise_is(command, kind, other, capsys):
     with pytest.raises(SystemExit):

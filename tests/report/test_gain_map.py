@@ -12,7 +12,7 @@ from quakedesign.errors import OutputError
 from quakedesign.lyapunov import Verdict, load_certificate
 from quakedesign.lyapunov.maps.gain_map import GainMap, Sheet, gain_map
 from quakedesign.lyapunov.search.certify import closed_loop
-from quakedesign.report import gain_map_figure as report
+from quakedesign.report import gain_map_drawing as report
 
 
 @pytest.fixture(scope="module")

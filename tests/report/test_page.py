@@ -186,7 +186,7 @@ def test_numbers_of_many_digits_become_decimals_and_no_others():
 
 def test_the_report_says_behind_what_its_runs_are():
     def compared(**path):
-        design = SimpleNamespace(path=path)
+        design = SimpleNamespace(setup=SimpleNamespace(path={name: time for name, time in path.items() if time}))
         return SimpleNamespace(of=lambda _: [SimpleNamespace(design=design)])
 
     assert page._way(compared()) == page._way(compared(lag=F(0))) == "in these runs the pressure acts at once"

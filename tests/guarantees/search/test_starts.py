@@ -144,7 +144,7 @@ def test_the_command_says_from_where(capsys, monkeypatch):
     [
         (
             ("real-fault", *GAINS, "--initial-slip-rate=-1 mm/s"),
-            "bounds of both signs, 0 or more. Received 0 m and -0.001",
+            "initial slip rate must be 0 or more. Received -0.001 m/s",
         ),
         (("crustal-patch", "--diffusion", "833 s", "--initial-slip", "1 um"), "from steady sliding"),
     ],
