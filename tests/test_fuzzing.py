@@ -51,6 +51,7 @@ from quakedesign.plant import uncertain_plant
 from quakedesign.report import Comparison, scale_lines
 from quakedesign.simulation.campaign import Space, campaign_problem
 from quakedesign.studies import Entry
+from quakedesign.symbolic import stability
 from quakedesign.symbolic.term_expressions import real_symbols
 
 LONGEST = 60  # seconds of this process
@@ -590,6 +591,7 @@ def test_calls(which, tmp_path, monkeypatch):
     check()
 
 
+EYE = ((1, 0), (0, 1))
 FOUND = [
     (Space.of(FAULT).sample, (np.array(0.5), 0)),
     (Space.of(FAULT).sample, (np.ma.masked, -1)),
@@ -603,6 +605,11 @@ FOUND = [
     (partial(RestLimit, width=3, per_slip=10**400, resolution=0, least=1, largest=10**400), ()),
     (PathModel, {"of_errors": (), "of_pressures": (), "of_asked": (), "kept": ()}),
     (longest_delay, (uncertain_plant(qd.load_fault("real-fault")), Fraction(0))),
+    (longest_delay, (uncertain_plant(qd.load_fault("real-fault")), Fraction(10**400))),
+    (PathModel, {"of_errors": EYE, "of_pressures": (*EYE, (1, 1)), "of_asked": (1, 1), "kept": ((1, 0),)}),
+    (PathModel, {"of_errors": EYE, "of_pressures": EYE, "of_asked": (1, 1, 1), "kept": EYE}),
+    (partial(stability, FAULT, loading_rate=Fraction(10**200)), ()),
+    (partial(stability, FAULT, pressure=(Fraction(10**300), Fraction(1))), ()),
     (scale_lines, ({},)),
     (qd.LoopSetup, {"measured": np.array([])}),
     (partial(sos.prove, multiplier=np.array([])), (object(),)),

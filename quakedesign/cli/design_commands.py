@@ -60,10 +60,6 @@ class DesignOptions(WellOptions):
     scheme
         Scheme of the runs of gains from --continuous: continuous (default, as in the paper), or sampled with a
         zero-order hold: explicit, implicit, semi-implicit, compensated. Other designs run as designed.
-    well
-        Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
-    diffusivity
-        Hydraulic diffusivity of the rock between well and fault, such as '0.5 m^2/s'.
     stress
         Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; by default the largest that the
         design withstands.

@@ -132,10 +132,6 @@ MetresPerSecond = Annotated[float, Parameter(converter=quantity("m/s"))]
 Pascals = Annotated[float, Parameter(converter=quantity("Pa"))]
 ExactSeconds = Annotated[str, Parameter(converter=_exact_reader("s"))]
 ExactPascals = Annotated[str, Parameter(converter=_exact_reader("Pa"))]
-ExactPascalsPerSecond = Annotated[str, Parameter(converter=_exact_reader("Pa/s"))]
-ExactSquareMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m^2/s"))]
-ExactMetres = Annotated[str, Parameter(converter=_exact_reader("m"))]
-ExactMetresPerSecond = Annotated[str, Parameter(converter=_exact_reader("m/s"))]
 Whole = Annotated[int, Parameter(converter=whole)]
 Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
@@ -401,18 +397,22 @@ def _exact_option(unit: str, text: str) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class WellOptions:
-    """Diffusion path from the distance of a well.
+    """Diffusion path from the distance of a well."""
 
-    Parameters
-    ----------
-    well
-        Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
-    diffusivity
-        Hydraulic diffusivity of the rock between well and fault, such as '0.5 m^2/s'.
-    """
-
-    well: ExactMetres | None = None
-    diffusivity: ExactSquareMetresPerSecond | None = None
+    well: Annotated[
+        str | None,
+        Parameter(
+            converter=_exact_reader("m"),
+            help="Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.",
+        ),
+    ] = None
+    diffusivity: Annotated[
+        str | None,
+        Parameter(
+            converter=_exact_reader("m^2/s"),
+            help="Hydraulic diffusivity of the rock between well and fault, such as '0.5 m^2/s'.",
+        ),
+    ] = None
 
     def setup(self, **more: Any) -> LoopSetup:
         """Loop setup of the options, with further fields of `LoopSetup`.
@@ -431,15 +431,7 @@ class WellOptions:
 @of_the_setup(*(name for name in quantities() if name != "step"))
 @dataclass(frozen=True, kw_only=True)
 class SetupOptions(WellOptions):
-    """Loop setup: delay, actuator, diffusion path, noise, jitter and initial errors.
-
-    Parameters
-    ----------
-    well
-        Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.
-    diffusivity
-        Hydraulic diffusivity of the rock between well and fault, such as '0.5 m^2/s'.
-    """
+    """Loop setup: delay, actuator, diffusion path, noise, jitter and initial errors."""
 
 
 # ----------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The data of a fault with rate-and-state friction that a guarantee of slow sliding uses."""
+"""Uncertain plants of a fault: on a moving reference, and in slow sliding for rate-and-state friction."""
 
 from fractions import Fraction
 
@@ -29,7 +29,7 @@ def static_friction(fault: Fault) -> Fraction:
 
 
 def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingPlant:
-    """The task of a fault that slides at V, the first rate of its reference, under a stress of at most `stress` [Pa].
+    """Plant of a fault that slides at V, the first rate of its reference, under a stress of at most `stress` [Pa].
 
     The ranges of a, b and D are their values and `spread` of them to both sides [-]; that of μ* follows from a − b.
 
@@ -89,11 +89,11 @@ def _near(expression: sp.Expr) -> Fraction:
 
 
 # ----------------------------------------------------------------------
-# The data of a fault that a guarantee uses.
+# Friction of slip and slip rate: the plant on a moving reference.
 
 
 def uncertain_plant(fault: Fault, *, rate_limited: bool = False) -> UncertainPlant:
-    """What a guarantee uses of a fault, exactly.
+    """Plant of a fault with its reference and disturbance, exact.
 
     Parameters
     ----------

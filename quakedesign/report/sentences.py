@@ -333,7 +333,7 @@ def part_of_task(run: Trajectory, fault: Fault) -> str:
 def _verdict(design: Design) -> list[str]:
     """Of the loop that ran or in continuous time, with the reason where it is not positive."""
     if design.verdict is Verdict.PROVED:
-        lasts = "for ever" if design.runs is None or not design.runs.proved else design.runs.lasts
+        lasts = "for all t >= 0" if design.runs is None or not design.runs.proved else design.runs.lasts
         return [f"proved for the loop that ran, {lasts}" if _sampled(design) else "proved in continuous time"]
     unsaid = {Verdict.REFUTED: "a counterexample checks in exact arithmetic", Verdict.UNDECIDED: "no certificate"}
     return _because(design.verdict, design.details.get("reason", unsaid[design.verdict]))

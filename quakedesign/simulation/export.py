@@ -155,8 +155,8 @@ def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
 
     Inputs are the measurement and ``applied`` [Pa], what pump or valve let through of the pressure since the last
     sample: all of it unless it is set after initialisation, and then again before every sample, since a law winds up
-    otherwise. The output ``pressure`` [Pa] is what is asked for since the last sample; the samples lie T_s apart from
-    the start of the experiment. The sources lie inside, so that any platform can compile them.
+    otherwise. The output ``pressure`` [Pa] is the commanded pressure since the last sample; the samples lie T_s apart
+    from the start of the experiment. The sources lie inside, so that any platform can compile them.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 /* A sampled controller as a model unit of FMI 2.0 for co-simulation: one instance owns its memory and its signals.
    The samples lie at start + k CONTROLLER_STEP. A step from t to t + h takes every sample in [t, t + h) with the
-   measurement that was set before, and the pressure is held from each sample to the next. A sample is told the applied
-   pressure that was set last, once one was set after initialisation; before that, all that was asked for counts as
+   measurement that was set before, and the pressure is held from each sample to the next. A sample takes the applied
+   pressure that was set last, once one was set after initialisation; before that, the commanded pressure counts as
    applied. */
 #include <math.h>
 #include <stdio.h>

@@ -173,7 +173,7 @@ class Wanted:
         if self.setup.measured != MEASURED[0]:
             raise ParameterError(
                 "measured is for a designed e-LQR, all other laws need slip and slip rate. "
-                f"Received {self.setup.measured!r}. Leave it out, or the gains and the controller."
+                f"Received {self.setup.measured!r}. Omit measured, or omit gains and controller."
             )
 
 

@@ -51,7 +51,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         if problem.setup.measured != MEASURED[0]:
             raise ParameterError(
                 f"a sliding mode needs slip and slip rate. Received {problem.setup.measured!r} for {law.name}. "
-                "Leave it out, or design an e-LQR."
+                "Omit measured, or design an e-LQR."
             )
         problem.require_exact_in_continuous_time()
         if problem.setup.path:

@@ -140,3 +140,8 @@ def test_a_design_is_reported_with_the_guarantee_of_the_loop_that_ran(capsys, tm
     command = [sys.executable, str(checker), str(out / found["certificate"])]
     assert "proved" in subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
     assert run(capsys, "check", str(out / found["certificate"]), "--fault", short(tmp_path))[0] == 0
+
+
+def test_a_diffusion_of_zero_is_not_taken_for_one_that_is_not_given(capsys, tmp_path):
+    code, _, err = run(capsys, "design", "crustal-patch", "--diffusion", "0", "--out", str(tmp_path / "o"))
+    assert (code, "a diffusion must be above 0 s. Received 0 s" in err) == (2, True)

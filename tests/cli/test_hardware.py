@@ -100,8 +100,8 @@ def test_people_see_the_units_of_what_flows(run):
 
 
 @pytest.mark.parametrize(("command", "kind", "other"), [
-    ("simulate", "Standard deviation of Gaussian noise of the measured slip", "--slip-noise of guarantee and design is a bound"),
-    ("campaign", "Standard deviation of Gaussian noise of the measured slip", "--slip-noise of guarantee and design is a bound"),
+    ("simulate", "Standard deviation of Gaussian noise", "--slip-noise of guarantee and design is a bound"),
+    ("campaign", "Standard deviation of Gaussian noise", "--slip-noise of guarantee and design is a bound"),
     ("guarantee", "Bound of the measurement error of the slip", "--slip-noise-deviation of simulate"),
     ("design", "Bound of the measurement error of the slip", "--slip-noise-deviation of simulate"),
 ])  # fmt: skip

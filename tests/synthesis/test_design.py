@@ -188,3 +188,8 @@ def test_a_simulation_that_holds_the_pressure_agrees_with_both_guarantees(real, 
     assert "diverged" not in held.events
     assert held.metrics.max_slip_error < 1e-4
     assert "diverged" in unstable.events
+
+
+def test_a_design_refuses_quantities_of_the_setup_that_it_does_not_know():
+    with pytest.raises(ParameterError, match=r"a design knows measured, delay, .* Received jitter, step"):
+        qd.design(qd.load_fault("real-fault"), "elqr", jitter="1 ms", step="100 ms")

@@ -291,7 +291,7 @@ class Deadbeat(Kind):
     def closest(
         self, task: UncertainPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]
     ) -> Closest | NoGuarantee:
-        """The weight and B0 with which a deadbeat step comes nearest to a guarantee, whatever the gains."""
+        """The weight and B0 with which a deadbeat step comes nearest to a guarantee, for any gains."""
         if (none := unpredictable(task, step)) is not None:
             return none
         if around.get("delay", 0) > MOST_DELAY * step:
@@ -363,7 +363,7 @@ def _settled(task: UncertainPlant, numbers: np.ndarray) -> tuple[Fraction, Fract
 def recovered(found: Guarantee) -> Compensation:
     """The sliding mode whose implicit step a guarantee is about, its gains read off the step; of 2-CTA and 2-DIA.
 
-    Whatever is read, the law that it makes must be that of the guarantee.
+    The law with these gains must be exactly that of the guarantee.
 
     Raises
     ------

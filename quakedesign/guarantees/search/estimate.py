@@ -96,8 +96,8 @@ def closeness(task: UncertainPlant, held: Held) -> tuple[float, Bounds | None]:
     return _closeness(None, least)
 
 
-def told_closeness(bounds: Bounds | NoGuarantee) -> tuple[float, Bounds | None]:
-    """The same of bounds that are known already."""
+def closeness_of_bounds(bounds: Bounds | NoGuarantee) -> tuple[float, Bounds | None]:
+    """Closeness of bounds that are computed already."""
     return _closeness(bounds, _small(bounds))
 
 

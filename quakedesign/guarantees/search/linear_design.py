@@ -27,12 +27,12 @@ from quakedesign.guarantees.exact.statement import ContinuousPeaks, Guarantee, a
 from quakedesign.guarantees.search.estimate import (
     BoundsEstimate,
     closeness,
+    closeness_of_bounds,
     estimated,
     own_poles,
     short,
     slowly_estimated,
     spectral_radius,
-    told_closeness,
 )
 from quakedesign.guarantees.search.lqg import (
     LawFamily,
@@ -326,7 +326,7 @@ class _Laws:
         """Closeness to a guarantee, and the bounds where one is to be expected."""
         if self.template.longest_step:
             seen = self.seen(x)
-            return (inf, None) if seen is None else told_closeness(seen.bounds)
+            return (inf, None) if seen is None else closeness_of_bounds(seen.bounds)
         try:
             return closeness(self.task, self.held(x)) if self.family.admits(x) else (inf, None)
         except LinAlgError:  # of a Riccati equation
@@ -633,10 +633,10 @@ def nearest_setup(
 ) -> tuple[str, Guarantee] | None:
     """Of a loop without a guarantee: a quantity that fails, and a guarantee with nearly the most of it that has one.
 
-    Where `pressed`, where a pressure fails that the pump would have to hold or that opens the fault, a design that no
-    pump limits tells the smallest that will do, else the largest disturbance is told. Else it is the first of
-    `LIMITING` without which a design has a guarantee at T_s and with all else as it is; None without one. Of a pump it
-    is the rate, with nearly the lowest that will do; of the box the share of all of its half-widths.
+    With `pressed` the pressure fails: it exceeds the pump, or opens the fault. Then the quantity is the smallest
+    sufficient pump, from a design without pump limits, or else the largest disturbance. Otherwise it is the first of
+    `LIMITING` without which a design has a guarantee at T_s; None without one. For a pump rate it is nearly the lowest
+    sufficient one, for the box a fraction of all half-widths.
     """
     laws = kind or Linear(measured)
     if pressed and (less := _less_pressed(laws, task, step, around)) is not None:
@@ -741,7 +741,7 @@ def _farthest(
     ----------
     laws : Kind
     ask : callable
-        What is asked of a design, of a time [s].
+        Plant, T_s and setup of the design for a time [s].
     first : Fraction
         Time to try first [s].
     most : Fraction, optional

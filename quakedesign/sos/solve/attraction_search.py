@@ -338,7 +338,7 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
     claim = _claim(field, V)
     if V is not None:
         refuted = _refuted(claim)
-        neither = "V - sum of squares and -dV/dt have no proof that was found, and no point refutes V"
+        neither = "no proof that V and -dV/dt are positive was found, and no point refutes V"
         return _proved(claim) or (replace(refuted, level=None) if refuted else replace(claim, reason=neither))
     rest = other_equilibrium(claim)
     if rest is not None:

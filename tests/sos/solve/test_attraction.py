@@ -265,6 +265,9 @@ def test_what_is_not_proved_says_why():
     assert (found.verdict, found.level, found.remark) == ("undecided", None, "no level below was proved")
     claim = sos.stability(VAN_DER_POL, degrees=())
     assert (claim.verdict, claim.check(), claim.reason) == ("undecided", True, "no degree of V was tried")
+    motzkin = "x^4*y^2 + x^2*y^4 + z^6 - 3*x^2*y^2*z^2 + (x^6 + y^6 + z^6)/100"  # positive, and no sum of squares
+    claim = sos.stability({"x": "-x", "y": "-y", "z": "-z"}, motzkin)
+    assert (claim.verdict, claim.reason[:8]) == ("undecided", "no proof")
     given = sos.stability({"x": "-x^3"}, "x^2 + x^4 - x^6")
     assert given.verdict == "refuted"
     assert given.reason == ""
