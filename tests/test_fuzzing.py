@@ -41,7 +41,7 @@ from quakedesign.cli.app import app
 from quakedesign.errors import QuakedesignError
 from quakedesign.exact import rational
 from quakedesign.fault import parse_fault
-from quakedesign.guarantees import Held, guarantee, longest_delay
+from quakedesign.guarantees import Held, farthest_rock, guarantee, longest_delay
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.laws import summed_integrals
@@ -606,10 +606,12 @@ FOUND = [
     (PathModel, {"of_errors": (), "of_pressures": (), "of_asked": (), "kept": ()}),
     (longest_delay, (uncertain_plant(qd.load_fault("real-fault")), Fraction(0))),
     (longest_delay, (uncertain_plant(qd.load_fault("real-fault")), Fraction(10**400))),
+    (farthest_rock, (uncertain_plant(qd.load_fault("real-fault")), Fraction(1, 10**20))),
     (PathModel, {"of_errors": EYE, "of_pressures": (*EYE, (1, 1)), "of_asked": (1, 1), "kept": ((1, 0),)}),
     (PathModel, {"of_errors": EYE, "of_pressures": EYE, "of_asked": (1, 1, 1), "kept": EYE}),
-    (partial(stability, FAULT, loading_rate=Fraction(10**200)), ()),
-    (partial(stability, FAULT, pressure=(Fraction(10**300), Fraction(1))), ()),
+    (partial(stability, FAULT, loading_rate=Fraction(10**400)), ()),
+    (partial(stability, qd.load_fault("crustal-patch"), loading_rate=Fraction(10**400)), ()),
+    (partial(stability, FAULT, pressure=(Fraction(10**400), Fraction(1))), ()),
     (scale_lines, ({},)),
     (qd.LoopSetup, {"measured": np.array([])}),
     (partial(sos.prove, multiplier=np.array([])), (object(),)),

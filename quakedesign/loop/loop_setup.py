@@ -220,8 +220,8 @@ class LoopSetup:
                     f"{title} must be 0 or more. Received {shortly(exact)} {part['unit']}. Omit the sign."
                 )
             object.__setattr__(self, name, exact)
-        if self.step is not None and not Fraction(1, 10**9) <= self.step <= 10**9:
-            raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {shortly(self.step)} s.")
+        if self.step is not None:
+            require_step(self.step)
         if self.withdrawal is not None and self.saturation is None:
             raise ParameterError(
                 "withdrawal needs saturation, the largest pressure of the pump. Received withdrawal alone. Give both."
@@ -284,6 +284,17 @@ class LoopSetup:
 
 
 _NOT_OF_A_LOOP = ("step", "measured", "averaging_time", "saturation", "withdrawal", "rate_limit")
+
+
+def require_step(step: Fraction) -> None:
+    """Refuse a sampling time [s] for which no loop is computed in floating point.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not Fraction(1, 10**9) <= step <= 10**9:
+        raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {shortly(step)} s.")
 
 
 def quantities() -> dict[str, Any]:

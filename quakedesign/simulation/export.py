@@ -364,7 +364,10 @@ def _software(scheme: Scheme) -> Sampled:
         raise ParameterError(f"a controller is exported with a scheme that samples. Received {scheme.name}.")
     if scheme.actuator.flowing:
         names = ", ".join(stage.name for stage in scheme.actuator.flowing)
-        raise ParameterError(f"what moves between samples belongs to the plant. Received {names}. Leave it out.")
+        raise ParameterError(
+            f"a stage that changes the pressure between samples belongs to the plant. Received {names}. "
+            "Remove it from the scheme."
+        )
     return replace(scheme, measurement=scheme.measurement.software, substeps=1)
 
 

@@ -169,7 +169,7 @@ class Wanted:
     setup: LoopSetup = IDEAL
 
     def require_all_measured(self) -> None:
-        """Refuse a law that is told the slip alone where it needs the slip rate as well."""
+        """Refuse a law that gets the slip alone where it needs the slip rate as well."""
         if self.setup.measured != MEASURED[0]:
             raise ParameterError(
                 "measured is for a designed e-LQR, all other laws need slip and slip rate. "

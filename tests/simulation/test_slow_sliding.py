@@ -17,8 +17,8 @@ from quakedesign.guarantees import Held
 from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_model
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Saturation, sliding_loop
-from quakedesign.loop.sensing import Transducer
-from quakedesign.simulation import Variation
+from quakedesign.loop.sensing import Measurement, Transducer
+from quakedesign.simulation import Load, Variation
 from quakedesign.simulation.slow_sliding import _Loop, simulate_sliding
 from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
 from quakedesign.symbolic import derive
@@ -283,7 +283,13 @@ def test_simulate_runs_what_a_design_found_in_its_own_way():
     [
         ({"controller": None}, "Without a controller use simulate_state"),
         ({"substeps": 2}, "Received substeps"),
-        ({"initial_slip": 1e-3}, "Received initial_slip"),
+        ({"initial_slip": 1e-3}, "Received initial_slip "),
+        ({"initial_slip_rate": 1e-3}, "Received initial_slip_rate"),
+        ({"checkpoint": "run.npz"}, "Received checkpoint"),
+        ({"rtol": 1e-8}, "Received rtol"),
+        ({"compiled": False}, "Received compiled"),
+        ({"load": Load()}, "Received load"),
+        ({"measurement": Measurement()}, "Received measurement"),
         ({"variation": Variation()}, "Received variation"),
         ({"step": 20.0}, "runs with the scheme explicit"),
         ({"plant": "coulomb"}, "one of smooth, quasi-dynamic"),

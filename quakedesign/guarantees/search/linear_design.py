@@ -18,7 +18,7 @@ from scipy.optimize import OptimizeResult, minimize
 
 from quakedesign.cache import search_once
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
-from quakedesign.exact import UpperBound, shortly
+from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.loop import Around, Held
@@ -44,7 +44,7 @@ from quakedesign.guarantees.search.lqg import (
 from quakedesign.guarantees.search.unclocked import unclocked_estimate, unclocked_guarantee
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.loop import PeriodicLoop, exact_integrals
-from quakedesign.loop.loop_setup import MEASURED, Pump
+from quakedesign.loop.loop_setup import MEASURED, Pump, require_step
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.plant.ranges import UncertainPlant
@@ -276,9 +276,7 @@ class _Laws:
     def of(cls, task: UncertainPlant, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
         """Laws for a T_s [s] and what is around them, or why there are none."""
         require_surroundings(around)
-        if step <= 0:
-            raise ParameterError(f"step must be positive. Received {shortly(step)} s. Give T_s.")
-        require_ordinary(step=step)
+        require_step(step)
         if (none := unpredictable(task, step)) is not None:
             return none
         if reason := why_no_law(step, measured, around):
