@@ -15,11 +15,11 @@ import json
 import os
 import pickle
 import platform
-import secrets
 import stat
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from functools import cache
 from hashlib import sha256
@@ -50,11 +50,17 @@ def in_use() -> bool:
     return _folder() is not None
 
 
+@cache
+def shipped(path: Path) -> Any:
+    """What a JSON file beside the code holds: found before, the same for every user, and compared anew by a test."""
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
 def recall(kind: str, *question: bytes) -> bytes | None:
     """What was kept for a question, or None."""
     name = _name(kind, question)
     try:
-        with _opened() as folder, open(os.open(name, os.O_RDONLY | os.O_NOFOLLOW, dir_fd=folder), "rb") as file:
+        with open(os.open(_own_folder() / name, os.O_RDONLY | os.O_NOFOLLOW), "rb") as file:
             told = os.fstat(file.fileno())
             if not stat.S_ISREG(told.st_mode) or not _own(told):
                 return None
@@ -69,21 +75,27 @@ def recall(kind: str, *question: bytes) -> bytes | None:
 
 def keep(kind: str, content: bytes, *question: bytes) -> None:
     """Keep the answer to a question for `recall`, if there is a place for it."""
-    name, new = _name(kind, question), f".{secrets.token_hex(8)}"
-    try:
-        with _opened(make=True) as folder:
-            try:
-                how = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
-                with open(os.open(new, how, mode=0o600, dir_fd=folder), "wb") as file:
-                    file.write(_digest(name, content) + content)
-                os.replace(new, name, src_dir_fd=folder, dst_dir_fd=folder)
-            except BaseException:
-                with suppress(OSError):
-                    os.unlink(new, dir_fd=folder)
-                raise
-            _make_room(folder)
-    except OSError:
-        return
+    name = _name(kind, question)
+    with suppress(OSError):
+        folder = _own_folder(make=True)
+        descriptor, new = tempfile.mkstemp(prefix=".", dir=folder)
+        try:
+            with open(descriptor, "wb") as file:
+                file.write(_digest(name, content) + content)
+            os.replace(new, folder / name)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(new)
+            raise
+        _make_room(folder)
+
+
+def once(kind: str, work: Callable[[], bytes], *question: bytes) -> bytes:
+    """Answer to a question: what was kept, else what work gives, which is kept."""
+    if (known := recall(kind, *question)) is None:
+        known = work()
+        keep(kind, known, *question)
+    return known
 
 
 def search_once(search: Callable[[], Any], *question: Any) -> Any:
@@ -96,17 +108,8 @@ def search_once(search: Callable[[], Any], *question: Any) -> Any:
     *question
         Values that say everything; what cannot be pickled is searched each time.
     """
-    if not in_use():
-        return search()
-    try:
-        asked = _stated(question)
-    except (pickle.PicklingError, AttributeError, TypeError):
-        return search()
-    if (kept := recall("search", asked)) is not None:
-        return json.loads(kept)
-    found = search()
-    keep("search", json.dumps(found).encode(), asked)
-    return found
+    asked = stated(question) if in_use() else None
+    return search() if asked is None else json.loads(once("search", lambda: json.dumps(search()).encode(), asked))
 
 
 class CachedStatement(pickle.Pickler):
@@ -125,9 +128,13 @@ class CachedStatement(pickle.Pickler):
         return type(value), tuple(self.field(value, field.name) for field in fields(value))
 
 
-def _stated(question: tuple[Any, ...]) -> bytes:
+def stated(value: Any, writer: type[CachedStatement] = CachedStatement) -> bytes | None:
+    """A question in bytes; None where it cannot be told."""
     content = io.BytesIO()
-    CachedStatement(content).dump(question)
+    try:
+        writer(content).dump(value)
+    except (pickle.PicklingError, AttributeError, TypeError, ValueError, RecursionError):
+        return None
     return content.getvalue()
 
 
@@ -145,9 +152,8 @@ def _folder() -> Path | None:
     return None
 
 
-@contextmanager
-def _opened(*, make: bool = False) -> Iterator[int]:
-    """Descriptor of the folder: what is done with it is done in that which was looked at.
+def _own_folder(*, make: bool = False) -> Path:
+    """Return the folder.
 
     Raises
     ------
@@ -159,15 +165,11 @@ def _opened(*, make: bool = False) -> Iterator[int]:
         raise FileNotFoundError(PLACE)
     if make:
         place.parent.mkdir(parents=True, exist_ok=True)
-        with suppress(FileExistsError):
-            place.mkdir(mode=0o700)
-    folder = os.open(place, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    try:
-        if not _own(os.fstat(folder)):
-            raise PermissionError(place)
-        yield folder
-    finally:
-        os.close(folder)
+        place.mkdir(mode=0o700, exist_ok=True)
+    told = place.lstat()
+    if not stat.S_ISDIR(told.st_mode) or not _own(told):
+        raise PermissionError(place)
+    return place
 
 
 def _own(told: os.stat_result) -> bool:
@@ -175,18 +177,18 @@ def _own(told: os.stat_result) -> bool:
     return told.st_uid == os.getuid() and not told.st_mode & _OTHERS
 
 
-def _make_room(folder: int) -> None:
+def _make_room(folder: Path) -> None:
     """Remove the oldest files until three quarters of the room are left, if there is too much."""
     with os.scandir(folder) as entries:
-        files = [(entry.stat(follow_symlinks=False), entry.name) for entry in entries]
+        files = [(entry.stat(follow_symlinks=False), entry.path) for entry in entries]
     size = sum(told.st_size for told, _ in files)
     if size <= MOST_BYTES:
         return
-    for told, name in sorted(files, key=lambda file: file[0].st_mtime):
+    for told, path in sorted(files, key=lambda file: file[0].st_mtime):
         if size <= MOST_BYTES * 3 // 4:
             break
         with suppress(OSError):  # another process was here first
-            os.unlink(name, dir_fd=folder)
+            os.unlink(path)
         size -= told.st_size
 
 

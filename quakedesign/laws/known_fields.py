@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quakedesign import laws
+from quakedesign.cache import shipped
 from quakedesign.laws.field_terms import FieldTerms
 from quakedesign.symbolic.terms import Term, plain
 
@@ -53,7 +54,7 @@ def derived_again() -> str:
 
 @cache
 def _kept() -> Mapping[str, FieldTerms]:
-    return {name: _read(raw) for name, raw in json.loads(FILE.read_text(encoding="utf-8")).items()}
+    return {name: _read(raw) for name, raw in shipped(FILE).items()}
 
 
 def _plain(terms: FieldTerms) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 import io
 import json
 import os
-import pickle
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -297,17 +296,14 @@ def drawn_once(draw: Callable[[], Mapping[str, Any]], told: Mapping[str, str], s
     shown : Any
         All that is shown, but for how long it took.
     """
+
+    def texts() -> bytes:
+        drawn = {name: (drawing, figure_bytes(drawing, "svg", name).decode()) for name, drawing in draw().items()}
+        return json.dumps({n: [v, inline_svg(v, drawing, n, told[n])] for n, (drawing, v) in drawn.items()}).encode()
+
     asked = _stated(told, shown) if cache.in_use() else None
-    if asked is not None and (kept := cache.recall("figures", asked)) is not None:
-        return {name: (vector.encode(), Markup(inside)) for name, (vector, inside) in json.loads(kept).items()}
-    drawn = {}
-    for name, drawing in draw().items():
-        vector = figure_bytes(drawing, "svg", name)
-        drawn[name] = vector, inline_svg(vector.decode(), drawing, name, told[name])
-    if asked is not None:
-        texts = {name: [vector.decode(), inside] for name, (vector, inside) in drawn.items()}
-        cache.keep("figures", json.dumps(texts).encode(), asked)
-    return drawn
+    known = texts() if asked is None else cache.once("figures", texts, asked)
+    return {name: (vector.encode(), Markup(inside)) for name, (vector, inside) in json.loads(known).items()}
 
 
 def _stated(told: Mapping[str, str], shown: Any) -> bytes | None:
@@ -315,20 +311,20 @@ def _stated(told: Mapping[str, str], shown: Any) -> bytes | None:
     import matplotlib as mpl
     from matplotlib.font_manager import fontManager
 
-    content = io.BytesIO()
-    statement = _Untimed(content)
-    statement.fast = True  # what is equal is written the same, be it one value or two
     try:
         fonts = [(font.fname, (file := os.stat(font.fname)).st_size, file.st_mtime_ns) for font in fontManager.ttflist]
-        settings = {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}  # which would be loaded
-        statement.dump((dict(told), shown, settings, fonts))
-    except (pickle.PicklingError, AttributeError, TypeError, OSError, ValueError, RecursionError):
+    except OSError:
         return None
-    return content.getvalue()
+    settings = {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}  # which would be loaded
+    return cache.stated((dict(told), shown, settings, fonts), _Untimed)
 
 
 class _Untimed(cache.CachedStatement):
     """A value by its fields, without how long it took and how it was computed."""
+
+    def __init__(self, content: io.BytesIO) -> None:
+        super().__init__(content)
+        self.fast = True  # what is equal is written the same, be it one value or two
 
     def field(self, value: Any, name: str) -> Any:
         given = super().field(value, name)

@@ -26,7 +26,7 @@ from typing import Any, cast
 
 import casadi as ca
 
-from quakedesign import cache as disk_cache
+from quakedesign.cache import once
 from quakedesign.errors import SimulationError
 from quakedesign.files import temporary_folder
 from quakedesign.loop.schemes.implicit import where_needed
@@ -793,11 +793,7 @@ def _compile(text: str, command: tuple[str, ...]) -> MachineCode:
     asked = text.encode(), repr((*command, *FLAGS, *_identity(command[0]))).encode()
     with temporary_folder() as folder:
         library = folder / "kept.so"
-        if (content := disk_cache.recall("code", *asked)) is not None:
-            library.write_bytes(content)
-        else:
-            library = shared_library(text, folder, command)
-            disk_cache.keep("code", library.read_bytes(), *asked)
+        library.write_bytes(once("code", lambda: shared_library(text, folder, command).read_bytes(), *asked))
         advance: Any = ctypes.CDLL(str(library)).advance
     advance.argtypes, advance.restype = [ctypes.c_void_p, ctypes.c_longlong], ctypes.c_int
     return cast(MachineCode, advance)

@@ -258,15 +258,15 @@ def run(
     wanted = instants(setting.steps, setting.samples)
     file = Checkpoint.of(checkpoint, step, start, wanted) if checkpoint else None
     steps = setting.steps * recorder.scheme.settings.get("substeps", 1)
-    known = stepping.RunInputs.of(step, start, wanted, compiled, steps)
-    if file is None and (answer := known.recall()) is not None:
-        kept, told, ready = answer.vectors, answer.told, perf_counter()
+    asked = stepping.run_question(step, start, wanted, compiled, steps)
+    if file is None and (answer := stepping.recall_run(asked)) is not None:
+        (kept, told), ready = answer, perf_counter()
     else:
         backend = prepare(step, compiled, steps)
         ready = perf_counter()
         kept = march(Advancer.of(backend, start), wanted, recorder.index("diverged"), progress, file)
         told = {"backend": backend.name, "backend_reason": backend.reason}
-        known.keep(stepping.SteppedRun(kept, told))
+        stepping.keep_run(asked, kept, told)
     return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | told, (began, ready))
 
 

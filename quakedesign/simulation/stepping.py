@@ -4,7 +4,6 @@ An interrupted run continues with bitwise the same numbers.
 """
 
 import hashlib
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -225,57 +224,27 @@ LONG = 100_000_000
 """Instructions of a run from which on it is worth a place."""
 
 
-@dataclass(frozen=True)
-class SteppedRun:
-    """What was computed.
-
-    Attributes
-    ----------
-    vectors : ndarray
-        At the kept instants, one a column.
-    told : dict of str to str
-        Backend and why, as in the provenance of a run.
-    """
-
-    vectors: "np.ndarray"
-    told: dict[str, str]
+def run_question(
+    step: Any, start: Sequence[float], instants: Sequence[int], compiled: bool | None, steps: int
+) -> tuple[bytes, ...]:
+    """Everything that determines the digits of so many steps of a casadi.Function; empty for a run that is not kept."""
+    if not cache.in_use() or compiled is False or steps * step.n_instructions() < LONG:
+        return ()
+    return step.serialize().encode(), np.array(start).tobytes(), np.array(instants).tobytes(), compilation().encode()
 
 
-@dataclass(frozen=True)
-class RunInputs:
-    """Everything that determines the digits of a run.
+def recall_run(question: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str]] | None:
+    """Vectors at the kept instants, one a column, and backend and why, as in the provenance of a run; or None."""
+    if not question or (content := cache.recall("run", *question)) is None:
+        return None
+    with np.load(BytesIO(content), allow_pickle=False) as kept:
+        told = {name: str(kept[name]) for name in kept.files if name != "vectors"}
+        return kept["vectors"], told | {"backend_reason": f"{told['backend_reason']}; from the cache"}
 
-    Attributes
-    ----------
-    parts : tuple of bytes
-        Empty for a run that is not kept.
-    """
 
-    parts: tuple[bytes, ...]
-
-    @classmethod
-    def of(
-        cls, step: Any, start: Sequence[float], instants: Sequence[int], compiled: bool | None, steps: int
-    ) -> "RunInputs":
-        """Question of a run of one step function (casadi.Function) over so many steps."""
-        if not cache.in_use() or compiled is False or steps * step.n_instructions() < LONG:
-            return cls(())
-        how = compilation()
-        return cls((step.serialize().encode(), np.array(start).tobytes(), np.array(instants).tobytes(), how.encode()))
-
-    def recall(self) -> SteppedRun | None:
-        """What was kept."""
-        content = cache.recall("run", *self.parts) if self.parts else None
-        if content is None:
-            return None
-        head, _, rest = content.partition(b"\n")
-        told = json.loads(head)
-        told["backend_reason"] += "; from the cache"
-        return SteppedRun(np.load(BytesIO(rest), allow_pickle=False), told)
-
-    def keep(self, answer: SteppedRun) -> None:
-        """Keep an answer."""
-        if self.parts and answer.told["backend"] == "compiled":
-            content = BytesIO()
-            np.save(content, answer.vectors, allow_pickle=False)
-            cache.keep("run", json.dumps(answer.told).encode() + b"\n" + content.getvalue(), *self.parts)
+def keep_run(question: tuple[bytes, ...], vectors: "np.ndarray", told: dict[str, str]) -> None:
+    """Keep a run for `recall_run`, unless no compiler made it."""
+    if question and told["backend"] == "compiled":
+        content = BytesIO()
+        np.savez(content, allow_pickle=False, vectors=vectors, **{name: np.array(text) for name, text in told.items()})
+        cache.keep("run", content.getvalue(), *question)

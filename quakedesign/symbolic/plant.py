@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, wraps
 from importlib import import_module
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -19,6 +18,7 @@ import sympy as sp
 from sympy.printing.latex import LatexPrinter
 from sympy.printing.str import StrPrinter
 
+from quakedesign.cache import shipped
 from quakedesign.exact import rational
 from quakedesign.fault import Fault, FrictionLaw
 
@@ -28,8 +28,7 @@ from quakedesign.fault import Fault, FrictionLaw
 # `derived.json` has what SymPy needs half a second for, by function and names of states; what it does not have is
 # derived. A test derives every entry again and compares; ``write_whole(FILE, derived_again())`` brings it up to date.
 
-FILE = Path(str(files(__package__))) / "derived.json"
-_TEXTS: dict[str, str] = json.loads(FILE.read_text(encoding="utf-8"))
+FILE = Path(__file__).parent / "derived.json"
 _Given = ParamSpec("_Given")
 _Result = TypeVar("_Result")
 
@@ -41,7 +40,7 @@ def kept(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
     @cache
     @wraps(derivation)
     def result(*names: Any, **options: Any) -> Any:
-        text = None if options else _TEXTS.get(" ".join([f"{home}.{derivation.__name__}", *sum(names, ())]))
+        text = None if options else shipped(FILE).get(" ".join([f"{home}.{derivation.__name__}", *sum(names, ())]))
         return derivation(*names, **options) if text is None else _read(text)
 
     return result  # type: ignore[return-value]
@@ -49,8 +48,9 @@ def kept(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
 
 def derived_again() -> str:
     """Content of the file, derived now."""
-    before, found = dict(_TEXTS), {}
-    _TEXTS.clear()
+    known = shipped(FILE)
+    before, found = dict(known), {}
+    known.clear()
     try:
         for key in before:
             name, *states = key.split()
@@ -59,7 +59,7 @@ def derived_again() -> str:
             derivation.cache_clear()
             found[key] = sp.srepr(derivation(*([tuple(states)] if states else [])))
     finally:
-        _TEXTS.update(before)
+        known.update(before)
     return json.dumps(found, indent=1) + "\n"
 
 

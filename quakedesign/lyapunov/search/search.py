@@ -7,6 +7,7 @@ results of the presets; a cached certificate counts only after its exact check.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import wraps
@@ -360,16 +361,12 @@ def kept(search: Search) -> Search:
             return search(loop, degree, subject)
         else:
             text = search_once(searched, "lyapunov", loop, degree)
-        if found:
-            return found[0]
-        if text == _NOTHING:
-            return None
-        try:
+        if found or text == _NOTHING:
+            return found[0] if found else None
+        with suppress(CertificateError, WorkError):
             certificate = parse_certificate(text)
             if certificate.loop == loop and decided_once(certificate, subject) is Verdict.PROVED:
                 return certificate
-        except (CertificateError, WorkError):
-            pass
         return search(loop, degree, subject)
 
     return known
