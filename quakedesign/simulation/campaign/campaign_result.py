@@ -37,7 +37,7 @@ def figure(title: str, caption: str, shown: Mapping[str, tuple[Any, Mapping[floa
 
     rows = max(1, -(-len(shown) // 3))
     drawing = Figure(figsize=(10, 0.8 + 2.6 * rows), layout="constrained")
-    axes = drawing.subplots(rows, 3, sharey=True, squeeze=False).ravel()
+    axes = drawing.subplots(rows, 3, sharey=True).ravel()
     for axis in axes[len(shown) :]:
         axis.set_visible(False)
     for axis, (name, (values, marks)) in zip(axes, shown.items(), strict=False):
@@ -50,7 +50,7 @@ def figure(title: str, caption: str, shown: Mapping[str, tuple[Any, Mapping[floa
 def _distribution(axis: Any, name: str, values: Any, marks: Mapping[float, float | None]) -> None:
     known = values[~np.isnan(values)]
     finite = np.sort(known[np.isfinite(known)])
-    axis.step(finite, np.arange(1, len(finite) + 1) / max(1, len(known)), where="post", color="#0072B2")
+    axis.step(finite, np.arange(1, len(finite) + 1) / len(known), where="post", color="#0072B2")
     for level, value in marks.items():
         if value is not None:
             axis.axvline(value, color="grey", linestyle=":", linewidth=1)
@@ -149,19 +149,26 @@ class Campaign:
 
         A quantile is the value of a sample (inverse of the distribution function), and of `min_pressure`, where less is
         worse, it is taken from above, so that high levels are bad throughout.
+
+        Raises
+        ------
+        ParameterError
+            For a level outside 0 to 1.
         """
+        if outside := [level for level in levels if not 0 <= level <= 1]:
+            raise ParameterError(f"level of a quantile must be between 0 and 1. Received {outside[0]!r}.")
         return {metric: self._quantiles(metric, levels) for metric in self.metrics}
 
     def _quantiles(self, metric: str, levels: Sequence[float]) -> dict[str, float | None]:
         way = -1 if metric in _LESS_IS_WORSE else 1
         ordered = sorted(way * value for value in self.values(metric).tolist() if not math.isnan(value))
-        places = {level: min(len(ordered) - 1, max(0, math.ceil(level * len(ordered)) - 1)) for level in levels}
+        places = {level: max(0, math.ceil(level * len(ordered)) - 1) for level in levels}
         return {f"{level:g}": _finite(way * ordered[place]) for level, place in places.items()}
 
     def worst(self, metric: str, count: int = SHOWN) -> list[int]:
         """Indices of the worst samples by one metric, the worst first, diverged ones before all others."""
-        way = -1 if metric in _LESS_IS_WORSE else 1
-        known = [(-way * value, i) for i, value in enumerate(self.values(metric).tolist()) if not math.isnan(value)]
+        require_metric(metric, self.metrics)
+        known = [(-badness(result, metric), i) for i, result in enumerate(self.results) if result]
         return [i for _, i in sorted(known)[:count]]
 
     @cached_property
@@ -282,7 +289,7 @@ class Campaign:
             f"{problem.fault.name}, {law}: {count} samples, {diverged} diverge",
             f"scheme {problem.scheme.name}, step {problem.setting.step:g} s",
             {
-                f"{name.replace('_', ' ')} [{StickMetrics.unit(name) or '-'}]": (
+                f"{name.replace('_', ' ')} [{StickMetrics.unit(name)}]": (
                     self.values(name),
                     {level: levels[name][f"{level:g}"] for level in _MARKED},
                 )
