@@ -138,7 +138,7 @@ def lock_of(target: Path) -> tuple[Path, int | None]:
         try:
             folder.mkdir(mode=0o700, exist_ok=True)
             lock = _locked(folder)
-            if os.path.samestat(os.fstat(lock), os.stat(folder)):
+            if _stands(folder, lock):
                 _mine.add(folder)
                 return folder, lock
             os.close(lock)
@@ -147,10 +147,18 @@ def lock_of(target: Path) -> tuple[Path, int | None]:
                 raise
             sleep(_PAUSE)
         except FileNotFoundError:
-            continue
+            pass
         except OSError:
             break
     return folder, None
+
+
+def _stands(folder: Path, lock: int) -> bool:
+    """Whether a folder is still the one that was locked, and not swept or made anew since."""
+    try:
+        return os.path.samestat(os.fstat(lock), os.stat(folder))
+    except FileNotFoundError:
+        return False
 
 
 def unlock(folder: Path, lock: int | None) -> None:

@@ -80,3 +80,24 @@ def test_toml_is_read_as_the_standard_library_reads_it():
     for wrong in ("a =", "x = " + "[" * 5000):
         with pytest.raises(ValueError, match=r".+"):
             parse_toml(wrong)
+
+
+@pytest.mark.parametrize(("largest", "said"), [(2**20, "1 MiB"), (3 * 2**20, "3 MiB"), (2**19, "512 KiB")])
+def test_the_largest_size_is_told_in_its_unit(tmp_path, largest, said):
+    (tmp_path / "large").touch()
+    os.truncate(tmp_path / "large", largest + 1)
+    with pytest.raises(ScenarioError, match=f"^it must be at most {said}. Received"):
+        read_text(tmp_path / "large", "it", largest=largest, refusal=ScenarioError)
+
+
+def test_a_byte_order_mark_is_no_text_where_one_may_stand(tmp_path):
+    (tmp_path / "marked").write_bytes(b"\xef\xbb\xbfa")
+    more = {"largest": 9, "refusal": ScenarioError}
+    assert read_text(tmp_path / "marked", "it", **more) == "a"
+    assert read_text(tmp_path / "marked", "it", **more, marked=False) == "\ufeffa"
+
+
+def test_a_line_with_as_many_dots_as_it_may_have_is_read():
+    assert parse_toml(f'a = "{"." * 400}"') == {"a": "." * 400}
+    with pytest.raises(ValueError, match=r"at most 400 dots, line 2 has 401"):
+        parse_toml(f'\na = "{"." * 401}"')

@@ -142,3 +142,62 @@ def test_a_folder_that_was_made_for_files_goes_where_none_could_be_written(tmp_p
     with pytest.raises(ValueError, match="other"), output.made_folder(tmp_path / "a" / "b"):
         raise ValueError("other")
     assert (tmp_path / "a" / "b" / "c").is_file()
+
+
+@pytest.fixture(autouse=True)
+def _nothing_stays_held():
+    yield
+    output.release()
+
+
+def test_one_folder_is_let_go_and_the_others_are_kept(tmp_path):
+    one, other = tmp_path / "one", tmp_path / "other"
+    assert output.hold(one)
+    assert output.hold(other)
+    output.release(one)
+    assert output.hold(one)
+    assert not output.hold(other)
+    with output.sole_writer(other):
+        pass
+    assert not output.hold(other), "who holds it already goes on holding it"
+    output.release()
+    assert output.hold(other)
+    assert output.hold(one)
+
+
+def test_folders_above_are_made_where_they_are_wanted(tmp_path):
+    assert output.hold(tmp_path / "none" / "results")
+    assert os.listdir(tmp_path) == []
+    for _ in range(2):
+        output.release()
+        assert output.hold(tmp_path / "a" / "b" / "results", make=True)
+    output.release()
+    assert os.listdir(tmp_path / "a" / "b") == []
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match=r"results cannot be written: (Not a directory|File exists)\. Choose another"):
+        output.hold(tmp_path / "file" / "results", make=True)
+
+
+def test_everybody_may_read_what_is_written_whatever_the_mask(tmp_path):
+    before = os.umask(0o077)
+    try:
+        write_whole(tmp_path / "file", "x")
+        with whole_folder(tmp_path / "folder"):
+            pass
+    finally:
+        os.umask(before)
+    assert [(tmp_path / name).stat().st_mode & 0o777 for name in ("file", "folder")] == [0o644, 0o755]
+
+
+def test_a_refusal_within_a_made_folder_keeps_its_words(tmp_path):
+    with pytest.raises(OutputError, match=r"^own words$"), output.made_folder(tmp_path / "a"):
+        raise OutputError("own words")
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("place", "reason"), [("none/a", r": No such file or directory\. Choose"), ("\0", r": embedded null byte\. Choose")]
+)
+def test_why_there_is_no_room(tmp_path, place, reason):
+    with pytest.raises(OutputError, match=f"must be in a folder that can be written.*{reason}"):
+        output.require_room(tmp_path / place)

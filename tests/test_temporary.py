@@ -1,17 +1,24 @@
 """Temporary folders of killed processes go at the next start, those of living ones stay."""
 
 import os
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from quakedesign import files
 from quakedesign.files import (
     FAMILY,
     PREFIX,
     discard_all,
+    is_temporary,
+    lock_of,
+    number_placed,
     require_room,
     sweep,
+    sweep_system,
     temporary_folder,
+    unlock,
     whole_folder,
     write_whole,
 )
@@ -148,3 +155,193 @@ def test_all_of_this_process_can_be_discarded_from_anywhere(tmp_path):
         assert not (one.exists())
         assert not (other.exists())
     assert os.listdir(tmp_path) == []
+
+
+@pytest.fixture
+def nothing_left(tmp_path):
+    """No descriptor, no folder and no note of one is left of what a test does."""
+    opened, noted = os.listdir("/dev/fd"), set(files._mine)
+    yield
+    assert os.listdir("/dev/fd") == opened
+    assert files._mine == noted
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.fixture
+def pauses(monkeypatch):
+    """Pauses between trials, which take no time."""
+    taken = []
+    monkeypatch.setattr(files, "sleep", taken.append)
+    return taken
+
+
+@pytest.fixture
+def first_lock(monkeypatch):
+    """Sets what happens in place of the first locks."""
+    own, calls = files._locked, []
+
+    def begin(*deeds):
+        def locked(folder):
+            calls.append(folder)
+            return (deeds[len(calls) - 1] if len(calls) <= len(deeds) else own)(folder)
+
+        monkeypatch.setattr(files, "_locked", locked)
+        return calls
+
+    begin.own = own
+    return begin
+
+
+def held(folder):
+    raise BlockingIOError
+
+
+def swept(folder):
+    folder.rmdir()
+    raise FileNotFoundError
+
+
+def swept_when_open(folder):
+    opened = os.open(folder, os.O_RDONLY)
+    folder.rmdir()
+    return opened
+
+
+def without_locks(folder):
+    raise OSError("no locks available")
+
+
+@pytest.mark.usefixtures("nothing_left")
+def test_the_lock_of_a_place_is_a_private_folder_beside_it(tmp_path, pauses):
+    folder, lock = lock_of(tmp_path / "results")
+    assert folder.parent == tmp_path
+    assert os.path.samestat(os.fstat(lock), folder.stat())
+    assert folder.stat().st_mode & 0o777 == 0o700
+    with pytest.raises(BlockingIOError):
+        lock_of(tmp_path / "results")
+    assert pauses == []  # nobody waits for himself
+    with pytest.raises(BlockingIOError):
+        files._locked(folder)
+    discard_all()
+    assert not folder.exists()
+    unlock(folder, lock)
+
+
+@pytest.mark.usefixtures("nothing_left")
+def test_a_lock_that_a_sweep_holds_for_a_moment_is_waited_for(tmp_path, pauses, first_lock):
+    first_lock(held, held)
+    folder, lock = lock_of(tmp_path / "results")
+    assert pauses == [files._PAUSE] * 2
+    assert os.path.samestat(os.fstat(lock), folder.stat())
+    unlock(folder, lock)
+
+
+def test_a_lock_that_stays_with_another_is_given_up(tmp_path, pauses, first_lock, monkeypatch):
+    monkeypatch.setattr(files, "_TRIALS", 4)
+    calls = first_lock(*[held] * 5)
+    with pytest.raises(BlockingIOError):
+        lock_of(tmp_path / "results")
+    assert (len(calls), pauses) == (4, [files._PAUSE] * 3)
+
+
+@pytest.mark.usefixtures("nothing_left")
+@pytest.mark.parametrize("again", [False, True])
+@pytest.mark.parametrize("before", [False, True])
+def test_a_folder_that_is_swept_while_it_is_locked_is_made_again(tmp_path, first_lock, again, before):
+    def swept_at_once(folder):
+        lock = None if before else first_lock.own(folder)
+        folder.rmdir()
+        if again:
+            (folder.parent / "other").mkdir()  # a folder of its own number
+            (folder.parent / "other").rename(folder)
+        if before:
+            raise FileNotFoundError
+        return lock
+
+    first_lock(swept_at_once)
+    folder, lock = lock_of(tmp_path / "results")
+    assert os.path.samestat(os.fstat(lock), folder.stat())
+    unlock(folder, lock)
+
+
+@pytest.mark.usefixtures("nothing_left")
+def test_where_there_are_no_locks_a_place_is_had_without(tmp_path, first_lock):
+    calls = first_lock(*[without_locks] * 9)
+    folder, lock = lock_of(tmp_path / "results")
+    assert (len(calls), lock) == (1, None)
+    unlock(folder, lock)
+    folder.rmdir()
+    with temporary_folder(tmp_path) as work:
+        assert work.exists()
+
+
+@pytest.mark.usefixtures("nothing_left")
+@pytest.mark.parametrize("deed", [held, swept, swept_when_open])
+def test_a_new_folder_that_is_swept_before_it_is_locked_is_made_again(tmp_path, first_lock, deed):
+    calls = first_lock(deed)
+    with temporary_folder(tmp_path) as folder:
+        assert folder.exists()
+        assert len(calls) == 2
+        assert folder != calls[0]
+    if deed is held:
+        calls[0].rmdir()
+
+
+@pytest.mark.usefixtures("nothing_left")
+def test_what_cannot_be_made_or_locked_leaves_nothing(tmp_path):
+    with pytest.raises(FileNotFoundError), temporary_folder(tmp_path / "none"):
+        raise AssertionError("the block must not begin")
+    elsewhere, link, file = tmp_path / "folder", tmp_path / "link", tmp_path / "file"
+    elsewhere.mkdir()
+    link.symlink_to(elsewhere)
+    file.touch()
+    for place in (link, file):
+        with pytest.raises(OSError, match=r"Not a directory|Too many levels"):
+            files._locked(place)
+        place.unlink()
+    elsewhere.rmdir()
+    assert files._SWEPT < 0, "no descriptor"
+
+
+@pytest.mark.usefixtures("nothing_left")
+def test_windows_has_no_locks_of_folders(tmp_path, monkeypatch):
+    monkeypatch.setattr(files.sys, "platform", "win32")
+    with pytest.raises(OSError, match="folders have no locks here"):
+        files._locked(tmp_path)
+
+
+def test_folders_of_other_users_stay(tmp_path, monkeypatch):
+    (tmp_path / f"{PREFIX}dead").mkdir()
+    opened, own = os.listdir("/dev/fd"), os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: own + 1)
+    sweep(tmp_path)
+    assert os.listdir(tmp_path) == [f"{PREFIX}dead"]
+    monkeypatch.undo()
+    sweep(tmp_path)
+    assert os.listdir(tmp_path) == []
+    assert os.listdir("/dev/fd") == opened
+
+
+def test_the_folder_of_the_system_is_used_and_swept(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / f"{PREFIX}dead").mkdir()
+    sweep_system()
+    assert os.listdir(tmp_path) == []
+    with temporary_folder() as folder:
+        assert folder.parent == tmp_path
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    sweep_system()
+
+
+def test_what_is_put_in_its_place_is_counted_but_for_what_is_temporary(tmp_path):
+    before = number_placed()
+    with temporary_folder(tmp_path) as folder:
+        assert is_temporary(folder / "a" / "b")
+        assert not is_temporary(tmp_path / "a")
+        write_whole(folder / "a", "x")
+        assert number_placed() == before
+    write_whole(tmp_path / "a", "x")
+    assert number_placed() == before + 1
+    with whole_folder(tmp_path / "b") as new:
+        write_whole(new / "c", "x")
+    assert number_placed() == before + 2
