@@ -248,7 +248,7 @@ scale {lab-fault;real-fault} {short.toml;lab-fault} | --controller {cta;dia;elqr
 simulate short.toml --duration {'20 ms';0.1} | --plant {smooth;coulomb} | --method rk4 \
  | --initial-slip '1 mm' | --json
 simulate lab-fault --controller {cta;dia;elqr} --duration '30 ms' | --plant coulomb | --method rk4 \
- | --substeps {2;10} | --json
+ | --scheme explicit --substeps {2;10} | --json
 simulate lab-fault --controller {cta;dia} --duration {'20 ms';'60 ms'} --scheme {explicit;implicit;semi-implicit} \
  | --delay {'2 ms';'10 ms'} --jitter 1 | --saturation {'1 MPa';'20 MPa'} --withdrawal 0 \
  | --rate-limit '1 MPa/s' | --seed 3 \
@@ -257,7 +257,7 @@ simulate lab-fault --controller {cta;dia} --duration {'20 ms';'60 ms'} --scheme 
 simulate lab-fault --controller cta --duration '30 ms' --scheme compensated | --weight {0.5;1} \
  | --plant coulomb | --drift '1 mm/s'
 simulate {lab-fault;short.toml} --controller elqr --gains 1e8 1e6 1e7 1e5 --duration '30 ms' --scheme explicit \
- | --quiet | --delay '10 ms' | --averaging 2 | --differentiator-bound 2 --slip-quantum '0.1 um' \
+ | --quiet | --delay '10 ms' | --differentiator-bound 2 --slip-quantum '0.1 um' --averaging {1;2} \
  | --perturbation '1e-3*sin(time)' | --json
 simulate crustal-patch --duration '1 day' \
  | --pressure {'1 MPa';'0 s: 0 MPa, 1 hour: 1 MPa';course.csv} | --plant quasi-dynamic
@@ -276,10 +276,10 @@ guarantee lab-fault --gains 1546085894 358137872 1490578667 524519950 | --slip-n
  | --class rate | --json | --delay '1 ms'
 identify record.csv --stiffness '1e-3 1/um' | --law rate-and-state-aging | --seed 2 \
  | --out identified.toml --force | --json
-sampling lab-fault --gains published --duration '50 ms' --out made --force | --controller {cta;elqr} | --json
-export lab-fault --certificate GUARANTEE --out made --force | --fmu
+sampling lab-fault --gains published --duration '50 ms' --out sampled --force | --controller {cta;elqr} | --json
+export lab-fault --certificate GUARANTEE --out proved --force | --fmu
 simulate lab-fault --certificate GUARANTEE --duration '0.2 s' | --plant coulomb | --saturation '1 MPa' | --json
-map cta --over k1 k2 --lipschitz 1/2 --points 3 --interior 1 --workers 1 --out made --force | --json
+map cta --over k1 k2 --lipschitz 1/2 --points 3 --interior 1 --workers 1 --out mapped --force | --json
 """
 """Lines that are done in a moment, and in seconds: one of {a;b} each, and any of the options after | beside them."""
 NAMES = {
@@ -375,7 +375,7 @@ def test_sound_command_lines(which, workplace):
     assert sum(codes.values()) >= (1000 if which == 0 else 15)
     assert Path.cwd() == workplace
     assert len(os.listdir("/dev/fd")) < opened + 20
-    assert codes[0, True] > 2 * codes[2, True]
+    assert codes[2, True] == 0
     assert codes[2, False] > 0
 
 

@@ -280,7 +280,7 @@ def controller_step(
     require_positive(step=period)
     chosen = _software(simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme)
     loop, measurement = ClosedLoop(fault, controller), {"slip": "m", "slip_rate": "m/s"}
-    if chosen.measurement.of_slip_alone or not _uses_rate(_function(loop, chosen, float(period), 2)[0]):
+    if not _uses_rate(_function(loop, chosen, float(period), 2)[0]):
         measurement.pop("slip_rate")
     function, start = _function(loop, chosen, float(period), len(measurement))
     facts = _facts(fault, controller, chosen)

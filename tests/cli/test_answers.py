@@ -420,6 +420,11 @@ def test_a_file_of_gram_says_all_that_is_asked(call, more):
     assert (code, "--gram is a file that says what is asked" in err) == (2, True)
 
 
+def test_a_polynomial_and_a_constraint_may_begin_with_a_sign(call):
+    code, out, _ = call("sos", "-x^2 + x", "--on", "-x^2 + x >= 0", "--json")
+    assert (code, json.loads(out)["verdict"]) == (0, "sos")
+
+
 def test_nothing_is_no_polynomial(call):
     code, _, err = call("sos")
     assert (code, "sos needs a polynomial, or --gram FILE" in err) == (2, True)

@@ -7,6 +7,7 @@ import subprocess
 from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,8 +27,10 @@ from quakedesign.laws import (
     disturbance_estimate,
     published,
     slip_observer,
+    summed_integrals,
 )
 from quakedesign.laws import compensated as compensated_law
+from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.laws.feed_forward import feed_forward
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.actuators.chain import Actuator
@@ -37,7 +40,7 @@ from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, 
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import simulate
-from quakedesign.simulation.export import controller_step, export_controller
+from quakedesign.simulation.export import FILES, _comment, _sizes, controller_step, export_controller
 from quakedesign.studies.runs import certified_choice
 
 LAB = load_fault("lab-fault")
@@ -228,6 +231,68 @@ def test_a_header_writes_exact_numbers_plainly(tmp_path):
     assert "feedback [-149400000, -" in law
     assert "Fraction" not in law
     assert "None" not in law
+
+
+def test_a_law_that_makes_nothing_of_the_slip_rate_measures_the_slip_alone():
+    gains = {"k1": 2e8, "k2": 0, "k3": 1e6, "k4": 1e5}
+    without = ExtendedLQR.from_values(tuple(map(str, gains.values())))
+    assert dict(controller_step(LAB, without).measurement) == {"slip": "m"}
+    assert dict(controller_step(LAB, PUBLISHED["elqr"]).measurement) == {"slip": "m", "slip_rate": "m/s"}
+
+
+@pytest.mark.parametrize(
+    ("case", "own"),
+    [("cta", {"xi_1"}), ("elqr", {"xi_1", "xi_2"}), ("cta limited", {"xi_1", "kept_0", "kept_1", "kept_2"})],
+)
+def test_what_never_changes_is_no_memory_and_nothing_was_asked_before_the_first_call(case, own):
+    """Integral states, what stages keep, the pressure of the sample before, and how far a law may wind up."""
+    controller, scheme, settings = CASES[case]
+    start = dict(controller_step(LAB, controller, step=1e-3, scheme=simulation_scheme(scheme, **settings)).start)
+    before = {f"before_{name}" for name in own if name.startswith("xi")}
+    assert set(start) == {"sample", "held_0", "push", *own, *before}
+    assert set(start.values()) == {0.0}
+
+
+def test_a_law_without_integral_states_cannot_wind_up():
+    law = summed_integrals((F(1), F(2), F(3), F(4)), F(1, 1000))
+    plain = replace(law, states=(), update=(), measured=(), output=())
+    found = controller_step(LAB, SampledController(law=plain, step=F(1, 1000)))
+    assert set(found.start) == {"sample", "held_0"}
+
+
+def test_substeps_are_those_of_a_simulation():
+    plain = controller_step(LAB, PUBLISHED["cta"], scheme=simulation_scheme("explicit"))
+    found = controller_step(LAB, PUBLISHED["cta"], scheme=simulation_scheme("explicit", substeps=10))
+    assert (found.facts, found.start) == (plain.facts, plain.start)
+    assert found.facts["substeps"] == "1"
+
+
+def test_the_step_is_seen_in_its_file_alone_and_arrays_have_an_entry_at_least(tmp_path):
+    export_controller(LAB, PUBLISHED["elqr"], tmp_path / "c")
+    lines = (tmp_path / "c" / "controller.c").read_text().splitlines()
+    assert (
+        "int sampled_step(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem){"
+        in lines
+    )
+    sizes = SimpleNamespace(sz_arg=lambda: 3, sz_res=lambda: 2, sz_iw=lambda: 0, sz_w=lambda: 1)
+    assert _sizes(sizes) == {"arguments": 3, "results": 2, "integers": 1, "work": 1}
+
+
+def test_a_comment_keeps_its_empty_lines():
+    assert _comment(["a", "", "b */ c"]) == "/*\n * a\n *\n * b * / c\n */\n"
+
+
+def test_only_an_export_is_replaced_by_force(tmp_path):
+    (tmp_path / "file").touch()
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "whole").mkdir()
+    for name in FILES:
+        (tmp_path / "whole" / name).touch()
+    with pytest.raises(OutputError, match=r"^only a folder with controller\.h, .* is replaced"):
+        export_controller(LAB, PUBLISHED["cta"], tmp_path / "file", force=True)
+    for place in ("empty", "whole"):
+        export_controller(LAB, PUBLISHED["cta"], tmp_path / place, force=True)
+        assert sorted(path.name for path in (tmp_path / place).iterdir()) == ["controller.c", "controller.h"]
 
 
 def test_a_law_of_slow_sliding_is_refused():

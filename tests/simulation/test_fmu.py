@@ -1,5 +1,7 @@
 """Controllers as model units of FMI 2.0: FMPy reads, checks and runs them, and the digits are those of the step."""
 
+import platform
+import xml.etree.ElementTree as ET
 import zipfile
 
 import fmpy
@@ -14,7 +16,7 @@ from quakedesign.loop import simulation_scheme
 from quakedesign.loop.actuators.chain import Actuator
 from quakedesign.loop.actuators.sampled_stages import Saturation
 from quakedesign.loop.sensing import Differentiator, OutputFeedback
-from quakedesign.simulation import simulate
+from quakedesign.simulation import export, simulate
 from quakedesign.simulation.export import controller_step, export_controller
 
 LAB = load_fault("lab-fault")
@@ -87,6 +89,10 @@ def test_the_description_follows_the_standard_and_names_units(unit):
     }
     assert float(told.defaultExperiment.stepSize) == STEP
     assert "lab-fault" in told.description
+    with zipfile.ZipFile(path) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    assert text.startswith("<?xml version=")
+    assert [entry.get("name") for entry in ET.fromstring(text).find("LogCategories")] == ["logStatusError"]
     assert fmpy.supported_platforms(path) == ["c-code", found.facts["fmu"]]
 
 
@@ -199,6 +205,28 @@ def test_without_a_compiler_the_sources_lie_inside(tmp_path, monkeypatch):
     with zipfile.ZipFile(tmp_path / "c" / "controller.fmu") as archive:
         assert not [name for name in archive.namelist() if name.startswith("binaries")]
     assert fmpy.supported_platforms(tmp_path / "c" / "controller.fmu") == ["c-code"]
+
+
+@pytest.mark.parametrize(
+    ("system", "machine"), [("Linux", "aarch64"), ("Darwin", "arm64"), ("Windows", "AMD64"), ("Plan9", "mips")]
+)
+def test_a_platform_that_is_not_built_here_gets_the_sources(monkeypatch, system, machine):
+    monkeypatch.setattr(platform, "system", lambda: system)
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    monkeypatch.setattr(export, "shared_library", lambda *_: pytest.fail("compiled"))
+    assert export._binary({}) == ({}, "sources only: this platform has no name in FMI 2.0 that is built here")
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "place"),
+    [("Linux", "x86_64", "linux64/controller.so"), ("Darwin", "AMD64", "darwin64/controller.dylib")],
+)
+def test_a_binary_has_the_name_of_its_platform(monkeypatch, tmp_path, system, machine, place):
+    (tmp_path / "built").write_bytes(b"library")
+    monkeypatch.setattr(platform, "system", lambda: system)
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    monkeypatch.setattr(export, "shared_library", lambda *_: tmp_path / "built")
+    assert export._binary({}) == ({f"binaries/{place}": b"library"}, place.partition("/")[0])
 
 
 def test_no_unit_is_written_unless_asked_for(tmp_path):
