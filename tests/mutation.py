@@ -245,7 +245,8 @@ def caches_in(objects: list[object], folder: Path) -> list[functools._lru_cache_
 def exchange_defaults(old: Mapping[str, object], new: Mapping[str, object]) -> None:
     """Give functions, inside of what is wrapped around them, the defaults of others of the same name."""
     for name, function in old.items():
-        inner, other = (inspect.unwrap(one) if callable(one) else one for one in (function, new.get(name)))
+        wrapped = callable(function) or isinstance(function, classmethod | staticmethod)
+        inner, other = (inspect.unwrap(one) if wrapped else one for one in (function, new.get(name)))
         if isinstance(inner, types.FunctionType) and isinstance(other, types.FunctionType):
             inner.__defaults__, inner.__kwdefaults__ = other.__defaults__, other.__kwdefaults__
 

@@ -76,6 +76,10 @@ class Size:
     def times(self, factor: int = 5) -> int:
         return self.value * factor
 
+    @classmethod
+    def of(cls, value: int = 11) -> "Size":
+        return cls(value)
+
 
 @cache
 def half(value: int = 8) -> int:
@@ -95,6 +99,8 @@ def test_defaults_of_fields_and_methods_are_changed_in_place(tmp_path):
         tool.apply(found[mutation], [size.times], [module])
         assert size().times() == product
     assert size(2).times(7) == 14
+    tool.apply(found["11 → 12"], [], [module])
+    assert size.of().value == 12
     tool.apply(found["8 → 9"], [module.half.__wrapped__], [module])
     assert module.half() == 4
     tool.apply(found["8 → 16"], [module.half.__wrapped__], [module])

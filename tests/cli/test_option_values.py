@@ -25,9 +25,9 @@ from quakedesign.cli.options import (
 )
 from quakedesign.errors import ParameterError, QuakedesignError, UnitError
 from quakedesign.fault import load_fault
-from quakedesign.loop import Delay, Diffusion, Lag
+from quakedesign.loop import Delay, Diffusion, Lag, Saturation
 from quakedesign.loop.actuators.base import Option
-from quakedesign.loop.sensing import Measurement, OutputFeedback
+from quakedesign.loop.sensing import Measurement, OutputFeedback, Transducer
 from quakedesign.studies import runs
 
 LAB, CRUSTAL = load_fault("lab-fault"), load_fault("crustal-patch")
@@ -466,6 +466,88 @@ def test_a_campaign_runs_a_certificate_without_delay_and_noise(delay, noise, ref
         assert options._of_proof(claim, "1/8", 0.0) == {"spread": F(1, 8), "stress": 0.0}
 
 
+@pytest.mark.parametrize(
+    ("given", "noise", "quantum"),
+    [(None, F(0), None), (None, F(1, 4), 0.5), ("own", F(0), "own"), ("own", F(1), "own")],
+)
+def test_a_reading_is_off_by_the_noise_of_the_proof_unless_a_transducer_is_given(monkeypatch, given, noise, quantum):
+    held = SimpleNamespace(step=F(1, 2), slip_noise=noise)
+    claim = SimpleNamespace(held=held, task=SimpleNamespace(stress=F(3)))
+    asked = {}
+    monkeypatch.setattr(options, "_instruments", lambda _, told, __: asked.update(told) or {"transducer": given})
+    command = {"law": SimpleNamespace(choose=lambda _: SimpleNamespace(claim=claim)), "state": StateOptions()}
+    found = options._as_proved(CRUSTAL, "a.json", {"plant": "smooth"}, command)
+    assert asked == {"plant": "smooth", "step": 0.5}
+    assert (found["claim"], found["stress"], found["step"]) == (claim, 3.0, None)
+    assert getattr(found["transducer"], "quantum", found["transducer"]) == quantum
+    stressed = {**command, "state": StateOptions(stress=7.0)}
+    assert options._as_proved(CRUSTAL, "a.json", {}, stressed)["stress"] == 7.0
+    for name in ("step", "delay", "lag", "diffusion"):
+        with pytest.raises(ParameterError, match=f"^{name} cannot be used with a.json, whose law has its own"):
+            options._as_proved(CRUSTAL, "a.json", {name: 1.0}, command)
+
+
+@pytest.fixture
+def run_with_state(monkeypatch, tmp_path, capsys):
+    """Runs `simulate` on a fault with a state; returns what was run, with what, and what was said."""
+    asked = {}
+
+    def done(kind):
+        saved = SimpleNamespace(name="the run", save=lambda path: path.write_text(kind))
+
+        def run(_fault, **told):
+            asked.clear()
+            asked.update(told, kind=kind)
+            return SimpleNamespace(trajectory=saved, to_dict=lambda: {"kind": kind})
+
+        return run
+
+    for kind in ("held", "state"):
+        monkeypatch.setattr(runs, f"run_{kind}", done(kind))
+    for name in ("sliding_run_lines", "state_run_lines"):
+        monkeypatch.setattr(f"quakedesign.report.sentences.{name}", lambda answer, name=name: [name, str(answer)])
+
+    def call(*options):
+        with pytest.raises(SystemExit) as end:
+            main(["simulate", "crustal-patch", *options, "--out", str(tmp_path / "run.nc"), "--force"])
+        return end.value.code, capsys.readouterr().out, asked, (tmp_path / "run.nc").read_text()
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "told"),
+    [
+        ((), "state", {}),
+        (("--drift", "1 mm/s", "--hold", "2 s"), "state", {"loading_rate": 0.001, "hold": 2.0}),
+        (("--controller", "elqr"), "held", {"stages": (), "transducer": None}),
+        (("--controller", "elqr", "--seed", "3"), "held", {"stages": (), "transducer": None}),
+        (
+            ("--controller", "elqr", "--lag", "2 s", "--stress", "1 kPa"),
+            "held",
+            {"stages": (), "transducer": None, "lag": 2.0, "stress": 1e3},
+        ),
+        (
+            ("--controller", "elqr", "--slip-noise-deviation", "1 um", "--seed", "3", "--saturation", "1 MPa"),
+            "held",
+            {"stages": (Saturation(lowest=-1e6, highest=1e6),), "transducer": Transducer(deviation=1e-6, seed=3)},
+        ),
+        (
+            ("--controller", "elqr", "--slip-quantum", "1 um", "--step", "2 s"),
+            "held",
+            {"stages": (), "transducer": Transducer(quantum=1e-6), "step": 2.0},
+        ),
+    ],
+)
+def test_a_run_with_a_state_is_free_or_held(run_with_state, given, kind, told):
+    code, out, asked, saved = run_with_state(*given)
+    assert (code, saved) == (0, kind)
+    assert asked == {**told, "kind": kind}
+    lines = "sliding_run_lines" if kind == "held" else "state_run_lines"
+    assert out.splitlines() == ["the run", f"  {lines}", f"  { ({'kind': kind}) }"]
+    assert json.loads(run_with_state(*given, "--json")[1]) == {"kind": kind}
+
+
 def test_options_of_groups_are_told_by_their_own_names():
     given = {"seed": 3, "run": RunOptions(substeps=2), "state": StateOptions(hold=1.0), "start": StartOptions()}
     found = options._single(given)
@@ -484,3 +566,21 @@ def test_a_fault_is_looked_for_before_anything_else_is_loaded(capsys):
         main(["simulate", "nowhere", "--duration", "x"])
     assert end.value.code == 2
     assert "nowhere" in capsys.readouterr().err
+
+
+def test_an_option_of_several_words_takes_all_that_follow(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["sampling", "lab-fault", "--schemes", "explicit", "nonsense", "--gains", "published"])
+    err = capsys.readouterr().err
+    assert end.value.code == 2
+    assert "nonsense" in err
+    assert "--help" not in err, "it is no second fault"
+
+
+def test_a_perturbation_may_begin_with_a_sign(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["simulate", "lab-fault", "--perturbation", "-2*nonsense", "--duration", "1 ms"])
+    err = capsys.readouterr().err
+    assert end.value.code == 2
+    assert "nonsense" in err
+    assert "--help" not in err, "it is no option"

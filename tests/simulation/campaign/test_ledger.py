@@ -1,8 +1,12 @@
 """The folder binds its campaign, and loses nothing that was written."""
 
+import hashlib
 import json
 import math
 import os
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +15,7 @@ from quakedesign.errors import OutputError, SimulationError
 from quakedesign.files import FAMILY, PREFIX
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing import Transducer
-from quakedesign.simulation.campaign.ledger import Ledger, differences, plain
+from quakedesign.simulation.campaign.ledger import Ledger, _told, differences, plain
 
 INPUTS = {"seed": 1, "controller": {"gains": {"k1": "7"}}}
 
@@ -116,3 +120,136 @@ def test_a_batch_with_any_byte_changed_is_whole_or_passed_over(tmp_path):
         assert found in ({}, whole)
         kept += bool(found)
     assert 0 < kept < len(content)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A value with a number that does not matter."""
+
+    size: float
+    cost: int = field(default=0, compare=False)
+
+
+class Silent:
+    """A value without a text."""
+
+
+class Spoken:
+    """A value with a text."""
+
+    def __repr__(self):
+        return "spoken"
+
+
+class Told:
+    """A value with a text for people alone."""
+
+    def __str__(self):
+        return "told"
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        (Told(), "told"),
+        (Part(math.inf, 5), {"type": "Part", "size": "inf"}),
+        (Part, "Part"),
+        ({1: Part(2.0)}, {"1": {"type": "Part", "size": 2.0}}),
+        ([1, (2.5, -math.inf)], [1, [2.5, "-inf"]]),
+        (math.nan, "nan"),
+        (Fraction(1, 3), "1/3"),
+        (Silent(), "Silent"),
+        (Silent, "Silent"),
+        (Spoken(), "spoken"),
+        *((value, value) for value in (None, True, 3, 2.5, "text")),
+    ],
+    ids=str,
+)
+def test_every_value_has_a_plain_one(value, told):
+    found = plain(value)
+    assert found == told
+    assert type(found) is type(told)
+
+
+def test_differences_name_what_one_of_the_two_has_alone():
+    assert differences({"a": {"b": 1, "c": 2}}, {"a": {"b": 1}}) == ["a.c"]
+    assert differences({"a": {}}, {"a": {"b": {"c": 1}}}) == ["a.b"]
+    assert differences({"a": {"b": 1}}, {"a": 1}) == ["a"]
+    assert differences([1], {"a": 1}) == [""]
+    assert differences({"a": 1}, {"a": 1}) == []
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ([""], "everything"),
+        (["arithmetic"], "arithmetic"),
+        (["seed", "arithmetic"], "seed"),
+        (list("abcde"), "a, b, c, d, e"),
+        (list("abcdef"), "a, b, c, d, e and more"),
+    ],
+)
+def test_five_differences_are_told(names, told):
+    assert _told(names) == told
+
+
+def test_a_campaign_is_known_by_its_inputs_in_any_order(tmp_path):
+    text = '{\n "b": [\n  1\n ],\n "seed": 2\n}'
+    for inputs in ({"seed": 2, "b": [1]}, {"b": [1], "seed": 2}):
+        ledger = Ledger.open(tmp_path, inputs)
+        assert ledger.fingerprint == hashlib.sha256(text.encode()).hexdigest()
+        assert (tmp_path / "campaign.json").read_text() == text + "\n"
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        Ledger.open(tmp_path / "other", {"seed": math.nan})
+    assert not (tmp_path / "other").exists()
+
+
+def test_what_killed_writers_left_goes_from_the_folder_and_from_its_batches(tmp_path):
+    Ledger.open(tmp_path, INPUTS)
+    for place in (tmp_path, tmp_path / "batches"):
+        (place / f"{PREFIX}dead").mkdir()
+    Ledger.open(tmp_path, INPUTS)
+    assert {path.name for path in tmp_path.rglob("*")} == {"batches", "campaign.json"}
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [("file", "file must be a folder: Not a directory"), ("file/below", "below cannot be written: Not a directory")],
+)
+def test_a_place_that_is_no_folder(tmp_path, place, said):
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match=said):
+        Ledger.open(tmp_path / place, INPUTS)
+
+
+def test_batches_have_the_name_of_their_starts(tmp_path):
+    ledger, starts, ends = filled(tmp_path)
+    ledger.add(starts, ends)
+    (first,) = (tmp_path / "batches").iterdir()
+    assert first.name == hashlib.sha256(starts.tobytes()).hexdigest()[:16] + ".npz"
+    ledger.add(starts[:1], ends[:1])
+    assert len(list((tmp_path / "batches").iterdir())) == 2
+    assert len(ledger.read()) == 2
+
+
+def test_hidden_files_are_no_batches_and_no_file_runs_code(tmp_path):
+    ledger, *_ = filled(tmp_path)
+    (batch,) = (tmp_path / "batches").iterdir()
+    batch.rename(batch.with_name("." + batch.name))
+    assert ledger.read() == {}
+    objects = np.array([[Part(1.0)]], dtype=object)
+    np.savez(tmp_path / "batches" / "a.npz", fingerprint=np.array(ledger.fingerprint), starts=objects, ends=objects)
+    assert ledger.read() == {}
+
+
+def test_force_goes_on_where_something_is_gone_already(tmp_path, monkeypatch):
+    filled(tmp_path)
+    for path in (tmp_path / "batches").iterdir():
+        path.unlink()
+    (tmp_path / "batches").rmdir()
+    with monkeypatch.context() as patch:
+        own = Path.glob
+        gone = {"results.json": [tmp_path / "gone"]}
+        patch.setattr(Path, "glob", lambda folder, pattern: [*own(folder, pattern), *gone.get(pattern, ())])
+        Ledger.open(tmp_path, {"seed": 2}, renew=True)
+    assert {path.name for path in tmp_path.iterdir()} == {"batches", "campaign.json"}

@@ -67,3 +67,42 @@ def test_divergence_ends_it_and_every_index_is_known():
 def test_nothing_to_vary():
     space = Space(MappingProxyType({name: (low, low) for name, (low, _) in PAPER.ranges.items()}))
     assert len(found_by(lambda n: 1.0, space=space).looked_at) == 2
+
+
+def test_every_coordinate_is_moved_both_ways_within_the_box():
+    space = Space({"a": (0.0, 1.0), "phase": (0.0, 1.0), "fixed": (2.0, 2.0)})
+    assert neighbours(space, (0.5, 0.5, 0.0), 0.25) == [
+        (0.25, 0.5, 0.0),
+        (0.75, 0.5, 0.0),
+        (0.5, 0.25, 0.0),
+        (0.5, 0.75, 0.0),
+    ]
+    assert neighbours(space, (1.0, 0.0, 0.0), 0.25) == [(0.75, 0.0, 0.0), (1.0, 0.75, 0.0), (1.0, 0.25, 0.0)]
+    assert neighbours(space, (0.1, 0.9, 0.0), 0.25)[:2] == [(0.0, 0.9, 0.0), (0.35, 0.9, 0.0)]
+    assert corners(space) == [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
+
+
+@pytest.mark.parametrize(("rounds", "spans"), [(0, []), (1, [0.25]), (4, [0.25, 0.25, 0.125, 0.0625])])
+def test_the_span_is_halved_where_no_neighbour_is_worse(rounds, spans):
+    """One coordinate, worst at 0.75 between the corners: found at the first look, and then closed in upon."""
+    space, looks = Space({"a": (0.0, 1.0)}), []
+
+    def evaluate(samples):
+        looks.append([sample.numbers["a"] for sample in samples])
+        return [-abs(value - 0.75) for value in looks[-1]]
+
+    worst = search(space, "any", evaluate, [(0.5,)], noise_seed=3, rounds=rounds)
+    assert looks[0] == [0.5, 0.0, 1.0]
+    centres = [0.5, 0.75, 0.75, 0.75]
+    expected = [[centre - span, centre + span] for centre, span in zip(centres, spans, strict=False)]
+    assert looks[1:] == expected
+    assert worst.sample.numbers["a"] == (0.75 if rounds else 0.5)
+    assert (worst.value, worst.metric) == (0.0 if rounds else -0.25, "any")
+    every = [value for look in looks for value in look]
+    assert [sample.numbers["a"] for sample in worst.looked_at] == every
+    assert worst.index == (4 if rounds else 0)
+
+
+def test_of_equal_samples_the_first_is_the_worst():
+    worst = found_by(lambda n: 1.0, rounds=3)
+    assert (worst.index, worst.value) == (0, 1.0)

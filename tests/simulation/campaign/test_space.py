@@ -7,7 +7,7 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.simulation.campaign.space import Space, noise_seed, point
+from quakedesign.simulation.campaign.space import MOST_SAMPLES, Space, noise_seed, point, require_count
 
 BOX = Space.of(load_fault("lab-fault", box="ten-percent"), initial_slip=2e-3, initial_slip_rate=1e-2)
 SIZE = len(BOX.ranges)
@@ -54,3 +54,37 @@ def test_a_point_of_another_dimension_is_refused():
     space = Space.of(load_fault("lab-fault"))
     with pytest.raises(ParameterError, match=f"point must hold {len(space.ranges)} numbers"):
         space.sample([0.5], 1)
+
+
+@pytest.mark.parametrize(("box", "width"), [("ten-percent", 0.1), ("paper", None)])
+def test_a_space_is_the_box_the_disturbance_and_the_start(box, width):
+    fault = load_fault("lab-fault", box=box)
+    widths = {name: width or getattr(fault.box, name) for name in ("stiffness", "damping", "authority")}
+    ranges = {name: (1 - off, 1 + off) for name, off in widths.items()}
+    ranges |= {"weakening": (0.0, 1.0), "amplitude": (0.0, 1.0), "phase": (0.0, 2 * math.pi)}
+    assert Space.of(fault).ranges == ranges | {"initial_slip": (0.0, 0.0), "initial_slip_rate": (0.0, 0.0)}
+    moved = Space.of(fault, initial_slip=2e-3, initial_slip_rate=1e-2)
+    assert moved.ranges == ranges | {"initial_slip": (0.0, 2e-3), "initial_slip_rate": (0.0, 1e-2)}
+    assert moved.periodic == (5,)
+    assert moved.sample([0.25] * SIZE, 7).numbers == {
+        name: pytest.approx(0.75 * low + 0.25 * high, rel=1e-15) for name, (low, high) in moved.ranges.items()
+    }
+    assert moved.sample([0.25] * SIZE, 7).noise_seed == 7
+    assert list(Space({"a": (0.0, 1.0), "b": (2.0, 2.0), "c": (3.0, 2.0)}).active) == [0]
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.3, 0.9), (0.03, 0.29)])
+def test_no_number_of_a_sample_lies_beyond_its_range(low, high):
+    assert low + 1.0 * (high - low) > high, "in floats"
+    assert Space({"a": (low, high)}).sample([1.0], 0).numbers["a"] == high
+
+
+@pytest.mark.parametrize("samples", [0, -1, MOST_SAMPLES + 1, True, 1.0, 1.5, "1", None])
+def test_a_number_of_samples_that_is_none(samples):
+    with pytest.raises(ParameterError, match="samples must be a whole number, 1 to 1048576"):
+        require_count(samples)
+
+
+@pytest.mark.parametrize("samples", [1, 2, MOST_SAMPLES])
+def test_a_number_of_samples(samples):
+    assert require_count(samples) is None
