@@ -40,7 +40,7 @@ from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, 
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import simulate
-from quakedesign.simulation.export import FILES, _comment, _sizes, controller_step, export_controller
+from quakedesign.simulation.export import FILES, _comment, _remarks, _sizes, controller_step, export_controller
 from quakedesign.studies.runs import certified_choice
 
 LAB = load_fault("lab-fault")
@@ -258,6 +258,77 @@ def test_a_law_without_integral_states_cannot_wind_up():
     plain = replace(law, states=(), update=(), measured=(), output=())
     found = controller_step(LAB, SampledController(law=plain, step=F(1, 1000)))
     assert set(found.start) == {"sample", "held_0"}
+    assert [found.function.numel_out(i) for i in range(2)] == [2, 1]
+
+
+def test_a_law_whose_states_alone_use_the_slip_rate_measures_it():
+    law = summed_integrals((F(1), F(2), F(3), F(4)), F(1, 1000))
+    late = replace(law, measured=tuple((F(0), F(1)) for _ in law.states), feedback=(F(1), F(0)))
+    found = controller_step(LAB, SampledController(law=late, step=F(1, 1000)))
+    assert set(found.measurement) == {"slip", "slip_rate"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "applied", "push", "frozen"),
+    [
+        (2.0, 1.0, 1e-3, True),
+        (2.0, 1.0, -1e-3, False),
+        (1.0, 2.0, -1e-3, True),
+        (1.0, 2.0, 1e-3, False),
+        (1.0, 1.0, 5.0, False),
+        (2.0, 1.0, 0.0, False),
+    ],
+)
+@pytest.mark.parametrize("case", ["observer", "elqr"])
+def test_an_integral_that_pushes_beyond_what_was_applied_stays_as_it_was_before(case, asked, applied, push, frozen):
+    controller, scheme, _ = CASES[case]
+    found = controller_step(LAB, controller, step=1e-3, scheme=simulation_scheme(scheme))
+    integrals = [name for name in found.start if name.startswith("xi")]
+    own = {name: 1e-6 * i for i, name in enumerate(integrals, start=5)}
+    before = {f"before_{name}": -value for name, value in own.items()}
+    memory = {**found.start, "sample": 10.0, **own, **before, "held_0": asked, "push": push}
+    seen = [1e-6, 2e-6][: len(found.measurement)]
+
+    def after(applied, **changed):
+        later, pressure = found.function(seen, applied, list({**memory, **changed}.values()))
+        told = dict(zip(found.start, later.full().ravel(), strict=True))
+        return [told[name] for name in ("sample", "held_0", *integrals)], float(pressure)
+
+    kept = {name: -value for name, value in own.items()} if frozen else own
+    expected = after(asked, push=0.0, **kept)
+    assert after(applied) == expected
+    assert expected[0][:2] == [11.0, expected[1]]
+    assert after(asked, push=0.0, **own) != after(asked, push=0.0, **{name: -value for name, value in own.items()})
+
+
+@pytest.mark.parametrize(
+    ("other", "path", "longest", "said"),
+    [
+        ("", {}, None, []),
+        ("another T_s", {}, None, ["another T_s"]),
+        ("", {"delay": F(1, 50)}, None, ["designed for a delay of 0.02 s between its answer"]),
+        (
+            "another T_s",
+            {"delay": F(1, 50), "lag": F(2), "diffusion": F(300)},
+            F(1, 2),
+            ["another T_s", "a delay of 0.02 s, a lag of 2 s, rock of L^2/D = 300 s between", "once every 0.25 s"],
+        ),
+        ("", {}, F(1, 2), ["to be called by a clock, once every 0.25 s"]),
+        (None, None, None, []),
+    ],
+)
+def test_what_is_said_first_is_what_a_law_is_for(other, path, longest, said):
+    none = {"delay": F(0), "lag": F(0), "diffusion": F(0)}
+    own = None if path is None else SimpleNamespace(**{**none, **path}, longest=longest, step=F(1, 4))
+    found = _remarks(LAB, SimpleNamespace(sampling=own, other_step=lambda _: other))
+    assert len(found) == len(said)
+    assert all(part in remark for part, remark in zip(said, found, strict=True))
+
+
+def test_gains_and_sampling_are_told_in_words_of_their_own():
+    facts = controller_step(LAB, SAMPLED).facts
+    assert not {"gains", "sampling"} & facts.keys()
+    assert {"law", "step", "scheme", "fault"} <= facts.keys()
 
 
 def test_substeps_are_those_of_a_simulation():
