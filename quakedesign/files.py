@@ -97,7 +97,6 @@ PREFIX = f"{FAMILY}{sha256(platform.node().encode()).hexdigest()[:8]}-"
 ASIDE = "aside"
 """What lies in this folder of a temporary folder has been moved there, and goes back where its place is empty."""
 
-_SWEPT = -1
 _TRIALS, _PAUSE = 10, 0.02  # s: a sweep holds a lock for less
 _mine: set[Path] = set()
 
@@ -111,13 +110,14 @@ def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
     parent : Path, optional
         Where it lies; the folder of the system for temporary files unless given.
     """
-    folder, lock = _made((parent or Path(tempfile.gettempdir())).absolute())
+    folder = (parent or Path(tempfile.gettempdir())).absolute() / f"{PREFIX}{secrets.token_hex(8)}"
+    _mine.add(folder)
+    lock = None
     try:
+        lock = _taken(folder)
         yield folder
     finally:
-        _discard(folder)
-        if lock is not None:
-            os.close(lock)
+        unlock(folder, lock)
 
 
 def lock_of(target: Path) -> tuple[Path, int | None]:
@@ -134,37 +134,20 @@ def lock_of(target: Path) -> tuple[Path, int | None]:
     folder = place.parent / f"{PREFIX}{sha256(os.fsencode(place.name)).hexdigest()[:16]}"
     if folder in _mine:
         raise BlockingIOError
-    for trial in range(_TRIALS):
-        try:
-            folder.mkdir(mode=0o700, exist_ok=True)
-            lock = _locked(folder)
-            if _stands(folder, lock):
-                _mine.add(folder)
-                return folder, lock
-            os.close(lock)
-        except BlockingIOError:  # held, or swept at this moment
-            if trial == _TRIALS - 1:
-                raise
-            sleep(_PAUSE)
-        except FileNotFoundError:
-            pass
-        except OSError:
-            break
-    return folder, None
-
-
-def _stands(folder: Path, lock: int) -> bool:
-    """Whether a folder is still the one that was locked, and not swept or made anew since."""
     try:
-        return os.path.samestat(os.fstat(lock), os.stat(folder))
-    except FileNotFoundError:
-        return False
+        lock = _taken(folder)
+    except BlockingIOError:
+        raise
+    except OSError:  # no new folder may be made there, but files may be in that which is there
+        return folder, None
+    _mine.add(folder)
+    return folder, lock
 
 
 def unlock(folder: Path, lock: int | None) -> None:
     """Give back what `lock_of` gave."""
+    _discard(folder)
     if lock is not None:
-        _discard(folder)
         os.close(lock)
 
 
@@ -201,34 +184,41 @@ def discard_all() -> None:
         _discard(folder)
 
 
-def _made(parent: Path) -> tuple[Path, int | None]:
-    """New folder and its lock, None where the file system has no locks."""
-    while True:
-        folder = parent / f"{PREFIX}{secrets.token_hex(8)}"
-        _mine.add(folder)
+def _taken(folder: Path) -> int | None:
+    """Make a folder, and lock it until the descriptor is closed; None where the file system has no locks.
+
+    Raises
+    ------
+    BlockingIOError
+        When another process holds it.
+    OSError
+        When it cannot be made.
+    """
+    for trial in range(_TRIALS):
+        folder.mkdir(mode=0o700, exist_ok=True)
         try:
-            folder.mkdir(mode=0o700)
-        except BaseException:
-            _mine.discard(folder)
-            raise
-        lock = _locks(folder)
-        if lock != _SWEPT:
-            return folder, lock
-        _mine.discard(folder)
+            lock = _locked(folder)
+        except BlockingIOError:  # held, or swept at this moment
+            if trial == _TRIALS - 1:
+                raise
+            sleep(_PAUSE)
+        except FileNotFoundError:
+            continue
+        except OSError:
+            return None
+        else:
+            if _stands(folder, lock):
+                return lock
+            os.close(lock)
+    raise BlockingIOError
 
 
-def _locks(folder: Path) -> int | None:
-    """Descriptor of the lock of a new folder; None without locks, `_SWEPT` where another process was here first."""
+def _stands(folder: Path, lock: int) -> bool:
+    """Whether a folder is still the one that was locked, and not swept or made anew since."""
     try:
-        lock = _locked(folder)
-    except (BlockingIOError, FileNotFoundError):
-        return _SWEPT
-    except OSError:
-        return None
-    if folder.exists():
-        return lock
-    os.close(lock)
-    return _SWEPT
+        return os.path.samestat(os.fstat(lock), os.stat(folder))
+    except FileNotFoundError:
+        return False
 
 
 def _locked(folder: Path) -> int:
@@ -289,7 +279,7 @@ def require_room(path: Path) -> None:
         ) from None
 
 
-_held: list[tuple[Path, Path, int | None]] = []
+_held: dict[Path, tuple[Path, int | None]] = {}
 """Folders that this command writes, with their locks."""
 
 
@@ -307,12 +297,12 @@ def hold(folder: Path, *, make: bool = False) -> bool:
     OutputError
     """
     place = Path(os.path.realpath(folder))
-    if any(place == held for held, _, _ in _held):
+    if place in _held:
         return False
     try:
         if make:
             place.parent.mkdir(parents=True, exist_ok=True)
-        _held.append((place, *lock_of(place)))
+        _held[place] = lock_of(place)
     except BlockingIOError:
         raise OutputError(
             f"{folder} must be written by one command at a time. Received one that another writes to. Wait for it, or "
@@ -325,10 +315,8 @@ def hold(folder: Path, *, make: bool = False) -> bool:
 
 def release(folder: Path | None = None) -> None:
     """Let others write a folder; every one, unless told."""
-    place = None if folder is None else Path(os.path.realpath(folder))
-    for entry in [entry for entry in _held if place in (None, entry[0])]:
-        _held.remove(entry)
-        unlock(*entry[1:])
+    for place in list(_held) if folder is None else {Path(os.path.realpath(folder))} & _held.keys():
+        unlock(*_held.pop(place))
 
 
 @contextmanager

@@ -18,12 +18,11 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future,
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from multiprocessing import parent_process
-from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing import get_context, parent_process
 from threading import Thread, current_thread, main_thread
 from time import monotonic
-from types import FrameType, TracebackType
-from typing import Any, Self, cast
+from types import FrameType
+from typing import Any, Self
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.files import discard_all, number_placed, sweep_system
@@ -284,9 +283,7 @@ class Crew(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         return None
 
 
@@ -314,11 +311,10 @@ class Processes(Crew):
     ) -> None:
         self._count = cores() if count is None else require_workers(count)
         self._begin = pickle.dumps((begin, arguments))  # whose modules take seconds to import
-        self._context = _Roll()
-        self._pool: Executor = self._filled()
+        self._pool = self._filled()
 
-    def _filled(self) -> Executor:
-        return ProcessPoolExecutor(self._count, self._context, _enlist, (self._begin,))
+    def _filled(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(self._count, get_context("spawn"), _enlist, (self._begin,))
 
     @property
     def width(self) -> int:
@@ -338,9 +334,7 @@ class Processes(Crew):
         self._end()
         self._pool = self._filled()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if kind is None:
                 self._pool.shutdown(wait=True, cancel_futures=True)
@@ -348,27 +342,9 @@ class Processes(Crew):
             self._end()
 
     def _end(self) -> None:
-        self._context.kill()
+        for process in list((self._pool._processes or {}).values()):
+            process.kill()
         self._pool.shutdown(wait=True, cancel_futures=True)
-
-
-class _Roll(SpawnContext):
-    """Starts processes afresh, and knows them."""
-
-    def __init__(self) -> None:
-        self._started: list[SpawnProcess] = []
-
-    def _known(self, *given: Any, **named: Any) -> SpawnProcess:
-        self._started.append(SpawnProcess(*given, **named))
-        return self._started[-1]
-
-    Process = cast(Any, _known)
-
-    def kill(self) -> None:
-        for process in self._started:
-            if process.is_alive():
-                process.kill()
-        self._started.clear()
 
 
 def cores() -> int:
@@ -558,9 +534,7 @@ class Cluster(Given):
                 "for processes of this machine."
             ) from None
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._executor.shutdown(wait=False)
         self._client.close()
 

@@ -177,13 +177,12 @@ def test_cores_are_those_that_this_process_may_use_else_all_and_one_where_nobody
 def test_an_error_in_the_block_ends_processes_at_once_and_renewal_begins_with_others():
     crew = Processes(1)
     assert crew.submit(divmod, 9, 7).result() == (1, 2)
-    (first,) = crew._context._started
+    (first,) = crew._pool._processes.values()
     crew.renew()
     assert not first.is_alive()
     assert crew.submit(divmod, 9, 7).result() == (1, 2)
-    (second,) = crew._context._started
+    (second,) = crew._pool._processes.values()
     crew.submit(time.sleep, 1000)
     crew.__exit__(RuntimeError, RuntimeError("enough"), None)
     second.join(10)
     assert not second.is_alive()
-    assert crew._context._started == []
