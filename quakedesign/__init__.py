@@ -1,60 +1,21 @@
 """Design controllers that let a fault slip slowly instead of in an earthquake, and prove that they do.
 
-The public names load on first use, so that ``import quakedesign`` costs nothing; ``__init__.pyi`` names them for tools.
+The public names are those of ``__init__.pyi``. They load on first use, and the stub is read then, so that
+``import quakedesign`` costs nothing.
 """
 
 from importlib import import_module as _import_module
 
-_HOME = {
-    "Certificate": "lyapunov",
-    "Controller": "laws",
-    "Design": "synthesis",
-    "Disturbance": "fault",
-    "Fault": "fault",
-    "FrictionLaw": "fault",
-    "LoopSetup": "loop.loop_setup",
-    "Reference": "fault",
-    "Scales": "fault",
-    "Trajectory": "simulation",
-    "UncertaintyBox": "fault",
-    "Verdict": "lyapunov",
-    "assess": "synthesis",
-    "campaign_problem": "simulation.campaign",
-    "certify": "lyapunov",
-    "check_files": "checking",
-    "compare": "report",
-    "derive": "symbolic",
-    "design": "synthesis",
-    "export_controller": "simulation",
-    "guarantee": "synthesis",
-    "identify": "identification",
-    "limits": "studies",
-    "load_certificate": "lyapunov",
-    "load_fault": "fault",
-    "load_guarantee": "guarantees",
-    "loop_margins": "simulation",
-    "loop_transfer": "simulation",
-    "published": "laws",
-    "run_campaign": "simulation.campaign",
-    "scaled_fault": "fault",
-    "simulate": "simulation",
-    "stated_problems": "synthesis",
-    "synthesise": "lyapunov",
-    "to_casadi": "simulation",
-    "to_iosystem": "simulation",
-    "to_statespace": "simulation",
-}
-
-__all__ = list(_HOME)
+from lazy_loader import attach_stub as _attach_stub
 
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
         return _import_module("importlib.metadata").version("quakedesign")
-    if name not in _HOME:
-        raise AttributeError(f"module 'quakedesign' has no attribute {name!r}")
-    return getattr(_import_module(f"quakedesign.{_HOME[name]}"), name)
+    load, _, names = _attach_stub(__name__, __file__)
+    globals()["__all__"] = names
+    return names if name == "__all__" else load(name)
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "__version__"]
+    return list(__getattr__("__all__"))

@@ -1,6 +1,7 @@
 """What the public names of a room are called with: every argument is of the type that its annotation says."""
 
 import ast
+import dataclasses
 import operator
 import sys
 import types
@@ -9,13 +10,17 @@ from enum import Enum
 from functools import cache, wraps
 from importlib import import_module
 from importlib.util import find_spec
-from inspect import Parameter, Signature, isclass, isfunction, signature
+from inspect import CO_VARARGS, CO_VARKEYWORDS, Parameter, Signature, isclass, isfunction, signature
 from itertools import islice
 from numbers import Integral, Rational, Real
-from typing import Any, Literal, NoReturn, Union, Unpack, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeVar, Union, Unpack, get_args, get_origin, get_type_hints
+
+import lazy_loader
 
 from quakedesign.errors import ParameterError
 from quakedesign.text import shown
+
+__all__ = ["attach", "checked", "checked_dataclass", "imported_for_types", "matches"]
 
 _ABBREVIATIONS = {"sp": "sympy", "np": "numpy", "pd": "pandas", "ca": "casadi"}
 _NUMBERS = {"float": Real, "int": Integral, "Fraction": Rational, "Expr": Real}  # SymPy takes numbers as they are
@@ -26,38 +31,51 @@ _REMEDIES = {
     "Fraction": "Write Fraction('0.1'), say.",
     "float": "Give it in SI units.",
 }
+_Value = TypeVar("_Value")
 _VARIABLE = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
 _MOST_ENTRIES = 16  # of a collection that are looked at, so that a large one costs nothing
 
 
-def check_arguments(room: str) -> None:
-    """Make every function and class among a room's public names refuse arguments of other types than annotated.
+def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """Load the public names of a package on first use, see `lazy_loader.attach_stub`; they check their arguments.
 
     Parameters
     ----------
-    room : str
-        Name of the package, which has its ``__all__`` already.
+    package, file : str
+        Its ``__name__`` and ``__file__``; its stub names them.
     """
-    module = sys.modules[room]
-    for name in module.__all__:
-        if name in vars(module):
-            setattr(module, name, checked(vars(module)[name]))
+    load, listed, names = lazy_loader.attach_stub(package, file)
+
+    def get(name: str) -> Any:
+        vars(sys.modules[package])[name] = value = checked(load(name))
+        return value
+
+    return get, listed, names
 
 
-def checked(value: Any) -> Any:
+def checked(value: _Value) -> _Value:
     """Public name that checks its arguments from now on; a function also where it is defined, so that it is pickled.
 
     Of a class its construction and its public methods do, but those of SymPy's own calls.
     """
     if isfunction(value):
-        replaced = _checked(value)
+        replaced: Any = _checked(value)
         setattr(sys.modules[value.__module__], value.__name__, replaced)
-        return replaced
+        return replaced  # type: ignore[no-any-return]
     if isclass(value) and not issubclass(value, Enum | BaseException) and not hasattr(value, "free_symbols"):
         for base in value.__mro__:
             if base.__module__.partition(".")[0] == __name__.partition(".")[0]:
                 _check_methods(base)
     return value
+
+
+if TYPE_CHECKING:
+    from dataclasses import dataclass as checked_dataclass
+else:
+
+    def checked_dataclass(**options: Any) -> Callable[[type], type]:
+        """Dataclass that checks what it is made of, and what its methods take, whoever has loaded it."""
+        return lambda kind: checked(dataclasses.dataclass(**options)(kind))
 
 
 def _check_methods(owner: type) -> None:
@@ -68,10 +86,12 @@ def _check_methods(owner: type) -> None:
             type.__setattr__(owner, name, replaced if function is member else type(member)(replaced))
 
 
-def _takes_any(function: Callable[..., Any], member: Any) -> bool:
+def _takes_any(function: Any, member: Any) -> bool:
     """Whether a method takes arguments besides its instance or class, and is not there to be overridden."""
-    abstract = getattr(function, "__isabstractmethod__", False)
-    return not abstract and len(_signature(function).parameters) > (not isinstance(member, staticmethod))
+    code = getattr(function, "__wrapped__", function).__code__
+    several = bool(code.co_flags & (CO_VARARGS | CO_VARKEYWORDS))
+    count = code.co_argcount + code.co_kwonlyargcount + several
+    return not getattr(function, "__isabstractmethod__", False) and count > (not isinstance(member, staticmethod))
 
 
 def _checked(function: Callable[..., Any]) -> Callable[..., Any]:

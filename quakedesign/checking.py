@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from quakedesign import fault as faults
 from quakedesign import guarantees, lyapunov
 from quakedesign import plant as plants
-from quakedesign.arguments import check_arguments
+from quakedesign.arguments import checked
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.certificate_files import (
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["check_files"]
 
 
+@checked
 def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tuple[str, list[str]]]:
     """Verdict (``proved``, ``refuted`` or ``invalid: reason``) and statement for every certificate file.
 
@@ -166,6 +167,3 @@ def statement(certificate: Certificate) -> list[str]:
     lines.append("SignedPower(x, a) is |x|^a with the sign of x, AbsolutePower(x, a) is |x|^a")
     lines.append("claims: " + ", ".join(f"{name} {v}" for name, v in certificate.claims.items()))
     return lines
-
-
-check_arguments(__name__)

@@ -9,13 +9,14 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from fractions import Fraction
 from functools import cached_property
 from math import inf, nan, nextafter
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import (
     ParameterError,
     QuakedesignError,
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 # How far the real fault may be from the nominal one.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class UncertaintyBox:
     """Relative half-widths of the plant's parameters; friction is uncertain in every box.
 
@@ -304,7 +305,7 @@ def require_name(name: str) -> None:
 # The slip that the controller shall follow.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
     """Smooth slip r(t) from rest to rest, eq. ref, held at its end for t > operation_time (ERRATA 26).
 
@@ -364,7 +365,7 @@ class Reference:
         return 15 / 8 * self.target_slip / self.operation_time
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingReference:
     """Slip r(t) = d_max((1 − λ)t/t_op + λ·shape(t/t_op)) of a fault that slides at r′(0) at first and at the end.
 
@@ -451,7 +452,7 @@ def acceleration(quantity: Any, authority: Fraction, name: str) -> tuple[float, 
     return (size if stress >= 0 else -size), True
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbance:
     """Acceleration φ̂_e(x1, x2, t) = constant + amplitude·sin(frequency·t) + slip_growth·x1 + rate_growth·x2.
 
@@ -521,7 +522,7 @@ class Disturbance:
 # One fault as a spring-slider, in SI units.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Fault:
     """Spring-slider analogue of one fault, eq. springmodel.
 

@@ -15,6 +15,7 @@ from math import lcm, prod
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnitError, UnknownNameError, require_known
 from quakedesign.exact import exact_text, fraction_of, rational
 from quakedesign.fault.friction.base import FrictionLaw
@@ -299,7 +300,7 @@ def _primes(number: int) -> list[int]:
 # Scale factors between faults, and how any quantity grows with them.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Scales:
     """Scale factors λ of the five independent dimensions, target over source.
 

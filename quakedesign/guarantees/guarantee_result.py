@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Unpack
 
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound, exact_text, float_above, rational, shortly
 from quakedesign.fault import Fault
@@ -62,7 +63,7 @@ _TOLD = (
 _GROWS = 1 + 1e-6  # a factor per sample; eigenvalues that are 1 twice are rounded by less
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class LoopAnswer:
     """Guarantee of one loop, or why there is none.
 

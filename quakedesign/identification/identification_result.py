@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import FrictionLaw
 from quakedesign.identification.fitting import CONFIDENCE, Fit
@@ -17,7 +18,7 @@ _CORRELATED = 2.0  # samples
 _DECISIVE = 10.0  # of AIC: odds of about 150 to 1
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class ParameterEstimate:
     """One parameter with its profile likelihood at 95 %.
 
@@ -92,7 +93,7 @@ class Rival:
         return told if self.excess > _DECISIVE else f"{told}; so little that the record hardly tells the laws apart"
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Identification:
     """Friction parameters of a record with their confidence regions.
 

@@ -8,12 +8,13 @@ import csv
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy import stats
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import RecordError
 from quakedesign.fault.units import si_value
 from quakedesign.files import read_text
@@ -43,7 +44,7 @@ _HEADING = re.compile(r"\s*(\w[\w \-]*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))?\s*")
 _BETWEEN_WORDS = re.compile(r"[ \-]+")
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Record:
     """What was measured, in SI, one value a sample.
 

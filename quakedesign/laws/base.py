@@ -3,7 +3,7 @@
 import tomllib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from fractions import Fraction
 from functools import partial
 from importlib.resources import files
@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, runtime_chec
 
 import sympy as sp
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.exact import rational, six_digits
 from quakedesign.fault import Fault
@@ -20,7 +21,7 @@ from quakedesign.laws.loop_field import LoopField
 from quakedesign.text import shown
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Signals:
     """What a control law may read.
 
@@ -44,7 +45,7 @@ class Signals:
     reference_acceleration: sp.Expr = sp.S.Zero
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Sampling:
     """How a law of samples runs, and in no other way: with the scheme, the numbers and the T_s of what is proved of it.
 
@@ -84,7 +85,7 @@ class Sampling:
 L = TypeVar("L", bound="Law", covariant=True)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class BaseGains(Generic[L]):
     """Gains of a law with λ = 1, the bound on |h'| that they are meant for, and where they come from.
 
@@ -104,7 +105,7 @@ class BaseGains(Generic[L]):
     literature: bool
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Law(ABC):
     """A law with exact gains whose closed loop can be proved.
 
@@ -246,7 +247,7 @@ class DesignProblem(Protocol[Designed]):
         """Answer of a law that found no gains."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Controller(Law):
     """A law that acts on the slip of a fault through the fluid pressure.
 

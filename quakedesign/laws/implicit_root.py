@@ -6,10 +6,10 @@ is then strongly monotone and has one root, which falls with e1 and rises with e
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
 
@@ -20,7 +20,7 @@ _TINY = 1e-300
 _HALVINGS = 50
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Power:
     """One term c⌈x⌋^a of a monotone sum.
 
@@ -53,7 +53,7 @@ class Power:
             )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ImplicitRoot:
     """The sum q, and between which lines its root is said to lie for the errors that are claimed of the loop.
 

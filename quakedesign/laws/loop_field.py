@@ -8,10 +8,10 @@ import dataclasses
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import sympy as sp
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.laws.field_terms import FieldTerms
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
@@ -169,7 +169,7 @@ def require_units(
 # A closed loop in symbols, as a law derives it, and its terms.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class LoopField:
     """A closed loop as an uncertain vector field, the subject of a certificate.
 

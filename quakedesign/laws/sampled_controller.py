@@ -5,7 +5,7 @@ step with a disturbance estimate in place of integral states, for simulation and
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import fraction_of, to_sympy
 from quakedesign.laws.base import Controller, Sampling, Signals
@@ -87,7 +88,7 @@ def cut_off(
 # A linear law of samples as a controller that simulations run.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class SampledController(Controller):
     """p = Cz + Dy, whose states z ← Fz + Gy are those of the scheme ``explicit`` with the step T_s: ξ ← ξ + T_s·ξ′.
 

@@ -6,10 +6,11 @@ integrator windup.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from typing import ClassVar
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
 from quakedesign.laws.implicit_root import ImplicitRoot
@@ -25,7 +26,7 @@ NOISES = ("slip_noise", "rate_noise")
 MOST_STATES = 12
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class LinearLaw:
     """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z from 0 unless told.
 
@@ -110,7 +111,7 @@ def require_sizes(
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class NominalModel:
     """Middle of what may be: e2' = s·e1 − w·e2 + β·b·(p − p*) + d, which a law predicts with.
 
@@ -129,7 +130,7 @@ class NominalModel:
     gain: Fraction
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
     """What a law expects, from its model; any numbers give a law, good ones a good one.
 
@@ -289,7 +290,7 @@ def combined(*parts: tuple[Fraction, Row]) -> Row:
 # A law of samples that measures the slip alone: an observer of both errors and of the disturbance.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorPrediction:
     """What an observer expects of both errors, from its model; any numbers give a law, good ones a good one.
 
@@ -370,7 +371,7 @@ def slip_observer(
 # Laws that carry a model of what stands between their pressure and the fault.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class PathModel:
     """What a law expects of fault and path; any numbers give a law, good ones a good one.
 
@@ -503,7 +504,7 @@ def _through(
 # A limit of the pressure while the fault rests, so that a law does not wind up while friction holds it.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class RestLimit:
     """While a fault rests, its pressure is no further below any earlier one than a width.
 

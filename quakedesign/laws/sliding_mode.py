@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import fraction_of, rational
 from quakedesign.laws.base import Controller, Law, Sampling, Signals
@@ -26,7 +27,7 @@ beta, d = sp.symbols("beta d", real=True)
 e1, e2, e3 = sp.symbols("e1 e2 e3", real=True)
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class SlidingMode(Controller):
     """A homogeneous law ν(e1, e2, ξ1) with weights (3, 2, 1) and degree −1.
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
 from quakedesign.laws.sampled_law import NOISES, LinearLaw, Matrix, NominalModel, Row, require_sizes, unit_row
@@ -317,7 +318,7 @@ def _stepped(jump: list[list[Fraction]], path: _Path) -> Matrix:
 # A linear law whose pressure acts at once: the loop as an idealisation in continuous time, without samples.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ContinuousLaw:
     """p = Cz + Dy + R(r, r′) and z′ = Fz + Gy at every time, y = (e1, e2), z from 0, r the reference.
 
@@ -438,7 +439,7 @@ StateLaw = Literal["ageing", "slip"]
 _ONE = Fraction(1)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingModel:
     """Middle of what may be about sliding at V, with v = Ve^y, θ = (D/V)e^z, slip error x, pressure error q = p − p*.
 

@@ -6,9 +6,10 @@ The second moves this error into the slip-rate error, as a known jump at each pr
 remainder.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.laws.sampled_law import unit_row
 from quakedesign.loop.periodic import Fading, PeriodicLoop
 
@@ -40,7 +41,7 @@ _PI = Fraction("3.14159265358979323846")  # π̂
 _SHORT = Fraction(1, 10**20)  # δ
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Layer:
     """The rock between well and fault.
 

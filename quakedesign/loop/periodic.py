@@ -1,9 +1,10 @@
 """Periodic linear systems with jumps and flows in rationals, and timing errors of samples."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from itertools import pairwise
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 
 # ----------------------------------------------------------------------
@@ -15,7 +16,7 @@ Matrix = tuple[Row, ...]
 EVEN: Row = tuple(Fraction(i, 8) for i in range(9))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
     """A jump x⁺ = Jx and the flow that follows it.
 
@@ -38,7 +39,7 @@ class Segment:
         return tuple(self.duration * (b - a) for a, b in pairwise(self.past_ends if past else self.ends))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Fading:
     """An input b·w that dies out after the jump of a segment: |w| ≤ W·(height·e^{−rate·θ} + floor) a time θ after it.
 
@@ -66,7 +67,7 @@ class Fading:
         return self.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24) + self.floor
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Pulse:
     """An input b·w that is there near the jump of a segment alone, before it or after it: |w| ≤ W.
 
@@ -93,7 +94,7 @@ class Pulse:
     after: Fraction
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class PeriodicLoop:
     """x' = Ax + Σ b_i·w_i between jumps; the segments follow each other for ever, the first one at time 0.
 
@@ -146,7 +147,7 @@ class PeriodicLoop:
 # How far the instants of a loop of samples are off its schedule.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Instants:
     """What is due at an instant happens within some time of it, each time anew, whatever the course.
 

@@ -17,6 +17,7 @@ from functools import cached_property
 from itertools import pairwise, product
 from math import comb
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.laws import NominalModel
 
@@ -45,7 +46,7 @@ class Friction:
     rate_slope: Fraction
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class UncertainPlant:
     """A fault, its reference and its disturbance, as a certificate states them. SI units.
 

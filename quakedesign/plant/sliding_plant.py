@@ -5,10 +5,11 @@ cuts.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import get_args
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import six_digits
 from quakedesign.loop import StateLaw
@@ -40,7 +41,7 @@ _SAME = {
 _WITHIN = {"distance": "m", "swing": "-", "stress": "Pa"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingPlant:
     """A fault, its box of constants, the reference and the stress disturbance.
 

@@ -1,8 +1,5 @@
 """Certificates for a proof assistant: files that Rocq's compiler, ``coqc``, verifies by itself."""
 
-from quakedesign.arguments import check_arguments
-from quakedesign.rocq.rocq_export import rocq_text, write_rocq
+from quakedesign.arguments import attach
 
-__all__ = ["rocq_text", "write_rocq"]
-
-check_arguments(__name__)
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

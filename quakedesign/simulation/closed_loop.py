@@ -15,6 +15,7 @@ import casadi as ca
 import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import rational
 from quakedesign.fault import Fault, FrictionLaw
@@ -33,7 +34,7 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 SYMBOLS = ("slip", "slip_rate", "time")
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Load:
     """Drift of the far end of the spring, and a perturbation φ_e(slip, slip rate, time).
 
@@ -93,7 +94,7 @@ NOTHING = Load()
 # A fault that differs from the nominal one within its uncertainty box, without deriving or compiling anything anew.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Variation:
     """True parameters over nominal ones; the controller keeps what it was designed with.
 
@@ -203,7 +204,7 @@ def varied_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
 WORKS = ("work_weakening", "work_injection", "work_viscous", "work_disturbance", "sum_slip")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class EnergyBudget:
     """Energies between the start and the end of a run [J]; what was stored or dissipated came from some work.
 

@@ -8,7 +8,7 @@ import textwrap
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from uuid import UUID
 
 import casadi as ca
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_positive
@@ -46,7 +47,7 @@ are not finite are not caught: check measurement and pressure.
 _COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and link with -lm."
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class ControllerStep:
     """What a controller does once per sample, as one function of its measurement and its memory.
 

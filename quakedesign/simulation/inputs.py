@@ -7,7 +7,6 @@ steps.
 import ast
 import csv
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnitError
 from quakedesign.exact import rational
 from quakedesign.fault.model import is_finite
@@ -127,7 +127,7 @@ _COLUMNS = ("time", "pressure")
 _UNITS = {"time": "s", "pressure": "Pa"}
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class PressureCourse:
     """Pressure p(t): held before the first instant and after the last, linear between, a step where one stands twice.
 

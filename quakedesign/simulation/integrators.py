@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from quakedesign.arguments import check_arguments
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.text import nearest_name
 
@@ -265,8 +264,6 @@ def _reason(text: str) -> str:
 # ----------------------------------------------------------------------
 # Integrators by name: with a fixed step, or with one of their own choice.
 
-__all__ = ["AdaptiveIntegrator", "Integrator", "adaptive_integrators", "any_integrator", "integrator", "integrators"]
-
 
 @cache
 def integrators() -> dict[str, type[Integrator]]:
@@ -308,9 +305,6 @@ def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
             f"{nearest_name(name, known)}"
         )
     return known[name]
-
-
-check_arguments(__name__)
 
 
 # ----------------------------------------------------------------------

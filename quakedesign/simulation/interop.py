@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.model import require_finite
@@ -314,7 +315,7 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actu
     return control.ss(-law * plant, name=f"{controller.name} around {fault.name}", inputs=["p"], outputs=["answer"])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class LoopMargins:
     """How far one linear loop is from instability.
 

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import casadi as ca
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.loop import Scheme
 from quakedesign.loop.schemes.base import Stepped
 from quakedesign.simulation.closed_loop import WORKS, ClosedLoop, EnergyBudget, Meter
@@ -276,7 +277,7 @@ def _figure(unit: str) -> Any:
     return field(default=None, metadata={"unit": unit})
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Metrics:
     """Figures of one run; those that do not apply are None, and all of a diverged run but its peak.
 
@@ -337,7 +338,7 @@ class Metrics:
         return _UNITS[name]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class StickMetrics(Metrics):
     """Figures of one run of a plant whose friction holds it at rest, given without a controller too.
 
@@ -350,7 +351,7 @@ class StickMetrics(Metrics):
     stick_fraction: float | None = _figure("")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ActuatorMetrics(StickMetrics):
     """Figures of one run whose pressure reaches the fault through an actuator; extremes of the whole run.
 

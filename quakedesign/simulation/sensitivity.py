@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, SimulationError, require_known
 from quakedesign.fault import Fault
 from quakedesign.laws import Controller
@@ -28,7 +29,7 @@ _COLOURS = {"explicit": "#D55E00", "implicit": "#0072B2", "semi-implicit": "#CC7
 _KEPT = 20_000
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Study:
     """Largest errors of several schemes over one parameter.
 

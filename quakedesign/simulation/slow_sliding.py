@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault import Fault, SlidingReference
 from quakedesign.fault.model import require_positive
@@ -28,7 +29,7 @@ _RTOL = 1e-11
 PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@checked_dataclass(frozen=True, eq=False, kw_only=True)
 class SlidingRun(Trajectory):
     """One run of a law around slow sliding: four instants a period, all of them kept; no energy.
 

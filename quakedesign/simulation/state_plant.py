@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 import sympy as sp
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.exact import rational
 from quakedesign.fault import Fault, FrictionLaw
@@ -34,7 +35,7 @@ slip, stretch, pressure_rate = sp.symbols("slip stretch pressure_rate", real=Tru
 _WIDEST = 1e3  # change of the logarithm of a rate that is looked for
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class SpringSlider:
     """A block per unit of area: mass·v' = stiffness·stretch − (normal_stress − p)·μ(slip, v, state) − damping·v.
 
@@ -226,7 +227,7 @@ FRICTION = ("direct_effect", "evolution_effect", "critical_slip")
 """Constants of friction that a spread is about: a, b and D_c."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Tide:
     """Shear stress S·sin(2πt/P + φ) on the fault, beside that of the spring; it begins with what it has at once.
 
@@ -253,7 +254,7 @@ class Tide:
         return self.amplitude * np.sin(2 * math.pi / self.period * time + self.phase)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingVariation:
     """True constants of a fault over those that its law and its plan know [-], each positive.
 

@@ -7,13 +7,14 @@ The outcome is tracked, slow slip, earthquake, diverged or opened.
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, field, fields
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.files import write_whole
@@ -120,7 +121,7 @@ class Recording(ABC):
 # What a simulation of a spring-slider with state returns.
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@checked_dataclass(frozen=True, eq=False, kw_only=True)
 class StateTrajectory(Recording):
     """One run of a spring-slider without control.
 
@@ -224,7 +225,7 @@ SLIP_BAND = 0.02
 """Of the target slip: a tracked run stays this close to its reference, the usual band for settling."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """What one run comes to, as `OutcomeCriterion` decides.
 
@@ -252,7 +253,7 @@ class Outcome:
         return asdict(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class OutcomeCriterion:
     """What the outcome of a run is decided by.
 
@@ -397,7 +398,7 @@ def _prefix(largest: float) -> tuple[float, str]:
 # What a simulation returns.
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@checked_dataclass(frozen=True, eq=False, kw_only=True)
 class Trajectory(Recording):
     """One run, at some of its instants, with metrics from all of them.
 
@@ -541,7 +542,7 @@ class Trajectory(Recording):
 Signal = tuple["np.ndarray", str, str]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@checked_dataclass(frozen=True, eq=False, kw_only=True)
 class SampledTrajectory(Trajectory):
     """A run whose pressure reaches the fault through an actuator; `pressure` is that in the fault.
 

@@ -9,6 +9,7 @@ from fractions import Fraction
 from functools import partial
 from typing import Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import Enclosure, rational
 from quakedesign.fault import Fault, require_fault
@@ -46,7 +47,7 @@ AS_IN_THE_PAPER = "continuous"
 """Scheme of the paper's simulations."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Entry:
     """One controller with its run.
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.fault import Fault
 from quakedesign.guarantees import Guarantee, design_held
 from quakedesign.plant import uncertain_plant
@@ -105,7 +106,7 @@ ROOMS = (1.2, 1.4, 1.6, 2.2)
 _PERIODS = 32  # natural periods of a run; errors count in its second half
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class FrontPoint:
     """One design.
 

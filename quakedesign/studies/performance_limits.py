@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
@@ -54,7 +55,7 @@ QUANTITIES = {
 """Title and unit of every limit, by the name of its field."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:
     """One quantity, its limit for all controllers, and how far designed ones have a guarantee.
 
@@ -157,7 +158,7 @@ class Told:
         return TOLD.format(self.words()) if self.noisy else KNOWING
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """Limits of a fault, for the worst friction and parameters of its box.
 

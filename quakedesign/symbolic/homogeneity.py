@@ -12,6 +12,7 @@ from typing import Any
 
 import sympy as sp
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.symbolic.enclosure import enclose
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, normal_form, signs, symbols_of
@@ -83,7 +84,7 @@ class Counterexample:
         return f"{self.meaning} fails at {where}, ε = {self.epsilon}: {left} ≠ {right}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Homogeneity:
     """Whether something is r-homogeneous, and of which degree (Bacciotti and Rosier 2005; Levant 2005 for inclusions).
 

@@ -14,6 +14,7 @@ import mpmath
 import sympy as sp
 from flint import arb, ctx
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import end_of, fraction_of, rational, shortly, to_sympy
 from quakedesign.fault import Fault, require_fault
@@ -296,7 +297,7 @@ def _number(expression: sp.Expr, fault: Fault, pressure: float, rate: float | No
 _DIGITS = 50
 
 
-@dataclass(frozen=True)
+@checked_dataclass(frozen=True)
 class Model:
     """Equations of one fault, derived from its force balance.
 

@@ -4,11 +4,12 @@
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 from html import escape
 from typing import Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError, require_known
 from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.units import exact_value
@@ -39,7 +40,7 @@ from quakedesign.synthesis.method import GainProblem, SlowSlidingDesign, method_
 # A controller for one fault with what is proved of it.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@checked_dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Design:
     """A controller for one fault, what is proved of it, and under which premises.
 

@@ -6,10 +6,10 @@ import pytest
 
 from quakedesign.cli import main
 from quakedesign.fault import BOXES, presets
-from quakedesign.guarantees import MEASURED
 from quakedesign.laws import control_laws
 from quakedesign.laws.feed_forward import FEED_FORWARDS
 from quakedesign.loop import schemes
+from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.simulation import integrators
 from quakedesign.synthesis import designable
 

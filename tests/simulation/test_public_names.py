@@ -5,20 +5,21 @@ import sys
 
 import pytest
 
+import quakedesign.loop
 import quakedesign.simulation as room
-from quakedesign.loop import Scheme, schemes, stages
+from quakedesign.loop import Scheme, schemes, simulation_scheme, stages
 from quakedesign.loop.actuators.base import Stage
 
 
 def test_every_stage_of_an_actuator_has_its_name_in_the_room():
-    named = (getattr(room, name) for name in room.__all__)
+    named = (getattr(quakedesign.loop, name) for name in quakedesign.loop.__all__)
     offered = {item for item in named if isinstance(item, type) and issubclass(item, Stage)}
     assert offered == set(stages().values())
 
 
 @pytest.mark.parametrize("name", sorted(schemes()))
 def test_every_scheme_is_made_by_name(name):
-    assert isinstance(room.simulation_scheme(name), Scheme)
+    assert isinstance(simulation_scheme(name), Scheme)
 
 
 def test_the_names_are_all_there_and_sorted():

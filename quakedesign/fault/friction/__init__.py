@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from quakedesign.arguments import check_arguments
+from quakedesign.arguments import checked
 from quakedesign.discovery import discovered, named
 from quakedesign.fault.friction.base import FrictionLaw
 
@@ -18,6 +18,7 @@ def friction_laws() -> dict[str, type[FrictionLaw]]:
     return discovered(__name__, FrictionLaw, shared=("base", "weakening"))
 
 
+@checked
 def friction_law(name: str, *, in_file: bool = False, allow_code: bool = False) -> type[FrictionLaw]:
     """Friction law of a given name, or of the user's own as ``module:Class``.
 
@@ -35,6 +36,3 @@ def friction_law(name: str, *, in_file: bool = False, allow_code: bool = False) 
         When there is none.
     """
     return named(name, friction_laws(), FrictionLaw, "friction law", in_file=in_file, code=allow_code)
-
-
-check_arguments(__name__)

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypedDict, cast
 
 from quakedesign import laws
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.norms import START
@@ -44,7 +45,7 @@ class Around(TypedDict, total=False):
     longest_step: Fraction
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Held:
     """A law as it runs: once every T_s, its pressure held, late, through a lag and rock, from what it measures.
 

@@ -51,12 +51,13 @@ would have had to obey the smaller one until then. So the slip rate never exceed
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import accumulate
 from typing import Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, shortly
 from quakedesign.guarantees.exact.loop import Channel, Gains, Held
@@ -72,7 +73,7 @@ _AT_ONCE = ("log_rate", "ageing", "strength")
 _ZERO, _ONE = Fraction(0), Fraction(1)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingClaims:
     """What is never exceeded, absolute values.
 

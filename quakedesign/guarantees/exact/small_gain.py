@@ -5,13 +5,14 @@ slip alone; sector bounds of the implicit step.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from fractions import Fraction
 from itertools import chain
 from typing import Any, ClassVar, Literal
 
 from flint import arb, ctx
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, shortly
 from quakedesign.guarantees.exact.loop import NOISELESS, Channel, Gains, GainSpread, beside, channels_of, through_layer
@@ -157,7 +158,7 @@ _LEFT_OUT = "what the modes of the layer leave out"
 _HALVINGS = 96
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
     """What no course of the uncertain quantities exceeds, from its start, for ever.
 
@@ -185,7 +186,7 @@ class Bounds:
     stepped: Fraction | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class NoGuarantee:
     """Why a loop has none.
 
@@ -369,7 +370,7 @@ MOST_PARTS = 16
 _ONE_OVER_E = Fraction(3679, 10000)  # from above
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlowGain:
     """How a proof uses that the input gain is slow: see `theorem`.
 

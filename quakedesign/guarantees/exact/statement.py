@@ -4,12 +4,13 @@ Chapters: claims and their check; guarantee of a sampled loop; peaks of the idea
 time; test whether a guarantee covers a task; guarantee of slow sliding over the cells of a parameter box.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from fractions import Fraction
 from functools import cached_property
 from math import ceil, floor, log10
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, six_digits
 from quakedesign.guarantees.exact import small_gain
@@ -42,7 +43,7 @@ _ENDS = ("least_pressure", "largest_pressure", "least_asked", "largest_asked")
 MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Claims:
     """What is never exceeded.
 
@@ -184,7 +185,7 @@ _RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # times of a pump that are tried, and 
 _FIRST = Fraction(1, 64)  # of a step, the first of them
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Guarantee:
     """Claims about one loop on one task; `check` decides them.
 
@@ -492,7 +493,7 @@ PREMISES = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ContinuousPeaks:
     """Claims about a law in continuous time, which no computer runs; `check` decides them.
 
@@ -634,7 +635,7 @@ def _rougher(proved: Friction, asked: Friction) -> list[str]:
 # A guarantee of slow sliding: a fault, its box of constants in cells, the loop that runs, and its bounds.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class SlidingGuarantee:
     """Claims about one loop around slow sliding; `check` decides them.
 

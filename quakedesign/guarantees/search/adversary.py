@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.cache import search_once
 from quakedesign.guarantees.exact.loop import Held
 from quakedesign.guarantees.exact.sliding_small_gain import loop_of, model_of
@@ -42,7 +43,7 @@ _SEED = 7
 _NEARLY = Fraction(31, 32)  # of the time between two events, so that they never meet
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class WorstFound:
     """Largest errors that were reached.
 

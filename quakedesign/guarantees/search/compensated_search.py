@@ -16,6 +16,7 @@ from typing import Any, Unpack
 import numpy as np
 import sympy as sp
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.cache import search_once
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, to_sympy
@@ -125,7 +126,7 @@ _EVALUATIONS, _NEAR_ENOUGH, _WORST = 60, 0.9, 9.0
 _ROOTS = tuple(Fraction(f"{10 ** (k / 24):.1e}") for k in range(-48, 73))  # ρ of λ = ρ⁶
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Compensation:
     """A sliding mode that runs in the scheme ``compensated``, and what is guaranteed of it.
 

@@ -3,10 +3,11 @@
 The second chapter states which schemes of a sliding mode have a guarantee (``compensated`` only) and why.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, Unpack
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import require_known
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.loop import Around
@@ -40,7 +41,7 @@ REACH = frozenset({"sampling_time", "delay"})
 """Premises of a guarantee, see `SampledDesign.premises`."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SampledDesign:
     """A law of samples for a fault, and how far laws like it reach.
 

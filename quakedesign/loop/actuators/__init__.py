@@ -2,7 +2,6 @@
 
 from functools import cache
 
-from quakedesign.arguments import check_arguments
 from quakedesign.discovery import discovered
 from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
 from quakedesign.loop.actuators.chain import DIRECT, Actuator
@@ -30,6 +29,3 @@ def stages() -> dict[str, type[Stage]]:
     """Every stage of the package, by name, along the signal."""
     known = discovered(__name__, Stage, shared=("base", "chain"))
     return dict(sorted(known.items(), key=lambda item: (issubclass(item[1], FlowStage), item[1].place)))
-
-
-check_arguments(__name__)

@@ -1,10 +1,10 @@
 """Stages in a row."""
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.laws import Sampling
 from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
@@ -14,7 +14,7 @@ from quakedesign.loop.actuators.sampled_stages import Delay
 LONGEST = 2.5  # of a substep times the fastest rate: below the limits 2.78 and 3.3 of the Runge–Kutta methods
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Actuator:
     """From the pressure that a law asks for to the pressure in the fault.
 

@@ -1,10 +1,10 @@
 """Dynamic actuator stages: first-order lag of pump and pipe, and the diffusion path."""
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, ClassVar, Self
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault.model import require_positive
 from quakedesign.loop.actuators.base import FlowStage, Option
@@ -13,7 +13,7 @@ from quakedesign.loop.actuators.base import FlowStage, Option
 # Inertia of pump and pipe.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Lag(FlowStage):
     """A first-order lag: τq' = p − q.
 
@@ -73,7 +73,7 @@ class Lag(FlowStage):
 MOST_CELLS = 200
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Diffusion(FlowStage):
     """One-dimensional diffusion ∂p/∂t = D∂²p/∂x² through a layer of length L that ends, without outflow, in the fault.
 

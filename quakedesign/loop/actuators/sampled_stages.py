@@ -1,11 +1,11 @@
 """Sampled actuator stages: delay, quantisation, rate limit, and saturation of pressure."""
 
 import math
-from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import casadi as ca
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault.model import require_positive
 from quakedesign.loop.actuators.base import Option, SampledStage
@@ -18,7 +18,7 @@ MOST_SAMPLES = 100
 _SAME = 1e-9  # of a sampling period
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Delay(SampledStage):
     """What is computed from one measurement acts some samples later; before that, nothing is injected.
 
@@ -110,7 +110,7 @@ class Delay(SampledStage):
 # Finite resolution of a converter.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Quantisation(SampledStage):
     """Rounds to the nearest multiple of a quantum, halves upward.
 
@@ -150,7 +150,7 @@ class Quantisation(SampledStage):
 # Fastest change of pressure that the pump can make.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class RateLimit(SampledStage):
     """Limits the change from one sample to the next, from zero at the start.
 
@@ -202,7 +202,7 @@ class RateLimit(SampledStage):
 # Largest and smallest pressure that the pump can hold.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Saturation(SampledStage):
     """Cuts the pressure off at two bounds (ERRATA 23).
 

@@ -4,7 +4,7 @@ from dataclasses import fields, is_dataclass
 from functools import cache
 from typing import Any
 
-from quakedesign.arguments import check_arguments
+from quakedesign.arguments import checked
 from quakedesign.discovery import discovered, named
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.laws import Controller
@@ -22,6 +22,7 @@ def schemes() -> dict[str, type[Scheme]]:
     return discovered(__name__, Scheme, shared=("base",))
 
 
+@checked
 def simulation_scheme(name: str, **settings: Any) -> Scheme:
     """Scheme of a given name, or of the user's own as ``module:Class``, with settings other than its own defaults.
 
@@ -43,6 +44,7 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
     return kind(**settings)
 
 
+@checked
 def own_way(
     controller: Controller | None, scheme: str | Scheme | None, step: float | None, usual: str = "explicit"
 ) -> tuple[str | Scheme, float | None, dict[str, Any]]:
@@ -67,6 +69,3 @@ def own_way(
             f"{name}{received} and {period if step is None else step!r} s. Leave scheme and step out."
         )
     return chosen, period, wanted if named else {}
-
-
-check_arguments(__name__)

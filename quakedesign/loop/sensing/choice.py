@@ -6,13 +6,14 @@ law.
 """
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_nonnegative
@@ -150,7 +151,7 @@ LARGEST_BOUND = 1e12
 _HALVINGS = 60
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class JointCondition:
     """Premise of a differentiator in a loop.
 

@@ -9,7 +9,7 @@ large bound λ_d, the implicit differentiator is a filter of backward difference
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from math import comb
@@ -17,6 +17,7 @@ from typing import Any
 
 import casadi as ca
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.model import require_positive
 from quakedesign.laws.sampled_law import LinearLaw
@@ -182,7 +183,7 @@ TABLES = (
 DISCRETISATIONS = ("euler", "homogeneous", "implicit")
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Differentiator:
     """Estimates slip and its first n_d derivatives exactly once |x1^(n_d+1)| ≤ L_d < λ_d, and filters with order n_f.
 
@@ -303,7 +304,7 @@ def _without_lag(derivatives: list[Any], step: Any) -> list[Any]:
 # A law that is told estimates: p(x̂1, x̂2).
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class OutputFeedback(Sensor):
     """Slip through a row of stages into a differentiator, which estimates slip and slip rate.
 

@@ -2,12 +2,12 @@
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault.model import require_nonnegative
 
@@ -121,7 +121,7 @@ _FACTORS = (40014, 40692)
 _MODULI = (2147483563, 2147483399)
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Measurement(Sensor):
     """Slip and slip rate with independent noise, once per sample.
 
@@ -214,7 +214,7 @@ def uniform(memory: list[Any]) -> tuple[list[Any], Any]:
 # Linear variable differential transformer (LVDT) and its converter: bandwidth, noise, resolution.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Transducer(SlipStage):
     """Slip behind a low-pass filter of first order, plus independent normal noise at every sample, then rounded.
 
@@ -286,7 +286,7 @@ class Transducer(SlipStage):
 MOST_SAMPLES = 1000
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Averaging(SlipStage):
     """Mean of the last N readings: noise falls by √N, and the slip lags by (N − 1)T_s/2.
 

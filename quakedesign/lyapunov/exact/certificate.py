@@ -10,6 +10,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.laws.known_fields import field_of, is_law
 from quakedesign.lyapunov.exact.certificate_files import evidence_of, read_json, save_certificate
 from quakedesign.lyapunov.exact.claim import Equilibrium, Evidence, Loop, Verdict, loop_of, require
@@ -166,7 +167,7 @@ def limit(terms: Any, loop: Loop, point: Any, signs: Any, parameters: Any) -> Fr
 # Evidence that decides itself, and goes into a file and back.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@checked_dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Certificate(Evidence):
     """A statement about one closed loop with its proof or its counterexample.
 

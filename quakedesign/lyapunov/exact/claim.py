@@ -2,13 +2,14 @@
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from fractions import Fraction
 from math import isqrt
 from typing import TYPE_CHECKING
 
 from quakedesign import symbolic
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import six_digits
 from quakedesign.laws.field_terms import FieldTerms
@@ -36,7 +37,7 @@ class Verdict(Enum):
         return self.name.lower()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Loop:
     """A closed loop with exact gains and ranges: the subject of a claim.
 
@@ -94,7 +95,7 @@ class Loop:
         return {**self.gains, **self.constants}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Witness:
     """multiplier · P = Σ squares + Σ cofactor_k · h_k on one cell.
 
@@ -119,7 +120,7 @@ class Witness:
         return f"Witness({len(self.squares)} squares, {len(self.cofactors)} cofactors)"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Equilibrium:
     """A Filippov equilibrium away from the origin, for admissible constant parameters.
 
@@ -137,7 +138,7 @@ class Equilibrium:
     weights: Mapping[str, Fraction]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """The parts of a `Certificate`, as they stand in a file."""
 

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.files import write_whole
 from quakedesign.simulation.campaign.problem import CampaignProblem, SampleResult
@@ -87,7 +88,7 @@ _MARKED = (0.05, 0.5, 0.95)
 _LESS_IS_WORSE = frozenset({"min_pressure"})
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Failure:
     """A batch that could not be computed; a run that diverges is a result, not a failure.
 
@@ -102,7 +103,7 @@ class Failure:
     reason: str
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@checked_dataclass(frozen=True, eq=False, kw_only=True)
 class Campaign:
     """Many runs of one closed loop.
 

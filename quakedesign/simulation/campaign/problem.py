@@ -22,6 +22,7 @@ from typing import Any, ClassVar, Protocol, Self, TypeVar
 import casadi as ca
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import shortly
 from quakedesign.fault import Fault
@@ -60,7 +61,7 @@ from quakedesign.simulation.trajectory import Outcome, OutcomeCriterion, Traject
 NOT_COMPARED = ("settled_from", "steps", "seconds")
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class SampleResult:
     """What is known of a sample that has been run; a diverged one has events, and its peak slip rate at most.
 
@@ -106,7 +107,7 @@ class CampaignProgram(Protocol):
         """Vectors at the end of samples by those at their start, one a row."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class CampaignProblem(ABC):
     """One closed loop, and how its samples differ; a vector of numbers at the start of a sample tells the end of it.
 
@@ -293,7 +294,7 @@ def _told(run: SlidingRun) -> list[float]:
     return [math.nan if value is None else float(value) for value in found]
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@checked_dataclass(frozen=True, kw_only=True, repr=False)
 class SlidingProblem(CampaignProblem):
     """Friction with a state, held in slow sliding; see `CampaignProblem`. The scheme has the stages of the pressure.
 
@@ -597,7 +598,7 @@ def _derived(seed: int, count: list[int]) -> int:
 _SLICE = 4096
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@checked_dataclass(frozen=True, kw_only=True, repr=False)
 class SteppedProblem(CampaignProblem):
     """Friction of slip and slip rate, with a fixed step; see `CampaignProblem`.
 

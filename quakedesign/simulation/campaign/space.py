@@ -6,13 +6,13 @@ from the corners of the box (Hooke and Jeeves 1961); the worst case found is a l
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 from types import MappingProxyType
 
 import numpy as np
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_nonnegative
@@ -25,7 +25,7 @@ PERIODIC = frozenset({"phase"})
 UNITS = {"phase": "rad", "initial_slip": "m", "initial_slip_rate": "m/s"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Sample:
     """One run of a campaign.
 
@@ -42,7 +42,7 @@ class Sample:
     noise_seed: int
 
 
-@dataclass(frozen=True)
+@checked_dataclass(frozen=True)
 class Space:
     """Interval of every number that differs from sample to sample; within it all values are equally likely.
 
@@ -142,7 +142,7 @@ Point = tuple[float, ...]
 Evaluate = Callable[[Sequence[Sample]], "Sequence[float]"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Worst:
     """The worst sample that a search has found; that there is no worse one is not claimed.
 

@@ -1,10 +1,11 @@
 """What the engine says: a verdict with its proof, which can be checked again without a solver."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from pathlib import Path
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.polynomial_files import save
 from quakedesign.sos.exact.polynomial_statement import Statement
@@ -27,7 +28,7 @@ class Positivity(Enum):
 _KIND = {SumOfSquares: Positivity.SOS, Functional: Positivity.NOT_SOS, Point: Positivity.NEGATIVE}
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Answer:
     """Verdict on one statement.
 

@@ -12,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import CertificateError, PolynomialError
 from quakedesign.files import parse_toml, read_text
 from quakedesign.sos.exact.answer import Answer
@@ -53,7 +54,7 @@ class LyapunovProof:
     decrease: SumOfSquares
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Attraction:
     """That V̇ < 0 where V < level, but at the origin, for x' = field(x): proved by squares, or refuted by a point.
 
@@ -157,7 +158,7 @@ class Attraction:
         return inside and (value <= 0 or evaluate(self.derivative, x) >= 0)
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Region:
     """What is proved of {V < level}, and what refutes more.
 

@@ -1,12 +1,12 @@
 """What is asked: whether multiplier · polynomial is in the cone of a simple semialgebraic set."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import combinations
 from typing import Any
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, constant, degree, product
 
@@ -21,7 +21,7 @@ Structure = tuple[
 """Number of variables, monomials of the target, degree, products, inequalities and equalities of a statement."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Statement:
     """multiplier · polynomial = Σ_S (Π_{i∈S} g_i)·σ_S + Σ_k q_k h_k with sums of squares σ_S, all of bounded degree.
 

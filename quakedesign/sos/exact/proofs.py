@@ -6,7 +6,7 @@ is used.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from functools import reduce
 from math import comb, lcm
@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from flint import fmpq, fmpq_mat, fmpz_mat
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.exact import fraction_of
 from quakedesign.sos.exact.polynomial import (
     Exponents,
@@ -42,7 +43,7 @@ Element = Exponents | Polynomial
 """Basis element: a monomial by its exponents, or a polynomial."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Square:
     """(Π_{i∈S} g_i) · bᵀQb with Q positive definite.
 
@@ -173,7 +174,7 @@ def as_polynomial(basis_element: Element) -> Polynomial:
 # The three kinds of proof about a statement, each decided in rational arithmetic without a solver.
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class SumOfSquares:
     """multiplier · polynomial = Σ squares + Σ_k cofactor_k h_k.
 
@@ -191,7 +192,7 @@ class SumOfSquares:
     multiplier: tuple[Square, ...] = field(default=())
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Functional:
     """Linear functional L, non-negative on the cone and negative on the target; zero on monomials without a value.
 
@@ -204,7 +205,7 @@ class Functional:
     values: Mapping[Exponents, Fraction]
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class Point:
     """A point of the set where the polynomial is negative.
 

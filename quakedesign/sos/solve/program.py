@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import diags_array
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import PolynomialError
 from quakedesign.exact import nearest, rational
 from quakedesign.sos.exact.answer import Answer, Positivity
@@ -60,7 +61,7 @@ class Solution:
     forced: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class NoSolution:
     """No decision was found; false where a truth value is needed, and no proof that there is none.
 

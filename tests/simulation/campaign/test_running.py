@@ -139,7 +139,8 @@ import json, os, random, signal, sys, time
 from dataclasses import replace
 from quakedesign.laws import published
 from quakedesign.fault import load_fault
-from quakedesign.simulation.campaign import SerialExecutor, campaign_problem, run_campaign
+from quakedesign.parallel import SerialExecutor
+from quakedesign.simulation.campaign import campaign_problem, run_campaign
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.loop.schemes import simulation_scheme
 

@@ -1,0 +1,17 @@
+from .fault_toml import fault_toml as fault_toml
+from .fault_toml import load_fault as load_fault
+from .fault_toml import parse_fault as parse_fault
+from .fault_toml import presets as presets
+from .friction import friction_law as friction_law
+from .friction import friction_laws as friction_laws
+from .friction.base import FrictionLaw as FrictionLaw
+from .model import BOXES as BOXES
+from .model import Disturbance as Disturbance
+from .model import Fault as Fault
+from .model import Reference as Reference
+from .model import SlidingReference as SlidingReference
+from .model import UncertaintyBox as UncertaintyBox
+from .model import require_fault as require_fault
+from .model import uncertainty_box as uncertainty_box
+from .similarity import Scales as Scales
+from .similarity import scaled_fault as scaled_fault

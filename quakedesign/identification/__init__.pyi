@@ -1,0 +1,12 @@
+from .fault_file import cover as cover
+from .fault_file import identified_fault as identified_fault
+from .fault_file import law_remarks as law_remarks
+from .fault_file import next_command as next_command
+from .fault_file import other_parts as other_parts
+from .fault_file import save_fault as save_fault
+from .fault_file import task_remarks as task_remarks
+from .identification_result import Identification as Identification
+from .identification_result import ParameterEstimate as ParameterEstimate
+from .identify import identify as identify
+from .record import Record as Record
+from .record import read_record as read_record

@@ -1,0 +1,10 @@
+from .choice import JointCondition as JointCondition
+from .choice import joint_condition as joint_condition
+from .choice import smallest_bound as smallest_bound
+from .differentiator import Differentiator as Differentiator
+from .differentiator import OutputFeedback as OutputFeedback
+from .measurement import Averaging as Averaging
+from .measurement import Measurement as Measurement
+from .measurement import Sensor as Sensor
+from .measurement import SlipStage as SlipStage
+from .measurement import Transducer as Transducer

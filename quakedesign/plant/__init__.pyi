@@ -1,0 +1,9 @@
+from .of_fault import slow_sliding_plant as slow_sliding_plant
+from .of_fault import static_friction as static_friction
+from .of_fault import uncertain_plant as uncertain_plant
+from .ranges import UncertainPlant as UncertainPlant
+from .sliding_plant import WHOLE as WHOLE
+from .sliding_plant import Cuts as Cuts
+from .sliding_plant import SlidingPlant as SlidingPlant
+from .sliding_plant import cells as cells
+from .sliding_plant import parts as parts

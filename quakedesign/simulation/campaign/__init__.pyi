@@ -1,0 +1,11 @@
+from .campaign_result import Campaign as Campaign
+from .campaign_result import Failure as Failure
+from .problem import CampaignProblem as CampaignProblem
+from .problem import SampleResult as SampleResult
+from .problem import SlidingProblem as SlidingProblem
+from .problem import SteppedProblem as SteppedProblem
+from .running import campaign_problem as campaign_problem
+from .running import run_campaign as run_campaign
+from .space import Sample as Sample
+from .space import Space as Space
+from .space import Worst as Worst

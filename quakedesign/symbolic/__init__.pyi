@@ -1,0 +1,14 @@
+from .homogeneity import Homogeneity as Homogeneity
+from .homogeneity import dilate as dilate
+from .homogeneity import homogeneous as homogeneous
+from .homogeneity import weights_for as weights_for
+from .signed_power import AbsolutePower as AbsolutePower
+from .signed_power import SignedPower as SignedPower
+from .signed_power import normal_form as normal_form
+from .signed_power import off_kinks as off_kinks
+from .stability import Model as Model
+from .stability import critical_stiffness as critical_stiffness
+from .stability import derive as derive
+from .stability import nucleation_length as nucleation_length
+from .stability import stability as stability
+from .term_expressions import real_symbols as real_symbols
