@@ -2,7 +2,6 @@
 
 import gc
 import os
-import sys
 
 from quakedesign.parallel import ending, leave
 from quakedesign.streams import has_room, lack_memory, lacks_memory, open_all, widen
@@ -31,11 +30,6 @@ def main() -> None:
 
 
 def _run() -> None:
-    if sys.argv[1:] in ([], ["--help"], ["-h"]):
-        from quakedesign.overview import print_overview
-
-        if print_overview():
-            sys.exit(0)
     if not has_room():
         lack_memory()
     from quakedesign.cli import main as run

@@ -56,7 +56,7 @@ WITHIN = {"lyapunov.search": ("lyapunov.maps",)}  # a search asks the map of gai
 MAY_IMPORT = {name: (*LESS.get(name, LAYERS[:place]), *WITHIN.get(name, ())) for place, name in enumerate(LAYERS)} | {
     "rocq": DECIDING,
     "checking": (*DECIDING, "guarantees"),
-    "__main__": ("cli", "parallel", "overview", "streams"),
+    "__main__": ("cli", "parallel", "streams"),
     "streams": (),
     "parallel": (),
     "cache": (),
@@ -65,7 +65,6 @@ MAY_IMPORT = {name: (*LESS.get(name, LAYERS[:place]), *WITHIN.get(name, ())) for
     "text": (),
     "discovery": (),
     "arguments": (),
-    "overview": (),
     "files": (),
     "exact": (),
 }
@@ -138,6 +137,7 @@ def circle(arrows):
 SLOW = {
     "fault": {"sympy", "pint", "mpmath", "docstring_parser"},
     "exact": {"sympy"},
+    "loop": {"casadi", "numpy"},
     "sos.exact": {"sympy"},
     "sos.solve": {"cvxpy", "scipy"},
     "simulation": {"control", "scipy", "pandas", "xarray", "matplotlib"},
@@ -290,6 +290,7 @@ def test_help_and_import_load_no_heavy_library():
     loaded, printed = loaded_by("-m", "quakedesign", "--help")
     assert "design" in printed
     assert not loaded & HEAVY
+    assert not loaded_by("-m", "quakedesign", "guarantee", "--help")[0] & HEAVY
     assert not loaded_by("-c", "import re, quakedesign")[0] & (HEAVY | {"cyclopts", "rich"})
 
 

@@ -2,14 +2,16 @@
 
 import math
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
-from quakedesign.laws import Sampling
 from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
 from quakedesign.loop.actuators.flow_stages import Diffusion, Lag
 from quakedesign.loop.actuators.sampled_stages import Delay
+
+if TYPE_CHECKING:
+    from quakedesign.laws import Sampling
 
 LONGEST = 2.5  # of a substep times the fastest rate: below the limits 2.78 and 3.3 of the Runge–Kutta methods
 
@@ -54,7 +56,7 @@ class Actuator:
             raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Leave one out.")
 
     @classmethod
-    def meant_for(cls, sampling: Sampling) -> "Actuator":
+    def meant_for(cls, sampling: "Sampling") -> "Actuator":
         """Delay, lag and rock for which a law of samples is designed; without stages where it is for none."""
         step, kinds = float(sampling.step), {kind.name: kind for kind in (Delay, Lag, Diffusion)}
         times: dict[str, Any] = {name: float(time) for name, time in sampling.path.items() if time}

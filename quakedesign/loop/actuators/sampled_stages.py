@@ -3,8 +3,6 @@
 import math
 from typing import Any, ClassVar, Self
 
-import casadi as ca
-
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault.model import require_positive
@@ -93,6 +91,8 @@ class Delay(SampledStage):
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
         """Pressure of the queue that is as old as the delay; see `SampledStage.apply`."""
+        import casadi as ca
+
         longest = self.samples + self.jitter
         queue = [*memory[:longest], pressure]
         if not self.jitter:
@@ -142,6 +142,8 @@ class Quantisation(SampledStage):
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
         """Nearest multiple; see `SampledStage.apply`."""
+        import casadi as ca
+
         (quantum,) = numbers
         return quantum * ca.floor(pressure / quantum + 0.5), memory
 
@@ -193,6 +195,8 @@ class RateLimit(SampledStage):
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
         """Pressure that can be reached; see `SampledStage.apply`."""
+        import casadi as ca
+
         (rate,), (held,) = numbers, memory
         reached = held + ca.fmin(ca.fmax(pressure - held, -rate * step), rate * step)
         return reached, [reached]
@@ -251,5 +255,7 @@ class Saturation(SampledStage):
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
         """Pressure within the bounds; see `SampledStage.apply`."""
+        import casadi as ca
+
         lowest, highest = numbers
         return ca.fmin(ca.fmax(pressure, lowest), highest), memory

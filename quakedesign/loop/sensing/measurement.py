@@ -4,9 +4,6 @@ import math
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
-import casadi as ca
-import numpy as np
-
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault.model import require_nonnegative
@@ -80,6 +77,8 @@ class Sensor(ABC):
 
     def function(self) -> Any:
         """CasADi Function (memory, slip [m]) → memory, slip estimate [m], slip-rate estimate [m/s]."""
+        import casadi as ca
+
         memory, slip = ca.SX.sym("memory", self.size), ca.SX.sym("slip")
         seen, after = self.measure([*map(ca.SX, self.numbers)], ca.vertsplit(memory), ca.vertcat(slip, 0))
         outputs = [ca.vertcat(*after), seen[0], seen[1]]
@@ -177,6 +176,8 @@ class Measurement(Sensor):
 
     def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
         """Measured x1 [m] and x2 [m/s] (SX), and the generator afterwards."""
+        import casadi as ca
+
         if not self.noisy:
             return x, memory
         drawn = []
@@ -191,12 +192,16 @@ EXACT = Measurement()
 
 def generator(seed: int) -> tuple[float, ...]:
     """State of a generator of random numbers, from a seed."""
+    import numpy as np
+
     words = np.random.SeedSequence(seed).generate_state(len(_MODULI))
     return tuple(float(int(word) % (m - 1) + 1) for word, m in zip(words, _MODULI, strict=True))
 
 
 def _normal(memory: list[Any]) -> tuple[list[Any], Any]:
     """State of the generator after two steps, and a number of the standard normal distribution."""
+    import casadi as ca
+
     memory, radius = uniform(memory)
     memory, angle = uniform(memory)
     return memory, ca.sqrt(-2 * ca.log(radius)) * ca.cos(2 * ca.pi * angle)
@@ -204,6 +209,8 @@ def _normal(memory: list[Any]) -> tuple[list[Any], Any]:
 
 def uniform(memory: list[Any]) -> tuple[list[Any], Any]:
     """Next state of the generator, and a number strictly between 0 and 1."""
+    import casadi as ca
+
     after = [ca.fmod(a * state, m) for a, state, m in zip(_FACTORS, memory, _MODULI, strict=True)]
     difference = after[0] - after[1]
     top = _MODULI[0] - 1
@@ -261,6 +268,8 @@ class Transducer(SlipStage):
 
     def pass_on(self, numbers: list[Any], memory: list[Any], slip: Any) -> tuple[Any, list[Any]]:
         """See `SlipStage.pass_on`."""
+        import casadi as ca
+
         numbers, memory, own = list(numbers), list(memory), []
         quantum = numbers.pop() if self.quantum else None
         if self._filtered:
