@@ -6,21 +6,21 @@ import operator
 import sys
 import types
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from enum import Enum
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from importlib import import_module
-from importlib.util import find_spec
-from inspect import CO_VARARGS, CO_VARKEYWORDS, Parameter, Signature, isclass, isfunction, signature
+from inspect import CO_VARARGS, CO_VARKEYWORDS, Parameter, Signature, getsource, isclass, isfunction, signature
 from itertools import islice
 from numbers import Integral, Rational, Real
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeVar, Union, Unpack, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, Unpack, get_args, get_origin, get_type_hints
 
 import lazy_loader
 
 from quakedesign.errors import ParameterError
 from quakedesign.text import shown
 
-__all__ = ["attach", "checked", "checked_dataclass", "imported_for_types", "matches"]
+__all__ = ["attach", "checked", "checked_dataclass", "matches"]
 
 _ABBREVIATIONS = {"sp": "sympy", "np": "numpy", "pd": "pandas", "ca": "casadi"}
 _NUMBERS = {"float": Real, "int": Integral, "Fraction": Rational, "Expr": Real}  # SymPy takes numbers as they are
@@ -32,7 +32,6 @@ _REMEDIES = {
     "float": "Give it in SI units.",
 }
 _Value = TypeVar("_Value")
-_VARIABLE = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
 _MOST_ENTRIES = 16  # of a collection that are looked at, so that a large one costs nothing
 
 
@@ -100,40 +99,16 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(function)
     def checking(*positional: Any, **named: Any) -> Any:
-        given = _given(function, positional, named)
-        for name, value in given.items():
-            _require(function, name, value)
-        converted = {name: new for name, value in given.items() if (new := _plain(function, name, value)) is not value}
-        if converted:
+        try:
             bound = _signature(function).bind(*positional, **named)
-            bound.arguments.update(converted)
-            return function(*bound.args, **bound.kwargs)
-        return function(*positional, **named)
+        except TypeError as error:
+            raise ParameterError(f"{_name(function)} cannot be called like this: {error}.") from None
+        for name, value in bound.arguments.items():
+            bound.arguments[name] = _accept(function, name)(value)
+        return function(*bound.args, **bound.kwargs)
 
     checking.checks_arguments = True  # type: ignore[attr-defined]
     return checking
-
-
-def _given(function: Callable[..., Any], positional: tuple[Any, ...], named: dict[str, Any]) -> Mapping[str, Any]:
-    """Arguments by name. Binding takes as long as making a small value, so it is left to calls that are not plain."""
-    leading, keywords, required = _names(function)
-    given = dict(zip(leading, positional, strict=False)) | named
-    plain = len(given) == len(positional) + len(named) and named.keys() <= keywords
-    if plain and required <= given.keys():
-        return given
-    try:
-        return _signature(function).bind(*positional, **named).arguments
-    except TypeError as error:
-        raise ParameterError(f"{_name(function)} cannot be called like this: {error}.") from None
-
-
-@cache
-def _names(function: Callable[..., Any]) -> tuple[tuple[str, ...], frozenset[str], frozenset[str]]:
-    """Names of parameters that take a place, that take a name, and that have to be given."""
-    single = {k: p for k, p in _signature(function).parameters.items() if p.kind not in _VARIABLE}
-    leading = tuple(k for k, p in single.items() if p.kind is not Parameter.KEYWORD_ONLY)
-    keywords = frozenset(k for k, p in single.items() if p.kind is not Parameter.POSITIONAL_ONLY)
-    return leading, keywords, frozenset(k for k, p in single.items() if p.default is Parameter.empty)
 
 
 @cache
@@ -142,85 +117,66 @@ def _signature(function: Callable[..., Any]) -> Signature:
 
 
 @cache
+def _accept(function: Callable[..., Any], name: str) -> Callable[[Any], Any]:
+    """Function that gives back what a parameter may be, with numbers as Python has them, and refuses all else."""
+    parameter, hint = _signature(function).parameters[name], _hint(function, name)
+    if parameter.kind is Parameter.VAR_POSITIONAL:
+        return lambda values: tuple(_accepted(function, name, hint, value) for value in values)
+    if parameter.kind is not Parameter.VAR_KEYWORD:
+        default = parameter.default
+        return lambda value: value if value is default else _accepted(function, name, hint, value)
+    if get_origin(hint) is not Unpack:
+        return lambda values: {key: _accepted(function, name, hint, value) for key, value in values.items()}
+    hints = get_type_hints(get_args(hint)[0])
+
+    def entries(values: Mapping[str, Any]) -> Mapping[str, Any]:
+        for key in values.keys() - hints.keys():
+            raise ParameterError(f"{_name(function)} cannot be called like this: there is no argument {key!r}.")
+        return {key: _accepted(function, key, hints[key], value) for key, value in values.items()}
+
+    return entries
+
+
+def _accepted(function: Callable[..., Any], name: str, hint: Any, value: Any) -> Any:
+    if not matches(value, hint):
+        remedies = (_REMEDIES[part] for part in _parts(hint) if part in _REMEDIES)
+        raise ParameterError(
+            f"{name} of {_name(function)} must be {_said(hint)}. Received {shown(value)}. {next(remedies, '')}"
+        )
+    if type(value) in _PLAIN:
+        return value
+    return float(value) if isinstance(value, Real) and _is_float_alone(hint) else _native(value)
+
+
+class _Late(dict[str, Any]):
+    """Names that a module imports for type checkers alone, and usual ones of libraries, once they are asked for."""
+
+    def __init__(self, module: str) -> None:
+        tree = ast.parse(getsource(sys.modules[module]))
+        blocks = (node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+        imports = (node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom))
+        self._homes = {alias.name: str(node.module) for node in imports for alias in node.names}
+
+    def __missing__(self, name: str) -> Any:
+        home = self._homes.get(name)
+        return getattr(import_module(home), name) if home else import_module(_ABBREVIATIONS[name])
+
+
+_late = cache(_Late)
+
+
+@cache
 def _hint(function: Callable[..., Any], name: str) -> Any:
     """Type of a parameter; what cannot be told outside of a type checker is anything."""
-    parameter = _signature(function).parameters[name]
-    if parameter.annotation is Parameter.empty:
-        return Any
-    home = function.__module__  # the `__init__` of a dataclass has names of its own besides
-    return _resolved(parameter.annotation, home, getattr(function, "__globals__", {}) | vars(sys.modules[home]))
-
-
-def _resolved(hint: Any, home: str, known: Mapping[str, Any]) -> Any:
+    hint = _signature(function).parameters[name].annotation
     if not isinstance(hint, str):
-        return hint
-    names = dict(known)
-    names |= {short: import_module(long) for short, long in _ABBREVIATIONS.items() if f"{short}." in hint}
-    while True:
-        try:
-            return eval(hint, names)
-        except NameError as error:
-            missing = str(error.name)
-            if missing not in imported_for_types(home):
-                return Any
-            names[missing] = getattr(import_module(imported_for_types(home)[missing]), missing)
-        except TypeError:
-            return Any
-
-
-@cache
-def imported_for_types(module: str) -> dict[str, str]:
-    """Where the names are defined that a module imports for type checkers alone.
-
-    Parameters
-    ----------
-    module : str
-        Its whole name.
-    """
-    spec = find_spec(module)
-    loader: Any = spec.loader if spec else None
-    blocks = (node for node in ast.parse(loader.get_source(module)).body if isinstance(node, ast.If))
-    imports = (node for block in blocks if ast.unparse(block.test) == "TYPE_CHECKING" for node in block.body)
-    return {
-        alias.name: str(node.module) for node in imports if isinstance(node, ast.ImportFrom) for alias in node.names
-    }
-
-
-def _require(function: Callable[..., Any], name: str, value: Any) -> None:
-    default, test, several = _wanted(function, name)
-    if several is None:
-        if value is not default and not test(value):
-            _refuse(function, name, _hint(function, name), value)
-    elif get_origin(_hint(function, name)) is Unpack:
-        _require_entries(function, get_type_hints(get_args(_hint(function, name))[0]), value)
-    else:
-        for each in value if several is Parameter.VAR_POSITIONAL else value.values():
-            if not test(each):
-                _refuse(function, name, _hint(function, name), each)
-
-
-def _require_entries(function: Callable[..., Any], hints: Mapping[str, Any], given: Mapping[str, Any]) -> None:
-    """Refuse what a function takes by the names of a typed dictionary, if it has others or is of other types."""
-    for name, each in given.items():
-        if name not in hints:
-            raise ParameterError(f"{_name(function)} cannot be called like this: there is no argument {name!r}.")
-        if not matches(each, hints[name]):
-            _refuse(function, name, hints[name], each)
-
-
-def _refuse(function: Callable[..., Any], name: str, hint: Any, value: Any) -> NoReturn:
-    remedies = (_REMEDIES[part] for part in _parts(hint) if part in _REMEDIES)
-    raise ParameterError(
-        f"{name} of {_name(function)} must be {_said(hint)}. Received {shown(value)}. {next(remedies, '')}"
-    )
-
-
-@cache
-def _wanted(function: Callable[..., Any], name: str) -> tuple[Any, Callable[[Any], bool], Any]:
-    """Default of a parameter, whether a value is of its type, and its kind if it takes several values."""
-    parameter = _signature(function).parameters[name]
-    several = parameter.kind if parameter.kind in _VARIABLE else None
-    return parameter.default, _test(_hint(function, name)), several
+        return Any if hint is Parameter.empty else hint
+    home = function.__module__  # the `__init__` of a dataclass has names of its own besides
+    known = getattr(function, "__globals__", {}) | vars(sys.modules[home])
+    for late in (dict, partial(_late, home)):
+        with suppress(NameError, TypeError, OSError):
+            return eval(hint, known, late())
+    return Any
 
 
 def matches(value: Any, hint: Any) -> bool:
@@ -262,19 +218,6 @@ def _test_of_class(hint: type) -> Callable[[Any], bool]:
         return isinstance(value, hint) or (hint is bool and type(value).__name__ == "bool")
 
     return test
-
-
-def _plain(function: Callable[..., Any], name: str, value: Any) -> Any:
-    """A number as Python has it: extended ones of NumPy crash the libraries that compute with them.
-
-    What is a number but no `float` or `int` becomes a float where nothing but floats is wanted.
-    """
-    if type(value) in _PLAIN:
-        return value
-    default, _, several = _wanted(function, name)
-    if several is None and isinstance(value, Real) and _is_float_alone(_hint(function, name)):
-        return float(value)
-    return _native(value) if value is not default else value
 
 
 _PLAIN = (float, int, str, bool, type(None))
