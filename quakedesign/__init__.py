@@ -18,4 +18,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return list(__getattr__("__all__"))
+    return [*__getattr__("__all__"), "__version__"]
