@@ -1,6 +1,7 @@
 """Exit codes, JSON and files of the commands that prove, for every kind of answer that the package may give."""
 
 import json
+from fractions import Fraction as F
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.loop.loop_setup import IDEAL
 
 guarantee_commands = import_module("quakedesign.cli.guarantee_commands")
+simulate_commands = import_module("quakedesign.cli.simulate_commands")
 
 
 @pytest.fixture
@@ -215,6 +217,59 @@ def test_limits_are_written_where_a_folder_is_given(call, monkeypatch, tmp_path)
     (tmp_path / "there").mkdir()
     (tmp_path / "there" / "thesis").touch()
     assert call("limits", "lab-fault", "--out", "there")[0] == 2
+
+
+# simulate
+
+
+@pytest.mark.parametrize(
+    ("changed", "outside"),
+    [
+        ({}, []),
+        ({"duration": 3.0, "seed": 2, "method": "rk4"}, []),
+        ({"delay": 0.02, "lag": 2.0}, []),
+        ({"delay": 0.03, "lag": 2.0, "diffusion": 1.0}, ["delay", "diffusion"]),
+        ({"initial_slip": 1e-3, "initial_slip_rate": -1e-2}, []),
+        ({"initial_slip": 1.1e-3, "initial_slip_rate": -1.1e-2}, ["initial_slip", "initial_slip_rate"]),
+        ({"slip_noise": 1e-6, "saturation": 1e6, "plant": "coulomb"}, ["plant", "saturation", "slip_noise"]),
+        ({"averaging": 2, "drift": 1e-9, "scheme": "implicit"}, ["scheme", "drift", "averaging"]),
+        ({"perturbation": "time", "weight": 0.5, "authority": 1.0}, ["perturbation", "weight", "authority"]),
+    ],
+)
+def test_what_a_proof_does_not_know_of_a_run_is_named(changed, outside):
+    """Delay 20 ms and lag 2 s, and from initial errors of at most 1 mm and 1 cm/s."""
+    held = SimpleNamespace(path={"delay": F(1, 50), "lag": F(2)}, start=(F(1, 1000), F(1, 100)))
+    assert simulate_commands._outside(changed, held) == outside
+
+
+@pytest.mark.parametrize("full", [True, False])
+def test_a_run_is_told_with_all_that_is_known_of_it(monkeypatch, full):
+    def named(name, **more):
+        return SimpleNamespace(to_dict=lambda: {"name": name}, **more)
+
+    metrics = SimpleNamespace(to_dict=lambda: {"steps": 3, "seconds": 0.5}, unit=lambda name: f"unit of {name}")
+    run = SimpleNamespace(
+        metrics=metrics,
+        energy=named("energy", relative_residual=1e-9) if full else None,
+        outcome=named("outcome"),
+        events={"stick": 0.1},
+        provenance={"scheme": "explicit"},
+    )
+    monkeypatch.setattr("quakedesign.simulation.natural.waiting", lambda *_: named("waiting") if full else None)
+    monkeypatch.setattr("quakedesign.studies.comparison.shortfall", lambda *_: "a shortfall")
+    assert simulate_commands._answer(run, None, [named("premise")]) == {
+        "outcome": {"name": "outcome"},
+        "waiting": {"name": "waiting"} if full else None,
+        "shortfall": "a shortfall",
+        "metrics": {"steps": 3, "seconds": 0.5},
+        "units": {"steps": "unit of steps", "seconds": "unit of seconds"},
+        "premises": [{"name": "premise"}],
+        "events": {"stick": 0.1},
+        "energy": {"name": "energy", "relative_residual": 1e-9} if full else None,
+        "steps": 3,
+        "seconds": 0.5,
+        "run": {"scheme": "explicit"},
+    }
 
 
 # certify

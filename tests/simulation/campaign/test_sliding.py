@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -15,7 +16,7 @@ from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Held
 from quakedesign.guarantees.search.lqg import sliding_law, sliding_model
-from quakedesign.laws import LinearLaw, published
+from quakedesign.laws import LinearLaw, SampledController, published, summed_integrals
 from quakedesign.loop import Actuator, Lag, simulation_scheme
 from quakedesign.loop.sensing import Measurement
 from quakedesign.parallel import Given, SerialExecutor
@@ -134,6 +135,16 @@ def test_what_does_not_apply_is_refused(wrong, said):
         campaign_problem(**({"fault": PATCH, "controller": CONTROLLER, "duration": 3000.0} | wrong))
     with pytest.raises(ParameterError, match="need friction with a state"):
         campaign_problem(load_fault("real-fault"), None, stress=1.0)
+
+
+def test_a_law_that_is_told_more_than_the_slip_or_has_no_samples_is_refused(monkeypatch):
+    told_the_rate = SampledController(law=summed_integrals((Fraction(1),) * 4, STEP), step=STEP)
+    said = "needs a law of samples that is told the slip alone"
+    with pytest.raises(ParameterError, match=said):
+        replace(PROBLEM, controller=told_the_rate)
+    monkeypatch.setattr(SampledController, "sampling", None)
+    with pytest.raises(ParameterError, match=said):
+        replace(PROBLEM, controller=CONTROLLER)
 
 
 def test_the_command_samples_what_design_found(tmp_path, monkeypatch, capsys):
