@@ -294,6 +294,14 @@ def test_help_and_import_load_no_heavy_library():
     assert not loaded_by("-c", "import re, quakedesign")[0] & (HEAVY | {"cyclopts", "rich"})
 
 
+@pytest.mark.parametrize("name", ["super-twisting_1.5_1.1", "guarantee_lab-fault"])
+def test_checking_a_file_loads_neither_sympy_nor_a_solver(name):
+    (path,) = (ROOT / "proofs" / "certificates").glob(f"{name}.json")
+    loaded, printed = loaded_by("-m", "quakedesign", "check", str(path))
+    assert ": proved" in printed
+    assert not loaded & (HEAVY - {"flint"})
+
+
 def test_loading_all_that_decides_loads_no_solver():
     modules = [module_name(p) for p in SOURCES if room(module_name(p)) in DECISIONS]
     loaded, _ = loaded_by("-c", "import re, " + ", ".join(m.removesuffix(".__init__") for m in modules))
