@@ -54,12 +54,3 @@ def asked(log):
     """Addresses that pages asked for; the browser's own requests have no origin."""
     told = [event.get("params", {}) for event in json.loads(log.read_text(encoding="utf-8"))["events"]]
     return {p["url"] for p in told if "url" in p and p.get("initiator", "not an origin") != "not an origin"}
-
-
-def printed_pages(page, folder):
-    """Number of pages of A4."""
-    path = folder / "printed.pdf"
-    command = [CHROMIUM, *_QUIET, f"--user-data-dir={folder / 'profile'}", "--no-pdf-header-footer"]
-    subprocess.run([*command, f"--print-to-pdf={path}", page.as_uri()], capture_output=True, check=True, timeout=300)
-    (count,) = re.findall(rb"/Type /Pages\b.*?/Count (\d+)", path.read_bytes(), flags=re.S)
-    return int(count)
