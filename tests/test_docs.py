@@ -68,6 +68,7 @@ class Addresses(HTMLParser):
             self.loaded.append(given["href"])
 
 
+@pytest.mark.slow
 def test_every_link_inside_resolves_and_nothing_is_loaded_from_elsewhere(pages):
     found = {page: Addresses(page) for page in pages.rglob("*.html")}
     assert {pages / name for name in PAGES} <= set(found)
@@ -86,6 +87,7 @@ def test_every_link_inside_resolves_and_nothing_is_loaded_from_elsewhere(pages):
     assert broken == []
 
 
+@pytest.mark.slow
 def test_every_public_name_and_command_is_told(pages):
     from quakedesign.cli.app import app
 
@@ -106,6 +108,15 @@ def test_tables_in_pages_are_what_the_program_says_today():
         assert len(re.findall(r"^\|", text, re.MULTILINE)) > 20
 
 
+def test_every_link_of_a_page_to_a_page_leads_to_one():
+    """Of what is built, links into pages are tested with -m slow, which `.ci/run` does."""
+    pages = [page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts]
+    links = {page: re.findall(r"\]\((?![a-z]+:)([^)#\s]+)", page.read_text(encoding="utf-8")) for page in pages}
+    assert sum(map(len, links.values())) > 50
+    broken = [(page.name, link) for page, found in links.items() for link in found if not (page.parent / link).exists()]
+    assert broken == []
+
+
 @pytest.mark.parametrize("folder", ["howto", "reference", "explanation"])
 def test_every_page_is_linked_from_the_index_of_its_folder(folder):
     index = ROOT / "docs" / folder / "index.md"
@@ -124,6 +135,7 @@ def test_what_is_proved_begins_with_the_guarantee_that_is_printed():
     assert quoted.lower() == f"{read_guarantee(raw).sentence()}.".lower()
 
 
+@pytest.mark.slow
 def test_equations_are_drawn_without_a_script(pages):
     model = (pages / "explanation" / "model.html").read_text(encoding="utf-8")
     assert model.count("<math") > 15
