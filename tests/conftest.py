@@ -15,7 +15,8 @@ import pytest
 from hypothesis import settings
 
 sys.set_int_max_str_digits(640)  # so that an exact number that is written by `str` is found by a shorter one
-settings.register_profile("reproducible", derandomize=True, print_blob=True, deadline=None)
+for name, examples in (("reproducible", 25), ("thorough", 100)):  # the second with --hypothesis-profile=thorough
+    settings.register_profile(name, max_examples=examples, derandomize=True, print_blob=True, deadline=None)
 settings.load_profile("reproducible")
 
 ROOT = Path(__file__).parent.parent
@@ -40,8 +41,16 @@ def pytest_collection():
     gc.enable()
 
 
+NOTEBOOKS = ("02_equations_and_scaling.ipynb", "03_certificates.ipynb")
+"""Those that run by default; the others with -m slow."""
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """The longest files first, so that no worker is left alone with one of them at the end."""
+    for item in items:
+        if item.path.suffix == ".ipynb" and item.path.name not in NOTEBOOKS:
+            item.add_marker("slow")
     items.sort(key=lambda item: (item.path.suffix != ".ipynb", item.path.name != "test_cli.py"))
 
 
@@ -51,6 +60,19 @@ def _no_warning_wanders():
     yield
     gc.collect()
     gc.freeze()  # what lives on is not searched again
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """What another file has searched, compiled, run or drawn is taken from one folder of all workers.
+
+    For tests of what is shown. A test of a computation computes.
+    """
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "kept"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("QUAKEDESIGN_CACHE", str(folder))
+        yield
 
 
 @pytest.fixture

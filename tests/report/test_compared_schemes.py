@@ -33,7 +33,7 @@ def undecided(fault, law):
 
 
 @pytest.fixture(scope="module")
-def compared():
+def compared(kept):
     """The published 2-CTA and e-LQR play the designed ones too; held over 2 ms the latter diverges (ERRATA 22)."""
     laws = published("lab-fault")
     with pytest.MonkeyPatch.context() as patch:

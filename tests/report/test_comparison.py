@@ -24,7 +24,7 @@ from quakedesign.synthesis import Design
 
 
 @pytest.fixture(scope="module")
-def comparison():
+def comparison(kept):
     """The laboratory fault with a task of 20 s, so that all runs are short."""
     fault = qd.load_fault("lab-fault")
     fault = replace(fault, reference=Reference(target_slip=fault.reference.target_slip, operation_time=20.0))
@@ -36,6 +36,8 @@ def comparison():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("quakedesign.studies.comparison.assess", undecided)  # verdicts on them are another test's
+        for name in ("longest_step", "longest_delay"):  # and so is how far other designs go
+            patch.setattr(f"quakedesign.guarantees.search.defaults.{name}", lambda *_, **__: None)
         yield qd.compare(fault, [qd.design(fault, "elqr")])
 
 
@@ -104,6 +106,7 @@ def test_the_folder_appears_whole_and_is_not_overwritten(comparison, tmp_path, m
     assert len(list((out / "figures").iterdir())) == 5
     with pytest.raises(OutputError, match="--force"):
         write_folder(comparison, out, force=False)
+    monkeypatch.setenv("QUAKEDESIGN_CACHE", "off")  # figures are kept for what they show, whoever draws them
     monkeypatch.setattr(Comparison, "figures", lambda _: {})
     write_folder(comparison, out, force=True)
     assert list((out / "figures").iterdir()) == []

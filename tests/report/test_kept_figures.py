@@ -7,6 +7,7 @@ from dataclasses import replace
 import matplotlib as mpl
 import pytest
 from matplotlib.figure import Figure
+from thinned import few
 
 from quakedesign import cache
 from quakedesign.fault import load_fault
@@ -60,13 +61,14 @@ def test_the_same_figure_is_drawn_once_and_has_the_bytes_of_its_drawing(drawn, m
 CHANGES = [{"shown": 3.0 + 1e-9}, {"told": "said"}, {"name": "two"}]
 
 
-@pytest.mark.parametrize("changed", CHANGES, ids=[next(iter(change)) for change in CHANGES])
+@few("changed", CHANGES, ids=[next(iter(change)) for change in CHANGES], every=3)
 def test_what_shows_something_else_is_drawn(drawn, changed):
     once()
     once(**changed)
     assert len(drawn) == 2
 
 
+@pytest.mark.slow
 def test_how_long_it_took_and_how_it_was_computed_is_not_shown(drawn):
     run = simulate(load_fault("lab-fault"), duration=0.01, samples=5)
     for seconds, backend, step in ((1.0, "compiled", 1), (2.0, "virtual-machine", 1), (2.0, "compiled", 2)):
@@ -82,6 +84,7 @@ def test_values_that_are_one_and_equal_ones_are_the_same(drawn):
     assert len(drawn) == 1
 
 
+@pytest.mark.slow
 def test_other_settings_are_drawn(drawn):
     once()
     with mpl.rc_context({"path.simplify": False}):
@@ -89,6 +92,7 @@ def test_other_settings_are_drawn(drawn):
     assert len(drawn) == 2
 
 
+@pytest.mark.slow
 def test_other_fonts_are_drawn(drawn, monkeypatch):
     from matplotlib.font_manager import fontManager
 
@@ -108,6 +112,7 @@ def test_what_cannot_be_told_is_drawn_each_time(drawn):
     assert len(drawn) == 4
 
 
+@pytest.mark.slow
 def test_what_draws_is_not_loaded_for_what_is_kept():
     code = "import sys; from quakedesign.report.drawing import _stated; _stated({}, 1); print(*sys.modules)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()

@@ -20,7 +20,7 @@ NUMBER = r"(-?\d+(?:\.\d+)?(?:e[-+]\d+)?)"
 
 
 @pytest.fixture(scope="module")
-def linear():
+def linear(kept):
     return judge(LAB, qd.published("lab-fault")["elqr"], step="0.5e-3", peaks="rate")
 
 

@@ -43,7 +43,7 @@ def entry(fault, controller, origin):
 
 
 @pytest.fixture(scope="module")
-def study():
+def study(kept):
     """The laboratory fault with a task of 2 s; the published 2-CTA plays the designed one too."""
     fault = qd.load_fault("lab-fault")
     fault = replace(fault, reference=Reference(target_slip=1e-4, operation_time=2.0))

@@ -231,6 +231,7 @@ def test_a_cycle_that_one_method_cannot_follow_is_computed_by_another(monkeypatc
     assert unknown.metrics.peak_slip_rate is None
 
 
+@pytest.mark.slow
 def test_a_design_goes_on_where_no_cycle_can_be_computed(comparison, monkeypatch, tmp_path):
     def stopped(*_, **__):
         raise SimulationError("the integration stopped.")
@@ -285,6 +286,7 @@ def test_figures_of_slow_sliding_show_rates_over_the_reference_and_errors_with_t
     assert not [row for row in parameter_rows(SHORT) if row[-1] == "disturbance"]
 
 
+@pytest.mark.slow
 def test_of_a_slow_task_the_beginning_is_run_and_the_report_says_so(comparison, monkeypatch):
     (entry,) = comparison.entries
     ageing = 8e-3 / 1e-6

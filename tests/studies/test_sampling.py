@@ -22,7 +22,7 @@ LINEAR = control_law("elqr").from_values(("4.17e7", "6.94e5", "4.17e6", "1.39e4"
 
 
 @pytest.fixture(scope="module")
-def report():
+def report(kept):
     return sampling_report(OWN, LINEAR, schemes=("implicit", "explicit"), duration=0.2)
 
 
@@ -56,6 +56,7 @@ def test_the_folder_and_the_terminal_show_it(report, tmp_path):
     assert all(len(line) <= 80 for line in said.splitlines() if line.startswith(("implicit", "explicit")))
 
 
+@pytest.mark.slow
 def test_gains_without_a_certificate_are_run_with_other_scales_beside_the_limit_times_the_scale():
     """No certificate of a 2-CTA exceeds λ(k3 − k4), ERRATA after row 29; with feed-forward e3 is not ξ1 + h."""
     law = BASE.with_feedforward(feed_forward("nominal", LAB, BASE.divisor))
