@@ -530,11 +530,21 @@ def main() -> int:
     parser.add_argument("--tests", nargs="*", default=[], help="without them the results so far are reported")
     parser.add_argument("--results", type=Path, default=Path(tempfile.gettempdir()) / "mutation.jsonl")
     parser.add_argument("--select", default="", help="expression on the names of tests, as pytest -k")
+    parser.add_argument("--slow", action="store_true", help="with the slow tests, which try all cases")
     parser.add_argument("--skip", help="regular expression for lines that are left for another run")
     parser.add_argument("--seconds", type=float, default=10, help="of tests for one mutant")
     options = parser.parse_args()
     if options.tests:
-        flags = ["-o", "addopts=--import-mode=importlib", "-m", "not slow", "-q", "-s", "-p", "no:cacheprovider"]
+        flags = [
+            "-o",
+            "addopts=--import-mode=importlib",
+            "-m",
+            "" if options.slow else "not slow",
+            "-q",
+            "-s",
+            "-p",
+            "no:cacheprovider",
+        ]
         flags += ["--assert=plain", "--tb=native"]
         done = pytest.main([*flags, "-k", options.select, *options.tests], plugins=[Mutation(options)])
         if done != 0:

@@ -127,6 +127,7 @@ for verdict, _ in check_files([*map(Path, sys.argv[1:])]).values():
 """
 
 
+@pytest.mark.slow
 def test_checking_does_not_wait_for_sympy():
     names = ("super-twisting_1.5_1.1", "guarantee_real-fault", "motzkin_not-sos")
     call = [sys.executable, "-c", FRESH, *(str(CERTIFICATES / f"{name}.json") for name in names)]

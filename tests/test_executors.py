@@ -7,6 +7,7 @@ from functools import partial
 from types import SimpleNamespace
 
 import pytest
+from thinned import few
 
 import quakedesign as qd
 from quakedesign import parallel as executors
@@ -52,7 +53,7 @@ def guaranteed(**who):
 
 
 @pytest.mark.filterwarnings("ignore:Creating scratch directories")  # dask's advice where a disk is slow for a second
-@pytest.mark.parametrize("asked", [mapped, climbed, guaranteed])
+@few("asked", [mapped, climbed, guaranteed], every=3)
 def test_no_digit_depends_on_who_computes(asked, scheduler):
     alone = asked(workers=1)
     assert asked(scheduler=scheduler) == alone

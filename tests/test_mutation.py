@@ -8,6 +8,8 @@ import sys
 from fnmatch import fnmatch
 from pathlib import Path
 
+import pytest
+
 PATH = Path(__file__).with_name("mutation.py")
 SPECIFICATION = importlib.util.spec_from_file_location("mutation", PATH)
 tool = importlib.util.module_from_spec(SPECIFICATION)
@@ -146,6 +148,7 @@ def test_single_mutants_and_kinds_are_explained():
     assert {explanations.of(key) for key in explanations.single} == {"equivalent"}
 
 
+@pytest.mark.slow
 def test_every_single_mutant_that_is_explained_can_be_made():
     single = set(tool.Explanations().single)
     made = {m.key() for path in {key[0] for key in single} for m in tool.mutants_of(tool.ROOT / path, compiled=False)}

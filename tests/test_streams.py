@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from thinned import few
 
 from quakedesign import streams
 
@@ -26,12 +27,12 @@ def run(*command, closed="", **more):
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("closed", ["0", "1", "2", "0,1,2"])
+@few("closed", ["0", "1", "2", "0,1,2"], every=3)
 def test_a_verdict_that_nobody_wants_told_is_the_exit_code(closed):
     assert run(*COMMAND, "check", PROVED, "--quiet", closed=closed) == (0, "", "")
 
 
-@pytest.mark.parametrize("line", [("check", PROVED), ("check", PROVED, "--json"), ("--help",), ("fault", "--help")])
+@few("line", [("check", PROVED), ("check", PROVED, "--json"), ("--help",), ("fault", "--help")], every=2)
 def test_what_cannot_be_told_is_one_line_and_no_verdict(line):
     code, out, err = run(*COMMAND, *line, closed="1")
     assert (code, out) == (2, "")
@@ -46,7 +47,7 @@ def test_the_checker_of_the_standard_library_tells_its_verdict_or_says_that_it_c
     assert run(*CHECKER, PROVED, closed="2")[0] == 0
 
 
-@pytest.mark.parametrize("columns", ["0", "1", "2", "9" * 30])
+@few("columns", ["0", "1", "2", "9" * 30], every=3)
 def test_help_ends_in_any_width(columns):
     code, out, _ = run(*COMMAND, "fault", "--help", env={**os.environ, "COLUMNS": columns})
     assert code == 0
@@ -80,7 +81,7 @@ def test_a_terminal_may_be_too_narrow_too(monkeypatch):
     assert os.environ.pop("COLUMNS") == "20"
 
 
-@pytest.mark.parametrize("megabytes", [150, 250, 500])
+@few("megabytes", [150, 250, 500], every=3)
 def test_too_little_memory_is_no_verdict(megabytes):
     limit = megabytes * 10**6
 

@@ -7,6 +7,7 @@ import time
 from concurrent.futures import BrokenExecutor, Future
 
 import pytest
+from thinned import few
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.parallel import Crew, Processes, cores, require_workers
@@ -32,7 +33,7 @@ KINDS = ["idle", "busy", *(["foreign"] if sys.platform == "linux" else [])]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
+@few(
     ("number", "code", "said"),
     [
         (signal.SIGINT, 130, "quakedesign: interrupted; nothing was written.\n"),
@@ -41,6 +42,7 @@ KINDS = ["idle", "busy", *(["foreign"] if sys.platform == "linux" else [])]
         (signal.SIGKILL, -signal.SIGKILL, ""),
     ],
     ids=lambda value: value.name if isinstance(value, signal.Signals) else "",
+    every=2,
 )
 def test_nobody_outlives_the_process_that_asks(start, tmp_path, number, code, said, kind):
     (tmp_path / "program.py").write_text(PROGRAM)

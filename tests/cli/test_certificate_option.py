@@ -88,6 +88,7 @@ def test_a_run_that_is_not_what_is_proved_says_so(file, capsys, more, outside):
         assert f"proved: {CLAIM.sentence()}" in out
 
 
+@pytest.mark.slow
 def test_a_start_for_which_a_law_is_proved_is_in_what_is_proved(capsys, tmp_path):
     held = replace(HELD, initial_slip=F(1, 10**5))
     claim = guarantee(uncertain_plant(REAL), held)

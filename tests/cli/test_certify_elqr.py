@@ -23,6 +23,7 @@ def run(capsys, *arguments):
     return stop.value.code, out, err
 
 
+@pytest.mark.slow
 def test_given_gains_are_proved_with_margins_peaks_and_files(capsys, tmp_path):
     out = tmp_path / "k.json"
     arguments = ("certify", "elqr", "lab-fault", "--gains", *SLOW, "--peaks", "rate", "--json", "--out", str(out))

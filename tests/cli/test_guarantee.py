@@ -72,6 +72,7 @@ GAINS = ("6.96e8", "2.53e8", "6.02e8", "2.16e8")
 GUARANTEE = import_module("quakedesign.synthesis.guarantee")  # the module: the package has a function of this name
 
 
+@pytest.mark.slow
 def test_given_gains_for_people(call):
     code, out, _ = call("real-fault", "--gains", *GAINS)
     assert code == 0
@@ -81,6 +82,7 @@ def test_given_gains_for_people(call):
     assert max(map(len, out.splitlines())) <= 200
 
 
+@pytest.mark.slow
 def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks():
     """A design one period late with larger gains, run on a fault at rest whatever it asks for: its own recursion."""
     fault, late = load_fault("real-fault"), F("0.184")
@@ -331,6 +333,7 @@ def test_several_faults_are_asked_the_same_and_each_has_its_answer(call, tmp_pat
     assert (code, "must be new" in err) == (2, True)
 
 
+@pytest.mark.slow
 def test_several_faults_for_people(call, monkeypatch):
     monkeypatch.setattr(GUARANTEE, "nearest_setup", lambda *_, **__: None)
     code, out, _ = call("real-fault", "crustal-patch", "--diffusion", "180 s", "--stress", "1 MPa", "--spread", "0")

@@ -180,6 +180,7 @@ def test_the_slip_law_is_proved_with_a_smaller_bound_of_the_slip_rate_than_is_tr
     assert found.check() is Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_a_pump_that_cannot_hold_what_may_be_asked_for_has_no_guarantee(monkeypatch):
     """The known law asks for -153 kPa to 3.713 MPa under 25 kPa; less stress asks for less."""
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())

@@ -120,6 +120,7 @@ def test_people_are_told_the_energy_that_is_lost(run):
     assert "energy that the integration loses" in out
 
 
+@pytest.mark.slow
 def test_a_sampling_report_is_a_folder(run, tmp_path):
     import importlib.resources
 

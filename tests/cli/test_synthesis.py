@@ -61,6 +61,7 @@ def test_people_get_a_table(capsys):
     assert "these" in out
 
 
+@pytest.mark.slow
 def test_the_smallest_sampled_error_on_a_fault(capsys, tmp_path, monkeypatch):
     from quakedesign.synthesis import simulated_error
 

@@ -9,6 +9,7 @@ import numpy as np
 import pint
 import pytest
 import sympy as sp
+from thinned import few
 
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.laws import Law, Signals, SlidingMode, control_law, control_laws, laws, model_of
@@ -154,7 +155,7 @@ def test_it_pushes_back_alike_in_both_directions(acting):
     assert outputs(controller, np.negative(AT)) == pytest.approx(-outputs(controller, AT), rel=1e-14)
 
 
-@pytest.mark.parametrize(("metre", "second", "kilogram"), [(100, 1, 1), (1, 60, 1), (1, 1, 1000), (39.37, 1e-3, 2.2)])
+@few(("metre", "second", "kilogram"), [(100, 1, 1), (1, 60, 1), (1, 1, 1000), (39.37, 1e-3, 2.2)], every=4)
 def test_the_units_of_gains_and_states_fit_together(acting, metre, second, kilogram):
     # In other units (1 m is `metre` of them, and so on) the same law gives the same pressure.
     own = pint.UnitRegistry()

@@ -220,6 +220,7 @@ def test_a_guarantee_cuts_off_what_it_proves_never_to_be_passed(proved):
     assert (behind.least, behind.largest) == (-(10**8), 10**8)  # of the valve, where the law acts
 
 
+@pytest.mark.slow
 def test_where_the_fault_sticks_no_course_takes_the_pressure_beyond_what_is_certified(proved):
     """The limit at rest alone allows twice the proved |p − p*|: before, courses left the interval."""
     seen, claims = worst_found(proved, sticks=True), proved.claims
@@ -363,7 +364,8 @@ BEHIND = {
 }
 
 
-@pytest.mark.parametrize("name", [pytest.param(k, marks=pytest.mark.slow) if "rock" in k else k for k in BEHIND])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BEHIND)
 def test_behind_a_lag_and_rock_a_fault_that_sticks_does_not_wind_up(name):
     """Ahead of its reference the fault rests, and without the limit the pressure falls on. One that moves is free."""
     step, around, stages, substeps = BEHIND[name]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
+from thinned import few
 
 from quakedesign import assess, simulate
 from quakedesign.errors import ParameterError, UnsupportedError
@@ -190,7 +191,7 @@ def test_its_expressions_are_those_of_the_matrices():
     assert law.gain_units == {"k1": "Pa/m", "k2": "Pa s/m", "predicted_rate": "Pa", "disturbance": "Pa"}
 
 
-@pytest.mark.parametrize(
+@few(
     ("around", "stages", "substeps"),
     [
         ({"lag": F(1, 5)}, (Lag(time_constant=0.2),), 1),
@@ -198,6 +199,7 @@ def test_its_expressions_are_those_of_the_matrices():
         ({"delay": 2 * STEP, "lag": F(1, 5)}, (Delay(samples=2), Lag(time_constant=0.2)), 1),
         ({"diffusion": F(20)}, (Diffusion.of_time(20.0),), 4),
     ],
+    every=2,
 )
 def test_what_a_law_is_designed_for_stands_in_every_run_unless_told(around, stages, substeps):
     law, told = Held(law=LAW, step=STEP, **around).controller, Actuator(stages=stages)
@@ -213,7 +215,7 @@ def test_what_a_law_is_designed_for_stands_in_every_run_unless_told(around, stag
 
 
 @pytest.mark.parametrize("lag", [0, F(1, 5)])
-@pytest.mark.parametrize("delay", [STEP / 3, STEP + F(1, 10)])
+@few("delay", [STEP / 3, STEP + F(1, 10)], every=2)
 def test_a_pressure_arrives_between_samples(delay, lag):
     """The law by its recursion, the plant by SciPy between changes of the pressure; friction has a kink at slip 0."""
     law, periods = Held(law=LAW, step=STEP, delay=delay, lag=lag).controller, 10

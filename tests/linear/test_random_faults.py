@@ -78,6 +78,7 @@ def test_twelve_random_faults_are_designed_with_a_proof():
     assert all(reasons)
 
 
+@pytest.mark.slow
 def test_the_riccati_designs_of_random_faults_are_recognised_as_optimal():
     rng = np.random.default_rng(77)
     for _ in range(6):

@@ -13,6 +13,7 @@ from quakedesign.linear.verdict import judge
 LAB = qd.load_fault("lab-fault")
 
 
+@pytest.mark.slow
 def test_every_proof_of_the_published_gains_is_a_file_that_checks(tmp_path):
     judged = judge(LAB, published("lab-fault")["elqr"], step="0.5e-3")
     facts = json.loads(json.dumps(judged.to_dict()))

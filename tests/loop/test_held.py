@@ -6,6 +6,7 @@ from random import Random
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.laws import (
@@ -81,7 +82,7 @@ def run_by_hand(law, periods, push, delay, lag, step=float(STEP), fine=4000, noi
 @pytest.mark.parametrize(
     "law", [PROPORTIONAL, ESTIMATE, INTEGRALS, OBSERVER], ids=["proportional", "estimate", "integrals", "observer"]
 )
-@pytest.mark.parametrize(("delay", "lag"), [("0", "0"), ("1/5", "0"), ("3/20", "0"), ("27/100", "1/10"), ("0", "1/4")])
+@few(("delay", "lag"), [("0", "0"), ("1/5", "0"), ("3/20", "0"), ("27/100", "1/10"), ("0", "1/4")], every=2)
 def test_matrices_do_what_the_schedule_says(law, delay, lag):
     with_integral = law if law.states else INTEGRALS
     loop = held_loop(with_integral, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag))
@@ -122,7 +123,7 @@ def run_implicit(law, periods, push, delay, ends, noise, fine=2000):
     return np.array(found)
 
 
-@pytest.mark.parametrize("law", [ESTIMATE, OBSERVER], ids=["estimate", "observer"])
+@few("law", [ESTIMATE, OBSERVER], ids=["estimate", "observer"], every=2)
 @pytest.mark.parametrize(("delay", "lag"), [("0", "0"), ("1/5", "0"), ("3/20", "0"), ("27/100", "1/10")])
 def test_what_is_measured_may_be_off(law, delay, lag):
     """The law is told e + n: by hand, and by two sampled inputs."""

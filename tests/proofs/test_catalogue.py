@@ -8,6 +8,7 @@ from fractions import Fraction as F
 from pathlib import Path
 
 import pytest
+from thinned import few
 
 from quakedesign.checking import check_files
 from quakedesign.fault import load_fault
@@ -59,9 +60,7 @@ def test_the_catalogue_is_complete():
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
 
 
-@pytest.mark.parametrize(
-    "path", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in LONG)) for p in FILES]
-)
+@few("path", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in LONG)) for p in FILES], every=3)
 def test_both_checkers_agree(path):
     expected = "refuted" if path.stem == "motzkin_not-sos" else "proved"
     ((verdict, _),) = check_files([path]).values()
@@ -110,7 +109,7 @@ def test_linear_certificates_cover_their_faults(fault):
     assert any(fault in line for line in lines)
 
 
-@pytest.mark.parametrize("path", GUARANTEES, ids=lambda p: p.stem)
+@few("path", GUARANTEES, ids=lambda p: p.stem, every=3)
 def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
     stored, fault = parse_guarantee(path.read_text()), load_fault(path.stem.split("_")[-1])
     assert check_files([path], fault.name)[str(path)][0] == "proved"
@@ -133,7 +132,7 @@ KEYS = ("slip_error", "slip_rate_error", "peak_slip_rate", "largest_pressure", "
 SMALLER = list(zip(GUARANTEES, KEYS, strict=True))
 
 
-@pytest.mark.parametrize(("path", "key"), SMALLER, ids=[f"{path.stem}-{key}" for path, key in SMALLER])
+@few(("path", "key"), SMALLER, ids=[f"{path.stem}-{key}" for path, key in SMALLER], every=3)
 def test_a_smaller_claim_of_a_guarantee_is_refused_by_both(path, key, tmp_path):
     raw = json.loads(path.read_text())
     raw["claims"][key] = str(F(raw["claims"][key]) * F(99, 100))
@@ -145,6 +144,7 @@ def test_a_smaller_claim_of_a_guarantee_is_refused_by_both(path, key, tmp_path):
         checker.check(changed.read_text())
 
 
+@pytest.mark.slow
 def test_a_patch_of_the_crust_is_held_below_1_2_times_its_rate_under_25_kpa():
     path = ROOT / "certificates" / "sliding_crustal-patch.json"
     claim = parse_guarantee(path.read_text())

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import sympy as sp
+from thinned import few
 
 from quakedesign.studies.errata import KINDS, errata_folder, errata_rows, find_rows, run_rows
 
@@ -31,7 +32,7 @@ def test_a_row_says_what_is_printed_what_is_correct_and_how_it_is_checked(number
     assert row.check.__doc__
 
 
-@pytest.mark.parametrize("number", range(1, 30))
+@few("number", range(1, 30), every=4)
 def test_the_corrected_form_holds_with_numbers_within_seconds(number):
     began = time.process_time()
     (result,) = run_rows([number])
@@ -80,7 +81,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("number", range(1, 30))
+@few("number", range(1, 30), every=4)
 def test_another_form_in_place_of_the_corrected_one_fails(number):
     assert ROWS[number].check(**WRONG[number]()).holds is False
 
@@ -104,6 +105,7 @@ def test_a_form_that_is_nearly_right_fails_too(number, near):
     assert ROWS[number].check(**near()).holds is False
 
 
+@pytest.mark.slow
 def test_the_switched_loop_grows_in_a_plain_integration_as_well():
     """Explicit Euler over the switching of row 7, without matrix exponentials, meets the factor 48 within 60 s."""
     module, step = source(7), 1e-4

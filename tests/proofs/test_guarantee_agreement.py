@@ -6,6 +6,7 @@ from fractions import Fraction as F
 import pytest
 from random_loops import random_loop
 from standalone_guarantee import checker
+from thinned import few
 
 from quakedesign.guarantees import Guarantee, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
@@ -28,7 +29,7 @@ def bounds_of_both(number):
     return (ours.slip_error, ours.slip_rate_error), theirs[:2]
 
 
-@pytest.mark.parametrize("number", [0, 5, 9, 15, 26, 29, 31])
+@few("number", [0, 5, 9, 15, 26, 29, 31], every=3)
 def test_both_look_back_as_far(number):
     """Both stop at the same K, seeing the same mode alone, whatever their units: also where two modes are as slow."""
     for ours, theirs in zip(*bounds_of_both(number), strict=True):

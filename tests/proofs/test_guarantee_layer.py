@@ -7,6 +7,7 @@ from functools import cache
 
 import pytest
 from standalone_guarantee import checker
+from thinned import few
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Guarantee, Held, SlowGain, guarantee
@@ -41,7 +42,7 @@ def document(held=None):
     return json.loads(guarantee_text(one))
 
 
-@pytest.mark.parametrize("around", [{"delay": F("0.03")}, {"lag": F("0.02")}], ids=["delay", "lag"])
+@few("around", [{"delay": F("0.03")}, {"lag": F("0.02")}], ids=["delay", "lag"], every=2)
 def test_both_find_the_same_gains_through_rock(around):
     held = replace(HELD, **around)
     ours = norms(held.loop(TASK))
@@ -91,6 +92,7 @@ def test_both_prove_a_loop_through_rock_and_refuse_what_does_not_follow(monkeypa
         assert parse_guarantee(json.dumps(forged)).check() is Verdict.UNDECIDED
 
 
+@pytest.mark.slow
 def test_a_well_that_is_farther_away_than_the_proof_says_is_refused_by_both():
     raw = document()
     raw["loop"]["diffusion"] = "3/10"

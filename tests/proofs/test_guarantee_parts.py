@@ -9,6 +9,7 @@ from random import Random
 
 import pytest
 from standalone_guarantee import checker
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
@@ -301,9 +302,10 @@ OFF = ((*NOISES, "late"), ("slip_noise", "late"), ("root", *NOISES, "late"), ("l
 
 
 @pytest.mark.usefixtures("coarse")
-@pytest.mark.parametrize(
+@few(
     ("more", "held"),
     [((), True), (("root",), True), (FORWARD, False), ((), False), *((more, True) for more in (*HEARD, *OFF))],
+    every=2,
 )
 @pytest.mark.parametrize("asked", [(), ("asked",)])
 def test_both_draw_the_same_bounds_from_the_same_gains(more, held, asked, monkeypatch):

@@ -37,7 +37,7 @@ BAD = [
 ]
 
 
-@pytest.fixture(scope="module", params=KINDS)
+@pytest.fixture(scope="module", params=[KINDS[0], pytest.param(KINDS[1], marks=pytest.mark.slow)])
 def document(request):
     return json.loads((FILES / request.param).read_text(encoding="utf-8"))
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.linalg import solve_continuous_are
+from thinned import few
 
 from quakedesign import load_fault
 from quakedesign.symbolic import plant
@@ -23,7 +24,8 @@ steps, theorem_1, theorem_2 = map(importlib.import_module, ("steps", "theorem_1"
 TINY = mp.mpf(10) ** -25
 
 
-@pytest.mark.parametrize(
+@pytest.mark.slow
+@few(
     ("script", "expected"),
     [
         (
@@ -50,6 +52,7 @@ TINY = mp.mpf(10) ** -25
             ),
         ),
     ],
+    every=2,
 )
 def test_the_script_prints_a_numbered_proof(script, expected):
     run = subprocess.run(
@@ -63,6 +66,7 @@ def test_the_script_prints_a_numbered_proof(script, expected):
         assert words in run.stdout
 
 
+@pytest.mark.slow
 def test_every_step_says_on_what_it_rests_and_little_is_cited():
     for proof in (theorem_1.proof(), theorem_2.proof()):
         assert {step.basis for step in proof} <= {"identity", "sign", "point", "cited"}
@@ -167,7 +171,7 @@ def named(name):
     )
 
 
-@pytest.mark.parametrize("seed", range(10))
+@few("seed", range(10), every=2)
 def test_v_dot_is_the_slope_of_v_along_the_loop_at_fifty_digits(seed):
     with mp.workdps(50):
         e, v = draw(seed)
@@ -276,7 +280,7 @@ def test_the_holding_pressure_of_the_real_fault_goes_down_to_the_published_value
 
 
 @pytest.mark.parametrize("feedback", ["state", "error"])
-@pytest.mark.parametrize("seed", range(3))
+@few("seed", range(3), every=3)
 def test_the_equilibrium_makes_all_rates_zero(feedback, seed):
     """The plant and the law in plain numbers, not from the toolkit."""
     draw_ = random.Random(seed).uniform

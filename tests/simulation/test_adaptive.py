@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
+from thinned import few
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Disturbance, friction_law, load_fault
@@ -55,7 +56,7 @@ def test_the_linear_law_agrees_with_scipy(method, scipy_method, rtol):
 
 
 @pytest.mark.parametrize("method", ADAPTIVE)
-@pytest.mark.parametrize(("scipy_method", "rtol"), [("Radau", 1e-9), ("LSODA", 1e-10)])
+@few(("scipy_method", "rtol"), [("Radau", 1e-9), ("LSODA", 1e-10)], every=2)
 def test_an_earthquake_agrees_with_scipy(method, scipy_method, rtol):
     """Uncontrolled, from a nudge over the event into rest: four decades of slip."""
     fault = REAL.with_disturbance(Disturbance(constant=1e-5))
@@ -139,7 +140,7 @@ def test_a_sampled_law_is_refused():
         simulate(REAL, published("real-fault")["elqr"], duration=10.0, method="cvodes", scheme="explicit")
 
 
-@pytest.mark.parametrize("method", ADAPTIVE)
+@few("method", ADAPTIVE, every=2)
 def test_a_diverging_loop_says_when_as_with_a_fixed_step(method, capfd):
     good = published("real-fault")["elqr"]
     bad = dataclasses.replace(good, gains={name: -value for name, value in good.gains.items()})

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.errors import SimulationError
 from quakedesign.fault import load_fault
@@ -26,7 +27,7 @@ def same(one, other):
     assert one.energy == other.energy
 
 
-@pytest.mark.parametrize("plant", ["smooth", "coulomb"])
+@few("plant", ["smooth", "coulomb"], every=2)
 def test_a_run_interrupted_thrice_ends_with_the_same_digits(tmp_path, plant):
     law = published("real-fault")["cta"]
     whole = simulate(REAL, law, plant=plant, **SETTING)
@@ -82,6 +83,7 @@ def test_memories_of_actuator_and_sensors_go_on_too(tmp_path):
     assert not np.array_equal(simulate(REAL, law, **setting, **other).slip, whole.slip)
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on(start, tmp_path):
     """SIGKILL in the middle of writing again and again."""
     path = tmp_path / "run.checkpoint"

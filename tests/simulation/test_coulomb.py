@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
@@ -66,7 +67,7 @@ def test_it_comes_back_only_if_the_spring_can_pull_it(push):
     assert ("reverse_slip" in run.events) == (push > 2)
 
 
-@pytest.mark.parametrize(
+@few(
     "load",
     [
         {"constant": -1e-3},
@@ -74,6 +75,7 @@ def test_it_comes_back_only_if_the_spring_can_pull_it(push):
         {"constant": -2 * STRENGTH * (1 - 1e-12)},
         {},
     ],
+    every=2,
 )
 def test_a_load_that_friction_carries_never_moves_it(load):
     run = simulate(pushed(REAL, **load), duration=2000.0, samples=10**6, plant="coulomb")
@@ -194,6 +196,7 @@ def test_a_shaken_block_agrees_with_scipys_events():
     assert np.max(np.abs(run.slip - expected[0])) < 1e-10 * np.ptp(expected[0])
 
 
+@pytest.mark.slow
 def test_the_published_linear_law_sticks_most_of_the_time_and_agrees_with_scipy():
     """ERRATA 14: e-LQR with the paper's shaking, where the smooth plant runs backward."""
     controller = published("real-fault")["elqr"]
@@ -235,7 +238,7 @@ def test_the_monitor_agrees_with_numpy():
     assert Metrics.unit("stick_fraction") == ""
 
 
-@pytest.mark.parametrize("law", ["cta", "elqr"])
+@few("law", ["cta", "elqr"], every=2)
 def test_both_backends_give_the_same_digits(law, monkeypatch):
     monkeypatch.setattr("quakedesign.simulation.compiled._WORTH", 0)
     setting = {"duration": 1001 * REAL.sampling_time, "samples": 40, "plant": "coulomb"}

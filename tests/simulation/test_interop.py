@@ -5,6 +5,7 @@ import control
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, friction_law, friction_laws, load_fault
@@ -140,7 +141,7 @@ def test_parameters_that_are_not_free_are_refused(parameters, controller, named)
         to_casadi(LAB, controller, parameters=parameters)
 
 
-@pytest.mark.parametrize("fault", list(faults_of_every_law()))
+@few("fault", list(faults_of_every_law()), every=2)
 def test_derivatives_at_the_equilibrium_are_those_that_are_derived(fault):
     """From rest motion goes to slip > 0 and slip rate > 0; rate and state are carried as logarithms (chain rule)."""
     if fault.friction.state_names:

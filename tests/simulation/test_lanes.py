@@ -63,6 +63,7 @@ def test_the_digits_do_not_depend_on_the_lanes_nor_on_the_processor(monkeypatch,
     assert without_compiler(of.program, starts(of), monkeypatch).tobytes() == ends[0].tobytes()
 
 
+@pytest.mark.slow
 def test_branches_and_substeps_have_the_digits_of_the_virtual_machine(monkeypatch, tmp_path):
     of = problem("cta", PUSHED)
     assert "times < 3" in of.program.source

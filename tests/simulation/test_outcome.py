@@ -112,6 +112,7 @@ def test_the_natural_peak_is_computed_once_for_a_fault_whatever_disturbs_it(monk
         assert simulate(fault, published("lab-fault")["elqr"], duration=0.1).outcome.share_of_natural > 0
 
 
+@pytest.mark.slow
 def test_a_loop_that_is_sampled_too_slowly_for_its_instability_is_an_earthquake():
     """Certified gains, T_s = 0.1 s, unstable pole at 13 1/s; at a tenth of this T_s the same gains track.
 

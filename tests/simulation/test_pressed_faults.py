@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
+from thinned import few
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import friction_law
@@ -100,7 +101,8 @@ def test_cycles_under_ramps_and_a_step_agree_with_an_independent_integrator(name
     assert np.max(np.abs(run.imbalance)) < 1e-8
 
 
-@pytest.mark.parametrize("method", ["radau", "cvodes"])
+@pytest.mark.slow
+@few("method", ["radau", "cvodes"], every=2)
 def test_implicit_methods_follow_the_same_cycles(method):
     _, onsets = quasi_dynamic("rate-and-state-aging", ALPHA, [0.0, 20.0, 60.0, 61.0])
     setting = {"start_rate": V0, "start_state": (D / V0 * 1.01,), "pressure": COURSE, "rtol": 1e-9}
@@ -109,6 +111,7 @@ def test_implicit_methods_follow_the_same_cycles(method):
     assert np.max(np.abs(run.onsets / onsets - 1)) < 1e-6
 
 
+@pytest.mark.slow
 def test_with_inertia_it_agrees_with_the_unlogged_equations_under_pressure():
     """Stretch, rate and state as such by another implicit method, from 0 to a bend at 20 s and on to 45 s."""
     mass = 2000.0

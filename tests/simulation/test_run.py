@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from thinned import few
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Disturbance, load_fault
@@ -95,7 +96,7 @@ def test_a_fault_without_weakening_is_a_forced_oscillator():
     assert np.allclose(run.slip, expected, rtol=1e-9, atol=1e-16)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@few("law", LAWS, every=3)
 @pytest.mark.parametrize("fault", [REAL, LAB], ids=["real", "lab"])
 def test_both_backends_give_the_same_digits(fault, law, monkeypatch):
     monkeypatch.setattr("quakedesign.simulation.compiled._WORTH", 0)
@@ -115,6 +116,7 @@ def test_both_backends_give_the_same_digits(fault, law, monkeypatch):
     assert fast.events == slow.events
 
 
+@pytest.mark.slow
 def test_a_run_that_is_shorter_than_a_compilation_is_not_compiled():
     short, long = (simulate(LAB, published("lab-fault")["cta"], duration=d, samples=2) for d in (0.1, 2000.0))
     assert (short.provenance["backend"], short.provenance["backend_reason"]) == (
@@ -216,12 +218,14 @@ def test_meaningless_settings_are_refused(options, said):
         simulate(LAB, **options)
 
 
-@pytest.mark.parametrize(
+@pytest.mark.slow
+@few(
     ("law", "bounds"),
     [
         ("cta", {"max_slip_rate_error": (5.4e-3, 6.0e-3)}),
         ("elqr", {"max_slip_error": (0.8e-3, 1.2e-3)}),
     ],
+    every=2,
 )
 def test_the_published_gains_give_the_papers_errors(law, bounds):
     """Section IV-A: 2-CTA rate error about 5.7e-3 m/s (ERRATA 14), e-LQR slip error about 1 mm (ERRATA 29)."""

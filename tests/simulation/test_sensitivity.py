@@ -49,6 +49,7 @@ def test_the_orders_hold_over_three_decades():
     assert list(study.orders()["compensated"].values()) == pytest.approx((3, 2.15, 1), abs=0.05)
 
 
+@pytest.mark.slow
 def test_noise_raises_the_errors_and_leaves_the_order_of_the_schemes():
     study = noise_sensitivity(
         REAL, LAW, levels=(1e-8, 1e-5), of="rate_noise", schemes=("explicit", "compensated"), duration=2000.0
@@ -58,6 +59,7 @@ def test_noise_raises_the_errors_and_leaves_the_order_of_the_schemes():
     assert study.errors["compensated"]["slip_rate_error"] < study.errors["explicit"]["slip_rate_error"]
 
 
+@pytest.mark.slow
 def test_the_compensated_scheme_keeps_both_limits_over_the_whole_box():
     study = gain_sensitivity(REAL.with_box("ten-percent"), LAW, points=2, schemes=("compensated",), duration=30000.0)
     assert study.levels[0] < 1.1 < 1.3 < study.levels[1]

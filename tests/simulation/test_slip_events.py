@@ -90,6 +90,7 @@ def test_a_locked_fault_ages_with_the_time_that_it_is_held():
         locked(fault(), RATE, 0.0)
 
 
+@pytest.mark.slow
 def test_late_in_the_cycle_the_rest_of_the_interval_is_left():
     start = late_in_cycle(fault(), RATE, 0.9, **QUASI)
     run = simulate_state(

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
+from thinned import few
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import friction_law, load_fault
@@ -211,6 +212,7 @@ def test_the_rate_solved_from_the_balance_of_forces_gives_the_same_motion(evolut
     assert np.max(np.abs(run.slip + run.stretch - run.stretch[0] - run.load_point)) < 1e-15
 
 
+@pytest.mark.slow
 def test_with_inertia_it_agrees_with_the_unlogged_equations():
     """Slip, rate and state as such, in an implicit method of another family; the interval converges to theirs."""
     slider = dataclasses.replace(QDYN, mass=2000.0)
@@ -235,7 +237,7 @@ def test_with_inertia_it_agrees_with_the_unlogged_equations():
     assert errors[-1] < 1e-9
 
 
-@pytest.mark.parametrize("mass", [0.0, 2e9])
+@few("mass", [0.0, 2e9], every=2)
 def test_small_perturbations_grow_as_the_derived_eigenvalues_say(mass):
     """det(λE − J) of `state_plant.characteristic` with numbers, against the simulated growth between two peaks."""
     slider = SpringSlider(law=law(), stiffness=450.0, normal_stress=1.0, damping=20.0, mass=mass)
@@ -278,6 +280,7 @@ def test_the_critical_stiffness_separates_decay_from_growth():
     assert ripples[1] < 0.8
 
 
+@pytest.mark.slow
 def test_a_fault_has_earthquakes_years_apart():
     """The paper's fault with rate-and-state friction: with inertia and without the same cycles within a few percent."""
     friction = law(critical_slip=0.02, reference_rate=1e-6)
@@ -361,7 +364,8 @@ def test_a_law_without_state_is_sent_to_simulate():
         simulate_state(load_fault("lab-fault"), 1e-6, duration=1.0)
 
 
-@pytest.mark.parametrize(("method", "rtol", "error"), [("cvodes", 1e-10, 3e-7), ("idas", 1e-10, 3e-7)])
+@pytest.mark.slow
+@few(("method", "rtol", "error"), [("cvodes", 1e-10, 3e-7), ("idas", 1e-10, 3e-7)], every=2)
 def test_sundials_finds_the_same_stick_slip_cycles(method, rtol, error):
     """Onsets are found although no step of the solver is known: every event of the parameters of QDYN's notebook."""
     run = simulate_state(QDYN, 1e-5, duration=300.0, start_rate=1.01e-5, start_state=(1.0,), method=method, rtol=rtol)

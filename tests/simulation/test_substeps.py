@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign import load_fault, published
 from quakedesign.loop import Actuator, Diffusion, simulation_scheme
@@ -34,7 +35,7 @@ def written_out(loop, motion, given, state, step, times):
     return state
 
 
-@pytest.mark.parametrize("plant", ["smooth", "coulomb"])
+@few("plant", ["smooth", "coulomb"], every=2)
 @pytest.mark.parametrize("factors", [(), Variation(stiffness=1.07).values], ids=["nominal", "varied"])
 def test_the_digits_are_those_of_steps_written_out(plant, factors):
     def motion(plant, passed, now, given):

@@ -149,6 +149,7 @@ def actuated():
     return simulate(LAB, law, scheme="explicit", actuator=actuator, substeps=2, duration=2.0, samples=2000)
 
 
+@pytest.mark.slow
 def test_what_an_actuator_adds_is_in_every_export_with_its_unit(actuated, tmp_path):
     units = {"well_pressure": "Pa", "injected_volume": "m^3", "flow_rate": "m^3/s"}
     with xr.open_dataset(actuated.save(tmp_path / "run.nc"), engine="h5netcdf") as data:

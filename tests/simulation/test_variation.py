@@ -40,11 +40,13 @@ def test_ones_change_nothing(plant):
     assert np.allclose(runs[0].slip, runs[1].slip, rtol=1e-9, atol=1e-12 * np.max(np.abs(runs[0].slip)))
 
 
+@pytest.mark.slow
 def test_less_damping():
     varied = same_motion(dataclasses.replace(REAL, damping=0.8 * REAL.damping), damping=0.8)
     assert varied.provenance["variation_damping"] == 0.8
 
 
+@pytest.mark.slow
 def test_less_weakening():
     """The drop is what changes; friction starts at its own static value."""
     friction = dataclasses.replace(REAL.friction, drop=0.6 * REAL.friction.drop)

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from thinned import few
 
 from quakedesign import sos
 from quakedesign.sos.exact.polynomial_text import names_in_text, parse, parse_constraint
@@ -31,7 +32,7 @@ def accepted(name):
     return {BY_NAME[name]["verdict"]} | ({"undecided"} if name in OPEN else set())
 
 
-@pytest.mark.parametrize("name", NAMES)
+@few("name", NAMES, every=4)
 def test_the_verdict_is_right_and_its_proof_checks(name):
     found = answer(name)
     assert str(found.verdict) in accepted(name)
@@ -102,7 +103,7 @@ def invariant(name, transformation):
 CASES = [(name, t) for k, t in enumerate(TRANSFORMATIONS) for name in NAMES[k::STRIDE]]
 
 
-@pytest.mark.parametrize(("name", "transformation"), CASES)
+@few(("name", "transformation"), CASES, every=4)
 def test_the_verdict_does_not_depend_on_names_order_and_scale(name, transformation):
     assert invariant(name, transformation)
 

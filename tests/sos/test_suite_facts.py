@@ -223,6 +223,7 @@ def test_what_is_not_a_sum_of_squares_is_nonnegative_all_the_same(name):
     assert proved(PROOFS[name]["nonnegative"], times(denominator, polynomial), inequalities, [])
 
 
+@pytest.mark.slow
 def test_harris_decic_has_thirty_zeros():
     form = symbolic("harris decic")
     mirrors = {X: sp.factor_list(form.subs({Y: X, Z: 1})), Y: sp.factor_list(form.subs({Y: 0, Z: 1}))}

@@ -4,6 +4,7 @@ from dataclasses import replace
 from fractions import Fraction as F
 
 import pytest
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.laws.dia import DiscontinuousIntegral
@@ -41,7 +42,8 @@ def test_the_largest_bound_is_told_with_what_limits_it_and_the_scale_for_a_large
     assert "lambda >=" in said
 
 
-@pytest.mark.parametrize("maximize", ["beta", "beta-factor"])
+@pytest.mark.slow
+@few("maximize", ["beta", "beta-factor"], every=2)
 def test_the_largest_range_is_told_as_a_range(maximize):
     answer = certified("super-twisting", ("1.2", "2"), lipschitz=1, maximize=maximize, gain_range=(2, 2))
     low, high = map(F, answer.facts["gain_range"])

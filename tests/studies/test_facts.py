@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from thinned import few
 
 from quakedesign.fault import load_fault
 from quakedesign.studies.facts import fault_sentences
@@ -22,6 +23,7 @@ def test_friction_is_told_as_it_was_read_with_its_box_in_numbers():
     assert not any("guarantees are for" in line for line in fault_sentences(PATCH))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("density", "unlikely"), [(2.5, True), (2500.0, False), (834.0, False), (833.0, True)])
 def test_shear_waves_that_no_rock_has_are_pointed_out(density, unlikely):
     """833.3 kg/m³ makes 6000 m/s of 30 GPa; a block in a laboratory may be anything."""
@@ -29,7 +31,7 @@ def test_shear_waves_that_no_rock_has_are_pointed_out(density, unlikely):
     assert "UNLIKELY" not in fault_sentences(load_fault("lab-fault"))[1]
 
 
-@pytest.mark.parametrize(("slowest", "fastest", "side"), [(2e-6, 1.0, "below"), (1e-9, 9e-7, "above"), (1e-6, 1.0, "")])
+@few(("slowest", "fastest", "side"), [(2e-6, 1.0, "below"), (1e-9, 9e-7, "above"), (1e-6, 1.0, "")], every=2)
 def test_a_task_beyond_the_rates_of_its_friction_is_said_to_be_extrapolated(slowest, fastest, side):
     """The patch slides at 1 µm/s."""
     law = replace(PATCH.friction, slowest_rate=slowest, fastest_rate=fastest, reference_rate=(slowest * fastest) ** 0.5)

@@ -143,6 +143,7 @@ def test_what_is_printed_stays_within_80_columns_and_on_the_safe_side(designs):
     json.dumps(found.to_dict(), allow_nan=False)
 
 
+@pytest.mark.slow
 def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
     plain, found = study(REAL), study(REAL, measured="slip", slip_noise="1e-6")
     least, noisy = (one.peak_slip_rate_error for one in (plain, found))

@@ -17,6 +17,7 @@ from laboratory import (  # beside the package
     numbers,
 )
 from scipy.integrate import solve_ivp
+from thinned import few
 
 from quakedesign.fault import load_fault
 from quakedesign.fault.model import rest_slip
@@ -89,13 +90,15 @@ def natural(damping, critical_slip):
     return end, at[1] - at[0]
 
 
-@pytest.mark.parametrize(
+@pytest.mark.slow
+@few(
     ("changed", "slip", "time"),
     [
         ({}, 7.1e-3, (50e-3, 80e-3)),  # printed: 50 ms, around 80 ms
         ({"damping": 10.0}, 7.1e-3, (0.5, 0.8)),
         ({"critical_slip": 5e-3}, 4.4e-3, (0.15, 0.2)),
     ],
+    every=3,
 )
 def test_the_natural_earthquake_takes_the_printed_time_with_the_printed_numbers_alone(changed, slip, time):
     one = replace(PRINTED, **changed)

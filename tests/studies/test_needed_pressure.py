@@ -62,6 +62,7 @@ def test_a_stable_fault_needs_injection_alone():
     assert "needs injection of fluid" in " ".join(fault_sentences(stable))
 
 
+@pytest.mark.slow
 def test_a_run_that_can_only_inject_says_why_it_fails():
     """e-LQR of the paper behind a pump without withdrawal: the fault goes as without control."""
     pump = Actuator(stages=(Saturation(lowest=0.0, highest=2e4),))
@@ -78,6 +79,7 @@ def test_a_run_that_can_only_inject_says_why_it_fails():
     assert "(withdrawal) to" in run_sentences(free, hurried)[1]
 
 
+@pytest.mark.slow
 def test_the_command_says_outcome_and_reason_first(capsys):
     call = ("simulate", "lab-fault", "--controller", "elqr", "--scheme", "explicit", "--step", "0.5 ms")
     limited = ("--saturation", "20 kPa", "--withdrawal", "0", "--duration", "600")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.fault import Disturbance, friction_law, load_fault
 from quakedesign.studies.facts import fault_sentences, sampling_adequacy, sampling_sentence
@@ -86,7 +87,7 @@ def test_friction_with_a_state_is_judged_in_slow_sliding_along_its_task(width):
     assert min(roots.real) > 0
 
 
-@pytest.mark.parametrize(("factor", "said"), [(0.49, True), (0.51, False), (1.99, False), (2.1, True)])
+@few(("factor", "said"), [(0.49, True), (0.51, False), (1.99, False), (2.1, True)], every=2)
 def test_a_state_asks_for_a_sampling_time_of_its_own_when_that_of_the_fault_is_far_off(factor, said):
     """A twentieth of D_c/V, where what a run-away allows is much longer."""
     patch = load_fault("crustal-patch")

@@ -135,6 +135,7 @@ def test_what_cannot_be_enclosed_is_not_proved(function, message):
         friction_bounds(shape((0.3, 0.6, 150, 0))(function)())
 
 
+@pytest.mark.slow
 def test_signed_powers_without_a_jump_are_proved():
     """Friction 0.4 + 0.1·min(1, (s/mm)²) has slopes up to 200 1/m."""
     squared = shape((0.4, 0.5, 200, 0))(lambda s, _: sp.Min(1, SignedPower(s, 2)))

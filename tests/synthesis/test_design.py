@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError, UnknownNameError
@@ -81,7 +82,7 @@ def test_a_sliding_mode_in_continuous_time_is_proved_with_its_premise_along_the_
     assert design.controller.scale == F(design.details["rho"]) ** 6
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+@few("variant", VARIANTS, every=3)
 def test_the_elqr_in_continuous_time_is_proved_about_constant_references(continuous, variant):
     design = continuous("elqr", variant)
     assert design.verdict is Verdict.PROVED

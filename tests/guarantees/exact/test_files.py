@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError
@@ -121,7 +122,7 @@ def standalone(text):
         return f"invalid: {error}"
 
 
-@pytest.mark.parametrize(
+@few(
     ("name", "rate_limited"),
     [
         pytest.param(name, kind, marks=pytest.mark.slow if kind and "rock" in name else ())
@@ -129,6 +130,7 @@ def standalone(text):
         for kind in (False, True)
         if not kind or "noisy" not in name
     ],
+    every=2,
 )
 def test_both_checkers_accept_what_the_package_writes(name, rate_limited):
     found = claim(name, rate_limited)
@@ -247,7 +249,7 @@ def test_the_statement_about_continuous_time_says_so_in_both():
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
 
 
-@pytest.mark.parametrize(
+@few(
     ("loop", "name"),
     [(loop, name) for loop in ("estimate", "sluggish", "continuous") for name in CLAIMS]
     + [("rock", "slip_rate_error"), ("lagging rock", "slip_error")]
@@ -256,6 +258,7 @@ CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "
     + [("jittery deadbeat", "slip_error"), ("jittery lag", "largest_asked"), ("paced", "largest_step")]
     + [("jittery and late", "least_pressure")]
     + [("observer", "slip_rate_error"), ("noisy sluggish", "slip_error"), ("noisy", "least_pressure")],
+    every=2,
 )
 def test_one_percent_less_is_refused_by_both(name, loop):
     raw = json.loads(guarantee_text(claim(loop)))
@@ -306,9 +309,7 @@ WORSE += [
 ]
 
 
-@pytest.mark.parametrize(
-    ("loop", "place", "factor"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else ""
-)
+@few(("loop", "place", "factor"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else "", every=2)
 def test_worse_data_under_the_same_claims_are_refused_by_both(loop, place, factor):
     raw = json.loads(guarantee_text(claim(loop)))
     holder = raw

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import mpmath
 import pytest
+from thinned import few
 
 from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError, UnsupportedError
@@ -204,7 +205,7 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction, swing):
     assert [moved[name] for name in OUTPUTS[:3]] == cell.soon(F(3))
 
 
-@pytest.mark.parametrize("path", [*PATHS, {"diffusion": F(40), "delay": F(20), "slip_noise": F(1, 10**7)}])
+@few("path", [*PATHS, {"diffusion": F(40), "delay": F(20), "slip_noise": F(1, 10**7)}], every=2)
 @pytest.mark.parametrize("friction", FRICTION.values(), ids=FRICTION)
 def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
     """Exactly, of gains that are made up: what adds at once, what a step does, small gain and bounds."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.guarantees import NoGuarantee, guarantee, worst_found
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
@@ -102,7 +103,7 @@ def test_no_mixed_course_of_ten_thousand_leaves_the_claims(row):
     assert claim.claims.slip_rate_error / ROWS[row][2] <= rate <= claim.claims.slip_rate_error
 
 
-@pytest.mark.parametrize("row", ["jitter", "of the delay", "sliding mode"])
+@few("row", ["jitter", "of the delay", "sliding mode"], every=3)
 def test_the_search_stays_inside_and_finds_more_than_on_time(row):
     claim = proved(row)
     on_time = replace(claim, held=replace(claim.held, jitter=F(0), delay_jitter=F(0)))
@@ -111,6 +112,7 @@ def test_the_search_stays_inside_and_finds_more_than_on_time(row):
     assert before.slip_rate_error < seen.slip_rate_error <= claim.claims.slip_rate_error
 
 
+@pytest.mark.slow
 def test_the_search_with_stick_stays_inside():
     claim = proved("late")
     seen = worst_found(claim, sticks=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import design_held
@@ -85,7 +86,7 @@ LAGS = {("0.184", "0.2"): 2.3e-4, ("0.05", "0.2"): 6.6e-5, ("0.184", "0.001"): 1
 
 
 @pytest.mark.parametrize("count", [500, pytest.param(10_000, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("times", LAGS)
+@few("times", LAGS, every=3)
 def test_no_course_violates_a_guarantee_behind_a_lag(times, count):
     step, lag = map(F, times)
     claim = design_held(uncertain_plant(REAL), step, lag=lag)
@@ -107,7 +108,8 @@ SLIP_ALONE = {
 }
 
 
-@pytest.mark.parametrize("behind", ["lag", pytest.param("rock", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("behind", ["lag", "rock"])
 def test_no_course_with_noise_violates_a_guarantee_of_the_slip_alone(behind):
     around, step, most, count = SLIP_ALONE[behind]
     claim = design_held(uncertain_plant(REAL), step, measured="slip", slip_noise=F(1, 10**6), **around)

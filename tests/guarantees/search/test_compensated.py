@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign import simulate
 from quakedesign.errors import ParameterError, UnsupportedError
@@ -138,9 +139,10 @@ def test_with_stick_no_course_leaves_the_bounds(row):
     assert largest[1].max() <= claim.claims.slip_rate_error
 
 
-@pytest.mark.parametrize(
+@few(
     ("row", "sticks"),
     [("cta", False), ("cta", True), ("1/64", False), pytest.param("1/64", True, marks=pytest.mark.slow)],
+    every=3,
 )
 def test_the_worst_found_is_below_the_bound_and_no_less_than_the_attacker_s(row, sticks):
     held, claim = numbers(row)

@@ -7,6 +7,7 @@ from fractions import Fraction as F
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError, UnknownNameError
@@ -72,7 +73,7 @@ def test_the_real_fault_reaches_what_the_method_promises(peaks):
     assert peaks["rate"].claims.slip_rate_error <= F("2.3e-5")
 
 
-@pytest.mark.parametrize("name", GAINS)
+@few("name", GAINS, every=2)
 @pytest.mark.parametrize("kind", CLASSES)
 def test_what_a_search_finds_is_below_and_near(name, kind):
     found = certified_peaks(qd.load_fault(name), law(name), disturbance_class=kind)
@@ -303,7 +304,7 @@ def test_the_sine_of_the_preset_stays_within_both_classes(real, designed, peaks,
     assert top[1] < float(peaks[kind].claims.slip_rate_error)
 
 
-@pytest.mark.parametrize("name", GAINS)
+@few("name", GAINS, every=2)
 @pytest.mark.parametrize("box", ["paper", "ten-percent"])
 def test_many_attacks_with_random_switching_never_exceed_the_bounds(name, box):
     """Parameters and force jump between their ends, 400 courses of 4000 steps; the loop by hand from the gains."""

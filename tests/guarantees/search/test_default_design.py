@@ -124,6 +124,7 @@ def test_sampled_faster_that_fault_is_guaranteed(step):
     assert claim.claims.peak_slip_rate < 1e-5  # its natural earthquake: 0.31 m/s
 
 
+@pytest.mark.slow
 def test_an_independent_simulator_does_not_leave_the_guarantee_of_the_shorter_step():
     claim = designed("slow").guarantee
     held = attacker.numbers(claim)

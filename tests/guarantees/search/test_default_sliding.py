@@ -203,6 +203,7 @@ def test_a_guarantee_needs_no_certificate_in_continuous_time(unproved, unreached
     assert qd.design(REAL, "cta", continuous=True).verdict is Verdict.UNDECIDED
 
 
+@pytest.mark.slow
 def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works(unproved):
     design = qd.design(SLOW, "cta")
     base = replace(design.controller, gains=dict(design.controller.gains), sampling=None)
@@ -215,6 +216,7 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert (found.holds, found.certified) == (False, step)
 
 
+@pytest.mark.slow
 def test_where_no_step_has_a_guarantee_it_is_the_design_in_continuous_time(monkeypatch):
     fails = NoGuarantee(reason="small gain 1.2", small_gain=None)
     known = load_certificate(CERTIFICATE)

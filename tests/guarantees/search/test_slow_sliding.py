@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
+from thinned import few
 
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
@@ -66,7 +67,7 @@ def test_claims_are_followed_down_to_what_both_checkers_still_prove(half):
     assert replace(found, claims=smaller).check() is Verdict.UNDECIDED
 
 
-@pytest.mark.parametrize("half", ["0", "0.02"])
+@few("half", ["0", "0.02"], every=2)
 def test_what_was_claimed_first_is_proved_where_too_little_is_claimed_then(half, monkeypatch):
     def too_small(found):
         return SlidingClaims(**{name: UpperBound(v / 100) for name, v in sizes(found.claims).items()})
@@ -122,9 +123,10 @@ def replayed(plant_task, stress, ahead, pieces=4, normal=50e6):
     return largest
 
 
-@pytest.mark.parametrize(
+@few(
     ("law", "room", "swing"),
     [("ageing", LOG_RATES[0], F(0)), ("slip", LOG_RATES[2], F(0)), ("ageing", F(1, 2), F(1, 20))],
+    every=3,
 )
 def test_what_the_search_finds_is_reached_by_another_integrator_and_stays_below_what_is_proved(law, room, swing):
     found = proved_sliding(replace(task("0", 8000), state_law=law, swing=swing), HELD, log_rate=room)
@@ -143,6 +145,7 @@ def test_what_the_search_finds_is_reached_by_another_integrator_and_stays_below_
     assert plant.largest(pushed, pushed / 8000 * float(swing))[0] <= worst.log_rate
 
 
+@pytest.mark.slow
 def test_where_the_way_has_taken_normal_stress_the_same_stress_does_more():
     """40 cm of it leave 46 of 50 MPa: what is found is reached there by another integrator."""
     found = proved_sliding(replace(task("0", 8000), distance=F("0.4")), HELD)

@@ -106,6 +106,7 @@ def test_a_run_from_a_corner_stays_within_the_claims_of_its_law():
     assert np.abs(run.slip_rate_error).max() <= claim.claims.slip_rate_error
 
 
+@pytest.mark.slow
 def test_a_search_leaves_from_the_corners_and_the_floats_of_a_design_know_the_start():
     claim, errors = started("fast"), {}
     for sticks in (False, True):

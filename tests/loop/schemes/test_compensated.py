@@ -55,6 +55,7 @@ def test_the_estimate_is_the_filtered_difference():
         assert found[k + 1] == pytest.approx(estimate, rel=1e-7, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_weight_one_chatters_where_the_theory_says_so():
     """At the start β/β0 = 1.425 with the smallest β0 of the box: above 4/3, below 8/5."""
     least = REAL.friction.residual * REAL.authority

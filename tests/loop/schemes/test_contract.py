@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, load_fault
@@ -75,7 +76,7 @@ def test_a_scheme_has_a_name_and_says_what_it_does(name):
     assert isinstance(simulation_scheme(name), kind)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@few("law", LAWS, every=3)
 @pytest.mark.parametrize("name", SAMPLED)
 def test_every_law_runs_with_finite_figures_or_is_named_diverged(name, law):
     found = run(name, law)
@@ -85,7 +86,7 @@ def test_every_law_runs_with_finite_figures_or_is_named_diverged(name, law):
     assert found.integrals.shape == (len(found.integral_units), found.time.size)
 
 
-@pytest.mark.parametrize("name", SAMPLED)
+@few("name", SAMPLED, every=2)
 def test_between_samples_the_fault_moves_under_the_pressure_that_is_held(name):
     """Without weakening and disturbance the plant is linear, and the matrix exponential gives every sample exactly."""
     friction = dataclasses.replace(REAL.friction, drop=0.0)
@@ -101,13 +102,13 @@ def test_between_samples_the_fault_moves_under_the_pressure_that_is_held(name):
         assert np.allclose(values[1:], expected, rtol=1e-8, atol=1e-9 * np.max(np.abs(values)))
 
 
-@pytest.mark.parametrize("name", SAMPLED)
+@few("name", SAMPLED, every=3)
 def test_without_control_a_scheme_is_the_integrator(name):
     sampled, plain = run(name, "none"), run("continuous", "none")
     assert np.allclose(sampled.slip, plain.slip, rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("name", SAMPLED)
+@few("name", SAMPLED, every=2)
 def test_substeps_refine_the_plant_and_not_the_control(name):
     """Under a law without chatter the motions differ by the error of the integrator only."""
     coarse, fine = (run(name, "elqr", count=60, substeps=n) for n in (1, 5))
@@ -115,7 +116,7 @@ def test_substeps_refine_the_plant_and_not_the_control(name):
     assert coarse.time.size == fine.time.size == 61
 
 
-@pytest.mark.parametrize("name", SAMPLED)
+@few("name", SAMPLED, every=3)
 def test_both_backends_give_the_same_digits_through_every_stage(name, monkeypatch):
     monkeypatch.setattr("quakedesign.simulation.compiled._WORTH", 0)
     setting = {
@@ -142,7 +143,7 @@ def machine(name, law, **options):
     return _step(recorder, integrator("dormand-prince")).serialize(), recorder.start(0.0)
 
 
-@pytest.mark.parametrize("name", SAMPLED)
+@few("name", SAMPLED, every=2)
 def test_numbers_are_data_and_not_code(name):
     """Other gains, limits and noise give the same step function, with another vector to start from."""
     other = control_law("cta").from_values(("8", "6", "2.5", "1.3"), scale="1/500", divisor=DIVISOR)
@@ -156,7 +157,7 @@ def test_numbers_are_data_and_not_code(name):
     assert start != changed
 
 
-@pytest.mark.parametrize("name", SAMPLED)
+@few("name", SAMPLED, every=3)
 def test_no_error_and_no_disturbance_means_no_pressure(name):
     still = dataclasses.replace(REAL, reference=dataclasses.replace(REAL.reference, target_slip=1e-300))
     found = run(name, "elqr", fault=still.with_disturbance(Disturbance()), count=20)

@@ -7,6 +7,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 import sympy as sp
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.laws import control_law
@@ -96,7 +97,7 @@ def states(scale, count=16):
     return [tuple(map(float, point)) for point in points]
 
 
-@pytest.mark.parametrize("scale", SCALES)
+@few("scale", SCALES, every=2)
 @pytest.mark.parametrize("name", GAINS)
 def test_pressure_and_integral_are_those_of_the_inclusion(name, scale):
     exact = F(scale)

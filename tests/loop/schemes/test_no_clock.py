@@ -40,6 +40,7 @@ def sampled(run):
     return [0, *(np.flatnonzero(np.diff(run.pressure)) + 1).tolist()]
 
 
+@pytest.mark.slow
 def test_samples_come_one_to_two_shortest_intervals_after_the_last_each_as_often():
     often = np.bincount(np.diff(sampled(seen())), minlength=17)
     assert sum(often[:8]) == 0
@@ -66,6 +67,7 @@ def test_the_law_of_the_file_asks_for_every_pressure_of_the_run():
     assert np.abs(asked - run["pressure [Pa]"]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_equal_intervals_are_those_of_a_clock_in_every_digit():
     fixed = simulate(FAULT, claim().controller, scheme=Explicit(clock=NoClock(shortest=8, longest=8)), **SHORT)
     law = replace(claim().controller, longest=F(0))
@@ -81,6 +83,7 @@ def test_a_run_stays_in_its_guarantee():
     assert "NoClock(shortest=8, longest=16, seed=0)" in seen().provenance["clock"]
 
 
+@pytest.mark.slow
 def test_noise_is_told_at_the_samples_alone():
     loud = simulate(FAULT, claim().controller, measurement=Measurement(slip_noise=1e-8, rate_noise=1e-6), **SHORT)
     assert sampled(loud) == sampled(seen())

@@ -5,6 +5,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.loop.sensing import Differentiator
@@ -56,9 +57,10 @@ def test_plain_euler_loses_an_order_between_the_first_and_the_last_estimate():
     assert found == pytest.approx([3, 1, 1], abs=0.25)
 
 
-@pytest.mark.parametrize(
+@few(
     ("order", "filters", "discretisation"),
     [(1, 0, "homogeneous"), (1, 0, "implicit"), (2, 0, "implicit"), (1, 2, "homogeneous")],
+    every=2,
 )
 def test_errors_grow_with_the_powers_of_the_noise_that_theory_gives(order, filters, discretisation):
     """|ε_i| ~ ε^((n + 1 − i)/(n + 1)): never above the constants that adverse noise gave, of the same order."""
@@ -89,6 +91,7 @@ def test_a_wave_of_amplitude_one_at_high_frequency_is_filtered_out(discretisatio
     assert errors[0][1] > 5 * errors[1][1] > 5 * errors[2][1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "theory"), [(1, [0, 1 / 2]), (2, [0, 1 / 3, 1]), (3, [0, 1 / 4, 11 / 12, 3 / 2])])
 @pytest.mark.parametrize("filters", [0, 1])
 def test_constants_of_the_implicit_one_are_the_next_terms_of_the_powers_of_the_logarithm(order, theory, filters):

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
@@ -106,7 +107,7 @@ def largest_error(law, scheme, step, duration=1.0):
 
 
 @pytest.mark.parametrize("discretisation", ["homogeneous", "implicit"])
-@pytest.mark.parametrize("law", ["elqr", "cta"])
+@few("law", ["elqr", "cta"], every=2)
 def test_a_bound_that_goes_with_the_sampling_period_tracks_to_a_micrometre(law, discretisation):
     scheme = sensed(bound=100.0, step=1e-5, discretisation=discretisation)
     assert largest_error(law, scheme, 1e-5) < 1e-6
@@ -124,6 +125,7 @@ def test_the_printed_differentiator_loses_the_sliding_mode_and_a_bound_ten_decad
     assert larger < 1e-7
 
 
+@pytest.mark.slow
 def test_the_implicit_differentiator_tracks_at_a_millisecond_for_every_bound_above_the_disturbance():
     errors = [largest_error("cta", sensed("implicit", bound=b, step=1e-3), 1e-3) for b in (10.0, 1e3, 1e6)]
     assert max(errors) < 2e-6

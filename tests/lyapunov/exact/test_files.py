@@ -75,7 +75,7 @@ def verdicts(text, standalone):
 NUMBER = re.compile(r'(?<=")-?\d+(?:/\d+)?(?=")|(?<=[\[,:])-?\d+(?=[\],}])')
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_changed_number_is_refused_or_a_changed_true_claim(texts, standalone, data):
     text = texts[data.draw(st.sampled_from(sorted(texts)))]

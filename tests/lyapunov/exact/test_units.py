@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import pytest
 import sympy as sp
+from thinned import few
 
 from quakedesign.fault import load_fault
 from quakedesign.laws.cta import ContinuousTwisting
@@ -44,6 +45,7 @@ def test_the_units_are_those_of_the_law_itself_whatever_its_name():
         assert units["e2"] == units["e3"] == (F(1), F(1))
 
 
+@pytest.mark.slow
 def test_a_controller_from_outside_the_package_is_judged_on_a_fault():
     fault = load_fault("real-fault")
     judged = assess(fault, Mine.from_values(tuple(GAINS.values()), scale=F(1, 100), divisor=least_authority(fault)))
@@ -52,7 +54,8 @@ def test_a_controller_from_outside_the_package_is_judged_on_a_fault():
     assert 0 < judged.domain.start_slip_error < judged.domain.slip_error < 1e-8
 
 
-@pytest.mark.parametrize("unit", ["4", "1/16", "1/256"])
+@pytest.mark.slow
+@few("unit", ["4", "1/16", "1/256"], every=3)
 def test_what_is_certified_does_not_depend_on_the_unit_of_the_second_state(unit):
     one, other = _judged("1"), _judged(unit)
     assert other.verdict is one.verdict is Verdict.PROVED

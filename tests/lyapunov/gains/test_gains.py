@@ -92,6 +92,7 @@ def test_the_fastest_decay_at_equal_norm():
     assert found.value > 1 / (5 * 66)
 
 
+@pytest.mark.slow
 def test_gains_of_the_literature_are_returned_where_the_search_finds_nothing_better(monkeypatch):
     from quakedesign.lyapunov.gains import synthesise as gains
 
@@ -104,6 +105,7 @@ def test_gains_of_the_literature_are_returned_where_the_search_finds_nothing_bet
     assert synthesise("cta", "norm", degrees=(5,), starts=1, compare=False) is None
 
 
+@pytest.mark.slow
 def test_no_set_beyond_the_bound_on_the_norm_takes_the_place_of_gains_found(monkeypatch):
     from quakedesign.lyapunov.gains import synthesise as gains
 
@@ -144,6 +146,7 @@ def test_the_widest_range_covers_what_is_asked_and_more():
     assert found.norm <= math.hypot(7, 5, 2.3, 1.1) * 1.05
 
 
+@pytest.mark.slow
 def test_a_law_of_the_users_own():
     # ⌈⌈e2⌋² + e1⌋^½ inside: neither a law of the package nor in the literature's list, so that starts are random
     e1, e2, a, b, beta, d = sp.symbols("e1 e2 a b beta d", real=True)

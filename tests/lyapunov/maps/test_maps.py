@@ -95,6 +95,7 @@ def test_a_point_without_a_proof_is_told_from_a_proved_one_and_its_neighbours_ar
     assert all(again.proved[p] for p in around if again.screened.get(p))
 
 
+@pytest.mark.slow
 def test_levels_and_degree_follow_from_the_gains_unless_given():
     asked = {"ranges": RANGES, "points": 3, "interior": 0, "workers": 1}
     chosen = gain_map("super-twisting", ("1.5", "1.1"), ("k1", "k2"), **asked)
@@ -142,6 +143,7 @@ def test_axes_are_exact_and_divided_in_equal_ratios_where_positive():
     assert len(set(many)) == 200
 
 
+@pytest.mark.slow
 def test_points_that_cannot_be_expressed_are_not_found():
     # with e1 for a state the root of kI1 stands under a cube root, so that it must be rational
     dia = DiscontinuousIntegral.loop_field()

@@ -122,6 +122,7 @@ def test_a_certificate_does_not_depend_on_what_was_screened_before(monkeypatch):
     assert all(begun)
 
 
+@pytest.mark.slow
 def test_neighbours_help(monkeypatch):
     every, counted = loops(sheet_of("super-twisting")), []
     sweep = Sweep(every[0], 6)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.lyapunov import Verdict, certificate_text
 from quakedesign.lyapunov.search.certify import certify
@@ -45,6 +46,7 @@ def super_twisting():
     return proof("super-twisting", ("1.5", "1.1"), lipschitz=1)
 
 
+@pytest.mark.slow
 def test_proofs_withstand(cta, super_twisting):
     for text in (cta, super_twisting):
         assert withstands(text, 100_000)
@@ -80,9 +82,7 @@ def random_proofs(name, seed):
             yield certificate_text(certificate)
 
 
-@pytest.mark.parametrize(
-    ("name", "wanted"), [("super-twisting", 4), ("cta", 1), pytest.param("dia", 1, marks=pytest.mark.slow)]
-)
+@few(("name", "wanted"), [("super-twisting", 4), ("cta", 1), pytest.param("dia", 1, marks=pytest.mark.slow)], every=2)
 def test_random_proofs_withstand(name, wanted):
     assert all(withstands(text, 30_000, trajectories=9, steps=800) for text in islice(random_proofs(name, 5), wanted))
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from fractions import Fraction as F
 
 import pytest
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
@@ -19,9 +20,7 @@ def proof():
     return certificate
 
 
-@pytest.mark.parametrize(
-    "gains", [GAINS, ("13", "7.5", "2.3", "1.1"), ("19", "10", "2.3", "1.1"), ("25", "15", "2.3", "1.1")]
-)
+@few("gains", [GAINS, ("13", "7.5", "2.3", "1.1"), ("19", "10", "2.3", "1.1"), ("25", "15", "2.3", "1.1")], every=3)
 def test_the_published_sets_are_proved_for_unit_lipschitz_bound(gains):
     # Torres-González et al. (2017) give these four sets for L = 1 and a known coefficient
     verdict, certificate = qd.certify("cta", gains, lipschitz=1)
@@ -77,6 +76,7 @@ def test_the_integral_action_bounds_what_the_nested_law_withstands(lipschitz):
     assert qd.certify("dia", (1, 20, 1, 0), lipschitz=lipschitz)[0] is not Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_a_root_outside_its_range_is_refused():
     certificate = qd.certify("dia", (2, 5, "1.44e-4", 0), lipschitz="1e-4")[1]
     of, (low, high) = certificate.loop.roots["kappa"]

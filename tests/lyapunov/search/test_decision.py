@@ -138,6 +138,7 @@ def test_a_suggested_counterexample_is_checked_against_the_users_own_field():
     assert certify(Leaky, ("1.5", "0.9"), lipschitz="1.0")[0] is Verdict.UNDECIDED
 
 
+@pytest.mark.slow
 def test_the_order_in_which_rates_are_written_does_not_matter():
     turned = replace(DIFFERENTIATOR, field=dict(reversed(DIFFERENTIATOR.field.items())))
     found = certify(turned, ("2", "2.12", "1.1"), lipschitz=1)[1]

@@ -31,6 +31,7 @@ def test_none_grows_where_they_stabilise(k1, k2, L):
     assert escape(closed_loop("super-twisting", (k1, k2), lipschitz=L)) is None
 
 
+@pytest.mark.slow
 def test_an_uncertain_coefficient_is_played_with_too():
     gains = ("0.9", "2")
     assert escape(closed_loop("super-twisting", gains, lipschitz="0.6"), steps=3000) is None

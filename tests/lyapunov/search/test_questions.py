@@ -84,6 +84,7 @@ def test_equal_integral_gains_are_never_proved(last):
     assert not reach.sharp
 
 
+@pytest.mark.slow
 def test_a_higher_degree_is_tried_where_the_lowest_finds_nothing():
     first, both = (largest_lipschitz("cta", ("3", "3", "2.3", "1.1"), degrees=d) for d in ((5,), (5, 6)))
     assert first.value is None
@@ -92,6 +93,7 @@ def test_a_higher_degree_is_tried_where_the_lowest_finds_nothing():
     assert both.sharp
 
 
+@pytest.mark.slow
 def test_what_speaks_against_gains_is_told():
     kinds = []
     for gains, lipschitz in ((("0.4", "1.5"), 1), (("0.4", "1.5"), 2), ((3, 2), 1)):

@@ -48,6 +48,7 @@ def test_what_is_given_takes_the_place_of_what_the_fault_needs(fault):
     assert trial.duration == 4000 * 0.05
 
 
+@pytest.mark.slow
 def test_gains_from_the_literature_are_returned_where_nothing_is_better(fault, monkeypatch):
     from quakedesign.synthesis import simulated_error
 

@@ -80,6 +80,7 @@ def test_slopes_in_the_ends_of_beta():
         assert slopes[name] == pytest.approx((moved[1] - moved[0]) * 500, rel=1e-2, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_found_is_what_the_search_finds_at_every_point():
     rng = np.random.default_rng(4)
     base = closed_loop("super-twisting", (1, 2), lipschitz=1)

@@ -96,6 +96,7 @@ def test_a_damaged_library_is_built_anew(ends, tmp_path, left):
     assert program.ends(starts(2), STEPS).tobytes() == ends[:2].tobytes()
 
 
+@pytest.mark.slow
 def test_a_library_that_is_gone_is_built_anew(ends, tmp_path):
     program = PROBLEM.program.compiled(tmp_path)
     program.library.path.unlink()

@@ -100,6 +100,7 @@ def test_what_is_saved(serial, tmp_path):
     assert len((tmp_path / "samples.csv").read_text().splitlines()) == COUNT + 1
 
 
+@pytest.mark.slow
 def test_more_samples_begin_with_those_that_are_there(serial, tmp_path):
     few = run_campaign(PROBLEM, 10, tmp_path, executor=SerialExecutor())
     more = run_campaign(PROBLEM, COUNT, tmp_path, executor=SerialExecutor())

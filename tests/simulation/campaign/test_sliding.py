@@ -64,6 +64,7 @@ def test_samples_fill_the_box_of_friction_plant_and_stress():
     assert certain.sample(1).numbers["critical_slip"] == 1.0
 
 
+@pytest.mark.slow
 def test_processes_have_the_same_digits_and_files_answer(serial, tmp_path):
     found, folder = serial
     other = run_campaign(PROBLEM, 6, tmp_path, workers=1, batch=3)
@@ -82,6 +83,7 @@ def test_a_batch_over_a_whole_task_is_a_few_samples(tmp_path):
             assert runner._batch_size(2000) == most
 
 
+@pytest.mark.slow
 def test_the_search_finds_the_largest_share_of_the_stress(tmp_path):
     problem = campaign_problem(PATCH, CONTROLLER, duration=1200.0, stress=40e3, stress_period=9000.0)
     found = run_campaign(problem, 2, tmp_path, executor=SerialExecutor(), metric="max_slip_rate_error", rounds=3)

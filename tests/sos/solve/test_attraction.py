@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
+from thinned import few
 
 from quakedesign import sos
 from quakedesign.cli import main
@@ -46,7 +47,7 @@ def test_the_table_is_about_all_systems():
     assert ROWS.keys() == SYSTEMS.keys()
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@few("name", SYSTEMS, every=4)
 def test_the_level_is_proved_and_a_point_just_above_refutes_more(name):
     found = region(name)
     *_, published, _, _, proved, above = ROWS[name]
@@ -89,7 +90,7 @@ def least_on_the_zero_set(name):
     return min(v for v in (float(V.subs({x: r, y: q})) for r, q in places) if v > 1e-9)
 
 
-@pytest.mark.parametrize("name", PLANAR)
+@few("name", PLANAR, every=7)
 def test_the_level_is_almost_the_least_v_where_it_does_not_fall(name):
     largest = least_on_the_zero_set(name)
     written = float(sp.sympify(ROWS[name][3].replace("√3", "*sqrt(3)")))
@@ -160,7 +161,7 @@ def test_a_solution_from_just_outside_does_not_arrive(name):
     assert float(SEARCHED[name][-1]) == pytest.approx(float(np.dot(start, start)), rel=1e-4)
 
 
-@pytest.mark.parametrize("name", SEARCHED)
+@few("name", SEARCHED, every=3)
 def test_what_is_inside_is_below_what_is_outside(name):
     found = grown(name, None)
     level = float(found.shape_level)
@@ -168,6 +169,7 @@ def test_what_is_inside_is_below_what_is_outside(name):
     assert found.inclusion.check()
 
 
+@pytest.mark.slow
 def test_a_searched_function_is_proved_and_its_region_has_the_part_of_the_shape(on_the_page):
     found = on_the_page["grown"]
     assert (found.verdict, found.proved.verdict, found.refuted.verdict) == ("proved", "proved", "refuted")
@@ -379,6 +381,7 @@ def test_another_file_is_refused_in_one_line(tmp_path, content):
         read_field(tmp_path / "none.toml")
 
 
+@pytest.mark.slow
 def test_everything_on_the_page_runs(on_the_page, tmp_path):
     assert on_the_page["said"].count("True True") == 2
     assert on_the_page["said"].endswith("\nproved\n")

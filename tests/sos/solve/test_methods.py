@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import pytest
 from own_parts import Monomials
+from thinned import few
 
 from quakedesign.errors import PolynomialError
 from quakedesign.sos import Positivity, prove
@@ -26,7 +27,7 @@ def test_they_are_tried_in_order():
     assert [method.name for method in methods()] == ["square-factor", "conic"]
 
 
-@pytest.mark.parametrize("text", [*POSITIVE, *OTHERS])
+@few("text", [*POSITIVE, *OTHERS], every=2)
 @pytest.mark.parametrize("name", ALL)
 def test_what_is_proposed_is_a_proof_of_what_was_asked_or_refused(name, text):
     question = asked(text)
@@ -43,6 +44,7 @@ def test_a_method_of_ones_own_is_one_class(monkeypatch):
     assert prove("-3*x^4*y^2").verdict is prove("x^2 + 1").verdict is Positivity.UNDECIDED
 
 
+@pytest.mark.slow
 def test_one_that_claims_too_much_changes_no_verdict(monkeypatch):
     class Bold(Method):
         name, order = "bold", -1
@@ -61,7 +63,8 @@ def test_one_that_claims_too_much_changes_no_verdict(monkeypatch):
 ROBINSON = "x^6+y^6+z^6-x^4*y^2-x^2*y^4-x^4*z^2-x^2*z^4-y^4*z^2-y^2*z^4+3*x^2*y^2*z^2"
 
 
-@pytest.mark.parametrize("factor", ["x + w", "x*w - y^2 + 1"])
+@pytest.mark.slow
+@few("factor", ["x + w", "x*w - y^2 + 1"], every=2)
 def test_an_automatic_multiplier_is_one_of_what_is_left_beside_squares(factor):
     answer = prove(f"({factor})^2*({ROBINSON})", multiplier="auto")
     assert answer.verdict is Positivity.SOS

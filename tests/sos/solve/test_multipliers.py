@@ -3,6 +3,7 @@
 from fractions import Fraction as F
 
 import pytest
+from thinned import few
 
 from quakedesign import sos
 from quakedesign.sos.exact.polynomial_files import load, text
@@ -20,6 +21,7 @@ def even_symmetric(variables, a, b, c):
     return f"{a}*{power[6]} + {b}*{power[4]}*{power[2]} + {c}*{power[2]}^3"
 
 
+@pytest.mark.slow
 def test_a_form_in_other_units_is_proved_though_its_norm_is_no_multiplier():
     assert str(sos.prove(STRETCHED, multiplier="x^2 + y^2 + z^2").verdict) == "not-sos"
     found = sos.prove(STRETCHED, multiplier="auto")
@@ -28,6 +30,7 @@ def test_a_form_in_other_units_is_proved_though_its_norm_is_no_multiplier():
     assert (asked, proof) == (found.statement, found.proof)
 
 
+@pytest.mark.slow
 def test_a_form_that_needs_a_quartic_multiplier_is_proved():
     """f(t) = (t − 2)(t − 3): the norm alone is refuted, exactly."""
     form = even_symmetric("xyzw", 6, -5, 1)
@@ -42,7 +45,7 @@ def test_what_is_negative_somewhere_has_no_multiplier():
     assert str(sos.prove(STRETCHED.replace("- 3", "- 4"), multiplier="auto").verdict) == "negative"
 
 
-@pytest.mark.parametrize("top", [2, 4])
+@few("top", [2, 4], every=2)
 def test_a_multiplier_is_a_sum_of_squares_of_its_degree_in_the_variables_that_occur(top):
     names, form = parse(MOTZKIN.format(x="x", y="y", z="z") + " + 0*w", ("w", "x", "y", "z"))
     multiplier = searched(names, form, top)

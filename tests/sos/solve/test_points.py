@@ -3,6 +3,7 @@
 from fractions import Fraction as F
 
 import pytest
+from thinned import few
 
 from quakedesign import sos
 from quakedesign.sos.exact.polynomial import evaluate
@@ -40,19 +41,19 @@ def cap(radius, direction, excess, centre=(0, 0)):
     return polynomial, [f"(x - {centre[0]})^2 + (y - {centre[1]})^2 <= {radius}"]
 
 
-@pytest.mark.parametrize("number", range(len(RADII)))
+@few("number", range(len(RADII)), every=3)
 @pytest.mark.parametrize("excess", EXCESS, ids=str)
 def test_every_cap_at_the_edge_of_a_disc_is_found(number, excess):
     assert negative(*cap(RADII[number], DIRECTIONS[number % len(DIRECTIONS)], excess)) is not None
 
 
-@pytest.mark.parametrize("radius", RADII[:4], ids=str)
+@few("radius", RADII[:4], ids=str, every=2)
 def test_a_cap_that_ends_before_the_edge_is_not_invented(radius):
     for direction, excess in zip(DIRECTIONS[1:4], (F(0), F(-1, 10**6), F(-1, 2)), strict=True):
         assert negative(*cap(radius, direction, excess)) is None
 
 
-@pytest.mark.parametrize("centre", [(3, 4), (F(-1, 3), F(2, 7)), (-1, 0)], ids=str)
+@few("centre", [(3, 4), (F(-1, 3), F(2, 7)), (-1, 0)], ids=str, every=3)
 def test_discs_elsewhere(centre):
     for direction in DIRECTIONS:
         assert negative(*cap(F(67, 1000), direction, F(1, 100), centre)) is not None
@@ -73,7 +74,7 @@ SETS = {
 }
 
 
-@pytest.mark.parametrize("name", SETS)
+@few("name", SETS, every=4)
 @pytest.mark.parametrize("excess", [F(1, 2), F(1, 100), F(1, 10**5), F(0)], ids=str)
 def test_edges_of_other_sets(name, excess):
     # every row is 0 at its least for m = 1 and −ε, or a positive multiple, for m = 1 + ε
@@ -85,6 +86,7 @@ def test_edges_of_other_sets(name, excess):
 SUBLEVEL = "100*x^4 - 384*x^2*y^2 + 400*y^4"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["67/1000", "1/16", "3/50", "1/10"])
 def test_drakes_region_12876_is_left_where_its_radius_is_too_large(level):
     # U = 1 first at radius² 1/20
@@ -101,7 +103,7 @@ def test_a_cap_with_a_mixed_term():
         assert answer.check()
 
 
-@pytest.mark.parametrize("factor", ["1", "x^2 + 1"])
+@few("factor", ["1", "x^2 + 1"], every=2)
 def test_products_of_motzkins_polynomial_have_no_negative_point(factor):
     motzkin = "(x^4*y^2 + x^2*y^4 + 1 - 3*x^2*y^2)"
     assert negative(f"{factor}*{motzkin}", ["x^2 + y^2 <= 3"]) is None

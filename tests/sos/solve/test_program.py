@@ -66,6 +66,7 @@ def region(level):
     return sos.prove(f"8*{LEVEL}*(1 - {LEVEL})", on=[f"{level} - x^2 - y^2 >= 0"])
 
 
+@pytest.mark.slow
 def test_region_of_attraction_approaches_one_twentieth_from_below():
     level, answer = sos.largest(region, "1/100", "1", relative=1e-4)
     assert Fraction(1, 20) * Fraction(999, 1000) < level <= Fraction(1, 20)
