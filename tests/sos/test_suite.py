@@ -39,6 +39,7 @@ def test_the_verdict_is_right_and_its_proof_checks(name):
     assert found.check()
 
 
+@pytest.mark.slow
 def test_hardly_anything_stays_undecided():
     undecided = [name for name in NAMES if str(answer(name).verdict) == "undecided"]
     assert len(undecided) <= UNDECIDED_AT_MOST, undecided
