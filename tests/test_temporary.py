@@ -301,6 +301,15 @@ def test_what_cannot_be_made_or_locked_leaves_nothing(tmp_path):
 
 
 @pytest.mark.usefixtures("nothing_left")
+def test_a_folder_that_is_swept_at_every_trial_is_not_had_without_a_lock(tmp_path, first_lock, monkeypatch):
+    monkeypatch.setattr(files, "_TRIALS", 3)
+    calls = first_lock(*[swept] * 5)
+    with pytest.raises(BlockingIOError):
+        lock_of(tmp_path / "results")
+    assert len(calls) == 3
+
+
+@pytest.mark.usefixtures("nothing_left")
 def test_windows_has_no_locks_of_folders(tmp_path, monkeypatch):
     monkeypatch.setattr(files.sys, "platform", "win32")
     with pytest.raises(OSError, match="folders have no locks here"):
