@@ -48,6 +48,9 @@ NOTEBOOKS = ("02_equations_and_scaling.ipynb", "03_certificates.ipynb")
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """The longest files first, so that no worker is left alone with one of them at the end."""
+    moving = [item.nodeid for item in items if " at 0x" in item.nodeid]
+    if moving:
+        raise pytest.UsageError(f"a name with an address differs from worker to worker: {moving[0]}")
     for item in items:
         if item.path.suffix == ".ipynb" and item.path.name not in NOTEBOOKS:
             item.add_marker("slow")

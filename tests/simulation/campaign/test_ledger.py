@@ -163,7 +163,7 @@ class Told:
         (Spoken(), "spoken"),
         *((value, value) for value in (None, True, 3, 2.5, "text")),
     ],
-    ids=str,
+    ids=lambda value: type(value).__name__,
 )
 def test_every_value_has_a_plain_one(value, told):
     found = plain(value)
