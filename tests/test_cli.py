@@ -5,6 +5,8 @@ import re
 import subprocess
 import sys
 from fractions import Fraction
+from importlib.resources import files
+from pathlib import Path
 
 import browser
 import pytest
@@ -20,7 +22,35 @@ def run(capsys, *arguments):
     return stop.value.code, out, err
 
 
-@pytest.fixture(scope="module", params=["real-fault", pytest.param("lab-fault", marks=pytest.mark.slow)])
+CHECKER = Path(__file__).parents[1] / "proofs" / "check.py"
+
+
+def test_a_design_is_a_folder_whose_certificates_both_checkers_accept(tmp_path, capsys):
+    """One controller of a fault of the user's with a task of a second; the main job itself is slow."""
+    text = (files("quakedesign.fault") / "presets" / "lab-fault.toml").read_text(encoding="utf-8")
+    (tmp_path / "own.toml").write_text(text.replace('"lab-fault"', '"own"').replace("1 hour", "1 s"), encoding="utf-8")
+    command = [sys.executable, "-m", "quakedesign", "design", "own.toml", "--controller", "elqr", "--json"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=500)
+    assert (done.returncode, done.stderr) == (0, "")
+    folder, results = tmp_path / "quakedesign-own", json.loads(done.stdout)
+    assert {p.name for p in tmp_path.iterdir()} == {folder.name, "own.toml"}
+    assert json.loads((folder / "results.json").read_text()) == results
+    found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+    assert {"report.html", "fault.toml", "figures/errors.svg", "certificates/elqr-guarantee.json"} <= found
+    told, metrics = results["controllers"]["elqr"]["guarantee"], results["controllers"]["elqr"]["metrics"]
+    assert results["controllers"]["elqr"]["verdict"] == "proved"
+    assert metrics["max_slip_error"] <= Fraction(told["slip_error"])
+    assert metrics["max_slip_rate_error"] <= Fraction(told["slip_rate_error"])
+    path = str(folder / told["certificate"])
+    done = subprocess.run([sys.executable, str(CHECKER), path], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout.count(": proved")) == (0, 1)
+    assert run(capsys, "check", path, "--fault", str(tmp_path / "own.toml"))[0] == 0
+    assert run(capsys, "check", path, "--fault", "real-fault")[0] == 1
+
+
+@pytest.fixture(
+    scope="module", params=[pytest.param(name, marks=pytest.mark.slow) for name in ("real-fault", "lab-fault")]
+)
 def main_job(request, tmp_path_factory):
     """The main job as a user runs it."""
     folder = tmp_path_factory.mktemp("job")
@@ -81,18 +111,15 @@ def test_the_keys_promised_are_there(main_job):
 
 
 def test_both_checkers_accept_the_certificates(main_job, capsys):
-    from pathlib import Path
-
     name, folder, _ = main_job
-    files = sorted(str(p) for p in (folder / "certificates").glob("*.json"))
-    checker = Path(__file__).parents[1] / "proofs" / "check.py"
-    done = subprocess.run([sys.executable, str(checker), *files], capture_output=True, text=True, timeout=120)
-    assert (done.returncode, done.stdout.count(": proved")) == (0, len(files)), done.stdout + done.stderr
-    code, said, _ = run(capsys, "check", *files)
-    assert (code, said.count(": proved")) == (0, len(files))
+    paths = sorted(str(p) for p in (folder / "certificates").glob("*.json"))
+    done = subprocess.run([sys.executable, str(CHECKER), *paths], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout.count(": proved")) == (0, len(paths)), done.stdout + done.stderr
+    code, said, _ = run(capsys, "check", *paths)
+    assert (code, said.count(": proved")) == (0, len(paths))
     mine = ("cta.json", "dia.json", "cta-guarantee.json", "dia-guarantee.json", "elqr-guarantee.json")
     own = [str(folder / "certificates" / n) for n in mine]
-    assert set(own) < set(files)
+    assert set(own) < set(paths)
     assert run(capsys, "check", *own, "--fault", name)[0] == 0
 
 

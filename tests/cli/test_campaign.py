@@ -52,6 +52,7 @@ def test_for_people(call):
     assert "search-" in out
 
 
+@pytest.mark.slow
 def test_another_campaign_needs_force(call):
     assert call("--samples", "2")[0] == 0
     code, _, err = call("--samples", "2", box="paper")

@@ -98,6 +98,7 @@ def test_a_start_for_which_a_law_is_proved_is_in_what_is_proved(capsys, tmp_path
     assert json.loads(told(capsys, *run, "11 um")[1])["outside"] == ["initial_slip"]
 
 
+@pytest.mark.slow
 def test_what_is_exported_says_first_what_it_is_for(file, capsys, tmp_path):
     code, out, _ = told(capsys, "export", "real-fault", "--certificate", file, "--out", tmp_path / "c")
     lines = out.splitlines()

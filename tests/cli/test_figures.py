@@ -28,6 +28,7 @@ def short(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_compare_prints_the_keys_of_design_and_writes_nothing(short, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, _ = run(capsys, "compare", str(short), "--controller", "elqr", "--json")

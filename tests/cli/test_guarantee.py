@@ -255,6 +255,7 @@ def test_the_slip_alone_with_noise_and_its_file(call, tmp_path):
     assert check_files([path], "real-fault")[str(path)][0] == "proved"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unattacked")
 def test_noise_in_given_gains_and_in_a_sliding_mode(call):
     noise = ("--slip-noise", "1e-6", "--rate-noise", "1/1000000")

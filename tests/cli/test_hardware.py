@@ -62,6 +62,7 @@ def test_an_actuator_in_units_gives_volume_and_flow_rate_in_units(run, tmp_path)
         assert np.all(data.well_pressure[:2] == 0)
 
 
+@pytest.mark.slow
 def test_jitter_steps_of_a_reading_and_of_a_differentiator_are_those_of_python(run):
     late = ("--delay", "1 ms", "--jitter", "1")
     read = ("--differentiator-bound", "1e4", "--slip-quantum", "0.15 um", "--differentiator-steps", "10")

@@ -37,6 +37,7 @@ MAP = ("map", "super-twisting", "--gains", "1.5", "1.1", "--degree", "6", "--int
 OVER, FIVE, ONE = ("--over", "k1", "k2"), ("--points", "5"), ("--lipschitz", "1")
 
 
+@pytest.mark.slow
 def test_a_map_is_a_folder_with_figure_table_and_certificates(capsys, tmp_path):
     folder = tmp_path / "m"
     code, said, err = run(

@@ -65,6 +65,7 @@ def test_the_adaptive_method_and_a_perturbation_are_chosen(run):
     assert answer["energy"]["relative_residual"] < 1e-6
 
 
+@pytest.mark.slow
 def test_a_differentiator_is_told_and_judged(run):
     estimates = ("--differentiator-bound", "100", "--filter-order", "1", "--slip-noise-deviation", "1e-7")
     code, out, _ = run(*SHORT, "--controller", "cta", "--scheme", "implicit", *estimates)

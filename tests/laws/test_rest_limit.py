@@ -147,6 +147,7 @@ def test_on_a_fault_that_sticks_the_pressure_stays_where_it_is_proved_to_stay(pr
         assert run.metrics.max_slip_rate_error < claims.slip_rate_error
 
 
+@pytest.mark.slow
 def test_single_runs_campaigns_and_python_control_cut_alike(proved):
     limit = RestLimit(width=F(4000), per_slip=F(10**6), resolution=F(1))
     tight = replace(proved.controller, rest_limit=limit)
@@ -325,6 +326,7 @@ def test_where_p_star_drifts_all_pressures_that_count_from_it_move(proved):
     assert limit.highest == pytest.approx([1.0])
 
 
+@pytest.mark.slow
 def test_the_search_with_stick_lets_the_limit_follow_every_step(proved, monkeypatch):
     followed = []
     monkeypatch.setattr(_Limit, "follow", lambda _, before, after: followed.append((before[0, 4], after[0, 4])))

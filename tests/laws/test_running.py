@@ -55,6 +55,7 @@ def test_a_run_asks_for_the_pressure_of_the_matrices():
     assert np.abs(errors).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_the_whole_task_stays_far_inside_the_guarantee():
     fault = load_fault("real-fault")
     claim = guarantee(uncertain_plant(fault), HELD)
@@ -126,6 +127,7 @@ def test_to_run_it_otherwise_is_refused_everywhere(wrong, tmp_path):
     assert not (tmp_path / "c").exists()
 
 
+@pytest.mark.slow
 def test_a_campaign_runs_it_as_simulate_does():
     """The undisturbed sample, by the program that all samples share."""
     problem = campaign_problem(REAL, HELD.controller, duration=18.4, initial_slip=1e-6)

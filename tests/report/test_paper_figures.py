@@ -53,6 +53,7 @@ def study(kept):
     return paper_study(Comparison(fault=fault, uncontrolled=natural_earthquake(fault), entries=tuple(entries)))
 
 
+@pytest.mark.slow
 def test_the_front_shows_what_was_seen_over_what_is_guaranteed(study):
     """Two made up designs, whose guaranteed slip-rate errors are 200 and 300 µm/s."""
     runs = [e.run for e in study.comparison.entries[:2]]

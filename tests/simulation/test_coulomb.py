@@ -186,6 +186,7 @@ class Oracle:
         return found
 
 
+@pytest.mark.slow
 def test_a_shaken_block_agrees_with_scipys_events():
     """Stick, slip forward and slip backward under a harmonic load: about thirty changes between them."""
     fault = pushed(BLOCK, constant=-STRENGTH, amplitude=1.6 * STRENGTH, frequency=0.31)

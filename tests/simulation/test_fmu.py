@@ -188,6 +188,7 @@ def test_what_cannot_be_is_an_error_of_the_standard(unit, wrong):
     slave.freeInstance()
 
 
+@pytest.mark.slow
 def test_the_same_controller_gives_the_same_bytes_and_another_one_another_name(tmp_path):
     files = {}
     for name, controller in {"one": CTA, "two": CTA, "other": published("lab-fault")["elqr"]}.items():

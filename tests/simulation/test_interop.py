@@ -24,6 +24,7 @@ def test_a_casadi_function_has_names():
     assert np.allclose(function(t=0, x=[0, 0.5], p=0)["dx"].full().ravel(), [0.5, -0.5 * LAB.specific_damping])
 
 
+@pytest.mark.slow
 def test_a_closed_loop_function_integrates_to_the_simulated_run():
     loop = to_casadi(LAB, published("lab-fault")["elqr"])
     run = simulate(LAB, published("lab-fault")["elqr"], step=1e-4, duration=0.2, samples=10)

@@ -114,6 +114,7 @@ def test_an_unstable_fault_that_does_not_move_is_a_defect(monkeypatch):
         natural_earthquake(LAWS["linear"])
 
 
+@pytest.mark.slow
 def test_the_measure_of_events_is_found_with_the_event(monkeypatch):
     """Whatever disturbance and box the fault has; under pressure or with stick it is another event."""
     monkeypatch.setattr(memoryless_earthquake, "_PEAKS", {})

@@ -321,6 +321,7 @@ def test_a_step_goes_through_the_layer_as_in_carslaw_and_jaeger():
         assert pressure == pytest.approx(1 - 4 / math.pi * np.sum(terms), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_control_holds_what_runs_away_without_it():
     tide, model = Tide(amplitude=1e3, period=4000.0), sliding_model(fault())
     held = simulate_sliding(

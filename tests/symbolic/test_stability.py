@@ -291,6 +291,7 @@ def test_a_users_law_without_state_goes_through_derive_and_stability():
         assert moving.outcome is (Stability.UNSTABLE if factor < 1 else Stability.STABLE)
 
 
+@pytest.mark.slow
 def test_a_users_law_with_state_goes_through_derive_and_stability():
     # about steady sliding θ' has slope −v/d_c again, and −1/v·2/2 in v: the critical stiffness of Ruina
     law = PerrinRiceZheng(direct=A, evolution=B, length=D)

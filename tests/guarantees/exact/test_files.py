@@ -144,6 +144,7 @@ def test_both_checkers_accept_what_the_package_writes(name, rate_limited):
     assert time.process_time() - began < 0.5
 
 
+@pytest.mark.slow
 def test_a_layer_behind_a_delay_is_accepted_by_both():
     text = guarantee_text(claim("late rock"))
     assert parse_guarantee(text).held == LOOPS["late rock"]
@@ -228,6 +229,7 @@ def test_feedback_of_the_state_is_accepted_by_both_and_needs_a_smooth_reference(
         assert package(text) != "proved", new
 
 
+@pytest.mark.slow
 def test_a_slower_disturbance_is_never_bounded_worse():
     """The published integrals are so slow that the shifted pressure drifts too much; the larger class bounds them."""
     law = exact_integrals(tuple(map(F, ("1880000000", "579000000", "1020000", "18.52"))))
@@ -309,7 +311,9 @@ WORSE += [
 ]
 
 
-@few(("loop", "place", "factor"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else "", every=2)
+@pytest.mark.parametrize(
+    ("loop", "place", "factor"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else ""
+)
 def test_worse_data_under_the_same_claims_are_refused_by_both(loop, place, factor):
     raw = json.loads(guarantee_text(claim(loop)))
     holder = raw
@@ -443,6 +447,7 @@ def test_hostile_values_in_continuous_time_are_refused_by_both_in_bounded_time(p
     assert time.process_time() - began < 10
 
 
+@pytest.mark.slow
 def test_a_law_of_many_states_in_continuous_time_is_decided_by_both():
     """Ten more states that follow e1 and are not used: the same claims, in bounded time."""
     raw = copy.deepcopy(CONTINUOUS_RAW)

@@ -85,6 +85,7 @@ def test_a_lag_is_followed_as_its_closed_form():
 LAGS = {("0.184", "0.2"): 2.3e-4, ("0.05", "0.2"): 6.6e-5, ("0.184", "0.001"): 1.8e-4}  # T_s, lag [s]: certified [m/s]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [500, pytest.param(10_000, marks=pytest.mark.slow)])
 @few("times", LAGS, every=3)
 def test_no_course_violates_a_guarantee_behind_a_lag(times, count):

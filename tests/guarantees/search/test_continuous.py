@@ -83,6 +83,7 @@ def test_what_a_search_finds_is_below_and_near(name, kind):
     assert seen.slip_rate_error < found.claims.slip_rate_error < 1.5 * seen.slip_rate_error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "box"),
     [("real-fault", "paper"), ("lab-fault", "ten-percent")]
@@ -304,6 +305,7 @@ def test_the_sine_of_the_preset_stays_within_both_classes(real, designed, peaks,
     assert top[1] < float(peaks[kind].claims.slip_rate_error)
 
 
+@pytest.mark.slow
 @few("name", GAINS, every=2)
 @pytest.mark.parametrize("box", ["paper", "ten-percent"])
 def test_many_attacks_with_random_switching_never_exceed_the_bounds(name, box):

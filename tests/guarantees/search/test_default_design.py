@@ -62,6 +62,7 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     assert premises(design)["delay"].certified >= F("0.5")
 
 
+@pytest.mark.slow
 def test_a_law_has_one_bound_however_it_is_asked_for(monkeypatch):
     found = designed("real").guarantee
     assert found.slow_gain is not None
@@ -70,6 +71,7 @@ def test_a_law_has_one_bound_however_it_is_asked_for(monkeypatch):
     assert qd.guarantee(REAL).found == assess(REAL, designed("real").controller).guarantee == found
 
 
+@pytest.mark.slow
 def test_both_objectives_are_what_they_are_called(unreached):
     peak, tracking = (qd.design(REAL, "elqr", objective=name).guarantee.claims for name in ("peak", "tracking"))
     assert peak.slip_rate_error < tracking.slip_rate_error
@@ -117,6 +119,7 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert guarantee(uncertain_plant(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["0.01", pytest.param("0.02", marks=pytest.mark.slow)])
 def test_sampled_faster_that_fault_is_guaranteed(step):
     claim = design_held(uncertain_plant(SLOW), F(step))
@@ -144,6 +147,7 @@ def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
     assert design.guarantee.sentence().startswith("none: ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault",
     [

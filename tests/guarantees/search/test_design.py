@@ -66,7 +66,7 @@ def aligned(held, periods, pieces, k):
     return max(found)
 
 
-@few("row", ROWS, every=2)
+@few("row", ROWS, every=5)
 def test_designs_are_guaranteed_within_the_targets(row):
     claim, (*_, rate, slip) = designed(row), ROWS[row]
     assert isinstance(claim, Guarantee)
@@ -81,6 +81,7 @@ def test_the_class_rate_is_guaranteed_far_lower():
     assert claim.claims.slip_error <= F(5, 10**5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", [pytest.param("tracking", marks=pytest.mark.slow), "peak"])
 def test_a_law_for_the_class_rate_is_chosen_for_that_class(objective):
     claim = design_held(uncertain_plant(load_fault("real-fault"), rate_limited=True), F("0.184"), objective=objective)
@@ -88,7 +89,7 @@ def test_a_law_for_the_class_rate_is_chosen_for_that_class(objective):
     assert claim.claims.slip_error <= F(1, 10**5)
 
 
-@few("row", ROWS, every=3)
+@few("row", ROWS, every=5)
 def test_no_course_of_ten_thousand_violates_a_guarantee(row):
     claim = designed(row)
     held = attacker.numbers(claim)
@@ -109,7 +110,7 @@ def test_the_worst_found_is_no_less_than_what_a_disturbance_does_to_the_plant_th
     assert largest[0].max() <= found <= claim.claims.slip_error
 
 
-@few("row", ROWS, every=3)
+@few("row", ROWS, every=5)
 def test_courses_along_the_nominal_response_come_close_and_stay_below(row):
     claim = designed(row)
     seen = [aligned(attacker.numbers(claim), 60, 8, k) for k in (0, 1)]
@@ -128,7 +129,7 @@ def test_where_stick_leaves_the_bounds_the_answer_says_so():
     assert not within.leaves_with_stick
 
 
-@few("row", ROWS, every=3)
+@few("row", ROWS, every=5)
 def test_a_designed_law_left_to_itself_settles_but_for_its_integral(row):
     """On a fault that rests whatever the pressure, the pressure that is asked for grows evenly, and no faster."""
     law = designed(row).held.law
@@ -154,7 +155,7 @@ def test_with_stick_no_course_leaves_the_bounds(row):
     assert found.slip_rate_error <= claim.claims.slip_rate_error
 
 
-@few("row", ROWS, every=3)
+@few("row", ROWS, every=5)
 def test_the_worst_found_is_below_the_bound_and_no_less_than_the_attacker_s(row):
     claim = designed(row)
     found, held = worst(row), attacker.numbers(claim)
@@ -232,6 +233,7 @@ def test_designs_say_what_is_guaranteed_of_them_as_they_run():
     assert sliding.sentence().startswith("none: a pressure that follows 2-CTA at every instant is run by no sampled")
 
 
+@pytest.mark.slow
 @few("row", ["real peak", "real tracking"], every=2)
 def test_the_worst_found_with_stick_is_no_less_than_the_attacker_s(row):
     claim = designed(row)

@@ -39,6 +39,7 @@ def designed(row):
     return design_held(uncertain_plant(REAL), STEP, objective=objective, measured="differentiator", slip_noise=noise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("courses", [300, pytest.param(10_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "row", [pytest.param(row, marks=[pytest.mark.slow] * (row != ("peak", NOISE))) for row in ROWS]

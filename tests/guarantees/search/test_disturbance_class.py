@@ -91,6 +91,7 @@ def test_the_steepest_disturbance_keeps_its_rate_in_short_pieces_too():
     assert not _steepest(np.ones((4, 1)), np.ones((4, 1)), np.ones(4), 0.0).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("objective", "most"), [("tracking", (1.15, 1.6)), pytest.param("peak", (1.55, 1.35), marks=pytest.mark.slow)]
 )

@@ -38,6 +38,7 @@ def lines(found):
     return [line for line in found.lines() if line.startswith("with ")]
 
 
+@pytest.mark.slow
 @few("controller", ["elqr", "dia"], every=2)
 def test_the_smallest_pump_that_will_do_is_named(controller):
     asked = Pump(least=F(-20 * 10**6), largest=F(3 * 10**6))

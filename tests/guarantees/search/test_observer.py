@@ -75,6 +75,7 @@ def nominal_response(held, k):
     return ends, off
 
 
+@pytest.mark.slow
 @few("name", ["slip alone", "both"], every=2)
 def test_noise_along_the_nominal_response_comes_close_and_the_worst_found_is_no_less(name):
     claim, seen = designed(name), []

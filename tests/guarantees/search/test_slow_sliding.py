@@ -123,6 +123,7 @@ def replayed(plant_task, stress, ahead, pieces=4, normal=50e6):
     return largest
 
 
+@pytest.mark.slow
 @few(
     ("law", "room", "swing"),
     [("ageing", LOG_RATES[0], F(0)), ("slip", LOG_RATES[2], F(0)), ("ageing", F(1, 2), F(1, 20))],
@@ -208,6 +209,7 @@ def corners_of(ranges, courses, random):
     return [np.array(end, float)[random.integers(2, size=courses)] for end in ends]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("courses", [200, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_no_course_of_many_leaves_what_is_proved(courses):
     """Stresses that push along a nominal response up to a random time, with random turns or without, or turn alone."""

@@ -128,6 +128,7 @@ def called(capsys, *arguments):
     return ended.value.code, capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_the_command_says_from_where(capsys, monkeypatch):
     seen = WorstFound(slip_error=1e-5, slip_rate_error=1e-4)
     monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_found", lambda *_, **__: seen)

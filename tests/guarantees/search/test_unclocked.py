@@ -81,6 +81,7 @@ def test_the_estimate_of_a_search_is_near_what_is_proved():
     assert none is None or isinstance(none.bounds, NoGuarantee)
 
 
+@pytest.mark.slow
 def test_a_design_has_a_law_for_the_middle_of_the_range(monkeypatch):
     monkeypatch.setattr(design, "_FEWER", 12)
     task, around = uncertain_plant(load_fault("lab-fault")), {"longest_step": F(1, 500)}

@@ -25,6 +25,7 @@ def test_both_errors_of_the_task_are_reached_at_once(duration):
     assert run.metrics.max_h_rate < float(LAW.scale)
 
 
+@pytest.mark.slow
 def test_a_constant_disturbance_leaves_no_error_where_the_implicit_scheme_keeps_one():
     still = dataclasses.replace(REAL, reference=dataclasses.replace(REAL.reference, target_slip=1e-12))
     pushed = still.with_disturbance(Disturbance(constant=1e-4))

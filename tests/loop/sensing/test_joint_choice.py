@@ -64,6 +64,7 @@ def test_the_swing_of_the_sliding_mode_is_that_of_its_powers_astride_the_origin(
     assert pressure_swing(PUBLISHED["cta"], a, b) == pytest.approx(nu * 1385 / 4, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step", "discretisation"), [(1e-5, "homogeneous"), (1e-4, "homogeneous"), (1e-4, "implicit")])
 def test_the_loop_tracks_from_the_smallest_bound_on_and_is_lost_well_below(step, discretisation):
     d = Differentiator(bound=1.0, step=step, discretisation=discretisation)

@@ -61,6 +61,7 @@ def test_every_bound_on_the_disturbance_gives_the_same_norm(small):
     assert other.value == pytest.approx(small.value, rel=0.05)
 
 
+@pytest.mark.slow
 def test_super_twisting_comes_near_the_smallest_gains_that_are_stable_at_all():
     found = synthesise("super-twisting", "norm", degrees=(4, 8), starts=1)
     k1, k2 = (float(k) for k in found.gains.values())

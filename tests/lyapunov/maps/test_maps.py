@@ -78,6 +78,7 @@ def test_certificates_are_about_their_points(drawn):
         assert certificate.check() is Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_a_point_without_a_proof_is_told_from_a_proved_one_and_its_neighbours_are_tried(drawn, monkeypatch):
     lost = min(p for p in drawn.edges if drawn.screened[p] == 1)
     honest = Screener.proof

@@ -123,6 +123,7 @@ def test_the_sampler_finds_what_is_wrong(cta):
     assert "bound_e2" in attack.sample(changed(cta, larger), 100_000)
 
 
+@pytest.mark.slow
 def test_the_simulation_tells_a_loop_that_settles_from_one_that_does_not(super_twisting):
     def unstable(raw):
         raw["gains"] = {"k1": "2/5", "k2": "3/2"}

@@ -86,6 +86,7 @@ def test_a_root_outside_its_range_is_refused():
         replace(certificate, loop=loop).check()
 
 
+@pytest.mark.slow
 def test_decay_bounds_the_settling_time():
     from quakedesign.lyapunov.search.search import balance, with_largest_decay
 

@@ -40,6 +40,7 @@ def test_an_uncertain_coefficient_is_played_with_too():
     assert escape(wide, steps=3000) is not None
 
 
+@pytest.mark.slow
 def test_nested_powers_are_followed():
     assert escape(closed_loop("dia", ("1", "20", "1", "0"), lipschitz="0.3"), steps=1500) is None
     assert escape(closed_loop("dia", ("1", "-2", "1", "0"), lipschitz="0.3"), steps=1500) is not None

@@ -48,6 +48,7 @@ def test_the_virtual_machine_has_the_same_digits(ends, monkeypatch, tmp_path):
     assert slow.tobytes() == ends.tobytes()
 
 
+@pytest.mark.slow
 def test_slices_and_company_change_nothing(ends, monkeypatch):
     monkeypatch.setattr(program_module, "SLICE", 77)
     for i in (0, 5, 15):
@@ -80,6 +81,7 @@ def test_the_planted_library_of_these_tests_would_be_seen(plant, tmp_path):
     assert mark.exists()
 
 
+@pytest.mark.slow
 def test_a_planted_library_is_not_loaded(ends, plant, tmp_path):
     program = PROBLEM.program.compiled(tmp_path)
     mark = plant(program.library.path)

@@ -64,6 +64,7 @@ def test_processes_have_the_same_digits_and_a_death_loses_nothing(serial, tmp_pa
     assert not active_children()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:Creating scratch directories")  # dask's advice where a disk is slow for a second
 def test_dask_has_the_same_digits(serial, tmp_path):
     from distributed import LocalCluster
@@ -74,6 +75,7 @@ def test_dask_has_the_same_digits(serial, tmp_path):
     assert answer(found) == answer(serial[0])
 
 
+@pytest.mark.slow
 def test_any_executor_will_do(serial, tmp_path):
     with ThreadPoolExecutor(3) as executor:
         found = run_campaign(PROBLEM, COUNT, tmp_path, executor=executor, **SEARCH)
