@@ -123,6 +123,7 @@ def test_gains_that_are_not_guaranteed_say_what_fails(call):
     assert found["class"] == "amplitude"
 
 
+@pytest.mark.slow
 def test_gains_that_do_not_hold_the_nominal_fault_either(call, tmp_path):
     path = tmp_path / "law.json"
     code, out, _ = call("real-fault", "--gains", "1", "1", "1", "1", "--out", str(path))

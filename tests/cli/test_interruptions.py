@@ -155,6 +155,7 @@ def test_an_interruption_ends_with_one_line(start):
     assert err == "quakedesign: interrupted; nothing was written.\n"
 
 
+@pytest.mark.slow
 def test_a_job_in_the_background_is_not_interrupted(start):
     """A shell lets such jobs ignore SIGINT, and nohup SIGHUP; SIGTERM ends them."""
     process = start("-m", "quakedesign", *GAINS.split(), ignored=("SIGINT", "SIGHUP"))

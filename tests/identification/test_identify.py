@@ -76,6 +76,7 @@ def test_ends_are_those_of_linear_least_squares_where_the_law_is_linear():
         np.testing.assert_allclose(ends, [-wide[0], wide[0], -wide[1], wide[1]], rtol=0.05)
 
 
+@pytest.mark.slow
 def test_sparse_velocity_steps_tell_only_the_difference_of_effects():
     """Every sample is steady: a and b enter by a - b alone."""
     steps = (1e-6, 1e-5, 1e-6, 3e-6)

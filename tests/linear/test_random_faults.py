@@ -71,6 +71,7 @@ def judged(seed, count):
     return proved, unstable, reasons
 
 
+@pytest.mark.slow
 def test_twelve_random_faults_are_designed_with_a_proof():
     proved, unstable, reasons = judged(2025, 12)
     assert proved >= 11

@@ -213,6 +213,7 @@ def test_the_statement_says_the_slip_rate_of_this_fault():
 STATE = exact_integrals(CONTINUOUS_GAINS, of_state=True)
 
 
+@pytest.mark.slow
 def test_feedback_of_the_state_is_accepted_by_both_and_needs_a_smooth_reference():
     """A cubic reference starts and ends with an acceleration, which the law would pass on as a jump."""
     text = guarantee_text(continuous_peaks(uncertain_plant(load_fault("real-fault")), STATE))

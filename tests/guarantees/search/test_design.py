@@ -75,6 +75,7 @@ def test_designs_are_guaranteed_within_the_targets(row):
     assert claim.claims.slip_error <= slip
 
 
+@pytest.mark.slow
 def test_the_class_rate_is_guaranteed_far_lower():
     claim = guarantee(uncertain_plant(load_fault("real-fault"), rate_limited=True), designed("real tracking").held)
     assert claim.claims.slip_rate_error <= F(7, 10**5)
