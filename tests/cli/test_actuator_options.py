@@ -137,6 +137,7 @@ class Leak(SampledStage):
 '''
 
 
+@pytest.mark.slow
 def test_an_actuator_is_one_file_its_option_included(tmp_path):
     """Beside the others, with nothing else changed: told by the help, read in units, put in its place and run."""
     (tmp_path / "leak.py").write_text(LEAK)

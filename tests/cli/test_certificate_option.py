@@ -48,6 +48,7 @@ def test_a_file_holds_its_law_with_the_limit_at_rest_and_what_stands_around_it(f
     assert qd.loop_transfer(REAL, law).nstates == 2 + 1 + 2
 
 
+@pytest.mark.slow
 def test_it_runs_behind_its_lag_with_its_noise(file, capsys):
     code, out, _ = told(capsys, "simulate", "real-fault", "--certificate", file, *SHORT, "--json")
     answer = json.loads(out)

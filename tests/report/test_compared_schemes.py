@@ -74,6 +74,7 @@ def test_the_best_scheme_makes_the_difference(compared):
     assert best.max_slip_rate_error < explicit.max_slip_rate_error / 30
 
 
+@pytest.mark.slow
 def test_a_divergence_among_them_is_told_and_leaves_no_number_that_is_none(compared, tmp_path):
     study = paper_study(compared)
     write_folder(compared, tmp_path / "out", force=False, study=study)

@@ -83,6 +83,7 @@ def test_bars_of_nearly_equal_values_name_no_crowded_parts_of_a_decade(compariso
         assert not any(tick.label1.get_text() for tick in axis.xaxis.get_minor_ticks())
 
 
+@pytest.mark.slow
 def test_no_tick_label_covers_another_and_no_text_leaves_its_figure(comparison):
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

@@ -276,6 +276,7 @@ def test_numbers_of_the_paper_are_set_beside_those_found(study):
     assert "no run" in printed_lines(missing)[-1]
 
 
+@pytest.mark.slow
 def test_the_folder_holds_figures_and_numbers_and_appears_whole(study, tmp_path, monkeypatch):
     out = tmp_path / "results"
     found = write_folder(study.comparison, out, force=False, study=study)

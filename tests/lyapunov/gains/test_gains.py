@@ -34,6 +34,7 @@ def small():
     return synthesise("cta", "norm", degrees=(5,), starts=1)
 
 
+@pytest.mark.slow
 def test_the_smallest_gains_are_proved_and_beat_the_published_ones(small):
     assert small.certificate.check() is Verdict.PROVED
     assert small.certificate.loop.gains == small.gains
@@ -48,6 +49,7 @@ def test_the_smallest_gains_are_proved_and_beat_the_published_ones(small):
     assert small.gains["k3"] - abs(small.gains["k4"]) > 1
 
 
+@pytest.mark.slow
 def test_synthesised_gains_withstand_the_sampler(small):
     assert not attack.sample(attack.Claim.read(certificate_text(small.certificate)), 50_000)
 
