@@ -27,9 +27,7 @@ from quakedesign.studies.comparison import Entry
 from quakedesign.studies.runs import chosen_controller
 from quakedesign.synthesis import assess
 
-pytestmark = (
-    pytest.mark.slow
-)  # by default tests/laws/test_rest_limit.py designs a 2-CTA, test_default_design.py an e-LQR
+pytestmark = pytest.mark.slow  # tests/laws/test_rest_limit.py designs one by default
 REAL = load_fault("real-fault")
 DATA = Path(__file__).parents[2] / "data"
 SLOW = load_fault(DATA / "undersampled_fault.toml")
