@@ -162,19 +162,22 @@ class UncertainPlant:
     @cached_property
     def slip_chord(self) -> Range:
         """s [1/s²]."""
+        return self.slip_slopes(self.stress)
+
+    def slip_slopes(self, stress: Range) -> Range:
+        """Force per slip and mass [1/s²] while the effective normal stress [Pa] is constant and within a range."""
         law, k = self.friction, self.stiffness
-        low, high = _hull(
-            n * stress * c
-            for n in self.area_per_mass
-            for stress in self.stress
-            for c in (law.weakening, -law.strengthening)
-        )
+        low, high = _hull(n * p * c for n in self.area_per_mass for p in stress for c in (law.weakening, -law.strengthening))
         return low - k[1] + self.growths[0], high - k[0] + self.growths[0]
 
     @cached_property
     def rate_chord(self) -> Range:
         """w [1/s]."""
-        most = self.area_per_mass[1] * max(map(abs, self.stress)) * self.friction.rate_slope
+        return self.rate_slopes(self.stress)
+
+    def rate_slopes(self, stress: Range) -> Range:
+        """Damping per mass [1/s] while the effective normal stress [Pa] is within a range."""
+        most = self.area_per_mass[1] * max(map(abs, stress)) * self.friction.rate_slope
         low, high = self.specific_damping
         return low - most - self.growths[1], high + most - self.growths[1]
 

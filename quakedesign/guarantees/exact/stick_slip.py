@@ -1,0 +1,677 @@
+"""Stick–slip plant: an invariant polytope of the sampled loop with friction that holds the fault at rest.
+
+**Plant.** Let y = x2 ≥ 0 be the slip rate, p*(x1) the pressure that balances the fault at rest at slip x1, b·β(x1) = μN̂,
+and U = p*(x1) − p at a sample with the held pressure p. For the slip ξ since the sample
+
+    y′ = −w·y + G(ξ) + φ + λ,   G(0) = −bβU,   G′(ξ) ∈ [S⁻, S⁺],   λ ≥ 0, λy = 0,
+
+exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ − φ1, whose slope is −κ − N̂μ′(σ′ − p). While the fault rests
+nothing changes. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is checked.
+
+**Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion is one
+of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the block before
+the next sample, and the period ends with y = 0. So each period is either the *sliding* map, with y ≥ 0 and ξ ≥ 0 at its
+end, or the *rest* map with a slip D until the last stop.
+
+**Sliding map.** With S0 the middle and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are linear in
+(y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Before, ξ(t) ≤ (t·y + t²/2·(H − bβU))/(1 − S⁺T²/2)
+and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
+
+**Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, partial integration gives D = f(0)y + ∫f·(G + φ)dt up to the stop. As
+G ≤ −H + |S⁻|(D − ξ) before it, and what G lacks of that falls with the slip,
+
+    D·(1 − |S⁻|T²/2 − δ) ≤ f(0)·y + 2H·(e^{wx} − 1 − wx)/w²,   x = (1 − θ)T,
+
+for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and δ the width of its range times (e^{wx} − 1)/w. Besides,
+bβ·U ≥ H + G(D)-part: b·β_max·U ≥ H − |S⁻|D.
+
+**Law.** `StickSlipLaw`; d = D_level + p*(x1) moves by −σξ [Pa] besides, σ = S_chord/(bβ). State at the samples: z = (e1, y,
+d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet exceeds 1 after either map; each is the largest value of a
+linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
+
+**Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ = −wy′ + Sy
+admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from flint import arb, arb_mat, ctx
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import end_of
+from quakedesign.guarantees.exact.norms import absolute, ball, majorant, matrix
+from quakedesign.laws.stick_slip_law import StickSlipLaw
+from quakedesign.plant.ranges import Range, UncertainPlant
+
+BITS = 128
+NODES = 16  # pieces of a period, for integrals of impulse responses
+LINES = 5  # bounds of the slip until a stop, less one
+MOST_FACETS, MOST_BASES = 400, 40_000
+_GRAIN = 2.0**-40  # of multipliers
+_FLAT = 1e-12  # volume below which the normals of a vertex count as dependent
+_NEAR = 1e-6  # by which a proposed vertex may lie outside of its polytope, of its size
+_ZERO = Fraction(0)
+
+# Slices of e1 at 0 and at max r′/c, and for each combination the slice, whether the target rate v is
+# positive, and r′ = q1·c·e1 + q0·max r′.
+SLICES = 3
+COMBINATIONS = (
+    (0, True, 0, 0),
+    (0, True, 0, 1),
+    (1, True, 1, 0),
+    (1, True, 0, 1),
+    (1, False, 0, 0),
+    (2, False, 0, 0),
+    (2, False, 0, 1),
+)
+_BEHIND = tuple(place == 0 for place in (*range(SLICES), *(combination[0] for combination in COMBINATIONS)))
+Basis = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StickSlipPolytope:
+    """The invariant set, with what proves that it is one.
+
+    Attributes
+    ----------
+    facets : tuple of rows
+        n_l, three entries each [1/m, s/m, 1/Pa]; the first five bound +e1, y, +d, −e1 and −d alone.
+    multipliers : tuple of rows
+        Of each facet: multiplier of y ≥ 0 at the end of a period [s/m], 0 or more; whether negative factors of ξ and of
+        y there are left out, as ξ ≥ 0 and y ≥ 0 (0 or 1); the same two where the innovation is cut off, with y = 0 and
+        a multiplier of either sign; share from 0 to 1 with which that cut-off counts at rest.
+    sliding : tuple of tuple of Basis
+        For each of the 3 slices vertices, by the numbers of three constraints each: facets, then y ≥ 0, then the ends
+        of the slice.
+    resting : tuple of tuple of Basis
+        For each of the 7 combinations vertices in (e1, y, d, D), by four constraints each: the same, then D ≥ 0, the
+        condition of rest, then bounds of D.
+
+    Raises
+    ------
+    ParameterError
+        When the sizes do not fit.
+    """
+
+    facets: tuple[tuple[Fraction, ...], ...]
+    multipliers: tuple[tuple[Fraction, ...], ...]
+    sliding: tuple[tuple[Basis, ...], ...]
+    resting: tuple[tuple[Basis, ...], ...]
+
+    def __post_init__(self) -> None:
+        count = len(self.facets)
+        bases = [(basis, 3) for line in self.sliding for basis in line]
+        bases += [(basis, 4) for line in self.resting for basis in line]
+        axes = tuple((index, sign) for index, sign in ((0, 1), (1, 1), (2, 1), (0, -1), (2, -1)))
+        fits = (
+            5 <= count <= MOST_FACETS
+            and len(bases) <= MOST_BASES
+            and {len(row) for row in self.facets} == {3}
+            and all(
+                row[index] * sign > 0 and not any(v for i, v in enumerate(row) if i != index)
+                for row, (index, sign) in zip(self.facets, axes, strict=False)
+            )
+            and len(self.multipliers) == count
+            and all(
+                len(row) == 5 and row[0] >= 0 <= row[4] <= 1 and row[1] in (0, 1) and row[3] in (0, 1)
+                for row in self.multipliers
+            )
+            and len(self.sliding) == SLICES
+            and len(self.resting) == len(COMBINATIONS)
+            and all(self.sliding)
+            and all(self.resting)
+            and all(len(basis) == size and 0 <= min(basis) for basis, size in bases)
+        )
+        if not fits:
+            raise ParameterError(
+                f"a polytope of a stick-slip loop needs 5 to {MOST_FACETS} facets of 3 entries, the first five along "
+                "+e1, +y, +d, -e1 and -d, 5 multipliers for each, and bases of 3 constraints for 3 slices "
+                "and of 4 for 7 combinations. Received other sizes. Search for it again."
+            )
+
+    @property
+    def box(self) -> tuple[Fraction, ...]:
+        """Bounds of +e1 [m], y [m/s], +d [Pa], −e1 [m] and −d [Pa]."""
+        return tuple(1 / abs(sum(row)) for row in self.facets[:5])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledStickSlip:
+    """The law as it runs: once every T_s, its pressure held, from exact measurements.
+
+    Attributes
+    ----------
+    law : StickSlipLaw
+    step : Fraction
+        T_s [s].
+
+    Raises
+    ------
+    ParameterError
+        For a step that is not positive.
+    """
+
+    law: StickSlipLaw
+    step: Fraction
+
+    def __post_init__(self) -> None:
+        if self.step <= 0:
+            raise ParameterError("T_s must be positive")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StickSlipBounds:
+    """What the theorem gives.
+
+    Attributes
+    ----------
+    behind, ahead : Fraction
+        How far the slip is behind and ahead of the reference at most [m].
+    slip_rate : Fraction
+        [m/s].
+    least_pressure, largest_pressure : Fraction
+        [Pa].
+    """
+
+    behind: Fraction
+    ahead: Fraction
+    slip_rate: Fraction
+    least_pressure: Fraction
+    largest_pressure: Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """How numbers are computed: floats for a search, balls for a proof; arrays of both have the same operations."""
+
+    number: Callable[[Fraction], Any]
+    exponential: Callable[[tuple[tuple[Fraction, ...], ...]], list[list[Any]]]
+    bent: Callable[[tuple[tuple[Fraction, ...], ...], Fraction], tuple[Any, Any]]
+    array: Callable[[Any], np.ndarray]
+    middle: Callable[[np.ndarray], np.ndarray]
+
+    def without(self, values: np.ndarray, flags: np.ndarray) -> np.ndarray:
+        """The values, but 0 for flagged ones that are certainly negative."""
+        return np.where(flags & (values < 0).astype(bool), self.number(_ZERO), values)
+
+
+def _ball_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[Any]]:
+    found: list[list[Any]] = matrix(rows).exp().tolist()
+    return found
+
+
+def curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[Any, Any]:
+    """Bounds of |(A²e^{Aτ})_12| and |(A²e^{Aτ})_22| for 0 ≤ τ ≤ T."""
+    a = matrix(flow)
+    within = absolute((majorant(a) * ball(step)).exp())
+    found = absolute(a * a) * within
+    return found[0, 1].upper(), found[1, 1].upper()
+
+
+def _ball_array(values: Any) -> np.ndarray:
+    table = np.array(values, dtype=object)
+    return np.vectorize(lambda v: ball(v) if isinstance(v, Fraction) else arb(v), otypes=[object])(table)
+
+
+def _ball_middle(values: np.ndarray) -> np.ndarray:
+    return np.asarray(np.vectorize(float, otypes=[float])(values))
+
+
+def _exact_array(values: Any) -> np.ndarray:
+    return np.vectorize(Fraction, otypes=[object])(np.array(values, dtype=object))
+
+
+BALLS = Backend(ball, _ball_exponential, curvature, _ball_array, _ball_middle)
+EXACT = Backend(Fraction, _ball_exponential, curvature, _exact_array, _ball_middle)
+"""Of rationals; only for what needs no exponential."""
+
+
+# ----------------------------------------------------------------------
+# Numbers of one period.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ranges:
+    """Ranges of the plant on a set of states, exact.
+
+    Attributes
+    ----------
+    slope, damping : (Fraction, Fraction)
+        [S⁻, S⁺] [1/s²], [w⁻, w⁺] [1/s].
+    chord : (Fraction, Fraction)
+        Range of bβσ [1/s²].
+    rest_pressure : (Fraction, Fraction)
+        p* [Pa].
+    """
+
+    slope: Range
+    damping: Range
+    chord: Range
+    rest_pressure: Range
+
+
+def ranges(task: UncertainPlant, ahead: Fraction, push: Range) -> Ranges:
+    """For a slip of at most `ahead` [m] beyond the target, and U = p* − p within a range [Pa].
+
+    Raises
+    ------
+    ParameterError
+        Where the theorem does not hold: the fault may open, slip backward, or its damping be negative.
+    """
+    wide = replace(task, target_slip=task.target_slip + ahead)
+    low, high = wide.stress
+    stress = min(low, low + push[0]), max(high, high + push[1])
+    slope, chord, damping = task.slip_slopes(stress), task.slip_slopes((low, high)), task.rate_slopes(stress)
+    if stress[0] <= 0:
+        raise ParameterError("the fault may open: its effective normal stress may reach 0 Pa")
+    if damping[0] < 0:
+        raise ParameterError("friction may weaken with the slip rate by more than the damping: w may be negative")
+    stiffness = max(task.stiffness[1] - task.growths[0], _ZERO)
+    load = task.area_per_mass[0] * task.friction.static * task.normal_stress
+    if load <= stiffness * wide.target_slip + task.amplitude:
+        raise ParameterError("the shear stress may reverse, so that the fault might slip backward")
+    slope, chord = ((min(pair[0], _ZERO), max(pair[1], _ZERO)) for pair in (slope, chord))
+    rest = task.normal_stress - high, task.normal_stress - low
+    return Ranges(slope=slope, damping=damping, chord=chord, rest_pressure=rest)
+
+
+def stop_bounds(task: UncertainPlant, held: SampledStickSlip, found: Ranges) -> tuple[tuple[Fraction, Fraction], ...]:
+    """Pairs (g, h) with D ≤ g·y + h for the slip D [m] until a last stop within a period.
+
+    Upper bounds of the exponentials: (1 − e^{−wm})/w ≤ m − wm²/2 + w²m³/6, (e^{wx} − 1 − wx)/w² ≤ x²/2/(1 − wx/3) and
+    (e^{wx} − 1)/w ≤ x/(1 − wx/2).
+
+    Raises
+    ------
+    ParameterError
+        For a period that is long against the plant.
+    """
+    step, amplitude = held.step, task.amplitude
+    low, high = found.damping
+    least = Fraction(1, 2) + low * step / 24
+    pairs = []
+    for i in range(LINES + 1):
+        share = least + (1 - least) * i / LINES
+        m, x = share * step, (1 - share) * step
+        room = 1 + found.slope[0] * step**2 / 2 - (high - low) * x / (1 - low * x / 2)
+        if least >= 1 or low * x >= 1 or room <= 0:
+            raise ParameterError("T_s is too long against the damping and the slope of friction for a bound of stops")
+        start = m - low * m**2 / 2 + low**2 * m**3 / 6
+        pairs.append((start / room, amplitude * x**2 / (1 - low * x / 3) / room))
+    return tuple(pairs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Period:
+    """One period in numbers of a back end; SI units."""
+
+    back: Backend
+    task: UncertainPlant
+    held: SampledStickSlip
+    found: Ranges
+    of_rate: tuple[Any, Any]  # ξ and y at the end, of y
+    of_force: tuple[Any, Any]  # and of a constant force
+    impulses: tuple[np.ndarray, np.ndarray]  # ξ and y, a time after an impulse, at the nodes
+    bent: tuple[Any, Any]
+
+    @classmethod
+    def of(cls, back: Backend, task: UncertainPlant, held: SampledStickSlip, found: Ranges) -> "Period":
+        """From exact ranges."""
+        zero, one = _ZERO, Fraction(1)
+        slope, damping = (sum(pair, _ZERO) / 2 for pair in (found.slope, found.damping))
+        flow = (zero, one), (slope, -damping)
+        tall = (*((*row, entry) for row, entry in zip(flow, (zero, one), strict=True)), (zero, zero, zero))
+        whole = back.exponential(tuple(tuple(v * held.step for v in row) for row in tall))
+        piece = held.step / NODES
+        nodes = [
+            back.exponential(tuple(tuple(v * piece * i for v in row) for row in flow)) for i in range(NODES + 1)
+        ]
+        return cls(
+            back=back,
+            task=task,
+            held=held,
+            found=found,
+            of_rate=(whole[0][1], whole[1][1]),
+            of_force=(whole[0][2], whole[1][2]),
+            impulses=(back.array([node[0][1] for node in nodes]), back.array([node[1][1] for node in nodes])),
+            bent=back.bent(flow, held.step),
+        )
+
+    def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
+        """Bounds of ∫|g(T − t)|t^j dt for j = 0 to 3, g = `of_slip`·ξ + `of_rate`·y of an impulse.
+
+        On a piece |g| is below the chord of its ends plus h²/8·max|g″|; Simpson's rule is exact to the third power.
+        """
+        number, h = self.back.number, self.held.step / NODES
+        above = (abs(of_slip) * self.bent[0] + abs(of_rate) * self.bent[1]) * number(h**2 / 8)
+        sizes = abs(of_slip[:, None] * self.impulses[0] + of_rate[:, None] * self.impulses[1]) + above[:, None]
+        sizes = sizes[:, ::-1]  # from the start of the period on
+        found: list[Any] = [0, 0, 0, 0]
+        for i in range(NODES):
+            first, last = sizes[:, i], sizes[:, i + 1]
+            for j in range(4):
+                begin, middle, end = ((h * i + h * k / 2) ** min(j, 2) for k in range(3))
+                area = first * number(begin * h / 6) + (first + last) * number(middle * h / 3) + last * number(end * h / 6)
+                found[j] = found[j] + area * number(h * (i + 1) if j == 3 else Fraction(1))
+        return found
+
+
+def gap(beta: Range) -> Fraction:
+    """Bound of the chord of 1/β over its range less 1/β: (β1 − β0)²/(4β0²β1)."""
+    return (beta[1] - beta[0]) ** 2 / (4 * beta[0] ** 2 * beta[1])
+
+
+# ----------------------------------------------------------------------
+# What each facet becomes in one period: linear functions to be bounded on polytopes.
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Functions c·z + k of some facets on the polytope of a slice (three entries) or a combination (four).
+
+    Attributes
+    ----------
+    place : int
+        Slice or combination.
+    which : ndarray of int
+        Numbers of the facets.
+    factors, constants : ndarray
+    cut : bool
+        Whether the innovation of the slip is cut off in the sliding map.
+    """
+
+    place: int
+    which: np.ndarray
+    factors: np.ndarray
+    constants: np.ndarray
+    cut: bool = False
+
+
+def push_row(
+    held: SampledStickSlip, fastest: Fraction, combination: tuple[int, bool, int, int]
+) -> tuple[tuple[Fraction, Fraction, Fraction], Fraction, tuple[Fraction, Fraction]]:
+    """U as a function of (e1, y, d) and its constant [Pa], and r′ = q1·e1 + q0."""
+    law = held.law
+    q1, q0 = law.return_rate * combination[2], fastest * combination[3]
+    return (-law.target_gain * (q1 - law.return_rate), law.rate_gain, Fraction(1)), -law.target_gain * q0, (q1, q0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Carried:
+    """What the law and the reference make of facets in a combination, whatever the plant does."""
+
+    place: int
+    push: tuple[Fraction, Fraction, Fraction]
+    push0: Fraction
+    of_error: np.ndarray
+    constant: np.ndarray
+
+
+def _carried(back: Backend, task: UncertainPlant, held: SampledStickSlip, facets: np.ndarray) -> Iterator[_Carried]:
+    number, law, step = back.number, held.law, held.step
+    n1, _, n3 = facets.T
+    fastest, bend = task.reference_rates
+    predicted = n3 * number(law.level_gain + law.slip_gain * step / 2)
+    for place, combination in enumerate(COMBINATIONS):
+        push, push0, (q1, q0) = push_row(held, fastest, combination)
+        p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
+        # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative
+        moves = np.where(back.middle(n1) > 0, float(bool(q1 or q0)), 1.0)
+        late = back.array(moves.tolist()) * abs(n1) * number(bend * step**2 / 2)
+        of_error = n1 - n1 * number(step * q1) - predicted * number(p1)
+        yield _Carried(place, push, push0, of_error, late - n1 * number(step * q0) - predicted * number(p0))
+
+
+def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
+    """What facets become in a period of the sliding map.
+
+    Parameters
+    ----------
+    period : Period
+    facets, multipliers : ndarray
+        Of numbers of the back end; see `StickSlipPolytope`.
+    """
+    back, held, task, found = period.back, period.held, period.task, period.found
+    number, law, step = back.number, held.law, held.step
+    n1, n2, n3 = facets.T
+    everyone, raised = np.arange(len(facets)), np.flatnonzero(back.middle(n3) > 0)
+    level, slip, half = number(law.level_gain), number(law.slip_gain), number(step / 2)
+    growth = 1 / (1 - found.slope[1] * step**2 / 2)
+    per_slip = number((found.slope[1] - found.slope[0]) / 2 * growth)
+    per_rate = number((found.damping[1] - found.damping[0]) / 2)
+    steepest, bound = number(found.slope[1] * growth), number(task.amplitude)
+    steep = gap(task.beta) * 2 * growth / task.authority * step
+    carried = list(_carried(back, task, held, facets))
+    for cut in (False, True):
+        which = raised if cut else everyone
+        if not len(which):
+            continue
+        a1, a2, a3, shares = n1[which], n2[which], n3[which], multipliers[which]
+        flag = back.middle(shares[:, 3 if cut else 1]) == 1
+        plain = a1 + a3 * (0 if cut else slip)
+        of_rate = a2 + shares[:, 2] if cut else back.without(a2 + a3 * level, flag) + shares[:, 0]
+        for end in found.chord:
+            chords = [number(end / (beta * task.authority)) for beta in task.beta]
+            of_slips = [back.without(plain - a3 * chord, flag) for chord in chords]
+            bent = (back.middle(of_slips[0]) != 0) | (back.middle(of_slips[1]) != 0)  # else no slip counts
+            curved = back.array(bent.astype(float).tolist()) * abs(a3) * number(abs(end) * steep)
+            for beta, of_slip in zip(task.beta, of_slips, strict=True):
+                whole = period.integrals(of_slip, of_rate)
+                of_force = (per_slip * whole[2] + per_rate * steepest * whole[3]) / 2 + per_rate * whole[1]
+                own = of_slip * period.of_force[0] + of_rate * period.of_force[1] + of_force
+                pushed = -number(beta * task.authority) * own
+                of_y = per_slip * whole[1] + per_rate * (whole[0] + steepest * whole[2]) + curved
+                of_y = of_y + of_slip * period.of_rate[0] + of_rate * period.of_rate[1]
+                of_y = of_y if cut else of_y - a3 * slip * half
+                force = bound * (whole[0] + of_force + curved * half)
+                for part in carried:
+                    factors = [pushed * number(v) for v in part.push]
+                    columns = [part.of_error[which] + factors[0], of_y + factors[1], a3 + factors[2]]
+                    constants = part.constant[which] + pushed * number(part.push0) + force
+                    yield Rows(COMBINATIONS[part.place][0], which, np.column_stack(columns), constants, cut)
+
+
+def resting_rows(
+    back: Backend,
+    task: UncertainPlant,
+    held: SampledStickSlip,
+    found: Ranges,
+    facets: np.ndarray,
+    multipliers: np.ndarray,
+) -> Iterator[Rows]:
+    """What facets become in a period that ends at rest: rational functions of rational numbers."""
+    number, law = back.number, held.law
+    n1, _, n3 = facets.T
+    rises = back.middle(n3) > 0
+    raised, lowered = np.flatnonzero(rises), np.flatnonzero(~rises)
+    slip, half = number(law.slip_gain), number(held.step / 2)
+    for part in _carried(back, task, held, facets):
+        for end in found.chord:
+            chord = number(end / task.authority)
+            for which, share in ((raised, 0), (raised, 1), (lowered, None)):
+                if not len(which):
+                    continue
+                a1, a3 = n1[which], n3[which]
+                cut_off = a3 * slip * (multipliers[which][:, 4] if share is None else share)
+                factors = np.column_stack(
+                    [part.of_error[which], -cut_off * half, a3, a1 - a3 * chord + cut_off]
+                )
+                yield Rows(SLICES + part.place, which, factors, part.constant[which])
+
+
+# ----------------------------------------------------------------------
+# Polytopes on which these functions are bounded: constraints Az ≤ b, exact.
+
+Constraint = tuple[tuple[Fraction, ...], Fraction]
+
+
+def slices(task: UncertainPlant, held: SampledStickSlip) -> tuple[tuple[Constraint, ...], ...]:
+    """Ends of the three slices: e1 up to 0, from there to max r′/c, and above."""
+    threshold, one = task.reference_rates[0] / held.law.return_rate, Fraction(1)
+    up, down = (one, _ZERO, _ZERO), (-one, _ZERO, _ZERO)
+    return ((up, _ZERO),), ((down, _ZERO), (up, threshold)), ((down, -threshold),)
+
+
+def polytopes(
+    task: UncertainPlant, held: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], found: Ranges | None
+) -> list[list[Constraint]]:
+    """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, D) where ranges are known."""
+    one = Fraction(1)
+    own: list[Constraint] = [(row, one) for row in facets]
+    own.append(((_ZERO, -one, _ZERO), _ZERO))
+    ends = slices(task, held)
+    flat = [[*own, *end] for end in ends]
+    if found is None:
+        return flat
+    lines = stop_bounds(task, held, found)
+    most = task.beta[1] * task.authority
+    for combination in COMBINATIONS:
+        push, push0, _ = push_row(held, task.reference_rates[0], combination)
+        larger = (*(-most * v for v in push), found.slope[0])
+        room = most * push0 - task.amplitude
+        tall: list[Constraint] = [((*row, _ZERO), b) for row, b in flat[combination[0]]]
+        tall += [((_ZERO, _ZERO, _ZERO, -one), _ZERO), (larger, room)]
+        tall += [((_ZERO, -g, _ZERO, one), h) for g, h in lines]
+        flat.append(tall)
+    return flat
+
+
+class Verifier:
+    """Bounds of linear functions on one polytope, from multipliers of named constraints; exact whatever floats say."""
+
+    def __init__(
+        self, constraints: list[Constraint], bases: Sequence[Basis], sizes: Sequence[Fraction], *, behind: bool
+    ) -> None:
+        count = len(constraints)
+        if any(place >= count for basis in bases for place in basis):
+            raise ParameterError(f"bases of a polytope must name {count} constraints by their numbers, from 0")
+        self.sizes, self.sign = _exact_array(list(sizes)), -1 if behind else 1  # of e1
+        self.rows = _exact_array([list(row) for row, _ in constraints])
+        self.ends = _exact_array([end for _, end in constraints])
+        ahead = [place for place, (row, end) in enumerate(constraints) if end and row[0] > 0 and not any(row[1:])]
+        self.last = next((place for place in ahead if place > len(constraints[0][0])), None)
+        self.bases = np.array(bases)
+        self.floats = _ball_middle(self.rows * self.sizes)
+        lengths = np.linalg.norm(self.floats, axis=1)
+        solvable = np.abs(np.linalg.det((self.floats / lengths[:, None])[self.bases])) > _FLAT
+        self.bases = self.bases[solvable]
+        if not len(self.bases):
+            raise ParameterError("the constraints of each basis must be independent")
+        ends = _ball_middle(self.ends)
+        self.vertices = np.linalg.solve(self.floats[self.bases], ends[self.bases][..., None])[..., 0]
+        inside = (self.vertices @ self.floats.T <= ends + _NEAR * lengths).all(axis=1)
+        if not inside.any():
+            raise ParameterError("the bases of each polytope must name its vertices")
+        self.bases, self.vertices = self.bases[inside], self.vertices[inside]
+
+    def proposed(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Constraints and their multipliers at the best vertex, in floating point; a negative one shows that it is not."""
+        bases = self.bases[(scaled @ self.vertices.T).argmax(axis=1)]
+        return bases, np.linalg.solve(self.floats[bases].swapaxes(-1, -2), scaled[..., None])[..., 0]
+
+    def largest(self, factors: np.ndarray, constants: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
+        """Upper bounds of c·z + k, of rationals or balls; where `which` names facets, those of 1 + (c − n)·z + k count too.
+
+        The second one decides where a period changes nothing, as at rest: there c − n has the sign that e1, y and D do
+        not have, D being at most g·y by the last constraint, and e1 at most its end of the slice.
+        """
+        factors, off = _middles(factors)
+        constants, above = _middles(constants)
+        constants = constants + above
+        bases, shares = self.proposed(_ball_middle(factors * self.sizes))
+        shares = _exact_array(np.maximum(np.round(shares / _GRAIN) * _GRAIN, 0).tolist())
+        left = factors - (shares[..., None] * self.rows[bases]).sum(axis=1)
+        found = (shares * self.ends[bases]).sum(axis=1) + self._rest(left, off)
+        if which is not None:
+            left = factors - self.rows[which]
+            if left.shape[1] > 3:
+                left[:, 1] = left[:, 1] - np.maximum(left[:, 3], 0) * self.rows[-1, 1]
+                left[:, 3] = 0
+            same = 1 + 0 * found
+            if self.last is not None:
+                same, left[:, 0] = same + np.maximum(left[:, 0], 0) * self.ends[self.last], np.minimum(left[:, 0], 0)
+            found = np.minimum(found, same + self._rest(left, off))
+        return np.asarray(found + constants)
+
+    def _rest(self, left: np.ndarray, off: np.ndarray) -> np.ndarray:
+        """Bound of what multipliers leave, within `off`, by the signs of e1, y and D."""
+        left = left * np.array([self.sign, 1, 1, 1][: left.shape[1]])
+        left[:, 2] = abs(left[:, 2])
+        return np.asarray((np.maximum(left + off, 0) * self.sizes).sum(axis=1))
+
+
+def _middles(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Middles and radii of balls, exact; of rationals themselves and 0."""
+    if not isinstance(values.flat[0], arb):
+        return values, 0 * values
+    ends = [(end_of(value.mid()), end_of(value.rad())) for value in values.flat]
+    middles, radii = (np.array(column, dtype=object).reshape(values.shape) for column in zip(*ends, strict=True))
+    return middles, radii
+
+
+def stick_slip_bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipBounds:
+    """Bounds of the theorem.
+
+    Raises
+    ------
+    ParameterError
+        With what of it does not hold.
+    """
+    with ctx.workprec(BITS):
+        return _bounds(task, held, reach)
+
+
+def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipBounds:
+    ahead, rate, up, lag, down = reach.box
+    fastest = task.reference_rates[0]
+    sizes = [max(ahead, lag), rate, max(up, down)]
+    push = _push(task, held, reach, sizes)
+    found = ranges(task, ahead + fastest * held.step, push)
+    if found.slope[1] * held.step**2 >= 1:
+        raise ParameterError("T_s is too long against the weakening of friction")
+    constraints = polytopes(task, held, reach.facets, found)
+    longest = max(min(g * rate + h for g, h in stop_bounds(task, held, found)), Fraction(1, 10**30))
+    if task.amplitude + found.slope[0] * longest < 0:
+        raise ParameterError("the disturbance is too small for the condition of rest")
+    verifiers = [
+        Verifier(lines, bases, sizes if len(bases[0]) == 3 else [*sizes, longest], behind=behind)
+        for lines, bases, behind in zip(constraints, (*reach.sliding, *reach.resting), _BEHIND, strict=True)
+    ]
+    period = Period.of(BALLS, task, held, found)
+    given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
+    sliding = sliding_rows(period, *map(_ball_array, given))
+    for rows in chain(sliding, resting_rows(EXACT, task, held, found, *map(_exact_array, given))):
+        tops = verifiers[rows.place].largest(rows.factors, rows.constants, rows.which)
+        for facet, top in zip(rows.which, tops, strict=True):
+            if not top <= 1:
+                kind = "slides" if rows.place < SLICES else "ends at rest"
+                raise ParameterError(f"the state may leave the polytope through facet {facet} in a period that {kind}")
+    moved = fastest * held.step
+    return StickSlipBounds(
+        behind=lag + moved,
+        ahead=ahead + moved,
+        slip_rate=rate,
+        least_pressure=found.rest_pressure[0] - push[1],
+        largest_pressure=found.rest_pressure[1] - push[0],
+    )
+
+
+def _push(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope, sizes: Sequence[Fraction]) -> Range:
+    """Least and largest U = p* − p at a sample [Pa]."""
+    law, fastest = held.law, task.reference_rates[0]
+    row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)
+    factors = _exact_array([list(row), [-v for v in row]])
+    constants = _exact_array([_ZERO, law.target_gain * fastest])
+    tops = [
+        Verifier(lines, bases, sizes, behind=behind).largest(factors, constants)
+        for lines, bases, behind in zip(
+            polytopes(task, held, reach.facets, None), reach.sliding, _BEHIND[:SLICES], strict=True
+        )
+    ]
+    high, low = (max(line[i] for line in tops) for i in (0, 1))
+    return -low, high

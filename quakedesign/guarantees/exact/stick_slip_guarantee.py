@@ -1,0 +1,145 @@
+"""A guarantee on the stick–slip plant as a statement that checks itself."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, ClassVar, Literal
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import LowerBound, UpperBound
+from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.statement import above
+from quakedesign.guarantees.exact.stick_slip import (
+    SampledStickSlip,
+    StickSlipBounds,
+    StickSlipPolytope,
+    stick_slip_bounds,
+)
+from quakedesign.laws.stick_slip_law import StickSlipController
+from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant.ranges import UncertainPlant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StickSlipClaims:
+    """What is never exceeded.
+
+    Attributes
+    ----------
+    slip_behind, slip_ahead : UpperBound
+        How far the slip is behind and ahead of the reference at most [m].
+    peak_slip_rate : UpperBound
+        [m/s].
+    least_pressure, largest_pressure : LowerBound, UpperBound
+        [Pa].
+    """
+
+    slip_behind: UpperBound
+    slip_ahead: UpperBound
+    peak_slip_rate: UpperBound
+    least_pressure: LowerBound
+    largest_pressure: UpperBound
+
+    @classmethod
+    def of(cls, bounds: StickSlipBounds) -> "StickSlipClaims":
+        """Rounded outward to four digits."""
+        return cls(
+            slip_behind=UpperBound(above(bounds.behind)),
+            slip_ahead=UpperBound(above(bounds.ahead)),
+            peak_slip_rate=UpperBound(above(bounds.slip_rate)),
+            least_pressure=LowerBound(-above(-bounds.least_pressure)),
+            largest_pressure=UpperBound(above(bounds.largest_pressure)),
+        )
+
+    def follow(self, bounds: StickSlipBounds) -> bool:
+        """Whether the claims follow from bounds."""
+        return (
+            self.slip_behind >= bounds.behind
+            and self.slip_ahead >= bounds.ahead
+            and self.peak_slip_rate >= bounds.slip_rate
+            and self.least_pressure <= bounds.least_pressure
+            and self.largest_pressure >= bounds.largest_pressure
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts, SI."""
+        return {
+            "slip_behind": self.slip_behind.exact,
+            "slip_ahead": self.slip_ahead.exact,
+            "peak_slip_rate": self.peak_slip_rate.exact,
+            "pressure": [self.least_pressure.exact, self.largest_pressure.exact],
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StickSlipGuarantee:
+    """Claims about one loop on the stick–slip plant, from rest; `check` decides them.
+
+    Attributes
+    ----------
+    task : UncertainPlant
+    held : SampledStickSlip
+    reach : StickSlipPolytope
+    claims : StickSlipClaims
+    covers, lasts : str
+        For what it holds, and for how long, in short.
+    """
+
+    proved: ClassVar[Literal[True]] = True
+    task: UncertainPlant
+    held: SampledStickSlip
+    reach: StickSlipPolytope
+    claims: StickSlipClaims
+    covers: ClassVar[str] = (
+        "every friction law of the box and every disturbance up to the stated size, whether the fault slides or sticks"
+    )
+    lasts: ClassVar[str] = "for all t >= 0"
+
+    def __repr__(self) -> str:
+        return f"StickSlipGuarantee({self.task.name}: slip rate at most {self.claims.peak_slip_rate:.4g} m/s)"
+
+    @property
+    def peak_slip_rate(self) -> UpperBound:
+        """What the slip rate never exceeds [m/s]."""
+        return self.claims.peak_slip_rate
+
+    @property
+    def controller(self) -> StickSlipController:
+        """The law for `simulate`."""
+        return StickSlipController(law=self.held.law, step=self.held.step)
+
+    def bounds(self) -> StickSlipBounds | NoGuarantee:
+        """What the theorem gives, computed anew."""
+        try:
+            return stick_slip_bounds(self.task, self.held, self.reach)
+        except ParameterError as error:
+            return NoGuarantee(reason=str(error), small_gain=None)
+
+    def check(self) -> Verdict:
+        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
+        bounds = self.bounds()
+        sound = isinstance(bounds, StickSlipBounds) and self.claims.follow(bounds)
+        return Verdict.PROVED if sound else Verdict.UNDECIDED
+
+    def sentence(self) -> str:
+        """What is guaranteed, for people; bounds rounded outward, what it is guaranteed for inward."""
+        task, held, claims = self.task, self.held, self.claims
+        stress = LowerBound(task.amplitude / task.area_per_mass[1])
+        when = f"held over {UpperBound(held.step):.6g} s"
+        under = f"for every disturbance of at most {LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
+        return (
+            f"from rest, {when}, {under} and all friction of the box: the slip rate never exceeds "
+            f"{claims.peak_slip_rate:.3g} m/s, whether the fault slides or sticks, and the slip stays between "
+            f"{claims.slip_behind:.3g} m behind and {claims.slip_ahead:.3g} m ahead of the reference, the pressure between "
+            f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}, for all t >= 0"
+        )
+
+
+def stick_slip_guarantee(
+    task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope
+) -> StickSlipGuarantee | NoGuarantee:
+    """Claims that the theorem gives for a polytope, or what of it does not hold."""
+    try:
+        bounds = stick_slip_bounds(task, held, reach)
+    except ParameterError as error:
+        return NoGuarantee(reason=str(error), small_gain=None)
+    return StickSlipGuarantee(task=task, held=held, reach=reach, claims=StickSlipClaims.of(bounds))

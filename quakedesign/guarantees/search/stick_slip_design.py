@@ -1,0 +1,587 @@
+"""Designs with a guarantee on the stick–slip plant: gains by the states that disturbances reach, then a polytope."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError, expm
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
+
+from quakedesign.errors import ParameterError
+from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.stick_slip import (
+    COMBINATIONS,
+    SLICES,
+    Backend,
+    Constraint,
+    Period,
+    Ranges,
+    Rows,
+    SampledStickSlip,
+    StickSlipPolytope,
+    Verifier,
+    curvature,
+    polytopes,
+    ranges,
+    resting_rows,
+    sliding_rows,
+    stop_bounds,
+)
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee, stick_slip_guarantee
+from quakedesign.guarantees.search.estimate import short
+from quakedesign.laws.stick_slip_law import StickSlipLaw
+from quakedesign.plant.ranges import UncertainPlant
+
+TUNINGS = tuple(
+    (level, slip, back, gain)
+    for level, slip in ((0.5, 0.5), (0.7, 0.5), (0.3, 0.3), (0.3, 0.5), (0.2, 0.2))
+    for back in (0.3, 0.1, 0.05)
+    for gain in (1.2125, 1.3)
+)
+"""Shares of the innovations that the estimate takes, of the slip error that a period takes back, and the input gain."""
+_SETTLED, _FEW, _MANY = 1e-4, 150, 250  # change of extents, vertices kept in comparisons and for a polytope
+_ROUNDS, _SUBSTEPS = 60, 12
+_FACETS = 130
+_PERIODS, _TURNS, _REFINED = 4, 80, (8, 15, 22, 29)
+_NEARLY = 0.93  # of the factor of y that keeps a facet where it is in a slow slide
+_ADDED, _MOST, _ALIKE, _WIDER, _KEPT, _FOLLOWED = 35, 270, 1 - 1e-8, 1e-5, 0.6, 14
+_MARGIN = 2e-7  # by which the last polytope is larger than the images that it must hold
+_FAR = 30  # times the first extents, from where on a set counts as unbounded
+_RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)
+_NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
+_TRIED = 3  # laws for which a polytope is searched
+_DIGITS = 7
+_ROOM = Fraction(3, 2)  # of extents, where ranges of the plant are taken before the polytope is known
+
+
+def _float_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[Any]]:
+    found: list[list[Any]] = expm(np.array(rows, dtype=float)).tolist()
+    return found
+
+
+def _float_curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[Any, Any]:
+    first, second = curvature(flow, step)
+    return float(first), float(second)
+
+
+FLOATS = Backend(
+    float, _float_exponential, _float_curvature, lambda values: np.asarray(values, dtype=float), lambda values: values
+)
+
+
+def tuned(task: UncertainPlant, step: Fraction, tuning: Sequence[float]) -> StickSlipLaw:
+    """Deadbeat feedback for the middle of the damping, with the shares of a tuning.
+
+    Parameters
+    ----------
+    task : UncertainPlant
+    step : Fraction
+        T_s [s].
+    tuning : sequence of float
+        As in `TUNINGS`.
+    """
+    level, slip, back, gain = tuning
+    damping, period = float(sum(task.rate_chord)) / 2, float(step)
+    decay = np.exp(-damping * period)
+    held = -np.expm1(-damping * period) / damping if damping else period
+    per_rate = 1 / (gain * held * float(task.authority))
+    return StickSlipLaw(
+        rate_gain=short(decay * per_rate, _DIGITS),
+        target_gain=short(per_rate, _DIGITS),
+        return_rate=short(back / period, _DIGITS),
+        level_gain=short(level * per_rate, _DIGITS),
+        slip_gain=short(slip * per_rate / period, _DIGITS),
+    )
+
+
+# ----------------------------------------------------------------------
+# States that disturbances reach: their convex hull, grown from sample to sample.
+
+
+@dataclass(frozen=True)
+class _Reach:
+    """The two maps of the theorem, and the plant itself, on many states at once."""
+
+    task: UncertainPlant
+    held: SampledStickSlip
+    found: Ranges
+    period: Period
+
+    @classmethod
+    def of(cls, task: UncertainPlant, held: SampledStickSlip) -> "_Reach":
+        found = ranges(task, task.target_slip / 100, (Fraction(0), Fraction(0)))
+        return cls(task, held, found, Period.of(FLOATS, task, held, found))
+
+    def after(self, states: np.ndarray) -> np.ndarray:
+        """States a period later under extreme disturbances and parameters."""
+        law, step, amplitude = self.held.law, float(self.held.step), float(self.task.amplitude)
+        slip, rate, level = (column[:, None] for column in states.T)
+        kinds = np.array(
+            [
+                (reference, force, chord)
+                for reference in (0.0, float(self.task.reference_rates[0]))
+                for force in self.task.beta
+                for chord in self.found.slope
+            ],
+            dtype=float,
+        )
+        reference, beta, slope = kinds.T
+        target = reference - float(law.return_rate) * slip
+        predicted = np.maximum(target, 0)
+        push = float(law.rate_gain) * rate - float(law.target_gain) * target + level
+        force = beta * float(self.task.authority) * push
+        per_level = float(law.level_gain)
+        per_slip = float(law.slip_gain)
+        half = step / 2
+
+        def ended(moved: np.ndarray, end: np.ndarray, rests: np.ndarray) -> np.ndarray:
+            innovation = moved - half * (rate + predicted)
+            innovation = np.where(rests, np.maximum(innovation, -half * predicted), innovation)
+            lifted = -moved * slope / (beta * float(self.task.authority))
+            after = level + per_level * (end - predicted) + per_slip * innovation + lifted
+            return np.stack([slip + moved - reference * step, end, after], axis=-1).reshape(-1, 3)
+
+        found = [ended(*self._simulated(rate, force, slope, start, switch)) for start in (1, -1) for switch in (0, 3, 6, 9)]
+        # the rest map
+        stop = np.min([float(g) * rate + float(h) for g, h in stop_bounds(self.task, self.held, self.found)], axis=0)
+        stop = stop + 0 * force
+        most = float(self.task.beta[1] * self.task.authority)
+        for share in (0.0, 0.5, 1.0):
+            possible = most * push >= amplitude + float(self.found.slope[0]) * share * stop
+            rest = ended(share * stop, 0 * stop, np.full(stop.shape, True))
+            found.append(rest[possible.reshape(-1)])
+        # the sliding map, whose end alone is known to be forward
+        size, (of_slip, of_rate) = float(self.held.step) / (len(self.period.impulses[0]) - 1), self.period.impulses
+        times = step - np.linspace(0, step, len(of_slip))
+        largest = np.maximum(times * rate[..., None] + times**2 / 2 * (amplitude - force[..., None]), 0)
+        width = float(self.found.slope[1] - self.found.slope[0]) / 2 / (1 - float(self.found.slope[1]) * step**2 / 2)
+        sizes = amplitude + width * largest
+        plain = [r * rate - f * force for r, f in zip(self.period.of_rate, self.period.of_force, strict=True)]
+        for start in (1, -1):
+            for switch in (0, 4, 8, 12):
+                pattern = np.where(np.arange(len(of_slip)) < switch, start, -start)
+                more = [np.trapezoid(sizes * pattern * impulse, dx=size, axis=-1) for impulse in (of_slip, of_rate)]
+                upward = more[1] > 0
+                scaled = np.where(upward, -plain[1] / np.where(upward, more[1], 1), 2)
+                for factor, rests in ((np.ones_like(scaled), False), (scaled, True)):
+                    moved, end = plain[0] + factor * more[0], plain[1] + factor * more[1]
+                    sound = (np.abs(factor) <= 1) & (moved >= 0) & (end >= -1e-12 * np.abs(rate).max())
+                    points = ended(moved, np.maximum(end, 0), np.full(moved.shape, rests))
+                    found.append(points[sound.reshape(-1)])
+        return np.vstack(found)
+
+    def _simulated(
+        self, rate: np.ndarray, force: np.ndarray, slope: np.ndarray, start: int, switch: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Slip and slip rate after a period of the plant that sticks, and whether it rests."""
+        size, amplitude = float(self.held.step) / _SUBSTEPS, float(self.task.amplitude)
+        damping = float(sum(self.found.damping)) / 2
+        moved, now = np.zeros_like(force), rate + np.zeros_like(force)
+        for i in range(_SUBSTEPS):
+            push = (start if i < switch else -start) * amplitude
+            acceleration = -damping * now + slope * moved - force + push
+            end = now + size * acceleration
+            stops = end < 0
+            braked = np.where(acceleration < 0, now**2 / (2 * np.maximum(-acceleration, 1e-300)), 0)
+            moved = moved + np.where(stops, braked, size * (now + end) / 2)
+            now = np.maximum(end, 0)
+        return moved, now, now <= 0
+
+    def hull(self, most: int, tell: Callable[[], None]) -> np.ndarray | None:
+        """Vertices of the hull of all states that are reached from rest; None where it grows without bound."""
+        points = np.zeros((1, 3))
+        directions = np.random.default_rng(0).standard_normal((1500, 3))
+        first, before = None, np.zeros(6)
+        for turn in range(_ROUNDS):
+            points = np.vstack([points, self.after(points)])
+            size = np.abs(points).max(axis=0)
+            if turn < 2 or size.min() == 0:
+                points = points[:: max(1, len(points) // 200)]
+                continue
+            try:
+                points = points[ConvexHull(points / size, qhull_options="QJ").vertices]
+            except QhullError:
+                return None
+            first = size if first is None else first
+            if (size > _FAR * first).any():
+                return None
+            if len(points) > most:
+                points = _extreme(points, directions, most)
+            extent = np.concatenate([points.max(axis=0), -points.min(axis=0)])
+            if np.all(np.abs(extent - before) <= _SETTLED * np.tile(size, 2)):
+                break
+            before = extent
+            tell()
+        return points
+
+
+def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarray:
+    """The points that are farthest in most directions, and the ends of the axes."""
+    size = np.abs(points).max(axis=0)
+    white = np.linalg.inv(np.linalg.cholesky(np.cov((points / size).T) + 1e-9 * np.eye(3)))
+    farthest = ((directions @ white) / size @ points.T).argmax(axis=1)
+    counts = np.bincount(farthest, minlength=len(points))
+    counts[[*points.argmax(axis=0), *points.argmin(axis=0)]] += len(directions)
+    return np.asarray(points[np.argsort(-counts, kind="stable")[:most]])
+
+
+# ----------------------------------------------------------------------
+# A polytope around them.
+
+
+def _rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
+    yield from sliding_rows(period, facets, multipliers)
+    yield from resting_rows(FLOATS, period.task, period.held, period.found, facets, multipliers)
+
+
+def _normals(points: np.ndarray, count: int) -> np.ndarray:
+    """The axes but −y, and normals of the hull that are as different as can be."""
+    size = np.abs(points).max(axis=0)
+    normals = ConvexHull(points / size, qhull_options="QJ").equations[:, :3]
+    white = normals @ np.linalg.cholesky(np.cov((points / size).T) + 1e-12 * np.eye(3))
+    white = white / np.linalg.norm(white, axis=1)[:, None]
+    chosen = [int(i) for i in (*white.argmax(axis=0), *white.argmin(axis=0))]
+    alike = (white @ white[chosen].T).max(axis=1)
+    while len(chosen) < count and alike.min() < 1 - 1e-6:
+        chosen.append(int(alike.argmin()))
+        alike = np.maximum(alike, white @ white[chosen[-1]])
+    axes = np.array([(1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, 0, -1)])
+    kept = normals[chosen]
+    kept = kept[~((kept[:, 1] < -0.999) | (np.abs(kept).max(axis=1) > 1 - 1e-9))]
+    return np.asarray(np.vstack([axes, kept]) / size)
+
+
+def _corners(constraints: list[Constraint], size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Vertices of a polytope, the constraints that meet there, and the rows of all constraints; None for an empty one."""
+    rows = np.array([row for row, _ in constraints], dtype=float) * size
+    ends = np.array([end for _, end in constraints], dtype=float)
+    length = np.linalg.norm(rows, axis=1)
+    rows, ends = rows / length[:, None], ends / length
+    dimension = rows.shape[1]
+    centre = linprog(
+        [*np.zeros(dimension), -1.0],
+        A_ub=np.column_stack([rows, np.ones(len(rows))]),
+        b_ub=ends,
+        bounds=[*[(None, None)] * dimension, (0, None)],
+    )
+    if centre.status or centre.x[-1] < 1e-9:
+        return None
+    try:
+        meet = HalfspaceIntersection(np.column_stack([rows, -ends]), centre.x[:dimension], qhull_options="QJ")
+    except QhullError:
+        return None
+    finite = np.isfinite(meet.intersections).all(axis=1)
+    facets = np.array([facet for facet, sound in zip(meet.dual_facets, finite, strict=True) if sound])
+    return meet.intersections[finite] * size, facets, np.array([row for row, _ in constraints], dtype=float)
+
+
+def _basis(rows: np.ndarray, ends: np.ndarray, factors: np.ndarray) -> tuple[int, ...] | None:
+    """Constraints that meet where a function is largest on a polytope, those with multipliers first."""
+    lengths = np.linalg.norm(rows, axis=1)
+    rows, ends = rows / lengths[:, None], ends / lengths
+    found = linprog(-factors, A_ub=rows, b_ub=ends, bounds=[(None, None)] * len(factors))
+    if found.status:
+        return None
+    order = np.lexsort((found.slack, found.ineqlin.marginals))
+    chosen = list[int]()
+    for place in order[:_TIGHT]:
+        if np.linalg.matrix_rank(rows[[*chosen, place]], tol=1e-9) > len(chosen):
+            chosen.append(int(place))
+        if len(chosen) == len(factors):
+            return tuple(chosen)
+    return None
+
+
+def _dyadic(value: float) -> Fraction:
+    """With 40 binary digits: balls of such numbers have no radius."""
+    mantissa, exponent = np.frexp(value)
+    return Fraction(int(np.round(mantissa * 2**40))) * Fraction(2) ** (int(exponent) - 40)
+
+
+@dataclass
+class _Images:
+    """Largest values of normals after a period, as `moves` times heights and a constant, and their linear functions."""
+
+    tops: np.ndarray
+    moves: np.ndarray
+    factors: np.ndarray
+    growth: np.ndarray
+
+
+@dataclass
+class _Growing:
+    """A polytope {n·z ≤ h} that grows until it holds its images."""
+
+    task: UncertainPlant
+    held: SampledStickSlip
+    normals: np.ndarray
+    heights: np.ndarray
+    multipliers: np.ndarray
+    least: np.ndarray
+    points: np.ndarray
+    last: _Images | None = None
+
+    @property
+    def facets(self) -> np.ndarray:
+        """n/h."""
+        return np.asarray(self.normals / self.heights[:, None])
+
+    @property
+    def size(self) -> np.ndarray:
+        """Of e1, y and d."""
+        box = 1 / np.abs(self.facets[:5].sum(axis=1))
+        return np.array([max(box[0], box[3]), box[1], max(box[2], box[4])])
+
+    def exact_ranges(self) -> Ranges:
+        """Of the plant, a little wide."""
+        law, size = self.held.law, [short(float(v), 4) for v in self.size]
+        most = law.target_gain * (law.return_rate * size[0] + self.task.reference_rates[0])
+        most = _ROOM * (most + law.rate_gain * size[1] + size[2])
+        return ranges(self.task, _ROOM * size[0], (-most, most))
+
+    def images(self) -> "_Images | None":
+        """Largest value of every normal after a period, with the best multipliers; None where a set is empty."""
+        found = self.exact_ranges()
+        facets = [tuple(Fraction(float(v)) for v in row) for row in self.facets]
+        sizes = np.append(self.size, self.size[1] * float(self.held.step))
+        corners = []
+        for lines in polytopes(self.task, self.held, facets, found):
+            tall = len(lines[0][0])
+            at = _corners(lines, sizes[:tall])
+            if at is None and tall == 3:
+                return None
+            corners.append(at)
+        tried, period = self._tried(), Period.of(FLOATS, self.task, self.held, found)
+        tops = self._tops(period, corners, tried)
+        best, row = tops.argmin(axis=0), np.arange(len(facets))
+        self.multipliers = np.column_stack(
+            [*tried[best[0], row, :2].T, *tried[best[1], row, 2:4].T, tried[best[2], row, 4]]
+        )
+        return self._images(period, corners)
+
+    def _tried(self) -> np.ndarray:
+        """Multipliers of every facet that are tried: the present ones, some near them, and a grid."""
+        law = self.held.law
+        n2, n3 = self.normals[:, 1:].T
+        plain = n2 + n3 * float(law.level_gain)
+        size = np.maximum(np.abs(plain), np.abs(n3) * float(law.target_gain))
+        tried = [self.multipliers * np.array([rate, 1, rate, 1, 1]) for rate in _NEAR]
+        for share in (0.0, 1.0):
+            fixed = np.full(len(n2), share)
+            tried += [np.column_stack([rate * size, fixed, rate * size, fixed, fixed]) for rate in _RATE_SHARES]
+            tried.append(np.column_stack([np.maximum(-plain, 0), fixed, -n2, fixed, fixed]))
+        return np.array(tried)
+
+    def _tops(self, period: Period, corners: list[Any], tried: np.ndarray) -> np.ndarray:
+        """Largest values for each choice of multipliers: while sliding, where the innovation is cut off, at rest."""
+        choices, count = tried.shape[:2]
+        found = np.full((3, choices * count), -np.inf)
+        for rows in _rows(period, np.tile(self.normals, (choices, 1)), tried.reshape(-1, 5)):
+            kind = 2 if rows.place >= SLICES else int(rows.cut)
+            at = corners[rows.place]
+            if at is not None:
+                tops = (rows.factors @ at[0].T).max(axis=1) + rows.constants
+                found[kind, rows.which] = np.maximum(found[kind, rows.which], tops)
+        return np.asarray(found.reshape(3, choices, count).swapaxes(0, 1))
+
+    def _images(self, period: Period, corners: list[Any]) -> "_Images":
+        """The largest values, as functions of the heights, and what of the state a facet becomes."""
+        sizes = np.append(self.size, self.size[1] * float(self.held.step))
+        count, steps = len(self.normals), np.array(stop_bounds(self.task, self.held, period.found), dtype=float)
+        found = _Images(np.full(count, -np.inf), np.zeros((count, count)), np.zeros((count, 3)), np.zeros(count))
+        for rows in _rows(period, self.normals, self.multipliers):
+            at = corners[rows.place]
+            if at is None:
+                continue
+            values = rows.factors @ at[0].T
+            vertex = values.argmax(axis=1)
+            tops = values[np.arange(len(vertex)), vertex] + rows.constants
+            larger = tops > found.tops[rows.which]
+            if not larger.any():
+                continue
+            which, factors, bases, tops = rows.which[larger], rows.factors[larger], at[1][vertex[larger]], tops[larger]
+            scale = sizes[: factors.shape[1]]
+            shares = (np.linalg.pinv((at[2] * scale)[bases].swapaxes(-1, -2)) @ (factors * scale)[..., None])[..., 0]
+            itself = ((bases == which[:, None]) * shares).sum(axis=1) / self.heights[which] > 1 - 1e-4
+            kept = ~(itself & (tops <= self.heights[which] * (1 + 1e-9)))  # a state at rest stays where it is
+            which, factors, bases, tops, shares = which[kept], factors[kept], bases[kept], tops[kept], shares[kept]
+            found.factors[which] = factors[:, :3]
+            if factors.shape[1] > 3:  # D is at most g·y + h
+                found.factors[which, 1] += np.maximum(factors[:, 3], 0) * steps[(steps[:, 0] * at[0][vertex[larger][kept], 1][:, None] + steps[:, 1]).argmin(axis=1), 0]
+            found.tops[which], found.moves[which] = tops, 0
+            for share, place in zip(shares.T, bases.T, strict=True):
+                own = place < count
+                found.moves[which[own], place[own]] += share[own] / self.heights[place[own]]
+        return found
+
+    def grown(self, tell: Callable[[], None]) -> bool:
+        """Whether it was changed until it holds its images: by turns of policies, else step by step."""
+        first = self.size
+        for turn in range(_TURNS):
+            if turn in _REFINED and self.last is not None:
+                self.refine(self.last)
+            after = self.images()
+            if after is None or (self.size > _FAR * first).any():
+                return False
+            after.growth, self.last = after.tops - self.heights, after
+            margin = _MARGIN * np.linalg.norm(self.normals * np.abs(self.size), axis=1)
+            if np.all(after.tops <= self.heights - margin / 4):
+                return True
+            if turn > _REFINED[-1] + _FOLLOWED:
+                raised = after.tops + margin
+                self.heights = np.where(after.tops > self.heights - margin / 4, np.maximum(raised, self.heights), self.heights)
+            else:
+                own = after.tops - after.moves @ self.heights + margin
+                for _ in range(_PERIODS):  # as long as this policy is followed
+                    self.heights = np.maximum(self.least, after.moves @ self.heights + own)
+            tell()
+        return False
+
+    def _neutral(self, normals: np.ndarray, chord: Fraction) -> np.ndarray:
+        """With as much of y as the image of a slow slide has, so that a fault that rests does not raise them."""
+        law, half = self.held.law, float(self.held.step) / 2
+        slip, level = float(law.slip_gain), float(law.level_gain)
+        n1, n2, n3 = normals.T
+        most = float(chord / self.task.authority)
+        needed = -n3 * slip * half * (1 + _WIDER)
+        slow = (n3 < 0) & (n1 + n3 * (slip - most) < 0) & (needed + n3 * level < 0)
+        slow &= n2 > _NEARLY * needed
+        slow[:5] = False  # the axes
+        return np.column_stack([n1, np.where(slow, np.maximum(n2, needed), n2), n3])
+
+    def refine(self, last: _Images) -> None:
+        """Add normals: what the facets that grow most are images of. Heights start again from what is reached."""
+        size, chord = self.size, self.exact_ranges().chord[1]
+        known = self.normals * size
+        widths = np.linalg.norm(known, axis=1)
+        known, more = known / widths[:, None], list[np.ndarray]()
+        for place in (last.growth / widths).argsort()[::-1]:
+            normal = last.factors[place] * size * (1, 1 + _WIDER * np.sign(last.factors[place][1]), 1)
+            length = np.linalg.norm(normal)
+            if length and (known @ normal).max() < _ALIKE * length and len(self.normals) + len(more) < _MOST:
+                known = np.vstack([known, normal / length])
+                more.append(normal / length / size)
+            if len(more) == _ADDED:
+                break
+        more.append(np.array([0, float(self.held.law.slip_gain * self.held.step) / 2 * (1 + _WIDER), -1]) / size[2])
+        if more:
+            self.normals = np.vstack([self.normals, more])
+            self.least = np.concatenate([self.least, (np.array(more) @ self.points.T).max(axis=1)])
+            self.multipliers = np.vstack([self.multipliers, np.zeros((len(more), 5))])
+        before = np.concatenate([self.heights, self.least[len(self.heights) :]])
+        self.normals = self._neutral(self.normals, chord)
+        self.least = np.maximum(self.least, (self.normals @ self.points.T).max(axis=1))
+        self.heights = self.least + _KEPT * (before - self.least)
+
+    def _scaled(self) -> np.ndarray:
+        """Multipliers of n/h instead of n."""
+        factors = np.ones_like(self.multipliers)
+        factors[:, [0, 2]] = 1 / self.heights[:, None]
+        return np.asarray(self.multipliers * factors)
+
+    def exact(self) -> StickSlipPolytope | None:
+        """In rational numbers of few digits, with the constraints that meet at each vertex."""
+        facets = tuple(tuple(_dyadic(float(v)) for v in row) for row in self.facets)
+        found, bases = self.exact_ranges(), list[list[tuple[int, ...]]]()
+        sizes = np.append(self.size, self.size[1] * float(self.held.step))
+        lines = polytopes(self.task, self.held, facets, found)
+        for constraints in lines:
+            at = _corners(constraints, sizes[: len(constraints[0][0])])
+            if at is None:
+                return None
+            bases.append([tuple(int(v) for v in basis) for basis in at[1]])
+        self._complete(Period.of(FLOATS, self.task, self.held, found), np.array(facets, dtype=float), lines, bases)
+        return StickSlipPolytope(
+            facets=facets,
+            multipliers=tuple(tuple(short(float(v), _DIGITS) for v in row) for row in self._scaled()),
+            sliding=tuple(tuple(line) for line in bases[:SLICES]),
+            resting=tuple(tuple(line) for line in bases[SLICES:]),
+        )
+
+    def _complete(
+        self, period: Period, facets: np.ndarray, lines: list[list[Constraint]], bases: list[list[tuple[int, ...]]]
+    ) -> None:
+        """Add vertices that rounding hid, by linear programs, where a function would have a negative multiplier."""
+        sizes = [short(float(v), 6) for v in (*self.size, self.size[1] * float(self.held.step))]
+        verifiers = [
+            Verifier(constraints, known, sizes[: len(known[0])], behind=False) for constraints, known in zip(lines, bases, strict=True)
+        ]
+        for rows in _rows(period, facets, self._scaled()):
+            verifier = verifiers[rows.place]
+            scaled = rows.factors * np.array(sizes[: rows.factors.shape[1]], dtype=float)
+            shares = verifier.proposed(scaled)[1]
+            for place in np.flatnonzero(shares.min(axis=1) < -_NEGATIVE * np.abs(shares).max(axis=1)):
+                basis = _basis(verifier.floats, np.array([float(end) for _, end in lines[rows.place]]), scaled[place])
+                if basis is not None and basis not in bases[rows.place]:
+                    bases[rows.place].append(basis)
+
+
+# ----------------------------------------------------------------------
+# From a fault to gains with a proof.
+
+
+def proved(
+    task: UncertainPlant, held: SampledStickSlip, tell: Callable[[], None] = lambda: None
+) -> StickSlipGuarantee | NoGuarantee:
+    """Guarantee of a law with a polytope that is searched for it, or what speaks against one."""
+    try:
+        points = _Reach.of(task, held).hull(_MANY, tell)
+        if points is None:
+            return NoGuarantee(reason="the states that disturbances reach grow without bound", small_gain=None)
+        normals = _normals(points, _FACETS)
+        heights = (normals @ points.T).max(axis=1)
+        growing = _Growing(task, held, normals, heights, np.zeros((len(normals), 5)), heights, points)
+        if not growing.grown(tell):
+            return NoGuarantee(reason="no polytope was found that the loop never leaves", small_gain=None)
+        reach = growing.exact()
+    except (ParameterError, LinAlgError, QhullError) as error:
+        return NoGuarantee(reason=str(error), small_gain=None)
+    if reach is None:
+        return NoGuarantee(reason="no polytope was found that the loop never leaves", small_gain=None)
+    return stick_slip_guarantee(task, held, reach)
+
+
+def design_stick_slip(
+    task: UncertainPlant,
+    step: Fraction,
+    *,
+    objective: str = "tracking",
+    tell: Callable[[], None] = lambda: None,
+) -> StickSlipGuarantee | NoGuarantee:
+    """Gains with a guarantee on the stick–slip plant.
+
+    Tunings are compared by the states that disturbances reach; the best few are tried in order until one is proved.
+
+    Parameters
+    ----------
+    task : UncertainPlant
+    step : Fraction
+        T_s [s].
+    objective : str
+        ``tracking``: smallest slip error; ``peak``: smallest slip rate.
+    tell : callable
+        Called now and then, to show progress or to interrupt.
+    """
+    candidates = []
+    for tuning in TUNINGS:
+        law = tuned(task, step, tuning)
+        held = SampledStickSlip(law=law, step=step)
+        try:
+            points = _Reach.of(task, held).hull(_FEW, tell)
+        except (ParameterError, LinAlgError, QhullError) as error:
+            return NoGuarantee(reason=str(error), small_gain=None)
+        if points is not None:
+            candidates.append((np.abs(points[:, 0]).max(), points[:, 1].max(), held))
+    if not candidates:
+        return NoGuarantee(reason="no tuning of the law keeps the states bounded", small_gain=None)
+    slips, rates = (np.array([entry[i] for entry in candidates]) for i in (0, 1))
+    score = slips / slips.min() + 2 * rates / rates.min() if objective == "tracking" else rates
+    result: StickSlipGuarantee | NoGuarantee = NoGuarantee(reason="no law was tried", small_gain=None)
+    for place in np.argsort(score, kind="stable")[:_TRIED]:
+        result = proved(task, candidates[place][2], tell)
+        if result.proved:
+            break
+    return result
