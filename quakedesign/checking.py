@@ -16,6 +16,7 @@ from quakedesign.lyapunov.exact.certificate_files import (
     GUARANTEE,
     LOOP,
     SLOW_SLIDING,
+    STICK_SLIP,
     entry_lines,
     evidence_of,
     kind_of,
@@ -73,7 +74,7 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
     try:
         raw = read_json(path)
         kind = kind_of(raw)
-        if kind in (GUARANTEE, SLOW_SLIDING):
+        if kind in (GUARANTEE, SLOW_SLIDING, STICK_SLIP):
             return _running(raw, fault)
         if kind != LOOP:
             verdict_of, said = _attraction(raw) if kind == ATTRACTION else _polynomial(raw)

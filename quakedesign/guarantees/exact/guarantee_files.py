@@ -16,11 +16,27 @@ from quakedesign.guarantees.exact.loop import Held
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.guarantees.exact.statement import Claims, ContinuousPeaks, Guarantee, SlidingGuarantee
+from quakedesign.guarantees.exact.stick_slip import (
+    COMBINATIONS,
+    MOST_BASES,
+    SLICES,
+    SampledStickSlip,
+    StickSlipPolytope,
+)
+from quakedesign.guarantees.exact.stick_slip import MOST_FACETS as MOST_STICK_SLIP_FACETS
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipClaims, StickSlipGuarantee
 from quakedesign.laws import ImplicitRoot, LinearLaw, Power
 from quakedesign.laws.implicit_root import MOST_TERMS
+from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
 from quakedesign.loop import ContinuousLaw
 from quakedesign.loop.loop_setup import Pump
-from quakedesign.lyapunov.exact.certificate_files import GUARANTEE, SLOW_SLIDING, kind_of, read_json
+from quakedesign.lyapunov.exact.certificate_files import (
+    GUARANTEE,
+    SLOW_SLIDING,
+    STICK_SLIP,
+    kind_of,
+    read_json,
+)
 from quakedesign.plant.ranges import Friction, UncertainPlant
 from quakedesign.plant.sliding_plant import AXES, MOST_CELLS, Cuts, SlidingPlant, cells
 from quakedesign.sos.exact.strict import (
@@ -37,8 +53,8 @@ from quakedesign.sos.exact.strict import (
     with_keys,
 )
 
-Claim = Guarantee | ContinuousPeaks | SlidingGuarantee
-_Claimed = TypeVar("_Claimed", Claims, SlidingClaims)
+Claim = Guarantee | ContinuousPeaks | SlidingGuarantee | StickSlipGuarantee
+_Claimed = TypeVar("_Claimed", Claims, SlidingClaims, StickSlipClaims)
 _ROCK = ("density", "shear_modulus", "length", "damping")
 _SPREADS = ("stiffness", "damping", "authority")
 _TIMES = ("step", "delay", "lag")
@@ -56,7 +72,10 @@ _ZERO = Fraction(0)
 
 def guarantee_document(claim: Claim) -> dict[str, Any]:
     """What stands in the file."""
-    about = _of_sliding(claim) if isinstance(claim, SlidingGuarantee) else _of_tracking(claim)
+    if isinstance(claim, StickSlipGuarantee):
+        about = _of_stick_slip(claim)
+    else:
+        about = _of_sliding(claim) if isinstance(claim, SlidingGuarantee) else _of_tracking(claim)
     bounds = {part.name: getattr(claim.claims, part.name) for part in fields(claim.claims)}
     claims = {name: bound.exact for name, bound in bounds.items() if bound is not None}
     return {"format": 1, **about, "claims": claims}
@@ -107,7 +126,8 @@ def read_guarantee(raw: Any) -> Claim:
         When it breaks a rule of FORMAT.md.
     """
     try:
-        return _read_sliding(raw) if kind_of(raw) == SLOW_SLIDING else _read_tracking(raw)
+        readers = {SLOW_SLIDING: _read_sliding, STICK_SLIP: _read_stick_slip}
+        return readers.get(kind_of(raw), _read_tracking)(raw)
     except ParameterError as error:
         raise CertificateError(str(error)) from None
 
@@ -117,8 +137,6 @@ def _exactly(value: Any, names: Iterable[str]) -> dict[str, str]:
 
 
 def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
-    task = claim.task
-    change = {} if task.change is None else {"change": str(task.change)}
     slow, start, reach = None, {}, None
     if isinstance(claim, Guarantee):
         reach = claim.reach
@@ -126,6 +144,18 @@ def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         start = {"start": errors} if any(claim.held.start) else {}
     return {
         "kind": GUARANTEE,
+        **_of_task(claim.task),
+        "loop": _loop(claim),
+        **start,
+        **({} if slow is None else {"slow_gain": {"parts": slow.parts, "growth": str(slow.growth)}}),
+        **({} if reach is None else {"reach": _reach_document(reach)}),
+    }
+
+
+def _of_task(task: UncertainPlant) -> dict[str, Any]:
+    """Fault, reference and disturbance."""
+    change = {} if task.change is None else {"change": str(task.change)}
+    return {
         "fault": {
             "name": task.name,
             **_exactly(task, (*_ROCK, "normal_stress")),
@@ -138,10 +168,21 @@ def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
             **change,
             "growths": dict(zip(_NOISE, texts(task.growths), strict=True)),
         },
-        "loop": _loop(claim),
-        **start,
-        **({} if slow is None else {"slow_gain": {"parts": slow.parts, "growth": str(slow.growth)}}),
-        **({} if reach is None else {"reach": _reach_document(reach)}),
+    }
+
+
+def _of_stick_slip(claim: StickSlipGuarantee) -> dict[str, Any]:
+    reach = claim.reach
+    return {
+        "kind": STICK_SLIP,
+        **_of_task(claim.task),
+        "loop": {"step": exact_text(claim.held.step), **_exactly(claim.held.law, GAIN_UNITS)},
+        "set": {
+            "facets": [texts(row) for row in reach.facets],
+            "multipliers": [texts(row) for row in reach.multipliers],
+            "sliding": [[list(basis) for basis in line] for line in reach.sliding],
+            "resting": [[list(basis) for basis in line] for line in reach.resting],
+        },
     }
 
 
@@ -239,6 +280,34 @@ def _read_sliding(raw: Any) -> SlidingGuarantee:
     model = model_of(task, claims)
     _require_few(loop_of(held, model, task).states if model is not None else ())
     return claim
+
+
+def _read_stick_slip(raw: Any) -> StickSlipGuarantee:
+    headed(raw, {"fault", "reference", "disturbance", "loop", "set", "claims"}, STICK_SLIP)
+    task = _task(raw)
+    need(task.change is None, "a bounded change of the disturbance is not used where the fault sticks")
+    step, *gains = read_exactly(raw["loop"], ("step", *GAIN_UNITS)).values()
+    given = with_keys(raw["set"], {"facets", "multipliers", "sliding", "resting"})
+    facets, multipliers = (
+        tuple(read_row(row, name, length=length) for row in listed(given[name], name, MOST_STICK_SLIP_FACETS))
+        for name, length in (("facets", 3), ("multipliers", 5))
+    )
+    sliding, resting = (
+        tuple(_vertices(line, length) for line in listed(given[name], name, length=count))
+        for name, length, count in (("sliding", 3, SLICES), ("resting", 4, len(COMBINATIONS)))
+    )
+    return StickSlipGuarantee(
+        task=task,
+        held=SampledStickSlip(law=StickSlipLaw(**dict(zip(GAIN_UNITS, gains, strict=True))), step=step),
+        reach=StickSlipPolytope(facets=facets, multipliers=multipliers, sliding=sliding, resting=resting),
+        claims=_claims(StickSlipClaims, raw),
+    )
+
+
+def _vertices(raw: Any, length: int) -> tuple[tuple[int, ...], ...]:
+    found = tuple(tuple(listed(basis, "a basis", length=length)) for basis in listed(raw, "bases", MOST_BASES))
+    need(all(type(i) is int for basis in found for i in basis), "numbers of constraints must be integers")
+    return found
 
 
 def _require_few(states: tuple[str, ...]) -> None:

@@ -255,8 +255,10 @@ class Ranges:
     rest_pressure: Range
 
 
-def ranges(task: UncertainPlant, ahead: Fraction, push: Range) -> Ranges:
-    """For a slip of at most `ahead` [m] beyond the target, and U = p* − p within a range [Pa].
+def ranges(task: UncertainPlant, ahead: Fraction, push: Range, moved: Fraction) -> Ranges:
+    """For a slip of at most `ahead` [m] beyond the target and `moved` [m] in a period, and U = p* − p in a range [Pa].
+
+    β changes within a period by at most N̂|μ′|/b·`moved`, so that σ is that share larger than s/(bβ) at most.
 
     Raises
     ------
@@ -275,6 +277,8 @@ def ranges(task: UncertainPlant, ahead: Fraction, push: Range) -> Ranges:
     load = task.area_per_mass[0] * task.friction.static * task.normal_stress
     if load <= stiffness * wide.target_slip + task.amplitude:
         raise ParameterError("the shear stress may reverse, so that the fault might slip backward")
+    change = max(task.friction.weakening, task.friction.strengthening) * task.area_per_mass[1] / task.authority
+    chord = (1 + change * moved) * chord[0], (1 + change * moved) * chord[1]
     slope, chord = ((min(pair[0], _ZERO), max(pair[1], _ZERO)) for pair in (slope, chord))
     rest = task.normal_stress - high, task.normal_stress - low
     return Ranges(slope=slope, damping=damping, chord=chord, rest_pressure=rest)
@@ -631,7 +635,7 @@ def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolyto
     fastest = task.reference_rates[0]
     sizes = [max(ahead, lag), rate, max(up, down)]
     push = _push(task, held, reach, sizes)
-    found = ranges(task, ahead + fastest * held.step, push)
+    found = ranges(task, ahead + fastest * held.step, push, rate * held.step)
     if found.slope[1] * held.step**2 >= 1:
         raise ParameterError("T_s is too long against the weakening of friction")
     constraints = polytopes(task, held, reach.facets, found)

@@ -112,7 +112,7 @@ class _Reach:
 
     @classmethod
     def of(cls, task: UncertainPlant, held: SampledStickSlip) -> "_Reach":
-        found = ranges(task, task.target_slip / 100, (Fraction(0), Fraction(0)))
+        found = ranges(task, task.target_slip / 100, (Fraction(0), Fraction(0)), task.amplitude * held.step**2)
         return cls(task, held, found, Period.of(FLOATS, task, held, found))
 
     def after(self, states: np.ndarray) -> np.ndarray:
@@ -340,7 +340,7 @@ class _Growing:
         law, size = self.held.law, [short(float(v), 4) for v in self.size]
         most = law.target_gain * (law.return_rate * size[0] + self.task.reference_rates[0])
         most = _ROOM * (most + law.rate_gain * size[1] + size[2])
-        return ranges(self.task, _ROOM * size[0], (-most, most))
+        return ranges(self.task, _ROOM * size[0], (-most, most), _ROOM * size[1] * self.held.step)
 
     def images(self) -> "_Images | None":
         """Largest value of every normal after a period, with the best multipliers; None where a set is empty."""
