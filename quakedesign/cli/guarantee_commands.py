@@ -54,6 +54,7 @@ def guarantee(
     measured: Literal["slip-and-rate", "slip", "differentiator"] = "slip-and-rate",
     around: SetupOptions = _IDEAL,
     disturbance_class: DisturbanceClass = "amplitude",
+    plant: Literal["continued", "stick-slip"] = "continued",
     stress: ExactPascals | None = None,
     spread: str = "0",
     box: Box = None,
@@ -88,6 +89,9 @@ def guarantee(
         differentiator (implicit, n_d = 2, any n_f): its smallest λ_d is printed.
     disturbance_class
         amplitude: any disturbance of the fault's amplitude; rate: also with the fault's rate of change, starting at 0.
+    plant
+        continued: friction continued to negative slip rates; stick-slip: friction holds the fault at rest, and it never
+        slips backward (e-LQR, exact measurements, a pressure that acts at once).
     stress
         Rate-and-state faults (slow sliding, e-LQR through a diffusion path or a lag): bound of the shear stress
         disturbance, such as '25 kPa'; by default the largest that the design withstands.
@@ -106,7 +110,7 @@ def guarantee(
     files = _files(out, [one.name for one in faults], force=force)
     setup = around.setup(step=step, measured=measured)
     asked: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "stress": stress}
-    asked |= {"disturbance_class": disturbance_class, "spread": spread}
+    asked |= {"disturbance_class": disturbance_class, "spread": spread, "plant": plant}
     calls = [partial(guaranteed, one, controller, setup, **asked) for one in faults]
     with progress() as tell:
         if not more and scheduler is None and workers == 1:

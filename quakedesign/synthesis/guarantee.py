@@ -14,6 +14,7 @@ from quakedesign.guarantees import CLASSES, OBJECTIVES, LoopAnswer, NoGuarantee
 from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
 from quakedesign.guarantees.search.linear_design import nearest_setup
+from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer, answer_stick_slip
 from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
@@ -67,6 +68,7 @@ def _asked(question: Callable[[], Found]) -> Found | QuakedesignError:
         return refused
 
 
+PLANTS = ("continued", "stick-slip")
 _PUMP = ("saturation", "withdrawal", "rate_limit")
 _OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", *_PUMP)
 
@@ -82,9 +84,10 @@ def guarantee(
     disturbance_class: str = CLASSES[0],
     stress: Quantity | None = None,
     spread: Quantity = 0,
+    plant: str = PLANTS[0],
     progress: Callable[[str, float], None] | None = None,
     **given: Quantity | None,
-) -> LoopAnswer | SlidingAnswer:
+) -> LoopAnswer | SlidingAnswer | StickSlipAnswer:
     """Prove bounds of slip, slip rate and pressure of the sampled loop, as the command `guarantee` does.
 
     The controller is designed for the loop setup unless gains are given.
@@ -110,14 +113,18 @@ def guarantee(
         unless given.
     spread : str, float or Fraction
         Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
+    plant : str
+        ``continued``: the plant without stick, its friction continued to negative slip rates; ``stick-slip``: friction
+        holds the fault at rest and it never slips backward. The second designs a law of its own, an e-LQR with a
+        prediction that is never negative (`StickSlipLaw`), for exact measurements and a pressure that acts at once.
     progress : callable, optional
-        Called with what a search for rate-and-state friction does, and the fraction done [-].
+        Called with what a search for rate-and-state friction or the stick–slip plant does, and the fraction done [-].
     **given : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
     -------
-    LoopAnswer or SlidingAnswer
+    LoopAnswer, SlidingAnswer or StickSlipAnswer
         Its ``lines()`` are what the command prints; ``found`` is the guarantee, which has a ``controller`` for
         `simulate`, `loop_transfer` and `export_controller`, or the reason why there is none.
 
@@ -129,6 +136,16 @@ def guarantee(
         For a controller that does not apply to the friction.
     """
     setup = setup.with_given(**given)
+    require_known(plant, PLANTS, "plant")
+    if plant == PLANTS[1]:
+        usual = (control_law(controller).name, tuple(gains), scheme, disturbance_class) == ("elqr", (), None, CLASSES[0])
+        if not usual or stress is not None or exact_value(spread, "", "spread"):
+            raise ParameterError(
+                "the stick-slip plant is guaranteed with a designed elqr, for the disturbance class amplitude and "
+                "friction without a state: omit controller, gains, scheme, class, stress and spread"
+            )
+        require_known(objective, OBJECTIVES, "objective")
+        return answer_stick_slip(fault, setup, objective=objective, progress=progress)
     least = None if stress is None else exact_value(stress, "Pa", "stress")
     off = exact_value(spread, "", "spread")
     if fault.friction.state_names:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from quakedesign.guarantees.search.estimate import short
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.ranges import UncertainPlant
 
+Tell = Callable[[str, float], None]
 TUNINGS = tuple(
     (level, slip, back, gain)
     for level, slip in ((0.5, 0.5), (0.7, 0.5), (0.3, 0.3), (0.3, 0.5), (0.2, 0.2))
@@ -45,7 +47,9 @@ TUNINGS = tuple(
 _SETTLED, _FEW, _MANY = 1e-4, 150, 250  # change of extents, vertices kept in comparisons and for a polytope
 _ROUNDS, _SUBSTEPS = 60, 12
 _FACETS = 130
-_PERIODS, _TURNS, _REFINED = 4, 80, (8, 15, 22, 29)
+_PERIODS, _TURNS, _REFINED = 4, 110, (8, 15, 22, 29)
+_TINY = 1e-12  # of a height: rounding
+_LITTLE = 1.01  # of a height that one step to where a policy leads may make of it
 _NEARLY = 0.93  # of the factor of y that keeps a facet where it is in a slow slide
 _ADDED, _MOST, _ALIKE, _WIDER, _KEPT, _FOLLOWED = 35, 270, 1 - 1e-8, 1e-5, 0.6, 14
 _MARGIN = 2e-7  # by which the last polytope is larger than the images that it must hold
@@ -102,6 +106,44 @@ def tuned(task: UncertainPlant, step: Fraction, tuning: Sequence[float]) -> Stic
 
 
 @dataclass(frozen=True)
+class _Start:
+    """States at a sample, one a row, and choices of reference, input gain and slope of friction, one a column."""
+
+    task: UncertainPlant
+    held: SampledStickSlip
+    slip: np.ndarray
+    rate: np.ndarray
+    level: np.ndarray
+    reference: np.ndarray
+    beta: np.ndarray
+    slope: np.ndarray
+    predicted: np.ndarray
+    push: np.ndarray
+    force: np.ndarray
+
+    @classmethod
+    def of(cls, task: UncertainPlant, held: SampledStickSlip, found: Ranges, states: np.ndarray) -> "_Start":
+        """With the ends of all ranges; the input gain changes slowest."""
+        law = held.law
+        slip, rate, level = (column[:, None] for column in states.T)
+        kinds = product(task.beta, (Fraction(0), task.reference_rates[0]), found.slope)
+        beta, reference, slope = np.array(list(kinds), dtype=float).T
+        target = reference - float(law.return_rate) * slip
+        push = float(law.rate_gain) * rate - float(law.target_gain) * target + level
+        force, scaled = beta * float(task.authority) * push, float(task.authority * task.beta[0]) * push
+        return cls(task, held, slip, rate, level, reference, beta, slope, np.maximum(target, 0), scaled, force)
+
+    def ended(self, moved: np.ndarray, end: np.ndarray, rests: np.ndarray) -> np.ndarray:
+        """States after a period, of the slip in it, the slip rate at its end, and whether the fault rests then."""
+        law, half = self.held.law, float(self.held.step) / 2
+        innovation = moved - half * (self.rate + self.predicted)
+        innovation = np.where(rests, np.maximum(innovation, -half * self.predicted), innovation)
+        lifted = -moved * self.slope / (self.beta * float(self.task.authority))
+        level = self.level + float(law.level_gain) * (end - self.predicted) + float(law.slip_gain) * innovation + lifted
+        return np.stack([self.slip + moved - 2 * half * self.reference, end + 0 * level, level], axis=-1)
+
+
+@dataclass(frozen=True)
 class _Reach:
     """The two maps of the theorem, and the plant itself, on many states at once."""
 
@@ -116,73 +158,55 @@ class _Reach:
         return cls(task, held, found, Period.of(FLOATS, task, held, found))
 
     def after(self, states: np.ndarray) -> np.ndarray:
-        """States a period later under extreme disturbances and parameters."""
-        law, step, amplitude = self.held.law, float(self.held.step), float(self.task.amplitude)
-        slip, rate, level = (column[:, None] for column in states.T)
-        kinds = np.array(
-            [
-                (reference, force, chord)
-                for reference in (0.0, float(self.task.reference_rates[0]))
-                for force in self.task.beta
-                for chord in self.found.slope
-            ],
-            dtype=float,
-        )
-        reference, beta, slope = kinds.T
-        target = reference - float(law.return_rate) * slip
-        predicted = np.maximum(target, 0)
-        push = float(law.rate_gain) * rate - float(law.target_gain) * target + level
-        force = beta * float(self.task.authority) * push
-        per_level = float(law.level_gain)
-        per_slip = float(law.slip_gain)
-        half = step / 2
-
-        def ended(moved: np.ndarray, end: np.ndarray, rests: np.ndarray) -> np.ndarray:
-            innovation = moved - half * (rate + predicted)
-            innovation = np.where(rests, np.maximum(innovation, -half * predicted), innovation)
-            lifted = -moved * slope / (beta * float(self.task.authority))
-            after = level + per_level * (end - predicted) + per_slip * innovation + lifted
-            return np.stack([slip + moved - reference * step, end, after], axis=-1).reshape(-1, 3)
-
-        found = [ended(*self._simulated(rate, force, slope, start, switch)) for start in (1, -1) for switch in (0, 3, 6, 9)]
-        # the rest map
-        stop = np.min([float(g) * rate + float(h) for g, h in stop_bounds(self.task, self.held, self.found)], axis=0)
-        stop = stop + 0 * force
-        most = float(self.task.beta[1] * self.task.authority)
-        for share in (0.0, 0.5, 1.0):
-            possible = most * push >= amplitude + float(self.found.slope[0]) * share * stop
-            rest = ended(share * stop, 0 * stop, np.full(stop.shape, True))
-            found.append(rest[possible.reshape(-1)])
-        # the sliding map, whose end alone is known to be forward
-        size, (of_slip, of_rate) = float(self.held.step) / (len(self.period.impulses[0]) - 1), self.period.impulses
-        times = step - np.linspace(0, step, len(of_slip))
-        largest = np.maximum(times * rate[..., None] + times**2 / 2 * (amplitude - force[..., None]), 0)
-        width = float(self.found.slope[1] - self.found.slope[0]) / 2 / (1 - float(self.found.slope[1]) * step**2 / 2)
-        sizes = amplitude + width * largest
-        plain = [r * rate - f * force for r, f in zip(self.period.of_rate, self.period.of_force, strict=True)]
-        for start in (1, -1):
-            for switch in (0, 4, 8, 12):
-                pattern = np.where(np.arange(len(of_slip)) < switch, start, -start)
-                more = [np.trapezoid(sizes * pattern * impulse, dx=size, axis=-1) for impulse in (of_slip, of_rate)]
-                upward = more[1] > 0
-                scaled = np.where(upward, -plain[1] / np.where(upward, more[1], 1), 2)
-                for factor, rests in ((np.ones_like(scaled), False), (scaled, True)):
-                    moved, end = plain[0] + factor * more[0], plain[1] + factor * more[1]
-                    sound = (np.abs(factor) <= 1) & (moved >= 0) & (end >= -1e-12 * np.abs(rate).max())
-                    points = ended(moved, np.maximum(end, 0), np.full(moved.shape, rests))
-                    found.append(points[sound.reshape(-1)])
+        """States a period later: those of runs, and extremes of both maps."""
+        start = _Start.of(self.task, self.held, self.found, states)
+        found = [self.simulated(states).reshape(-1, 3), *self._resting(start), *self._sliding(start)]
         return np.vstack(found)
 
-    def _simulated(
-        self, rate: np.ndarray, force: np.ndarray, slope: np.ndarray, start: int, switch: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def simulated(self, states: np.ndarray) -> np.ndarray:
+        """States after a period of the plant that sticks, (states, choices, 3); the input gain is the slowest choice."""
+        start = _Start.of(self.task, self.held, self.found, states)
+        runs = [start.ended(*self._run(start, sign, turn)) for sign in (1, -1) for turn in (0, 3, 6, 9)]
+        return np.stack(runs, axis=2).reshape(len(states), -1, 3)
+
+    def _resting(self, start: "_Start") -> Iterator[np.ndarray]:
+        """Ends of the rest map."""
+        stop = np.min([float(g) * start.rate + float(h) for g, h in stop_bounds(self.task, self.held, self.found)], axis=0)
+        stop = stop + 0 * start.force
+        most, amplitude = float(self.task.beta[1] / self.task.beta[0]), float(self.task.amplitude)
+        for share in (0.0, 0.5, 1.0):
+            possible = most * start.push >= amplitude + float(self.found.slope[0]) * share * stop
+            yield start.ended(share * stop, 0 * stop, np.full(stop.shape, True))[possible]
+
+    def _sliding(self, start: "_Start") -> Iterator[np.ndarray]:
+        """Ends of the sliding map, whose end alone is known to be forward."""
+        step, amplitude = float(self.held.step), float(self.task.amplitude)
+        of_slip, of_rate = self.period.impulses
+        times = step - np.linspace(0, step, len(of_slip))
+        largest = times * start.rate[..., None] + times**2 / 2 * (amplitude - start.force[..., None])
+        width = float(self.found.slope[1] - self.found.slope[0]) / 2 / (1 - float(self.found.slope[1]) * step**2 / 2)
+        sizes, size = amplitude + width * np.maximum(largest, 0), step / (len(of_slip) - 1)
+        of_state = zip(self.period.of_rate, self.period.of_force, strict=True)
+        plain = [r * start.rate - f * start.force for r, f in of_state]
+        for sign in (1, -1):
+            for turn in (0, 4, 8, 12):
+                pattern = np.where(np.arange(len(of_slip)) < turn, sign, -sign)
+                more = [np.trapezoid(sizes * pattern * impulse, dx=size, axis=-1) for impulse in (of_slip, of_rate)]
+                upward = more[1] > 0
+                scaled = np.where(upward, -plain[1] / np.where(upward, more[1], 1), 2)  # so that it ends at rest
+                for factor, rests in ((np.ones_like(scaled), False), (scaled, True)):
+                    moved, end = plain[0] + factor * more[0], plain[1] + factor * more[1]
+                    sound = (np.abs(factor) <= 1) & (moved >= 0) & (end >= -1e-12 * np.abs(start.rate).max())
+                    yield start.ended(moved, np.maximum(end, 0), np.full(moved.shape, rests))[sound]
+
+    def _run(self, start: "_Start", sign: int, turn: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Slip and slip rate after a period of the plant that sticks, and whether it rests."""
         size, amplitude = float(self.held.step) / _SUBSTEPS, float(self.task.amplitude)
         damping = float(sum(self.found.damping)) / 2
-        moved, now = np.zeros_like(force), rate + np.zeros_like(force)
+        moved, now = np.zeros_like(start.force), start.rate + np.zeros_like(start.force)
         for i in range(_SUBSTEPS):
-            push = (start if i < switch else -start) * amplitude
-            acceleration = -damping * now + slope * moved - force + push
+            push = (sign if i < turn else -sign) * amplitude
+            acceleration = -damping * now + start.slope * moved - start.force + push
             end = now + size * acceleration
             stops = end < 0
             braked = np.where(acceleration < 0, now**2 / (2 * np.maximum(-acceleration, 1e-300)), 0)
@@ -190,7 +214,7 @@ class _Reach:
             now = np.maximum(end, 0)
         return moved, now, now <= 0
 
-    def hull(self, most: int, tell: Callable[[], None]) -> np.ndarray | None:
+    def hull(self, most: int, tell: Tell) -> np.ndarray | None:
         """Vertices of the hull of all states that are reached from rest; None where it grows without bound."""
         points = np.zeros((1, 3))
         directions = np.random.default_rng(0).standard_normal((1500, 3))
@@ -214,7 +238,7 @@ class _Reach:
             if np.all(np.abs(extent - before) <= _SETTLED * np.tile(size, 2)):
                 break
             before = extent
-            tell()
+            tell("states that disturbances reach", turn / _ROUNDS)
         return points
 
 
@@ -405,8 +429,7 @@ class _Growing:
             which, factors, bases, tops = rows.which[larger], rows.factors[larger], at[1][vertex[larger]], tops[larger]
             scale = sizes[: factors.shape[1]]
             shares = (np.linalg.pinv((at[2] * scale)[bases].swapaxes(-1, -2)) @ (factors * scale)[..., None])[..., 0]
-            itself = ((bases == which[:, None]) * shares).sum(axis=1) / self.heights[which] > 1 - 1e-4
-            kept = ~(itself & (tops <= self.heights[which] * (1 + 1e-9)))  # a state at rest stays where it is
+            kept = ~self._unchanged(rows, larger, steps, sizes)
             which, factors, bases, tops, shares = which[kept], factors[kept], bases[kept], tops[kept], shares[kept]
             found.factors[which] = factors[:, :3]
             if factors.shape[1] > 3:  # D is at most g·y + h
@@ -417,7 +440,19 @@ class _Growing:
                 found.moves[which[own], place[own]] += share[own] / self.heights[place[own]]
         return found
 
-    def grown(self, tell: Callable[[], None]) -> bool:
+    def _unchanged(self, rows: Rows, chosen: np.ndarray, steps: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        """Where a function is below that of its facet by the signs of e1, y and D, as at rest; see `Verifier.largest`."""
+        left = rows.factors[chosen, :3] - self.normals[rows.which[chosen]]
+        if rows.factors.shape[1] > 3:
+            left[:, 1] += np.maximum(rows.factors[chosen, 3], 0) * steps[-1, 0]
+        slice_number = rows.place if rows.place < SLICES else COMBINATIONS[rows.place - SLICES][0]
+        end = float(self.task.reference_rates[0] / self.held.law.return_rate) if slice_number == 1 else np.inf
+        constants = rows.constants[chosen] + (np.maximum(left[:, 0], 0) * end if slice_number == 1 else 0)
+        small = _TINY * self.heights[rows.which[chosen]]
+        of_error = (left[:, 0] * (-1 if slice_number == 0 else 1) * sizes[0] <= small) | (slice_number == 1)
+        return of_error & (left[:, 1] <= 0) & (np.abs(left[:, 2]) * sizes[2] <= small) & (constants <= small)
+
+    def grown(self, tell: Tell) -> bool:
         """Whether it was changed until it holds its images: by turns of policies, else step by step."""
         first = self.size
         for turn in range(_TURNS):
@@ -430,15 +465,31 @@ class _Growing:
             margin = _MARGIN * np.linalg.norm(self.normals * np.abs(self.size), axis=1)
             if np.all(after.tops <= self.heights - margin / 4):
                 return True
-            if turn > _REFINED[-1] + _FOLLOWED:
-                raised = after.tops + margin
-                self.heights = np.where(after.tops > self.heights - margin / 4, np.maximum(raised, self.heights), self.heights)
-            else:
-                own = after.tops - after.moves @ self.heights + margin
-                for _ in range(_PERIODS):  # as long as this policy is followed
-                    self.heights = np.maximum(self.least, after.moves @ self.heights + own)
-            tell()
+            own = after.tops - after.moves @ self.heights + margin
+            late = turn > _REFINED[-1] + _FOLLOWED
+            changed = after.tops > self.heights - margin / 4 if late else np.full(len(own), True)
+            if late and (solved := self._settled(after.moves, own, changed)) is not None:
+                self.heights = solved
+                continue
+            for _ in range(_PERIODS):  # as long as this policy is followed
+                least = self.heights if late else self.least
+                self.heights = np.where(changed, np.maximum(least, after.moves @ self.heights + own), self.heights)
+            tell("a polytope that the loop never leaves", turn / _TURNS)
         return False
+
+    def _settled(self, moves: np.ndarray, own: np.ndarray, changed: np.ndarray) -> np.ndarray | None:
+        """Heights that this policy keeps, where only `changed` ones move and none by much; None if there are none."""
+        places = np.flatnonzero(changed)
+        inner = moves[np.ix_(places, places)]
+        if not len(places) or np.abs(np.linalg.eigvals(inner)).max() >= 1:
+            return None
+        fixed = own[places] + moves[places][:, ~changed] @ self.heights[~changed]
+        found = np.linalg.solve(np.eye(len(places)) - inner, fixed)
+        if (found < self.heights[places]).any() or (found > _LITTLE * self.heights[places]).any():
+            return None
+        heights = self.heights.copy()
+        heights[places] = found
+        return heights
 
     def _neutral(self, normals: np.ndarray, chord: Fraction) -> np.ndarray:
         """With as much of y as the image of a slow slide has, so that a fault that rests does not raise them."""
@@ -524,7 +575,7 @@ class _Growing:
 
 
 def proved(
-    task: UncertainPlant, held: SampledStickSlip, tell: Callable[[], None] = lambda: None
+    task: UncertainPlant, held: SampledStickSlip, tell: Tell = lambda said, done: None
 ) -> StickSlipGuarantee | NoGuarantee:
     """Guarantee of a law with a polytope that is searched for it, or what speaks against one."""
     try:
@@ -549,7 +600,7 @@ def design_stick_slip(
     step: Fraction,
     *,
     objective: str = "tracking",
-    tell: Callable[[], None] = lambda: None,
+    tell: Tell = lambda said, done: None,
 ) -> StickSlipGuarantee | NoGuarantee:
     """Gains with a guarantee on the stick–slip plant.
 
@@ -563,7 +614,7 @@ def design_stick_slip(
     objective : str
         ``tracking``: smallest slip error; ``peak``: smallest slip rate.
     tell : callable
-        Called now and then, to show progress or to interrupt.
+        Called with what is done, and the fraction done [-].
     """
     candidates = []
     for tuning in TUNINGS:
@@ -585,3 +636,47 @@ def design_stick_slip(
         if result.proved:
             break
     return result
+
+
+# ----------------------------------------------------------------------
+# Falsification: the worst case that a search finds.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorstStickSlip:
+    """Largest values that disturbances and parameters of the class were seen to reach.
+
+    Attributes
+    ----------
+    behind, ahead : float
+        Slip behind and ahead of the reference [m].
+    slip_rate : float
+        [m/s].
+    """
+
+    behind: float
+    ahead: float
+    slip_rate: float
+
+
+def worst_stick_slip(found: StickSlipGuarantee, *, runs: int = 240, periods: int = 150) -> WorstStickSlip:
+    """Worst case of runs that choose, period by period, what takes them farthest in one direction.
+
+    β is constant in a run, as it is nearly in a fault; the slope of friction is any of its range in each period, and
+    the disturbance changes its sign at most once in each. Directions are the facets of the invariant polytope.
+    """
+    task, held = found.task, found.held
+    reach = _Reach.of(task, held)
+    facets = np.array(found.reach.facets, dtype=float)
+    facets = facets[np.arange(runs) % len(facets)]
+    states, extremes = np.zeros((runs, 3)), np.zeros(3)
+    high = np.arange(runs) // 2 % 2 == 0  # which end of β
+    for _ in range(periods):
+        after = reach.simulated(states)  # (runs, choices, 3); choices: β is the slower half
+        half = after.shape[1] // 2
+        own = np.where(high[:, None, None], after[:, :half], after[:, half:])
+        best = np.einsum("rcs,rs->rc", own, facets).argmax(axis=1)
+        states = own[np.arange(runs), best]
+        extremes = np.maximum(extremes, [-states[:, 0].min(), states[:, 0].max(), states[:, 1].max()])
+    behind, ahead, rate = (float(v) for v in extremes)
+    return WorstStickSlip(behind=behind, ahead=ahead, slip_rate=rate)

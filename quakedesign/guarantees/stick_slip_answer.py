@@ -1,0 +1,107 @@
+"""Result of a guarantee on the stick–slip plant, with the worst case that a search finds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import rational
+from quakedesign.fault import Fault
+from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip, design_stick_slip, worst_stick_slip
+from quakedesign.laws.stick_slip_law import GAIN_UNITS
+from quakedesign.loop.loop_setup import LoopSetup
+from quakedesign.plant.of_fault import uncertain_plant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StickSlipAnswer:
+    """Guarantee of one loop on the stick–slip plant, or why there is none.
+
+    Attributes
+    ----------
+    fault : Fault
+    found : StickSlipGuarantee or NoGuarantee
+    worst : WorstStickSlip or None
+        Largest values that a search reaches on the same loop: lower bounds of the worst case; None without a guarantee.
+    """
+
+    fault: Fault
+    found: StickSlipGuarantee | NoGuarantee
+    worst: WorstStickSlip | None = None
+
+    @property
+    def proved(self) -> bool:
+        """Whether there is a guarantee."""
+        return self.found.proved
+
+    def lines(self) -> list[str]:
+        """For people: the sentence first, then the worst case found."""
+        if not self.found.proved:
+            return [self.found.sentence(), "the plant without stick may have a guarantee: omit --plant"]
+        said = [f"proved: {self.found.sentence()}"]
+        if self.worst is not None:
+            said.append(
+                f"worst case found: slip rate {self.worst.slip_rate:.3g} m/s, slip {self.worst.behind:.3g} m behind and "
+                f"{self.worst.ahead:.3g} m ahead of the reference"
+            )
+        return said
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; exact numbers as texts."""
+        if not self.found.proved:
+            return {"verdict": "undecided", "sentence": self.found.sentence(), "reason": self.found.reason}
+        worst, law = self.worst, self.found.held.law
+        return {
+            "verdict": "proved",
+            "sentence": self.found.sentence(),
+            "plant": "stick-slip",
+            **self.found.claims.to_dict(),
+            "worst_found": worst
+            and {"slip_rate": worst.slip_rate, "slip_behind": worst.behind, "slip_ahead": worst.ahead},
+            "step": str(self.found.held.step),
+            "law": {name: str(getattr(law, name)) for name in GAIN_UNITS},
+        }
+
+
+def answer_stick_slip(
+    fault: Fault,
+    setup: LoopSetup,
+    *,
+    objective: str = "tracking",
+    progress: Callable[[str, float], None] | None = None,
+) -> StickSlipAnswer:
+    """Design a law for the stick–slip plant and prove its bounds.
+
+    Parameters
+    ----------
+    fault : Fault
+        Its friction depends on slip and slip rate alone.
+    setup : LoopSetup
+        Only its sampling time may be given.
+    objective : str
+        ``tracking`` or ``peak``.
+    progress : callable, optional
+        Called with what the search does, and the fraction done [-].
+
+    Raises
+    ------
+    ParameterError
+        For a quantity of the setup other than the sampling time.
+    """
+    if unknown := setup.given().keys() - {"step"}:
+        raise ParameterError(
+            f"a guarantee on the stick-slip plant knows no {', '.join(sorted(unknown))}: it is proved for exact "
+            "measurements and a pressure that acts at once. Omit the quantity, or omit plant for the plant without stick"
+        )
+    task = uncertain_plant(fault)
+    step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)
+
+    def tell(said: str, done: float) -> None:
+        if progress is not None:
+            progress(said, done)
+
+    found = design_stick_slip(task, step, objective=objective, tell=tell)
+    return StickSlipAnswer(fault=fault, found=found, worst=worst_stick_slip(found) if found.proved else None)
