@@ -300,7 +300,7 @@ class RunOptions:
         Integrator: dormand-prince or rk4; for single smooth runs also cvodes or idas. Rate-and-state faults: cvodes or
         idas, for single runs without control also radau or dop853.
     plant
-        smooth (as in the paper, for forward slip) or coulomb (set-valued friction: stick, slip, reversal).
+        smooth (as in the paper, for forward slip) or coulomb, also stick-slip (set-valued friction).
         Rate-and-state faults: smooth or quasi-dynamic (without inertia).
     step
         Length of one step; the fault's sampling time by default.

@@ -15,6 +15,7 @@ from .exact.statement import Guarantee as Guarantee
 from .exact.statement import SlidingGuarantee as SlidingGuarantee
 from .exact.statement import continuous_peaks as continuous_peaks
 from .exact.statement import guarantee as guarantee
+from .exact.stick_slip_guarantee import StickSlipGuarantee as StickSlipGuarantee
 from .guarantee_result import LoopAnswer as LoopAnswer
 from .guarantee_result import answer_sliding as answer_sliding
 from .guarantee_result import attacked as attacked
@@ -38,3 +39,4 @@ from .search.linear_design import farthest_rock as farthest_rock
 from .search.linear_design import longest_delay as longest_delay
 from .search.linear_design import longest_step as longest_step
 from .search.linear_design import tightened as tightened
+from .stick_slip_answer import StickSlipAnswer as StickSlipAnswer

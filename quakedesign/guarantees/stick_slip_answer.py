@@ -44,8 +44,8 @@ class StickSlipAnswer:
         said = [f"proved: {self.found.sentence()}"]
         if self.worst is not None:
             said.append(
-                f"worst case found: slip rate {self.worst.slip_rate:.3g} m/s, slip {self.worst.behind:.3g} m behind and "
-                f"{self.worst.ahead:.3g} m ahead of the reference"
+                f"worst case found: slip rate {self.worst.slip_rate:.3g} m/s, slip {self.worst.behind:.3g} m behind "
+                f"and {self.worst.ahead:.3g} m ahead of the reference"
             )
         return said
 
@@ -94,7 +94,7 @@ def answer_stick_slip(
     if unknown := setup.given().keys() - {"step"}:
         raise ParameterError(
             f"a guarantee on the stick-slip plant knows no {', '.join(sorted(unknown))}: it is proved for exact "
-            "measurements and a pressure that acts at once. Omit the quantity, or omit plant for the plant without stick"
+            "measurements and a pressure that acts at once. Omit the quantity, or omit plant"
         )
     task = uncertain_plant(fault)
     step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)

@@ -10,6 +10,8 @@ from quakedesign.exact import rational
 from quakedesign.laws.base import BaseGains, Controller, Law
 from quakedesign.laws.loop_field import LoopField
 
+_OF_MATRICES = "sampled", "stick-slip"
+"""Laws that are not made of gains in order."""
 Subject = str | type[Law] | LoopField
 """What a claim can be about: the name of a law of the package, a law of the user's own, or a bare closed loop."""
 BARE = "custom"
@@ -19,7 +21,9 @@ BARE = "custom"
 def laws() -> dict[str, type[Law]]:
     """Every law of the package by name, those included that act on other plants than a fault and are only proved."""
     found = discovered(__package__, Law)
-    return {name: law for name, law in found.items() if name not in ("sampled", "stick-slip")}  # not made of gains in order
+    return {
+        name: law for name, law in found.items() if name not in ("sampled", "stick-slip")
+    }  # not made of gains in order
 
 
 def law(name: str) -> type[Law]:

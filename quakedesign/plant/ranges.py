@@ -167,7 +167,9 @@ class UncertainPlant:
     def slip_slopes(self, stress: Range) -> Range:
         """Force per slip and mass [1/s²] while the effective normal stress [Pa] is constant and within a range."""
         law, k = self.friction, self.stiffness
-        low, high = _hull(n * p * c for n in self.area_per_mass for p in stress for c in (law.weakening, -law.strengthening))
+        low, high = _hull(
+            n * p * c for n in self.area_per_mass for p in stress for c in (law.weakening, -law.strengthening)
+        )
         return low - k[1] + self.growths[0], high - k[0] + self.growths[0]
 
     @cached_property

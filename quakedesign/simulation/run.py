@@ -229,6 +229,10 @@ def by_no_clock(
     return (step / clock.shortest if clock else step), numbers
 
 
+STICK_SLIP = "stick-slip"
+"""Another name of the plant ``coulomb``, which sticks."""
+
+
 def loop_class(plant: str) -> type[ClosedLoop]:
     """Closed loop with a named plant.
 
@@ -238,6 +242,7 @@ def loop_class(plant: str) -> type[ClosedLoop]:
         When there is none of that name.
     """
     classes = {kind.plant_name: kind for kind in (ClosedLoop, CoulombLoop)}
+    classes[STICK_SLIP] = CoulombLoop
     require_known(plant, classes, "plant")
     return classes[plant]
 

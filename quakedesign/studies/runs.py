@@ -21,6 +21,7 @@ from quakedesign.fault import Disturbance, Fault, SlidingReference
 from quakedesign.fault.model import require_positive
 from quakedesign.guarantees import ContinuousPeaks, Guarantee, SlidingGuarantee, load_guarantee
 from quakedesign.guarantees.exact.statement import differences
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.guarantees.search.compensated_search import recovered
 from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_model
 from quakedesign.laws import Controller, Sampling, control_law, published
@@ -640,10 +641,10 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         controller = claim.controller
     if claim.check() is not Verdict.PROVED:
         raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
-    return Choice(controller=controller, claim=claim)
+    return Choice(controller=controller, claim=None if isinstance(claim, StickSlipGuarantee) else claim)
 
 
-def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee) -> list[str]:
+def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee | StickSlipGuarantee) -> list[str]:
     """What of a fault a certificate does not cover."""
     if isinstance(claim, SlidingGuarantee):
         return claim.task.differences(slow_sliding_plant(fault, claim.task.stress))

@@ -138,7 +138,12 @@ def guarantee(
     setup = setup.with_given(**given)
     require_known(plant, PLANTS, "plant")
     if plant == PLANTS[1]:
-        usual = (control_law(controller).name, tuple(gains), scheme, disturbance_class) == ("elqr", (), None, CLASSES[0])
+        usual = (control_law(controller).name, tuple(gains), scheme, disturbance_class) == (
+            "elqr",
+            (),
+            None,
+            CLASSES[0],
+        )
         if not usual or stress is not None or exact_value(spread, "", "spread"):
             raise ParameterError(
                 "the stick-slip plant is guaranteed with a designed elqr, for the disturbance class amplitude and "

@@ -126,8 +126,10 @@ def read_guarantee(raw: Any) -> Claim:
         When it breaks a rule of FORMAT.md.
     """
     try:
-        readers = {SLOW_SLIDING: _read_sliding, STICK_SLIP: _read_stick_slip}
-        return readers.get(kind_of(raw), _read_tracking)(raw)
+        kind = kind_of(raw)
+        if kind == STICK_SLIP:
+            return _read_stick_slip(raw)
+        return _read_sliding(raw) if kind == SLOW_SLIDING else _read_tracking(raw)
     except ParameterError as error:
         raise CertificateError(str(error)) from None
 

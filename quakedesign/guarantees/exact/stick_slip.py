@@ -1,36 +1,38 @@
 """Stick–slip plant: an invariant polytope of the sampled loop with friction that holds the fault at rest.
 
-**Plant.** Let y = x2 ≥ 0 be the slip rate, p*(x1) the pressure that balances the fault at rest at slip x1, b·β(x1) = μN̂,
-and U = p*(x1) − p at a sample with the held pressure p. For the slip ξ since the sample
+**Plant.** Let y = x2 ≥ 0 be the slip rate, p*(x1) the pressure that balances the fault at rest at slip x1, b·β(x1) =
+μN̂, and U = p*(x1) − p at a sample with the held pressure p. For the slip ξ since the sample
 
     y′ = −w·y + G(ξ) + φ + λ,   G(0) = −bβU,   G′(ξ) ∈ [S⁻, S⁺],   λ ≥ 0, λy = 0,
 
-exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ − φ1, whose slope is −κ − N̂μ′(σ′ − p). While the fault rests
-nothing changes. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is checked.
+exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ − φ1, whose slope is −κ − N̂μ′(σ′ − p). While the fault
+rests nothing changes. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is checked.
 
-**Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion is one
-of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the block before
-the next sample, and the period ends with y = 0. So each period is either the *sliding* map, with y ≥ 0 and ξ ≥ 0 at its
-end, or the *rest* map with a slip D until the last stop.
+**Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion is
+one of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the block
+before the next sample, and the period ends with y = 0. So each period is either the *sliding* map, with y ≥ 0 and ξ ≥ 0
+at its end, or the *rest* map with a slip D until the last stop.
 
-**Sliding map.** With S0 the middle and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are linear in
-(y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Before, ξ(t) ≤ (t·y + t²/2·(H − bβU))/(1 − S⁺T²/2)
-and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
+**Sliding map.** With S0 the middle and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are linear
+in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Before, ξ(t) ≤ (t·y + t²/2·(H − bβU))/(1 −
+S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0. With U fixed, σ = s/(bβ) makes terms in 1/β, which exceed their
+chord over the range of β by at most `gap` times the slip that there would be without pressure.
 
-**Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, partial integration gives D = f(0)y + ∫f·(G + φ)dt up to the stop. As
-G ≤ −H + |S⁻|(D − ξ) before it, and what G lacks of that falls with the slip,
+**Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, partial integration gives D = f(0)y + ∫f·(G + φ)dt up to the
+stop. As G ≤ −H + |S⁻|(D − ξ) before it, and what G lacks of that falls with the slip,
 
     D·(1 − |S⁻|T²/2 − δ) ≤ f(0)·y + 2H·(e^{wx} − 1 − wx)/w²,   x = (1 − θ)T,
 
-for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and δ the width of its range times (e^{wx} − 1)/w. Besides,
-bβ·U ≥ H + G(D)-part: b·β_max·U ≥ H − |S⁻|D.
+for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and δ the width of its range times (e^{wx} − 1)/w. At the stop
+bβU ≥ H + s·D for some s in [S⁻, S⁺], so that b·β_max·U ≥ H − |S⁻|D.
 
-**Law.** `StickSlipLaw`; d = D_level + p*(x1) moves by −σξ [Pa] besides, σ = S_chord/(bβ). State at the samples: z = (e1, y,
-d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet exceeds 1 after either map; each is the largest value of a
-linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
+**Law.** `StickSlipLaw`; d = D + p*(x1), D its level, moves by −σξ [Pa] besides, σ = s/(bβ) at the end of the period, s
+a chord slope at σ′ − p*. State at the samples: z = (e1, y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no
+facet exceeds 1 after either map; each is the largest value of a linear function on a polytope, bounded by multipliers
+of three or four constraints, which a file names.
 
-**Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ = −wy′ + Sy
-admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
+**Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ = −wy′
++ Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -40,7 +42,7 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat, ctx
+from flint import arb, ctx
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import end_of
@@ -137,7 +139,7 @@ class StickSlipPolytope:
     @property
     def box(self) -> tuple[Fraction, ...]:
         """Bounds of +e1 [m], y [m/s], +d [Pa], −e1 [m] and −d [Pa]."""
-        return tuple(1 / abs(sum(row)) for row in self.facets[:5])
+        return tuple(1 / abs(sum(row, _ZERO)) for row in self.facets[:5])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -215,7 +217,7 @@ def curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[A
 
 def _ball_array(values: Any) -> np.ndarray:
     table = np.array(values, dtype=object)
-    return np.vectorize(lambda v: ball(v) if isinstance(v, Fraction) else arb(v), otypes=[object])(table)
+    return np.asarray(np.vectorize(lambda v: ball(v) if isinstance(v, Fraction) else arb(v), otypes=[object])(table))
 
 
 def _ball_middle(values: np.ndarray) -> np.ndarray:
@@ -223,7 +225,7 @@ def _ball_middle(values: np.ndarray) -> np.ndarray:
 
 
 def _exact_array(values: Any) -> np.ndarray:
-    return np.vectorize(Fraction, otypes=[object])(np.array(values, dtype=object))
+    return np.asarray(np.vectorize(Fraction, otypes=[object])(np.array(values, dtype=object)))
 
 
 BALLS = Backend(ball, _ball_exponential, curvature, _ball_array, _ball_middle)
@@ -332,9 +334,7 @@ class Period:
         tall = (*((*row, entry) for row, entry in zip(flow, (zero, one), strict=True)), (zero, zero, zero))
         whole = back.exponential(tuple(tuple(v * held.step for v in row) for row in tall))
         piece = held.step / NODES
-        nodes = [
-            back.exponential(tuple(tuple(v * piece * i for v in row) for row in flow)) for i in range(NODES + 1)
-        ]
+        nodes = [back.exponential(tuple(tuple(v * piece * i for v in row) for row in flow)) for i in range(NODES + 1)]
         return cls(
             back=back,
             task=task,
@@ -360,7 +360,9 @@ class Period:
             first, last = sizes[:, i], sizes[:, i + 1]
             for j in range(4):
                 begin, middle, end = ((h * i + h * k / 2) ** min(j, 2) for k in range(3))
-                area = first * number(begin * h / 6) + (first + last) * number(middle * h / 3) + last * number(end * h / 6)
+                area = (
+                    first * number(begin * h / 6) + (first + last) * number(middle * h / 3) + last * number(end * h / 6)
+                )
                 found[j] = found[j] + area * number(h * (i + 1) if j == 3 else Fraction(1))
         return found
 
@@ -502,9 +504,7 @@ def resting_rows(
                     continue
                 a1, a3 = n1[which], n3[which]
                 cut_off = a3 * slip * (multipliers[which][:, 4] if share is None else share)
-                factors = np.column_stack(
-                    [part.of_error[which], -cut_off * half, a3, a1 - a3 * chord + cut_off]
-                )
+                factors = np.column_stack([part.of_error[which], -cut_off * half, a3, a1 - a3 * chord + cut_off])
                 yield Rows(SLICES + part.place, which, factors, part.constant[which])
 
 
@@ -574,12 +574,12 @@ class Verifier:
         self.bases, self.vertices = self.bases[inside], self.vertices[inside]
 
     def proposed(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Constraints and their multipliers at the best vertex, in floating point; a negative one shows that it is not."""
+        """Constraints at the best vertex and their multipliers, in floats; a negative one shows a better vertex."""
         bases = self.bases[(scaled @ self.vertices.T).argmax(axis=1)]
         return bases, np.linalg.solve(self.floats[bases].swapaxes(-1, -2), scaled[..., None])[..., 0]
 
     def largest(self, factors: np.ndarray, constants: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
-        """Upper bounds of c·z + k, of rationals or balls; where `which` names facets, those of 1 + (c − n)·z + k count too.
+        """Upper bounds of c·z + k, of rationals or balls, and of 1 + (c − n)·z + k where `which` names facets.
 
         The second one decides where a period changes nothing, as at rest: there c − n has the sign that e1, y and D do
         not have, D being at most g·y by the last constraint, and e1 at most its end of the slice.

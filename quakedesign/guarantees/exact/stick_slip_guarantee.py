@@ -1,7 +1,6 @@
 """A guarantee on the stick–slip plant as a statement that checks itself."""
 
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any, ClassVar, Literal
 
 from quakedesign.errors import ParameterError
@@ -125,11 +124,13 @@ class StickSlipGuarantee:
         task, held, claims = self.task, self.held, self.claims
         stress = LowerBound(task.amplitude / task.area_per_mass[1])
         when = f"held over {UpperBound(held.step):.6g} s"
-        under = f"for every disturbance of at most {LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
+        size = f"{LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
         return (
-            f"from rest, {when}, {under} and all friction of the box: the slip rate never exceeds "
+            f"from rest, {when}, for every disturbance of at most {size} and all friction of the box: the slip "
+            f"rate never exceeds "
             f"{claims.peak_slip_rate:.3g} m/s, whether the fault slides or sticks, and the slip stays between "
-            f"{claims.slip_behind:.3g} m behind and {claims.slip_ahead:.3g} m ahead of the reference, the pressure between "
+            f"{claims.slip_behind:.3g} m behind and {claims.slip_ahead:.3g} m ahead of the reference, "
+            f"the pressure between "
             f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}, for all t >= 0"
         )
 

@@ -37,22 +37,17 @@ from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.ranges import UncertainPlant
 
 Tell = Callable[[str, float], None]
-TUNINGS = tuple(
-    (level, slip, back, gain)
-    for level, slip in ((0.5, 0.5), (0.7, 0.5), (0.3, 0.3), (0.3, 0.5), (0.2, 0.2))
-    for back in (0.3, 0.1, 0.05)
-    for gain in (1.2125, 1.3)
-)
+TUNINGS = tuple((level, slip, back, 1.3) for level, slip in ((0.5, 0.5), (0.7, 0.5), (0.3, 0.3)) for back in (0.3, 0.1))
 """Shares of the innovations that the estimate takes, of the slip error that a period takes back, and the input gain."""
 _SETTLED, _FEW, _MANY = 1e-4, 150, 250  # change of extents, vertices kept in comparisons and for a polytope
 _ROUNDS, _SUBSTEPS = 60, 12
 _FACETS = 130
-_PERIODS, _TURNS, _REFINED = 4, 110, (8, 15, 22, 29)
+_PERIODS, _TURNS, _REFINED = 4, 200, (8, 15, 22, 29)
 _TINY = 1e-12  # of a height: rounding
 _LITTLE = 1.01  # of a height that one step to where a policy leads may make of it
 _NEARLY = 0.93  # of the factor of y that keeps a facet where it is in a slow slide
 _ADDED, _MOST, _ALIKE, _WIDER, _KEPT, _FOLLOWED = 35, 270, 1 - 1e-8, 1e-5, 0.6, 14
-_MARGIN = 2e-7  # by which the last polytope is larger than the images that it must hold
+_MARGINS = 2e-7, 2e-6, 2e-5  # by which the last polytope is larger than the images that it must hold
 _FAR = 30  # times the first extents, from where on a set counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
@@ -164,14 +159,16 @@ class _Reach:
         return np.vstack(found)
 
     def simulated(self, states: np.ndarray) -> np.ndarray:
-        """States after a period of the plant that sticks, (states, choices, 3); the input gain is the slowest choice."""
+        """States after a period of the plant that sticks, (states, choices, 3); the input gain changes slowest."""
         start = _Start.of(self.task, self.held, self.found, states)
         runs = [start.ended(*self._run(start, sign, turn)) for sign in (1, -1) for turn in (0, 3, 6, 9)]
         return np.stack(runs, axis=2).reshape(len(states), -1, 3)
 
     def _resting(self, start: "_Start") -> Iterator[np.ndarray]:
         """Ends of the rest map."""
-        stop = np.min([float(g) * start.rate + float(h) for g, h in stop_bounds(self.task, self.held, self.found)], axis=0)
+        stop = np.min(
+            [float(g) * start.rate + float(h) for g, h in stop_bounds(self.task, self.held, self.found)], axis=0
+        )
         stop = stop + 0 * start.force
         most, amplitude = float(self.task.beta[1] / self.task.beta[0]), float(self.task.amplitude)
         for share in (0.0, 0.5, 1.0):
@@ -279,7 +276,7 @@ def _normals(points: np.ndarray, count: int) -> np.ndarray:
 
 
 def _corners(constraints: list[Constraint], size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Vertices of a polytope, the constraints that meet there, and the rows of all constraints; None for an empty one."""
+    """Vertices of a polytope, the constraints that meet there, and the rows of all; None for an empty polytope."""
     rows = np.array([row for row, _ in constraints], dtype=float) * size
     ends = np.array([end for _, end in constraints], dtype=float)
     length = np.linalg.norm(rows, axis=1)
@@ -346,6 +343,8 @@ class _Growing:
     multipliers: np.ndarray
     least: np.ndarray
     points: np.ndarray
+    margin: float = _MARGINS[0]
+    turn: int = 0
     last: _Images | None = None
 
     @property
@@ -433,7 +432,10 @@ class _Growing:
             which, factors, bases, tops, shares = which[kept], factors[kept], bases[kept], tops[kept], shares[kept]
             found.factors[which] = factors[:, :3]
             if factors.shape[1] > 3:  # D is at most g·y + h
-                found.factors[which, 1] += np.maximum(factors[:, 3], 0) * steps[(steps[:, 0] * at[0][vertex[larger][kept], 1][:, None] + steps[:, 1]).argmin(axis=1), 0]
+                found.factors[which, 1] += (
+                    np.maximum(factors[:, 3], 0)
+                    * steps[(steps[:, 0] * at[0][vertex[larger][kept], 1][:, None] + steps[:, 1]).argmin(axis=1), 0]
+                )
             found.tops[which], found.moves[which] = tops, 0
             for share, place in zip(shares.T, bases.T, strict=True):
                 own = place < count
@@ -441,7 +443,7 @@ class _Growing:
         return found
 
     def _unchanged(self, rows: Rows, chosen: np.ndarray, steps: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Where a function is below that of its facet by the signs of e1, y and D, as at rest; see `Verifier.largest`."""
+        """Where a function is below that of its facet by the signs of e1, y and D; see `Verifier.largest`."""
         left = rows.factors[chosen, :3] - self.normals[rows.which[chosen]]
         if rows.factors.shape[1] > 3:
             left[:, 1] += np.maximum(rows.factors[chosen, 3], 0) * steps[-1, 0]
@@ -450,19 +452,21 @@ class _Growing:
         constants = rows.constants[chosen] + (np.maximum(left[:, 0], 0) * end if slice_number == 1 else 0)
         small = _TINY * self.heights[rows.which[chosen]]
         of_error = (left[:, 0] * (-1 if slice_number == 0 else 1) * sizes[0] <= small) | (slice_number == 1)
-        return of_error & (left[:, 1] <= 0) & (np.abs(left[:, 2]) * sizes[2] <= small) & (constants <= small)
+        rest = (left[:, 1] <= 0) & (np.abs(left[:, 2]) * sizes[2] <= small) & (constants <= small)
+        return np.asarray(of_error & rest)
 
     def grown(self, tell: Tell) -> bool:
         """Whether it was changed until it holds its images: by turns of policies, else step by step."""
         first = self.size
-        for turn in range(_TURNS):
+        for turn in range(self.turn, _TURNS):
+            self.turn = turn + 1
             if turn in _REFINED and self.last is not None:
                 self.refine(self.last)
             after = self.images()
             if after is None or (self.size > _FAR * first).any():
                 return False
             after.growth, self.last = after.tops - self.heights, after
-            margin = _MARGIN * np.linalg.norm(self.normals * np.abs(self.size), axis=1)
+            margin = self.margin * np.linalg.norm(self.normals * np.abs(self.size), axis=1)
             if np.all(after.tops <= self.heights - margin / 4):
                 return True
             own = after.tops - after.moves @ self.heights + margin
@@ -558,7 +562,8 @@ class _Growing:
         """Add vertices that rounding hid, by linear programs, where a function would have a negative multiplier."""
         sizes = [short(float(v), 6) for v in (*self.size, self.size[1] * float(self.held.step))]
         verifiers = [
-            Verifier(constraints, known, sizes[: len(known[0])], behind=False) for constraints, known in zip(lines, bases, strict=True)
+            Verifier(constraints, known, sizes[: len(known[0])], behind=False)
+            for constraints, known in zip(lines, bases, strict=True)
         ]
         for rows in _rows(period, facets, self._scaled()):
             verifier = verifiers[rows.place]
@@ -578,6 +583,7 @@ def proved(
     task: UncertainPlant, held: SampledStickSlip, tell: Tell = lambda said, done: None
 ) -> StickSlipGuarantee | NoGuarantee:
     """Guarantee of a law with a polytope that is searched for it, or what speaks against one."""
+    none = NoGuarantee(reason="no polytope was found that the loop never leaves", small_gain=None)
     try:
         points = _Reach.of(task, held).hull(_MANY, tell)
         if points is None:
@@ -585,14 +591,16 @@ def proved(
         normals = _normals(points, _FACETS)
         heights = (normals @ points.T).max(axis=1)
         growing = _Growing(task, held, normals, heights, np.zeros((len(normals), 5)), heights, points)
-        if not growing.grown(tell):
-            return NoGuarantee(reason="no polytope was found that the loop never leaves", small_gain=None)
-        reach = growing.exact()
+        found: StickSlipGuarantee | NoGuarantee = none
+        for growing.margin in _MARGINS:
+            if not growing.grown(tell) or (reach := growing.exact()) is None:
+                return found
+            found = stick_slip_guarantee(task, held, reach)
+            if found.proved:
+                break
     except (ParameterError, LinAlgError, QhullError) as error:
         return NoGuarantee(reason=str(error), small_gain=None)
-    if reach is None:
-        return NoGuarantee(reason="no polytope was found that the loop never leaves", small_gain=None)
-    return stick_slip_guarantee(task, held, reach)
+    return found
 
 
 def design_stick_slip(
