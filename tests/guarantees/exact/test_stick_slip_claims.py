@@ -1,0 +1,216 @@
+"""The decision about a stick–slip certificate: each condition, each claim, and files."""
+
+from dataclasses import replace
+from fractions import Fraction as F
+from math import exp
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import quakedesign as qd
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.exact import LowerBound, UpperBound
+from quakedesign.guarantees import guarantee_document, load_guarantee, read_guarantee
+from quakedesign.guarantees.exact.stick_slip import gap, ranges, stick_slip_bounds, stop_bounds
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipClaims, stick_slip_guarantee
+from quakedesign.laws.stick_slip_law import StickSlipLaw
+from quakedesign.lyapunov import Verdict
+
+FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "stick_slip_real-fault.json"
+
+
+@pytest.fixture(scope="module")
+def proof():
+    return load_guarantee(FILE)
+
+
+@pytest.fixture(scope="module")
+def bounds(proof):
+    return stick_slip_bounds(proof.task, proof.held, proof.reach)
+
+
+def test_the_stored_certificate_holds_and_reaches_what_was_asked(proof, bounds):
+    assert proof.claims.follow(bounds)
+    assert bounds.slip_rate < F("1.6e-4")
+    assert bounds.behind < F("2.0e-5")
+    assert bounds.ahead < F("3.7e-5")
+
+
+@pytest.mark.parametrize("name", ["slip_behind", "slip_ahead", "peak_slip_rate", "least_pressure", "largest_pressure"])
+def test_no_claim_may_be_one_percent_sharper(proof, bounds, name):
+    value = getattr(proof.claims, name)
+    sharper = LowerBound(value * F(99, 100)) if name == "least_pressure" else UpperBound(value * F(99, 100))
+    assert not replace(proof.claims, **{name: sharper}).follow(bounds)
+
+
+def test_the_largest_entry_of_each_facet_is_needed(proof):
+    """A polytope whose facets all lie 2 % further inside is left; one facet further out is another set."""
+    facets = proof.reach.facets
+    smaller = replace(proof.reach, facets=tuple(tuple(v * F(102, 100) for v in row) for row in facets))
+    assert not stick_slip_guarantee(proof.task, proof.held, smaller).proved
+
+
+@pytest.mark.parametrize("name", ["rate_gain", "target_gain", "return_rate", "level_gain", "slip_gain"])
+def test_the_set_is_that_of_the_law(proof, name):
+    law = replace(proof.held.law, **{name: getattr(proof.held.law, name) * F(11, 10)})
+    assert not stick_slip_guarantee(proof.task, replace(proof.held, law=law), proof.reach).proved
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"amplitude": F("3.4e-4")}, "may leave the polytope"),
+        ({"normal_stress": F(14_000_000)}, "effective normal stress may reach 0"),
+        ({"growths": (F(0), F(2))}, "w may be negative"),
+        ({"shear_modulus": F(30) * 10**11}, "effective normal stress may reach 0|slip backward"),
+        ({"target_slip": F(1)}, "may leave the polytope"),
+    ],
+)
+def test_what_the_theorem_needs_of_the_fault_is_checked(proof, changed, reason):
+    found = stick_slip_guarantee(replace(proof.task, **changed), proof.held, proof.reach)
+    assert not found.proved
+    assert any(part in found.reason for part in reason.split("|"))
+
+
+def test_backward_slip_is_excluded_by_the_shear_stress(proof):
+    """N(mu* sigma') = 8e-8·0.3353·5e7 = 1.3412 m/s², k = 0.48 1/s²: positive up to a slip of 2.79 m."""
+    ranges(proof.task, F("1.9"), (F(0), F(0)), F(0))
+    with pytest.raises(ParameterError, match="slip backward"):
+        ranges(replace(proof.task, amplitude=F("0.1")), F("1.9"), (F(0), F(0)), F(0))
+
+
+def test_a_period_that_is_long_against_the_plant_is_refused(proof):
+    with pytest.raises(ParameterError, match="T_s is too long"):
+        stick_slip_bounds(proof.task, replace(proof.held, step=F(3)), proof.reach)
+
+
+def test_the_slip_until_a_stop_is_below_its_bound_and_not_by_far(proof):
+    """Greedy courses of y' = -wy - G + phi with G <= -H: coast as long as possible, then brake hardest."""
+    found = ranges(proof.task, F(1, 1000), (F(0), F(0)), F(0))
+    pairs, step, amplitude = stop_bounds(proof.task, proof.held, found), float(proof.held.step), 3.2e-4
+    damping, steps = float(found.damping[0]), 4000
+    for start in (1e-5, 3e-5, 8e-5, 1.1e-4):
+        largest = 0.0
+        for turn in range(0, steps, 20):
+            rate, slip = start, 0.0
+            for i in range(steps):
+                acceleration = -damping * rate - (0.0 if i < turn else 2 * amplitude)
+                after = rate + step / steps * acceleration
+                if after <= 0:
+                    break
+                slip, rate = slip + step / steps * (rate + after) / 2, after
+            else:
+                continue  # it does not stop within the period
+            largest = max(largest, slip)
+        bound = min(float(g) * start + float(h) for g, h in pairs)
+        assert largest <= bound
+        assert bound <= 1.35 * largest
+
+
+def test_the_bounds_of_exponentials_lie_above_them(proof):
+    found = ranges(proof.task, F(1, 1000), (F(0), F(0)), F(0))
+    w, step = float(found.damping[0]), float(proof.held.step)
+    room = 1 + float(found.slope[0]) * step**2 / 2
+    least = 0.5 + w * step / 24
+    for i, (g, h) in enumerate(stop_bounds(proof.task, proof.held, found)):
+        share = least + (1 - least) * i / 5
+        m, x = share * step, (1 - share) * step
+        exact = (1 - exp(-w * m)) / w / room, 2 * 3.2e-4 * (exp(w * x) - 1 - w * x) / w**2 / room
+        assert exact[0] <= float(g) * (1 + 1e-12)
+        assert float(g) <= 1.002 * exact[0]  # the next term of the series is (wT)³/24 = 0.001
+        assert exact[1] - 1e-18 <= float(h) <= 1.01 * exact[1] + 1e-18
+
+
+def test_the_gap_of_one_over_beta_bounds_its_distance_from_the_chord():
+    for low, high in ((1.0, 1.425), (1.0, 2.0), (0.7, 0.9)):
+        beta = np.linspace(low, high, 1001)
+        chord = 1 / low + (1 / high - 1 / low) * (beta - low) / (high - low)
+        assert (chord - 1 / beta).max() <= float(gap((F(low), F(high))))
+
+
+def test_a_file_is_read_as_it_was_written(proof):
+    document = guarantee_document(proof)
+    assert read_guarantee(document) == proof
+    for key in ("set", "loop", "fault", "claims"):
+        with pytest.raises(CertificateError):
+            read_guarantee({name: value for name, value in document.items() if name != key})
+    with pytest.raises(CertificateError, match="bounded change"):
+        read_guarantee(document | {"disturbance": document["disturbance"] | {"change": "1"}})
+
+
+@pytest.mark.parametrize(
+    "forged",
+    [
+        lambda s: s | {"facets": s["facets"][:4]},
+        lambda s: s | {"facets": [["1", "1", "1"], *s["facets"][1:]]},
+        lambda s: s | {"multipliers": [["-1", "0", "0", "0", "0"], *s["multipliers"][1:]]},
+        lambda s: s | {"multipliers": [["0", "2", "0", "0", "0"], *s["multipliers"][1:]]},
+        lambda s: s | {"multipliers": s["multipliers"][1:]},
+        lambda s: s | {"sliding": s["sliding"][:2]},
+        lambda s: s | {"sliding": [[[0, 1]], *s["sliding"][1:]]},
+        lambda s: s | {"resting": [[], *s["resting"][1:]]},
+        lambda s: s | {"resting": [[["0", "1", "2", "3"]], *s["resting"][1:]]},
+    ],
+)
+def test_a_forged_set_is_refused(proof, forged):
+    document = guarantee_document(proof)
+    with pytest.raises(CertificateError):
+        read_guarantee(document | {"set": forged(document["set"])})
+
+
+def test_bases_that_name_no_constraint_decide_nothing(proof):
+    reach = replace(proof.reach, sliding=(((0, 1, 9999),), *proof.reach.sliding[1:]))
+    assert "by their numbers" in stick_slip_guarantee(proof.task, proof.held, reach).reason
+
+
+def test_the_sentence_has_no_condition_about_negative_slip_rates(proof):
+    said = proof.sentence()
+    assert "whether the fault slides or sticks" in said
+    assert "negative" not in said
+    assert "for all t >= 0" in said
+    assert proof.check() is Verdict.PROVED
+
+
+def test_a_law_needs_gains_of_the_right_sign():
+    gains = {"rate_gain": F(1), "target_gain": F(1), "return_rate": F(1), "level_gain": F(0), "slip_gain": F(0)}
+    StickSlipLaw(**gains)
+    for name in gains:
+        with pytest.raises(ParameterError, match=f"{name} of a stick-slip law must be"):
+            StickSlipLaw(**gains | {name: F(-1)})
+
+
+def test_a_run_on_the_plant_that_sticks_stays_within_the_claims(proof):
+    """Half a day of the paper's task, in which the fault rests most of the time and never slips backward."""
+    fault = qd.load_fault("real-fault")
+    run = qd.simulate(fault, proof.controller, plant="stick-slip", duration=43200.0, settled_from=0.0)
+    claims, metrics = proof.claims, run.metrics
+    assert metrics.peak_slip_rate <= claims.peak_slip_rate
+    assert metrics.max_slip_error <= max(claims.slip_behind, claims.slip_ahead)
+    assert claims.least_pressure <= metrics.min_pressure <= metrics.max_pressure <= claims.largest_pressure
+    assert metrics.reverse_slip_fraction == 0
+    assert metrics.stick_fraction > 0.5
+
+
+def test_claims_are_rounded_outward(bounds):
+    claims = StickSlipClaims.of(bounds)
+    assert claims.follow(bounds)
+    assert claims.peak_slip_rate <= bounds.slip_rate * F(1001, 1000)
+
+
+@pytest.mark.parametrize(
+    "given", [{"delay": "20 ms"}, {"slip_noise": "1 um"}, {"controller": "cta"}, {"disturbance_class": "rate"}]
+)
+def test_what_the_theorem_does_not_know_is_refused(given):
+    with pytest.raises(ParameterError, match=r"stick-slip plant"):
+        qd.guarantee(qd.load_fault("real-fault"), plant="stick-slip", **given)
+
+
+@pytest.mark.slow
+def test_the_real_fault_is_designed_and_proved_anew():
+    answer = qd.guarantee(qd.load_fault("real-fault"), plant="stick-slip")
+    assert answer.proved
+    assert answer.found.claims.peak_slip_rate < F("1.9e-4")
+    assert answer.found.check() is Verdict.PROVED
+    assert answer.worst.slip_rate < answer.found.claims.peak_slip_rate
+    assert "stick-slip" in answer.to_dict()["plant"]
