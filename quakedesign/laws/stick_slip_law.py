@@ -1,20 +1,11 @@
 """A sampled law for friction that sticks: its predicted slip rate is never negative, and it uses the measured slip."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from fractions import Fraction
-from functools import partial
-from types import MappingProxyType
-from typing import Any, ClassVar, Self
 
-import sympy as sp
+from quakedesign.errors import ParameterError
+from quakedesign.exact import shortly
 
-from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.exact import shortly, to_sympy
-from quakedesign.laws.base import Controller, Sampling, Signals
-from quakedesign.laws.loop_field import LoopField
-
-STATES = ("level", "predicted_rate", "last_rate", "last_slip")
 GAIN_UNITS = {
     "rate_gain": "Pa s/m",
     "target_gain": "Pa s/m",
@@ -69,67 +60,3 @@ class StickSlipLaw:
             if value < 0 or (positive and not value):
                 least = "positive" if positive else "0 or more"
                 raise ParameterError(f"{part.name} of a stick-slip law must be {least}, got {shortly(value)}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class StickSlipController(Controller):
-    """The law as a controller of a simulation: one step every T_s by the scheme ``explicit``, its states `STATES`.
-
-    Attributes
-    ----------
-    law : StickSlipLaw
-    step : Fraction
-        T_s [s].
-    """
-
-    name: ClassVar[str] = "stick-slip"
-    title: ClassVar[str] = "e-LQR"
-    source: ClassVar[str] = "quakedesign.laws.stick_slip_law"
-    gain_units: ClassVar[Mapping[str, str]] = GAIN_UNITS
-    integral_units: ClassVar[tuple[str, ...]] = ("Pa", "m/s", "m/s", "m")
-
-    gains: Mapping[str, Fraction] = field(default_factory=dict, init=False)
-    law: StickSlipLaw
-    step: Fraction
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "gains", MappingProxyType({name: getattr(self.law, name) for name in GAIN_UNITS}))
-
-    def __reduce__(self) -> tuple[Any, tuple[()]]:
-        return partial(type(self), law=self.law, step=self.step), ()
-
-    @property
-    def sampling(self) -> Sampling:
-        """By the scheme ``explicit``, once every T_s."""
-        return Sampling(step=self.step)
-
-    def pressure(self, signals: Signals) -> sp.Expr:
-        """p of the law [Pa]."""
-        return self._step(signals)[0]
-
-    def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
-        """(new state − old state)/T_s."""
-        period = to_sympy(self.step)
-        return tuple((new - old) / period for new, old in zip(self._step(signals)[1], signals.integrals, strict=True))
-
-    def _step(self, signals: Signals) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
-        """Pressure [Pa], and the states after the sample."""
-        law, period = self.law, to_sympy(self.step)
-        level, predicted, last_rate, last_slip = signals.integrals
-        slip, rate = signals.slip, signals.slip_rate
-        innovation = slip - last_slip - period * (last_rate + predicted) / 2
-        stopped = sp.Piecewise((sp.Max(innovation, -period * predicted / 2), rate <= 0), (innovation, True))
-        level += to_sympy(law.level_gain) * (rate - predicted) + to_sympy(law.slip_gain) * stopped
-        target = rate - signals.slip_rate_error - to_sympy(law.return_rate) * signals.slip_error
-        pressure = -to_sympy(law.rate_gain) * rate + to_sympy(law.target_gain) * target - level
-        return pressure, (level, sp.Max(target, 0), rate, slip)
-
-    @classmethod
-    def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
-        """Raise: gains in order do not make the law."""
-        raise UnsupportedError("a stick-slip law is made of a StickSlipLaw and T_s, not of gains in order")
-
-    @classmethod
-    def loop_field(cls) -> LoopField:
-        """Raise: it has no loop in continuous time."""
-        raise UnsupportedError("a sampled law has no loop in continuous time: use a guarantee of the sampled loop")

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, fields
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, Union, cast
 
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound, exact_text
@@ -16,18 +16,8 @@ from quakedesign.guarantees.exact.loop import Held
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.guarantees.exact.statement import Claims, ContinuousPeaks, Guarantee, SlidingGuarantee
-from quakedesign.guarantees.exact.stick_slip import (
-    COMBINATIONS,
-    MOST_BASES,
-    SLICES,
-    SampledStickSlip,
-    StickSlipPolytope,
-)
-from quakedesign.guarantees.exact.stick_slip import MOST_FACETS as MOST_STICK_SLIP_FACETS
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipClaims, StickSlipGuarantee
 from quakedesign.laws import ImplicitRoot, LinearLaw, Power
 from quakedesign.laws.implicit_root import MOST_TERMS
-from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
 from quakedesign.loop import ContinuousLaw
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.certificate_files import (
@@ -53,8 +43,11 @@ from quakedesign.sos.exact.strict import (
     with_keys,
 )
 
-Claim = Guarantee | ContinuousPeaks | SlidingGuarantee | StickSlipGuarantee
-_Claimed = TypeVar("_Claimed", Claims, SlidingClaims, StickSlipClaims)
+if TYPE_CHECKING:
+    from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+
+Claim = Union[Guarantee, ContinuousPeaks, SlidingGuarantee, "StickSlipGuarantee"]
+_Claimed = TypeVar("_Claimed")
 _ROCK = ("density", "shear_modulus", "length", "damping")
 _SPREADS = ("stiffness", "damping", "authority")
 _TIMES = ("step", "delay", "lag")
@@ -72,10 +65,10 @@ _ZERO = Fraction(0)
 
 def guarantee_document(claim: Claim) -> dict[str, Any]:
     """What stands in the file."""
-    if isinstance(claim, StickSlipGuarantee):
-        about = _of_stick_slip(claim)
+    if isinstance(claim, Guarantee | ContinuousPeaks):
+        about = _of_tracking(claim)
     else:
-        about = _of_sliding(claim) if isinstance(claim, SlidingGuarantee) else _of_tracking(claim)
+        about = _of_sliding(claim) if isinstance(claim, SlidingGuarantee) else _of_stick_slip(claim)
     bounds = {part.name: getattr(claim.claims, part.name) for part in fields(claim.claims)}
     claims = {name: bound.exact for name, bound in bounds.items() if bound is not None}
     return {"format": 1, **about, "claims": claims}
@@ -128,7 +121,9 @@ def read_guarantee(raw: Any) -> Claim:
     try:
         kind = kind_of(raw)
         if kind == STICK_SLIP:
-            return _read_stick_slip(raw)
+            from quakedesign.guarantees.exact.stick_slip_files import read_stick_slip
+
+            return read_stick_slip(raw)
         return _read_sliding(raw) if kind == SLOW_SLIDING else _read_tracking(raw)
     except ParameterError as error:
         raise CertificateError(str(error)) from None
@@ -146,7 +141,7 @@ def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         start = {"start": errors} if any(claim.held.start) else {}
     return {
         "kind": GUARANTEE,
-        **_of_task(claim.task),
+        **task_document(claim.task),
         "loop": _loop(claim),
         **start,
         **({} if slow is None else {"slow_gain": {"parts": slow.parts, "growth": str(slow.growth)}}),
@@ -154,7 +149,7 @@ def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
     }
 
 
-def _of_task(task: UncertainPlant) -> dict[str, Any]:
+def task_document(task: UncertainPlant) -> dict[str, Any]:
     """Fault, reference and disturbance."""
     change = {} if task.change is None else {"change": str(task.change)}
     return {
@@ -173,19 +168,10 @@ def _of_task(task: UncertainPlant) -> dict[str, Any]:
     }
 
 
-def _of_stick_slip(claim: StickSlipGuarantee) -> dict[str, Any]:
-    reach = claim.reach
-    return {
-        "kind": STICK_SLIP,
-        **_of_task(claim.task),
-        "loop": {"step": exact_text(claim.held.step), **_exactly(claim.held.law, GAIN_UNITS)},
-        "set": {
-            "facets": [texts(row) for row in reach.facets],
-            "multipliers": [texts(row) for row in reach.multipliers],
-            "sliding": [[list(basis) for basis in line] for line in reach.sliding],
-            "resting": [[list(basis) for basis in line] for line in reach.resting],
-        },
-    }
+def _of_stick_slip(claim: "StickSlipGuarantee") -> dict[str, Any]:
+    from quakedesign.guarantees.exact.stick_slip_files import stick_slip_document
+
+    return {"kind": STICK_SLIP, **task_document(claim.task), **stick_slip_document(claim)}
 
 
 def _of_sliding(claim: SlidingGuarantee) -> dict[str, Any]:
@@ -247,7 +233,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
 def _read_tracking(raw: Any) -> Guarantee | ContinuousPeaks:
     more = {"slow_gain", "start", "reach"} & set(raw) if isinstance(raw, dict) else set[str]()
     headed(raw, {"fault", "reference", "disturbance", "loop", "claims"} | more, GUARANTEE)
-    task, claims, loop = _task(raw), _claims(Claims, raw), raw["loop"]
+    task, claims, loop = read_task(raw), read_claims(Claims, raw), raw["loop"]
     if isinstance(loop, dict) and "rates" in loop:
         need(not more, f"{min(more, default='')} is for a law of samples")
         claim: Guarantee | ContinuousPeaks = ContinuousPeaks(task=task, law=_continuous(loop), claims=claims)
@@ -276,7 +262,7 @@ def _read_tracking(raw: Any) -> Guarantee | ContinuousPeaks:
 
 def _read_sliding(raw: Any) -> SlidingGuarantee:
     headed(raw, {"fault", "reference", "stress", "loop", "cells", "claims"}, SLOW_SLIDING)
-    task, held, claims = _sliding_task(raw), _sliding_held(raw["loop"]), _claims(SlidingClaims, raw)
+    task, held, claims = _sliding_task(raw), _sliding_held(raw["loop"]), read_claims(SlidingClaims, raw)
     claim = SlidingGuarantee(task=task, held=held, cuts=_cuts(raw["cells"]), claims=claims)
     cells(task, claim.cuts)
     model = model_of(task, claims)
@@ -284,40 +270,13 @@ def _read_sliding(raw: Any) -> SlidingGuarantee:
     return claim
 
 
-def _read_stick_slip(raw: Any) -> StickSlipGuarantee:
-    headed(raw, {"fault", "reference", "disturbance", "loop", "set", "claims"}, STICK_SLIP)
-    task = _task(raw)
-    need(task.change is None, "a bounded change of the disturbance is not used where the fault sticks")
-    step, *gains = read_exactly(raw["loop"], ("step", *GAIN_UNITS)).values()
-    given = with_keys(raw["set"], {"facets", "multipliers", "sliding", "resting"})
-    facets, multipliers = (
-        tuple(read_row(row, name, length=length) for row in listed(given[name], name, MOST_STICK_SLIP_FACETS))
-        for name, length in (("facets", 3), ("multipliers", 5))
-    )
-    sliding, resting = (
-        tuple(_vertices(line, length) for line in listed(given[name], name, length=count))
-        for name, length, count in (("sliding", 3, SLICES), ("resting", 4, len(COMBINATIONS)))
-    )
-    return StickSlipGuarantee(
-        task=task,
-        held=SampledStickSlip(law=StickSlipLaw(**dict(zip(GAIN_UNITS, gains, strict=True))), step=step),
-        reach=StickSlipPolytope(facets=facets, multipliers=multipliers, sliding=sliding, resting=resting),
-        claims=_claims(StickSlipClaims, raw),
-    )
-
-
-def _vertices(raw: Any, length: int) -> tuple[tuple[int, ...], ...]:
-    found = tuple(tuple(listed(basis, "a basis", length=length)) for basis in listed(raw, "bases", MOST_BASES))
-    need(all(type(i) is int for basis in found for i in basis), "numbers of constraints must be integers")
-    return found
-
-
 def _require_few(states: tuple[str, ...]) -> None:
     need(len(states) <= _MOST_STATES, f"at most {_MOST_STATES} states in all")
 
 
-def _claims(kind: type[_Claimed], raw: dict[str, Any]) -> _Claimed:
-    given, known = raw["claims"], fields(kind)
+def read_claims(kind: type[_Claimed], raw: dict[str, Any]) -> _Claimed:
+    """Claims of a parsed file; a kind is a dataclass of bounds."""
+    given, known = raw["claims"], fields(cast(Any, kind))
     more = {part.name for part in known if part.default is None}
     left_out = set[str]()
     for group in (more - {"largest_step"}, more & {"largest_step"}):
@@ -336,7 +295,8 @@ def _name(fault: dict[str, Any]) -> str:
     return str(name)
 
 
-def _task(raw: dict[str, Any]) -> UncertainPlant:
+def read_task(raw: dict[str, Any]) -> UncertainPlant:
+    """Fault, reference and disturbance of a parsed file."""
     rock = (*_ROCK, "normal_stress")
     fault = with_keys(raw["fault"], {"name", *rock, "spreads", "friction"})
     reference = with_keys(raw["reference"], {"shape", "target_slip", "operation_time"})

@@ -71,7 +71,6 @@ COMBINATIONS = (
     (2, False, 0, 0),
     (2, False, 0, 1),
 )
-_BEHIND = tuple(place == 0 for place in (*range(SLICES), *(combination[0] for combination in COMBINATIONS)))
 Basis = tuple[int, ...]
 
 
@@ -188,7 +187,7 @@ class StickSlipBounds:
 
 
 @dataclass(frozen=True, slots=True)
-class Backend:
+class Numbers:
     """How numbers are computed: floats for a search, balls for a proof; arrays of both have the same operations."""
 
     number: Callable[[Fraction], Any]
@@ -228,8 +227,8 @@ def _exact_array(values: Any) -> np.ndarray:
     return np.asarray(np.vectorize(Fraction, otypes=[object])(np.array(values, dtype=object)))
 
 
-BALLS = Backend(ball, _ball_exponential, curvature, _ball_array, _ball_middle)
-EXACT = Backend(Fraction, _ball_exponential, curvature, _exact_array, _ball_middle)
+BALLS = Numbers(ball, _ball_exponential, curvature, _ball_array, _ball_middle)
+EXACT = Numbers(Fraction, _ball_exponential, curvature, _exact_array, _ball_middle)
 """Of rationals; only for what needs no exponential."""
 
 
@@ -316,7 +315,7 @@ def stop_bounds(task: UncertainPlant, held: SampledStickSlip, found: Ranges) -> 
 class Period:
     """One period in numbers of a back end; SI units."""
 
-    back: Backend
+    back: Numbers
     task: UncertainPlant
     held: SampledStickSlip
     found: Ranges
@@ -326,7 +325,7 @@ class Period:
     bent: tuple[Any, Any]
 
     @classmethod
-    def of(cls, back: Backend, task: UncertainPlant, held: SampledStickSlip, found: Ranges) -> "Period":
+    def of(cls, back: Numbers, task: UncertainPlant, held: SampledStickSlip, found: Ranges) -> "Period":
         """From exact ranges."""
         zero, one = _ZERO, Fraction(1)
         slope, damping = (sum(pair, _ZERO) / 2 for pair in (found.slope, found.damping))
@@ -416,9 +415,20 @@ class _Carried:
     push0: Fraction
     of_error: np.ndarray
     constant: np.ndarray
+    late: np.ndarray
+    rising: np.ndarray
+
+    def constants(self, back: Numbers, which: np.ndarray, pushed: np.ndarray) -> np.ndarray:
+        """Constants of facets, of which `pushed` is the factor of U.
+
+        r(t + T) − r(t) is within max|r″|T²/2 of T·r′, and never negative: where r′ = 0, n1 > 0 and nothing else of the
+        function rises with r′, it counts as nothing.
+        """
+        needed = self.rising[which] | ~(pushed >= 0).astype(bool)
+        return np.asarray(self.constant[which] + back.array(needed.astype(float).tolist()) * self.late[which])
 
 
-def _carried(back: Backend, task: UncertainPlant, held: SampledStickSlip, facets: np.ndarray) -> Iterator[_Carried]:
+def _carried(back: Numbers, task: UncertainPlant, held: SampledStickSlip, facets: np.ndarray) -> Iterator[_Carried]:
     number, law, step = back.number, held.law, held.step
     n1, _, n3 = facets.T
     fastest, bend = task.reference_rates
@@ -426,11 +436,10 @@ def _carried(back: Backend, task: UncertainPlant, held: SampledStickSlip, facets
     for place, combination in enumerate(COMBINATIONS):
         push, push0, (q1, q0) = push_row(held, fastest, combination)
         p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
-        # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative
-        moves = np.where(back.middle(n1) > 0, float(bool(q1 or q0)), 1.0)
-        late = back.array(moves.tolist()) * abs(n1) * number(bend * step**2 / 2)
+        falls = (back.middle(n1) > 0) & ((back.middle(n3) >= 0) | (not combination[1])) & (not (q1 or q0))
         of_error = n1 - n1 * number(step * q1) - predicted * number(p1)
-        yield _Carried(place, push, push0, of_error, late - n1 * number(step * q0) - predicted * number(p0))
+        constant, late = -n1 * number(step * q0) - predicted * number(p0), abs(n1) * number(bend * step**2 / 2)
+        yield _Carried(place, push, push0, of_error, constant, late, ~falls)
 
 
 def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
@@ -478,12 +487,12 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
                 for part in carried:
                     factors = [pushed * number(v) for v in part.push]
                     columns = [part.of_error[which] + factors[0], of_y + factors[1], a3 + factors[2]]
-                    constants = part.constant[which] + pushed * number(part.push0) + force
+                    constants = part.constants(back, which, pushed) + pushed * number(part.push0) + force
                     yield Rows(COMBINATIONS[part.place][0], which, np.column_stack(columns), constants, cut)
 
 
 def resting_rows(
-    back: Backend,
+    back: Numbers,
     task: UncertainPlant,
     held: SampledStickSlip,
     found: Ranges,
@@ -505,7 +514,7 @@ def resting_rows(
                 a1, a3 = n1[which], n3[which]
                 cut_off = a3 * slip * (multipliers[which][:, 4] if share is None else share)
                 factors = np.column_stack([part.of_error[which], -cut_off * half, a3, a1 - a3 * chord + cut_off])
-                yield Rows(SLICES + part.place, which, factors, part.constant[which])
+                yield Rows(SLICES + part.place, which, factors, part.constants(back, which, 0 * a1))
 
 
 # ----------------------------------------------------------------------
@@ -535,7 +544,9 @@ def polytopes(
     lines = stop_bounds(task, held, found)
     most = task.beta[1] * task.authority
     for combination in COMBINATIONS:
-        push, push0, _ = push_row(held, task.reference_rates[0], combination)
+        # U falls with r': the condition is taken at the least r' of the combination, so that r' stays free
+        least = combination[0], combination[1], int(combination[:2] == (1, True)), 0
+        push, push0, _ = push_row(held, task.reference_rates[0], least)
         larger = (*(-most * v for v in push), found.slope[0])
         room = most * push0 - task.amplitude
         tall: list[Constraint] = [((*row, _ZERO), b) for row, b in flat[combination[0]]]
@@ -549,16 +560,22 @@ class Verifier:
     """Bounds of linear functions on one polytope, from multipliers of named constraints; exact whatever floats say."""
 
     def __init__(
-        self, constraints: list[Constraint], bases: Sequence[Basis], sizes: Sequence[Fraction], *, behind: bool
+        self,
+        constraints: list[Constraint],
+        bases: Sequence[Basis],
+        sizes: Sequence[Fraction],
+        *,
+        place: int,
+        facets: int,
     ) -> None:
         count = len(constraints)
         if any(place >= count for basis in bases for place in basis):
             raise ParameterError(f"bases of a polytope must name {count} constraints by their numbers, from 0")
-        self.sizes, self.sign = _exact_array(list(sizes)), -1 if behind else 1  # of e1
+        slice_number = place if place < SLICES else COMBINATIONS[place - SLICES][0]
+        self.sizes, self.sign = _exact_array(list(sizes)), -1 if slice_number == 0 else 1  # of e1
         self.rows = _exact_array([list(row) for row, _ in constraints])
         self.ends = _exact_array([end for _, end in constraints])
-        ahead = [place for place, (row, end) in enumerate(constraints) if end and row[0] > 0 and not any(row[1:])]
-        self.last = next((place for place in ahead if place > len(constraints[0][0])), None)
+        self.last = facets + 2 if slice_number == 1 else None  # e1 <= max r'/c, after y >= 0 and e1 >= 0
         self.bases = np.array(bases)
         self.floats = _ball_middle(self.rows * self.sizes)
         lengths = np.linalg.norm(self.floats, axis=1)
@@ -638,13 +655,15 @@ def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolyto
     found = ranges(task, ahead + fastest * held.step, push, rate * held.step)
     if found.slope[1] * held.step**2 >= 1:
         raise ParameterError("T_s is too long against the weakening of friction")
-    constraints = polytopes(task, held, reach.facets, found)
+    if _bracket(task, held, found, push[1]) > task.amplitude:
+        raise ParameterError("the disturbance is too small against what the range of the input gain makes of U")
+    constraints, count = polytopes(task, held, reach.facets, found), len(reach.facets)
     longest = max(min(g * rate + h for g, h in stop_bounds(task, held, found)), Fraction(1, 10**30))
     if task.amplitude + found.slope[0] * longest < 0:
         raise ParameterError("the disturbance is too small for the condition of rest")
     verifiers = [
-        Verifier(lines, bases, sizes if len(bases[0]) == 3 else [*sizes, longest], behind=behind)
-        for lines, bases, behind in zip(constraints, (*reach.sliding, *reach.resting), _BEHIND, strict=True)
+        Verifier(lines, bases, sizes if len(bases[0]) == 3 else [*sizes, longest], place=place, facets=count)
+        for place, (lines, bases) in enumerate(zip(constraints, (*reach.sliding, *reach.resting), strict=True))
     ]
     period = Period.of(BALLS, task, held, found)
     given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
@@ -665,6 +684,17 @@ def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolyto
     )
 
 
+def _bracket(task: UncertainPlant, held: SampledStickSlip, found: Ranges, push: Fraction) -> Fraction:
+    """What |a| ≤ H + δS·ξ + δw·y loses at most where ξ and y of one β stand beside the U of another [m/s²].
+
+    As long as it is below H, the bounds in 1/β are convex where the chord of `gap` needs them to be.
+    """
+    step, growth = held.step, 1 / (1 - found.slope[1] * held.step**2 / 2)
+    width, damping = (found.slope[1] - found.slope[0]) / 2, (found.damping[1] - found.damping[0]) / 2
+    share = width * growth * step**2 / 2 + damping * step * (1 + found.slope[1] * growth * step**2)
+    return share * task.authority * (task.beta[1] - task.beta[0]) * max(push, _ZERO)
+
+
 def _push(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope, sizes: Sequence[Fraction]) -> Range:
     """Least and largest U = p* − p at a sample [Pa]."""
     law, fastest = held.law, task.reference_rates[0]
@@ -672,9 +702,9 @@ def _push(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope
     factors = _exact_array([list(row), [-v for v in row]])
     constants = _exact_array([_ZERO, law.target_gain * fastest])
     tops = [
-        Verifier(lines, bases, sizes, behind=behind).largest(factors, constants)
-        for lines, bases, behind in zip(
-            polytopes(task, held, reach.facets, None), reach.sliding, _BEHIND[:SLICES], strict=True
+        Verifier(lines, bases, sizes, place=place, facets=len(reach.facets)).largest(factors, constants)
+        for place, (lines, bases) in enumerate(
+            zip(polytopes(task, held, reach.facets, None), reach.sliding, strict=True)
         )
     ]
     high, low = (max(line[i] for line in tops) for i in (0, 1))

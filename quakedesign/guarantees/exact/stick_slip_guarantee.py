@@ -1,7 +1,7 @@
 """A guarantee on the stick–slip plant as a statement that checks itself."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
@@ -13,9 +13,11 @@ from quakedesign.guarantees.exact.stick_slip import (
     StickSlipPolytope,
     stick_slip_bounds,
 )
-from quakedesign.laws.stick_slip_law import StickSlipController
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.ranges import UncertainPlant
+
+if TYPE_CHECKING:
+    from quakedesign.laws.stick_slip_controller import StickSlipController
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,8 +104,10 @@ class StickSlipGuarantee:
         return self.claims.peak_slip_rate
 
     @property
-    def controller(self) -> StickSlipController:
+    def controller(self) -> "StickSlipController":
         """The law for `simulate`."""
+        from quakedesign.laws.stick_slip_controller import StickSlipController
+
         return StickSlipController(law=self.held.law, step=self.held.step)
 
     def bounds(self) -> StickSlipBounds | NoGuarantee:

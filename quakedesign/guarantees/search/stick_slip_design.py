@@ -16,8 +16,8 @@ from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.stick_slip import (
     COMBINATIONS,
     SLICES,
-    Backend,
     Constraint,
+    Numbers,
     Period,
     Ranges,
     Rows,
@@ -66,7 +66,7 @@ def _float_curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> 
     return float(first), float(second)
 
 
-FLOATS = Backend(
+FLOATS = Numbers(
     float, _float_exponential, _float_curvature, lambda values: np.asarray(values, dtype=float), lambda values: values
 )
 
@@ -562,8 +562,8 @@ class _Growing:
         """Add vertices that rounding hid, by linear programs, where a function would have a negative multiplier."""
         sizes = [short(float(v), 6) for v in (*self.size, self.size[1] * float(self.held.step))]
         verifiers = [
-            Verifier(constraints, known, sizes[: len(known[0])], behind=False)
-            for constraints, known in zip(lines, bases, strict=True)
+            Verifier(constraints, known, sizes[: len(known[0])], place=place, facets=len(facets))
+            for place, (constraints, known) in enumerate(zip(lines, bases, strict=True))
         ]
         for rows in _rows(period, facets, self._scaled()):
             verifier = verifiers[rows.place]

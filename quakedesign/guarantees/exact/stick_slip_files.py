@@ -1,0 +1,64 @@
+"""Files of guarantees on the stick–slip plant (proofs/FORMAT.md)."""
+
+from typing import Any
+
+from quakedesign.exact import exact_text
+from quakedesign.guarantees.exact.guarantee_files import read_claims, read_task
+from quakedesign.guarantees.exact.stick_slip import (
+    COMBINATIONS,
+    MOST_BASES,
+    MOST_FACETS,
+    SLICES,
+    SampledStickSlip,
+    StickSlipPolytope,
+)
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipClaims, StickSlipGuarantee
+from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
+from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
+from quakedesign.sos.exact.strict import headed, listed, need, read_exactly, read_row, texts, with_keys
+
+
+def stick_slip_document(claim: StickSlipGuarantee) -> dict[str, Any]:
+    """Loop and set."""
+    reach = claim.reach
+    return {
+        "loop": {
+            "step": exact_text(claim.held.step),
+            **{name: exact_text(getattr(claim.held.law, name)) for name in GAIN_UNITS},
+        },
+        "set": {
+            "facets": [texts(row) for row in reach.facets],
+            "multipliers": [texts(row) for row in reach.multipliers],
+            "sliding": [[list(basis) for basis in line] for line in reach.sliding],
+            "resting": [[list(basis) for basis in line] for line in reach.resting],
+        },
+    }
+
+
+def read_stick_slip(raw: Any) -> StickSlipGuarantee:
+    """Claim from a parsed file. Raises CertificateError or ParameterError where it breaks a rule of FORMAT.md."""
+    headed(raw, {"fault", "reference", "disturbance", "loop", "set", "claims"}, STICK_SLIP)
+    task = read_task(raw)
+    need(task.change is None, "a bounded change of the disturbance is not used where the fault sticks")
+    step, *gains = read_exactly(raw["loop"], ("step", *GAIN_UNITS)).values()
+    given = with_keys(raw["set"], {"facets", "multipliers", "sliding", "resting"})
+    facets, multipliers = (
+        tuple(read_row(row, name, length=length) for row in listed(given[name], name, MOST_FACETS))
+        for name, length in (("facets", 3), ("multipliers", 5))
+    )
+    sliding, resting = (
+        tuple(_vertices(line, length) for line in listed(given[name], name, length=count))
+        for name, length, count in (("sliding", 3, SLICES), ("resting", 4, len(COMBINATIONS)))
+    )
+    return StickSlipGuarantee(
+        task=task,
+        held=SampledStickSlip(law=StickSlipLaw(**dict(zip(GAIN_UNITS, gains, strict=True))), step=step),
+        reach=StickSlipPolytope(facets=facets, multipliers=multipliers, sliding=sliding, resting=resting),
+        claims=read_claims(StickSlipClaims, raw),
+    )
+
+
+def _vertices(raw: Any, length: int) -> tuple[tuple[int, ...], ...]:
+    found = tuple(tuple(listed(basis, "a basis", length=length)) for basis in listed(raw, "bases", MOST_BASES))
+    need(all(type(i) is int for basis in found for i in basis), "numbers of constraints must be integers")
+    return found
