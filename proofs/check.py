@@ -116,9 +116,10 @@ def check_polynomial(document: dict[str, Any]) -> Result:
 
 
 def check_guarantee(document: dict[str, Any]) -> Result:
-    """Verify a file of the kind ``guarantee`` or ``slow_sliding``."""
-    kind, modules = document["kind"], {"guarantee": "tracking", "slow_sliding": "slow_sliding"}
-    need(kind in tuple(modules), "kind", "guarantee or slow_sliding", kind)
+    """Verify a file of the kind ``guarantee``, ``slow_sliding`` or ``stick_slip``."""
+    kind = document["kind"]
+    modules = {"guarantee": "tracking", "slow_sliding": "slow_sliding", "stick_slip": "stick_slip"}
+    need(kind in tuple(modules), "kind", "guarantee, slow_sliding or stick_slip", kind)
     return Result("proved", tuple(beside(f"guarantee.{modules[kind]}").verify(document)))
 
 

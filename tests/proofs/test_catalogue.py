@@ -24,9 +24,11 @@ FILES = sorted((ROOT / "certificates").glob("*.json"))
 POLYNOMIALS = [p for p in FILES if p.stem.startswith("motzkin")]
 GUARANTEES = [p for p in FILES if p.stem.startswith("guarantee")]
 SLIDING = [p for p in FILES if p.stem.startswith("sliding")]
-LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES, *SLIDING)]
+STICKING = [p for p in FILES if p.stem.startswith("stick_slip")]
+LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES, *SLIDING, *STICKING)]
 each = pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
-LONG = {"sliding_crustal-patch", "cta3_1_2_2_0.05_0.02_0.01"}  # a proof of either kind is checked by both elsewhere
+# a proof of each kind is checked by both elsewhere
+LONG = {"sliding_crustal-patch", "cta3_1_2_2_0.05_0.02_0.01", "stick_slip_real-fault"}
 each_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda p: p.stem)
 
 # L̄ and [b_m, b_M] of every file; four 2-CTA sets are those of Torres-González et al. (2017) for L̄ = 1, the fifth and
@@ -57,6 +59,7 @@ def test_the_catalogue_is_complete():
     loops = {"real-fault", "lab-fault", "cta_real-fault", "late_real-fault", "no-clock_lab-fault"}
     assert {p.stem for p in GUARANTEES} == {f"guarantee_{loop}" for loop in loops}
     assert {p.stem for p in SLIDING} == {"sliding_crustal-patch"}
+    assert {p.stem for p in STICKING} == {"stick_slip_real-fault"}
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
 
 
@@ -75,7 +78,7 @@ def test_the_library_writes_the_same_bytes(path):
         assert polynomial_files.text(*polynomial_files.load(text)) == text
     elif path in GUARANTEES:
         assert guarantee_text(parse_guarantee(text)) == text
-    elif path in SLIDING:
+    elif path in (*SLIDING, *STICKING):
         assert guarantee_text(parse_guarantee(text)) == text
     else:
         assert certificate_text(load_certificate(path)) == text

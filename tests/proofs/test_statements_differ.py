@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from standalone_guarantee import CHECK
+from stick_slip_box import box
 from thinned import some_or_all
 
 from quakedesign.checking import check_files
@@ -111,6 +112,7 @@ GIVEN = {
     "start": start(GUARANTEES.changed(GUARANTEES.HELD, (("loop", "first"), [["1", "2"]]))),
     "limits": GUARANTEES.changed(GUARANTEES.PUMPED, (("loop", "applied"), ["1/7"])),
     "sliding": SLIDING,
+    "sticking": box(),
     "stored": json.loads((CERTIFICATES / "guarantee_real-fault.json").read_text()),
 } | {name.lower(): getattr(GUARANTEES, name) for name in ("ROOTED", "BEHIND", "CONTINUOUS", "LAYERED", "NOISY", "BOTH")}
 

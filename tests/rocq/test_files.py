@@ -225,7 +225,12 @@ def test_the_same_certificate_gives_the_same_bytes_in_another_process():
     assert told.decode() == rocq_text(read_json(path))
 
 
-KINDS = {"motzkin_not-sos": "not-sos", "guarantee_lab-fault": "a guarantee", "sliding_crustal-patch": "a slow_sliding"}
+KINDS = {
+    "motzkin_not-sos": "not-sos",
+    "guarantee_lab-fault": "a guarantee",
+    "sliding_crustal-patch": "a slow_sliding",
+    "stick_slip_real-fault": "a stick_slip",
+}
 
 
 @pytest.mark.parametrize(("name", "kind"), KINDS.items())
@@ -381,7 +386,7 @@ def test_coqc_accepts_the_catalogue(path, tmp_path):
     try:
         text = rocq_text(read_json(path))
     except UnsupportedError:
-        assert path.stem == "motzkin_not-sos" or path.stem.startswith(("guarantee", "sliding"))
+        assert path.stem == "motzkin_not-sos" or path.stem.startswith(("guarantee", "sliding", "stick_slip"))
         return
     code, out, err = compiled(text, tmp_path)
     assert (code, err) == (0, "")

@@ -64,10 +64,38 @@ class Task:
     steady_beta: bool
 
 
-def read_task(document: dict[str, Any]) -> Task:
-    """Read fault, reference and disturbance, and derive."""
+@dataclass
+class Rock:
+    """A fault: stiffness, damping and area per mass, each in its range, and friction; SI units."""
+
+    name: str
+    normal_stress: Fraction
+    mu: dict[str, Fraction]
+    stiffness: tuple[Fraction, Fraction]
+    damping: tuple[Fraction, Fraction]
+    area: tuple[Fraction, Fraction]
+
+    def stress(self, slip: Fraction, growth: Fraction) -> tuple[Fraction, Fraction]:
+        """Range of the effective normal stress that holds the fault at rest, for slips up to one."""
+        kappas = [(k - growth) / n for k, n in product(self.stiffness, self.area)]
+        return effective_stress(self.mu, self.normal_stress, slip, kappas)
+
+    def of_slip(self, stress: tuple[Fraction, Fraction], growth: Fraction) -> tuple[Fraction, Fraction]:
+        """Range of the acceleration per slip under such stresses."""
+        falls = (self.mu["weakening"], -self.mu["strengthening"])
+        low, high = hull(n * at * c for n in self.area for at in stress for c in falls)
+        return low - self.stiffness[1] + growth, high - self.stiffness[0] + growth
+
+    def of_rate(self, stress: tuple[Fraction, Fraction], growth: Fraction) -> tuple[Fraction, Fraction]:
+        """Range of the deceleration per slip rate."""
+        sheared = self.area[1] * max(abs(v) for v in stress) * self.mu["rate_slope"]
+        return self.damping[0] - sheared - growth, self.damping[1] + sheared - growth
+
+
+def read_rock(value: Any) -> Rock:
+    """Read a fault."""
     parts = ("name", "density", "shear_modulus", "length", "damping", "normal_stress", "spreads", "friction")
-    given = keys(document["fault"], "fault", *parts)
+    given = keys(value, "fault", *parts)
     name = given["name"]
     need(
         type(name) is str and FAULT.fullmatch(name) is not None,
@@ -82,10 +110,7 @@ def read_task(document: dict[str, Any]) -> Task:
     need(min(eta, mu["weakening"], mu["strengthening"], mu["rate_slope"]) >= 0, "damping and slopes must be >= 0")
     need(all(0 <= v < 1 for v in spread.values()), "spreads must be in [0, 1)")
     need(mu["least"] <= mu["static"] <= mu["largest"], "static friction must lie between the bounds")
-    shape, target, duration = read_reference(document["reference"])
-    amplitude, change, grows = read_disturbance(document["disturbance"])
-
-    k, damping, area = (
+    stiffness, damping, area = (
         (value * (1 - spread[kind]), value * (1 + spread[kind]))
         for value, kind in (
             (modulus / (rho * size**2), "stiffness"),
@@ -93,18 +118,23 @@ def read_task(document: dict[str, Any]) -> Task:
             (1 / (rho * size), "authority"),
         )
     )
-    b = mu["least"] * area[0]
-    stress = effective_stress(mu, sigma, target, [(k_ - grows["slip"]) / n for k_, n in product(k, area)])
-    bent = hull(n * at * c for n in area for at in stress for c in (mu["weakening"], -mu["strengthening"]))
-    s = bent[0] - k[1] + grows["slip"], bent[1] - k[0] + grows["slip"]
-    sheared = area[1] * max(abs(v) for v in stress) * mu["rate_slope"]
-    w = damping[0] - sheared - grows["rate"], damping[1] + sheared - grows["rate"]
+    return Rock(name, sigma, mu, stiffness, damping, area)
+
+
+def read_task(document: dict[str, Any]) -> Task:
+    """Read fault, reference and disturbance, and derive."""
+    rock = read_rock(document["fault"])
+    shape, target, duration = read_reference(document["reference"])
+    amplitude, change, grows = read_disturbance(document["disturbance"])
+    stress, mu, area = rock.stress(target, grows["slip"]), rock.mu, rock.area
+    s, w = rock.of_slip(stress, grows["slip"]), rock.of_rate(stress, grows["rate"])
+    b, sigma = mu["least"] * area[0], rock.normal_stress
     first = max(abs(v) for v in on_unit_interval(slope(shape))) * target / duration
     second = max(abs(v) for v in on_unit_interval(slope(slope(shape)))) * target / duration**2
     bent = slope(slope(shape))
     third = max(abs(v) for v in on_unit_interval(slope(bent))) * target / duration**3
     return Task(
-        name=name,
+        name=rock.name,
         b=b,
         s=s,
         w=w,

@@ -38,7 +38,9 @@ of three or four constraints, which a file names.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cache
 from itertools import chain
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -348,22 +350,29 @@ class Period:
     def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
         """Bounds of ∫|g(T − t)|t^j dt for j = 0 to 3, g = `of_slip`·ξ + `of_rate`·y of an impulse.
 
-        On a piece |g| is below the chord of its ends plus h²/8·max|g″|; Simpson's rule is exact to the third power.
+        On a piece |g| is below the chord of its ends plus h²/8·max|g″|: all four are integrals of this one function.
         """
         number, h = self.back.number, self.held.step / NODES
         above = (abs(of_slip) * self.bent[0] + abs(of_rate) * self.bent[1]) * number(h**2 / 8)
         sizes = abs(of_slip[:, None] * self.impulses[0] + of_rate[:, None] * self.impulses[1]) + above[:, None]
         sizes = sizes[:, ::-1]  # from the start of the period on
-        found: list[Any] = [0, 0, 0, 0]
-        for i in range(NODES):
-            first, last = sizes[:, i], sizes[:, i + 1]
-            for j in range(4):
-                begin, middle, end = ((h * i + h * k / 2) ** min(j, 2) for k in range(3))
-                area = (
-                    first * number(begin * h / 6) + (first + last) * number(middle * h / 3) + last * number(end * h / 6)
-                )
-                found[j] = found[j] + area * number(h * (i + 1) if j == 3 else Fraction(1))
+        found: list[Any] = []
+        for j in range(4):
+            weights = [self.back.number(weight * h ** (j + 1)) for weight in _moments(j)]
+            found.append((sizes * np.array(weights, dtype=object if sizes.dtype == object else float)).sum(axis=1))
         return found
+
+
+@cache
+def _moments(power: int) -> tuple[Fraction, ...]:
+    """∫ of the hat functions at 0 … `NODES` times t^j."""
+    found = [_ZERO] * (NODES + 1)
+    for i in range(NODES):
+        for k in range(power + 1):
+            part = comb(power, k) * Fraction(i) ** (power - k)
+            found[i] += part / ((k + 1) * (k + 2))
+            found[i + 1] += part / (k + 2)
+    return tuple(found)
 
 
 def gap(beta: Range) -> Fraction:

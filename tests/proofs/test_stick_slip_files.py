@@ -1,0 +1,261 @@
+"""Files of the kind stick_slip in both checkers: what is proved, what is refused, and numbers that both derive."""
+
+import copy
+import json
+from fractions import Fraction as F
+from functools import cache
+from pathlib import Path
+
+import pytest
+from standalone_guarantee import CHECK
+from stick_slip_box import CLAIMS, STICK, box, period_of
+
+from quakedesign.checking import check_files
+from quakedesign.errors import CertificateError
+from quakedesign.guarantees import read_guarantee
+from quakedesign.guarantees.exact import stick_slip as package
+from quakedesign.lyapunov.exact.claim import Verdict
+
+PATH = Path(__file__).parents[2] / "proofs" / "certificates" / "stick_slip_real-fault.json"
+
+
+@cache
+def stored():
+    return json.loads(PATH.read_text())
+
+
+def changed(document, *changes):
+    document = copy.deepcopy(document)
+    for path, new in changes:
+        holder = document
+        for key in path[:-1]:
+            holder = holder[key]
+        holder[path[-1]] = new(holder[path[-1]]) if callable(new) else new
+    return document
+
+
+def times(share):
+    """A number of a file, or all of a list, times another one."""
+    return lambda old: [times(share)(v) for v in old] if isinstance(old, list) else str(F(old) * F(share))
+
+
+def refused(document, reason=None):
+    with pytest.raises(CHECK.Refused, match=reason):
+        CHECK.check(json.dumps(document))
+
+
+def package_refuses(document):
+    try:
+        claim = read_guarantee(document)
+    except CertificateError:
+        return True
+    return claim.check() is not Verdict.PROVED
+
+
+def test_both_prove_the_stored_file_and_say_the_same_entries():
+    found = CHECK.check(PATH.read_text())
+    claim = read_guarantee(stored())
+    assert found.verdict == "proved"
+    assert claim.check() is Verdict.PROVED
+    said = "\n".join(found.statement)
+    for part in (
+        'fault "real-fault" (a name',
+        "friction any function of the slip alone within its bounds and slopes, whether the fault slides or sticks",
+        "every 23/125 s",
+        "any acceleration of at most 0.00032 m/s^2; from rest, along the reference, for all t >= 0",
+        "never exceeds 0.0001563 m/s",
+        "at most 1.68e-05 m behind and 3.684e-05 m ahead of the reference",
+        "pressure from -1.425e+07 Pa to 1.408e+07 Pa",
+    ):
+        assert part in said
+
+
+def test_both_derive_the_same_ranges():
+    ours, claim = period_of(stored()), read_guarantee(stored())
+    task, held, reach = claim.task, claim.held, claim.reach
+    ahead, rate, up, behind, down = reach.box
+    push = package._push(task, held, reach, [max(ahead, behind), rate, max(up, down)])
+    found = package.ranges(task, ahead + task.reference_rates[0] * held.step, push, rate * held.step)
+    assert [float(v) for v in ours.push] == pytest.approx([float(v) for v in push], rel=1e-12)
+    for mine, theirs in (
+        (ours.slope, found.slope),
+        (ours.damping, found.damping),
+        (ours.chord, found.chord),
+        (ours.rest, found.rest_pressure),
+    ):
+        assert [float(v) for v in mine] == pytest.approx([float(v) for v in theirs], rel=1e-12)
+    theirs = package.stop_bounds(task, held, replace_ranges(found, ours))
+    assert theirs == tuple(ours.stops())
+
+
+def replace_ranges(found, ours):
+    """Those of the other checker, so that what follows from them is the same rational number."""
+    return package.Ranges(slope=ours.slope, damping=ours.damping, chord=ours.chord, rest_pressure=found.rest_pressure)
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_a_claim_one_per_cent_smaller_is_refused(name):
+    refused(changed(stored(), (("claims", name), times("99/100"))), f"claim {name} must follow")
+
+
+@pytest.mark.slow
+def test_the_package_refuses_such_claims_too():
+    bounds = read_guarantee(stored()).bounds()
+    for name in CLAIMS:
+        smaller = read_guarantee(changed(stored(), (("claims", name), times("99/100"))))
+        assert not smaller.claims.follow(bounds)
+    assert read_guarantee(stored()).claims.follow(bounds)
+
+
+NUMBERS = [
+    *((("fault", name),) for name in ("density", "shear_modulus", "length", "damping", "normal_stress")),
+    *((("fault", "friction", name),) for name in ("static", "least", "largest", "weakening")),
+    *((("reference", name),) for name in ("target_slip", "operation_time")),
+    (("disturbance", "amplitude"),),
+    (("disturbance", "growths", "slip"),),
+    *((("loop", name),) for name in ("step", *STICK.LAW)),
+]
+
+
+@cache
+def told():
+    """What both checkers say of the stored file."""
+    ((_, lines),) = check_files([PATH]).values()
+    return CHECK.check(PATH.read_text()).statement, lines
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", ["51/50", "49/50"])
+@pytest.mark.parametrize("path", [path for (path,) in NUMBERS], ids=lambda path: path[-1])
+def test_a_number_two_per_cent_off_is_refused_or_told_by_both(path, share, tmp_path):
+    document, (own, packages) = changed(stored(), (path, times(share))), told()
+    try:
+        assert CHECK.check(json.dumps(document)).statement != own
+    except CHECK.Refused:
+        pass
+    file = tmp_path / "changed.json"
+    file.write_text(json.dumps(document))
+    ((verdict, lines),) = check_files([file]).values()
+    assert verdict != "proved" or lines != packages
+
+
+FACETS, MULTIPLIERS = ("set", "facets"), ("set", "multipliers")
+FORMS = [
+    ((("more",), "1"), "the file must have exactly the keys"),
+    ((("set", "more"), []), "set must have exactly the keys"),
+    ((("loop", "delay"), "0"), "loop must have exactly the keys"),
+    ((("claims", "slip_error"), "1"), "claims must have exactly the keys"),
+    ((("disturbance", "change"), "1"), "bounded change of the disturbance must not be given"),
+    (((*FACETS, 0, 1), "1/9"), "first five facets"),
+    (((*FACETS, 0), ["-5/2", "0", "0"]), "first five facets"),
+    (((*FACETS, 1, 1), "0"), "first five facets"),
+    ((FACETS, lambda old: [old[0], *old[2:]]), "first five facets|multipliers must have"),
+    ((FACETS, lambda old: old[:4]), "there must be 5 to 400 facets"),
+    ((FACETS, lambda old: [*old, *[old[5]] * 400]), "there must be 5 to 400 facets"),
+    (((*FACETS, 5), ["1", "1"]), "facets must be a list of 3 rationals"),
+    (((*FACETS, 5, 0), "2/4"), "facets must be in lowest terms"),
+    (((*FACETS, 5, 0), 1), "facets must be a rational"),
+    (((*MULTIPLIERS, 1), ["0"] * 4), "multipliers must be a list of 5 rationals"),
+    ((MULTIPLIERS, lambda old: old[1:]), "multipliers must have 11 rows"),
+    (((*MULTIPLIERS, 1, 0), "-1/7"), "multipliers must be"),
+    (((*MULTIPLIERS, 1, 1), "2"), "multipliers must be"),
+    (((*MULTIPLIERS, 1, 3), "1/2"), "multipliers must be"),
+    (((*MULTIPLIERS, 2, 4), "2"), "multipliers must be"),
+    (((*MULTIPLIERS, 2, 4), "-1/2"), "multipliers must be"),
+    ((("set", "sliding", 1), []), "sliding must have bases of every polytope"),
+    ((("set", "sliding"), lambda old: old[:2]), "sliding must have 3 lists"),
+    ((("set", "resting"), lambda old: [*old, old[0]]), "resting must have 7 lists"),
+    ((("set", "resting", 4), []), "resting must have bases of every polytope"),
+    ((("set", "sliding", 0, 0), [0, 1]), "must be 3 numbers of constraints"),
+    ((("set", "resting", 0, 0), [0, 1, 2]), "must be 4 numbers of constraints"),
+    ((("set", "sliding", 0, 0, 0), 13), "must be 3 numbers of constraints"),
+    ((("set", "sliding", 1, 0, 0), 14), "must be 3 numbers of constraints"),
+    ((("set", "resting", 0, 0, 0), 21), "must be 4 numbers of constraints"),
+    ((("set", "resting", 3, 0, 0), 22), "must be 4 numbers of constraints"),
+    ((("set", "sliding", 0, 0, 0), "3"), "must be 3 numbers of constraints"),
+    ((("set", "sliding", 0, 0, 0), True), "must be 3 numbers of constraints"),
+    ((("set", "resting", 0), lambda old: old * 5000), "there must be at most 40000 bases"),
+    ((("loop", "step"), "0"), "step, rate, target and return gains must be > 0"),
+    ((("loop", "rate_gain"), "0"), "step, rate, target and return gains must be > 0"),
+    ((("loop", "target_gain"), "0"), "step, rate, target and return gains must be > 0"),
+    ((("loop", "return_rate"), "-1"), "step, rate, target and return gains must be > 0"),
+    ((("loop", "level_gain"), "-1"), "level_gain and slip_gain must be >= 0"),
+    ((("loop", "slip_gain"), "-1"), "level_gain and slip_gain must be >= 0"),
+]
+
+
+@pytest.mark.parametrize(("change", "reason"), FORMS, ids=lambda value: str(value)[:50])
+def test_a_file_of_another_form_is_refused_by_both(change, reason):
+    document = changed(box(), change)
+    refused(document, reason)
+    assert package_refuses(document)
+
+
+def test_floats_are_refused_by_both():
+    text = json.dumps(changed(box(), ((*FACETS, 5, 0), 0.2)))
+    with pytest.raises(CHECK.Refused, match="a number must be an integer or a rational in a string"):
+        CHECK.check(text)
+    with pytest.raises(CertificateError):
+        read_guarantee(json.loads(text))
+
+
+def test_the_largest_numbers_of_a_form_are_read():
+    """The last constraint of every polytope, 400 facets, 40 000 bases."""
+    last = [12, 13, 12, 20, 20, 21, 21, 21, 20, 20]
+    document = box()
+    for place, most in enumerate(last):
+        bases = document["set"]["sliding"][place] if place < 3 else document["set"]["resting"][place - 3]
+        bases.append([most, *bases[0][1:]])
+    assert len(STICK.read_reach(document["set"]).facets) == 11
+    many = changed(box(), (FACETS, lambda old: [*old, *[old[5]] * 389]), (MULTIPLIERS, lambda old: old[:1] * 400))
+    assert len(STICK.read_reach(many["set"]).facets) == 400
+    room = 40_000 - sum(map(len, (*box()["set"]["sliding"], *box()["set"]["resting"])))
+    full = changed(box(), (("set", "sliding", 0), lambda old: [*old, *old[:1] * room]))
+    assert len(STICK.read_reach(full["set"]).sliding[0]) == room + 8
+
+
+CONDITIONS = [
+    ("fault must not open", "the fault may open", (("loop", "target_gain"), "12")),
+    ("damping must not be negative", "damping", (("fault", "friction", "rate_slope"), "1/4")),
+    ("shear stress must not reverse", "shear stress may reverse", (("disturbance", "amplitude"), "2")),
+    ("short against the weakening", "too long against the weakening", (("loop", "step"), "1")),
+    ("short against damping and slope", "too long against the damping", (("fault", "damping"), "150")),
+    ("short against damping and slope", "too long against the damping", (("fault", "damping"), "400")),
+    ("short against damping and slope", "too long against the damping", (("fault", "damping"), "3000")),
+    ("short against damping and slope", "too long against the damping", (("fault", "damping"), "80")),
+    ("large enough for the condition of rest", "too small for the condition of rest",
+     (("disturbance", "amplitude"), "1/90")),
+    ("facet 0 must hold after a period that slides", "may leave the polytope", (("loop", "slip_gain"), "3/2")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("reason", "theirs", "change"), CONDITIONS)
+def test_what_the_theorem_needs_is_asked_for_by_both(reason, theirs, change):
+    document = changed(box(), change, (("claims", "peak_slip_rate"), "9"))
+    refused(document, reason)
+    assert theirs in read_guarantee(document).bounds().reason
+
+
+FORGED = {
+    "y less": ((*FACETS, 1), times("101/100")),
+    "y more": ((*FACETS, 1), times("99/100")),
+    "ahead less": ((*FACETS, 0), times("101/100")),
+    "ahead more": ((*FACETS, 0), times("99/100")),
+    "level less": ((*FACETS, 2), times("101/100")),
+    "another facet less": ((*FACETS, 163), times("101/100")),
+    "another facet more": ((*FACETS, 163), times("99/100")),
+    "no multipliers": (MULTIPLIERS, lambda old: [["0"] * 5] * len(old)),
+    "few bases": (("set", "sliding", 0), lambda old: old[:2]),
+    "few bases at rest": (("set", "resting", 0), lambda old: old[:2]),
+}
+
+
+@pytest.mark.parametrize("change", FORGED.values(), ids=FORGED)
+def test_a_forged_set_is_refused(change):
+    refused(changed(stored(), change))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", FORGED.values(), ids=FORGED)
+def test_a_forged_set_is_refused_by_the_package(change):
+    assert package_refuses(changed(stored(), change))
