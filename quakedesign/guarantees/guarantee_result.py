@@ -449,26 +449,29 @@ def answer_sliding(
     box = fault.box
     if controller != "elqr" or any((box.stiffness, box.damping, box.authority)):
         raise UnsupportedError(
-            "slow sliding is guaranteed of elqr, with the box of a, b and D_c that a spread gives; sliding modes do "
-            "not apply to it, as the slip rate follows the pressure at once. Received "
-            f"{controller} and the box {box.name}. Give --controller elqr, --box paper and --spread."
+            "slow sliding has a guarantee for the controller elqr, with the box of a, b and D_c given by --spread; "
+            "sliding modes do not apply, since the slip rate responds to the pressure without delay. Received the "
+            f"controller {controller} and the box {box.name}. Give --controller elqr, --box paper and --spread."
         )
     if not 0 <= spread < 1:
         meant = f": {float(spread):g} % is {float(spread) / 100:g}" if 1 <= spread < 100 else ""
-        raise ParameterError(f"a spread must be from 0 to below 1. Received {shortly(spread)}. Change it{meant}.")
+        raise ParameterError(f"spread must be from 0 to below 1. Received {shortly(spread)}. Give a fraction{meant}.")
     if stress is not None and stress <= 0:
-        raise ParameterError(f"a stress must be above 0. Received {shortly(stress)} Pa. Change it, or leave it out.")
+        raise ParameterError(
+            f"stress must be positive. Received {shortly(stress)} Pa. Omit stress for the largest that can be proved."
+        )
     if not (around.get("lag") or around.get("diffusion")):
         raise ParameterError(
-            "slow sliding is guaranteed through rock or a lag between well and fault. Received neither. Give "
-            "--diffusion, such as '833 s', or --lag."
+            "slow sliding needs a diffusion path or a lag between well and fault. Received neither. Give --diffusion, "
+            "such as '833 s', or --lag."
         )
     held_over = rational(fault.sampling_time) if step is None else step
     task = slow_sliding_plant(fault, stress or _TRIFLE, spread)
     pump = around.pop("pump", None)
     if pump is not None and pump.rate is not None:
         raise ParameterError(
-            f"the rate of a pump is not known of slow sliding. Received {shortly(pump.rate)} Pa/s. Leave it out."
+            "slow sliding has no guarantee with the rate limit of a pump. Received the rate limit "
+            f"{shortly(pump.rate)} Pa/s. Omit the rate limit."
         )
     prove = _proof(pump, tell, given=stress is not None)
     tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)

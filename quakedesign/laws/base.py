@@ -307,16 +307,18 @@ class Controller(Law):
 
     def scaled(self, scale: str | float | Fraction) -> Self:
         """Return the same base gains with another λ; refused by a law without."""
-        raise ParameterError(f"a scale belongs to a sliding mode. Received {self.name}. Leave it out.")
+        raise ParameterError(f"scale is for sliding modes. Received a scale for {self.name}. Omit the scale.")
 
     def with_divisor(self, divisor: Fraction) -> Self:
         """Return the same gains with another divisor; refused by a law without."""
-        raise ParameterError(f"{self.name} has no divisor. Received the divisor {divisor}. Leave it out.")
+        raise ParameterError(f"{self.name} has no divisor. Received the divisor {divisor}. Omit the divisor.")
 
     def with_feedforward(self, feedforward: FeedForward) -> Self:
         """Return the same law with another feed-forward; any but none is refused by a law without."""
         if feedforward != NONE:
-            raise ParameterError(f"a feed-forward belongs to a sliding mode. Received {self.name}. Leave it out.")
+            raise ParameterError(
+                f"feedforward is for sliding modes. Received {feedforward.name} for {self.name}. Omit feedforward."
+            )
         return self
 
     @classmethod

@@ -182,12 +182,14 @@ class SampledController(Controller):
     @classmethod
     def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
         """Refuse: gains in order do not make its matrices."""
-        raise UnsupportedError("a sampled law is made from its matrices, not from gains in order. Use LinearLaw.")
+        raise UnsupportedError("a sampled law is given by its matrices, not by gains in order. Use LinearLaw.")
 
     @classmethod
     def loop_field(cls) -> LoopField:
         """Refuse: it has no loop in continuous time."""
-        raise UnsupportedError("a sampled law has no loop in continuous time. Use a guarantee of the loop that runs.")
+        raise UnsupportedError(
+            "a sampled law has no closed loop in continuous time. Use the guarantee of the sampled loop."
+        )
 
 
 def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Expr:
@@ -234,8 +236,8 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
     """
     if not 0 < weight <= 1 or gain <= 0:
         raise ParameterError(
-            "a compensated step needs a weight in (0, 1] and a positive gain. Received "
-            f"{float(weight):.4g} and {float(gain):.4g}. Change them."
+            "a compensated step needs a weight in (0, 1] and a positive gain. Received the weight "
+            f"{float(weight):.4g} and the gain {float(gain):.4g}. Correct whichever is outside."
         )
     known = before, pushed, estimate, _, rate_error, end_rate = sp.symbols("before pushed estimate e1 e2 w")
     share, size = to_sympy(weight), to_sympy(gain)

@@ -71,13 +71,13 @@ class LinearLaw:
         require_sizes(self.states, self.update, self.measured, self.output, self.feedback, seen)
         if self.first and [len(row) for row in self.first] != [len(MEASURED)] * len(self.states):
             raise ParameterError(
-                f"first of a linear law needs {len(self.states)} rows of {len(MEASURED)} entries, or none. Received "
-                f"{len(self.first)} rows. Complete them."
+                f"first of a linear law must have {len(self.states)} rows of {len(MEASURED)} entries, or be empty. "
+                f"Received rows of {', '.join(str(len(row)) for row in self.first)} entries."
             )
         if self.applied and len(self.applied) != len(self.states):
             raise ParameterError(
-                f"applied of a linear law needs {len(self.states)} entries, or none. Received {len(self.applied)}. "
-                "Complete them."
+                f"applied of a linear law must have {len(self.states)} entries, one a state, or be empty. "
+                f"Received {len(self.applied)}."
             )
 
     @property
@@ -96,19 +96,18 @@ def require_sizes(
     ParameterError
     """
     n = len(states)
-    fits = (
-        n <= MOST_STATES
-        and len(set(states)) == n
-        and [len(row) for row in own] == [n] * n
-        and [len(row) for row in measured] == [seen] * n
-        and len(output) == n
-        and len(feedback) == seen
-    )
-    if not fits:
+    if n > MOST_STATES or len(set(states)) != n:
         raise ParameterError(
-            f"a linear law needs F of n × n, G of n × {seen}, C of n and D of {seen} entries, n at most {MOST_STATES} "
-            f"states of different names. Received {n} states ({', '.join(states)}) and other sizes. Complete them."
+            f"a linear law needs at most {MOST_STATES} states with different names. "
+            f"Received {n}: {', '.join(states[: MOST_STATES + 1])}."
         )
+    rows = {"F": (own, n, n), "G": (measured, n, seen), "C": ((output,), 1, n), "D": ((feedback,), 1, seen)}
+    for name, (matrix, height, width) in rows.items():
+        if [len(row) for row in matrix] != [width] * height:
+            raise ParameterError(
+                f"matrix {name} of a linear law with {n} states must be {height} × {width}. Received "
+                f"{len(matrix)} rows of {', '.join(str(len(row)) for row in matrix) or 'no'} entries."
+            )
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,8 +159,9 @@ class Prediction:
     def __post_init__(self) -> None:
         if len(self.of_pushes) != len(self.ahead_of_pushes) + 1 or not sum(self.of_pushes):
             raise ParameterError(
-                "a prediction needs pushes from 0 and from 1 sample ago on, those of the next sample not zero in all. "
-                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)}. Complete them."
+                "of_pushes of a prediction must have one entry more than ahead_of_pushes, with a sum other than 0. "
+                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)} entries, and the sum "
+                f"{shortly(sum(self.of_pushes))}."
             )
 
 
@@ -234,7 +234,7 @@ def disturbance_estimate(
 def require_gain(gain: Fraction) -> None:
     """Refuse a model whose pressure does nothing, or the wrong thing."""
     if gain <= 0:
-        raise ParameterError(f"the gain of a model must be positive. Received {shortly(gain)} m²/kg. Check its sign.")
+        raise ParameterError(f"the input gain of a model must be positive. Received {shortly(gain)} m²/kg.")
 
 
 def answered(
@@ -317,8 +317,8 @@ class ErrorPrediction:
     def __post_init__(self) -> None:
         if len(self.of_pushes) != len(self.ahead_of_pushes) + 1:
             raise ParameterError(
-                "a prediction needs pushes from 0 and from 1 sample ago on. "
-                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)}. Complete them."
+                "of_pushes of a prediction must have one entry more than ahead_of_pushes. "
+                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)} entries."
             )
 
 
@@ -400,10 +400,16 @@ class PathModel:
     def __post_init__(self) -> None:
         n = max(map(len, self.of_pressures), default=0)
         sizes = [len(row) for row in (*self.kept, *self.of_pressures)]
-        if sizes != [n] * (n + 2) or len(self.of_pressures) != 2 or len(self.of_asked) != 2 or not self.of_constant[1]:
+        if sizes != [n] * (n + 2) or len(self.of_pressures) != 2 or len(self.of_asked) != 2:
             raise ParameterError(
-                f"a model of {n} pressures needs {n} × {n} numbers of how they are kept, and a constant pressure must "
-                "move the fault. Received another one. Complete it."
+                f"a path model with {n} pressures needs kept of {n} × {n}, of_pressures of 2 × {n} and of_asked of 2 "
+                f"entries. Received {len(self.kept)} and {len(self.of_pressures)} rows of "
+                f"{', '.join(map(str, sizes)) or 'no'} entries, and {len(self.of_asked)} entries of of_asked."
+            )
+        if not self.of_constant[1]:
+            raise ParameterError(
+                "the gain of a path model from a constant pressure to the slip rate must not be 0. Received 0. "
+                "Correct of_asked or of_pressures."
             )
 
     @property
@@ -476,8 +482,8 @@ def _through(
     count, own = len(model.kept), len(names)
     if len(gains) != 2 + count or gain <= 0:
         raise ParameterError(
-            f"a law with a model of {count} pressures needs {2 + count} gains and a positive gain of the model. "
-            f"Received {len(gains)} and {shortly(gain)} m²/kg. Complete them."
+            f"a law with a path model of {count} pressures needs {2 + count} gains and a positive input gain of the "
+            f"model. Received {len(gains)} gains and the input gain {shortly(gain)} m²/kg."
         )
     path = [unit_row(len(level), {own + i: Fraction(1)}) for i in range(count)]
     away = [combined((1 / gain, q), (1 / gain, level)) for q in path]
@@ -556,12 +562,11 @@ class RestLimit:
         if (self.least is None) != (self.largest is None) or not (self.least or 0) <= 0 <= (self.largest or 0):
             ends = [None if end is None else f"{shortly(end)} Pa" for end in (self.least, self.largest)]
             raise ParameterError(
-                "least and largest pressure of a limit at rest must have 0 between them, both or none of them given. "
-                f"Received {ends[0]} and {ends[1]}. Change them."
+                "least and largest of a limit at rest must be both omitted, or least <= 0 <= largest. "
+                f"Received least {ends[0]} and largest {ends[1]}."
             )
-        if self.width <= 0 or min(self.per_slip, self.resolution, self.fastest) < 0:
-            raise ParameterError(
-                "a limit at rest needs a positive width, and no other number below 0. Received "
-                f"{shortly(self.width)} Pa, {shortly(self.per_slip)} Pa/m and {shortly(self.resolution)} m. "
-                "Check their signs."
-            )
+        if self.width <= 0:
+            raise ParameterError(f"width of a limit at rest must be positive. Received {shortly(self.width)} Pa.")
+        for name, unit in (("per_slip", "Pa/m"), ("resolution", "m"), ("fastest", "m")):
+            if (value := getattr(self, name)) < 0:
+                raise ParameterError(f"{name} of a limit at rest must be 0 or more. Received {shortly(value)} {unit}.")

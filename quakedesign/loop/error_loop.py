@@ -158,18 +158,18 @@ class _Path:
         step, delay, lag, diffusion = self.step, self.delay, self.lag, self.diffusion
         if step <= 0 or not 0 <= delay <= MOST_PERIODS * step or lag < 0:
             raise ParameterError(
-                f"a held loop needs a positive step, a delay of 0 to {MOST_PERIODS} steps and a lag of 0 or more. "
-                f"Received {shortly(step)} s, {shortly(delay)} s, {shortly(lag)} s. Shorten the delay."
+                f"step must be positive, delay 0 to {MOST_PERIODS} steps, and lag 0 or more. Received the step "
+                f"{shortly(step)} s, the delay {shortly(delay)} s and the lag {shortly(lag)} s. Shorten the delay."
             )
         if diffusion and SHORTEST * diffusion < step:
             raise ParameterError(
-                f"diffusion must take at least T_s/{SHORTEST}, here {float(step / SHORTEST):.4g} s, or nothing. "
-                f"Received {shortly(diffusion)} s. Leave it out."
+                f"the diffusion time L^2/D must be 0, or at least T_s/{SHORTEST} = {float(step / SHORTEST):.4g} s. "
+                f"Received {shortly(diffusion)} s. Omit diffusion, or shorten the step."
             )
         if diffusion and self.watched:
             raise ParameterError(
-                "jitter and the rate of a pump are known of pressures that reach the fault at once or through a lag. "
-                f"Received rock of {shortly(diffusion)} s. Leave one of them out."
+                "jitter, averaging and the rate limit of a pump have no guarantee with a diffusion path. Received "
+                f"L^2/D = {shortly(diffusion)} s with one of them. Omit diffusion, or jitter, averaging and rate limit."
             )
 
     @property
@@ -238,8 +238,8 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
             pivots.append((column, pivot))
     if any(row[n] for row in rows):
         raise ParameterError(
-            "a law must be able to ask for a constant pressure without errors. Received one that cannot. "
-            "Give it an integral or an estimate of the disturbance."
+            "a law must have a steady state with zero errors and a constant pressure. Received a law without "
+            "integral action. Add an integral of the slip error, or an estimate of the disturbance."
         )
     solution = [Fraction(0)] * n
     for column, pivot in reversed(pivots):

@@ -50,12 +50,13 @@ class Pump:
         alone = (self.least is None) != (self.largest is None)
         if alone or not low <= 0 <= high or (self.least is not None and low == high):
             raise ParameterError(
-                "the least and the largest pressure of a pump must have 0 between them. Received "
-                f"{shortly(low)} Pa and {shortly(high)} Pa. Change their signs."
+                "the least pressure of a pump must be 0 or less, the largest 0 or more, and both be given. Received "
+                f"{shortly(low)} Pa and {shortly(high)} Pa. Give the withdrawal as negative, the injection as positive."
             )
         if self.rate is not None and self.rate <= 0:
             raise ParameterError(
-                f"the rate limit of a pump must be positive. Received {shortly(self.rate)} Pa/s. Omit it for none."
+                f"the rate limit of a pump must be positive. Received {shortly(self.rate)} Pa/s. "
+                "Omit the rate limit if the pump has none."
             )
 
     @property
@@ -217,7 +218,7 @@ class LoopSetup:
             exact = exact_value(value, part["unit"], title)
             if exact < 0:
                 raise ParameterError(
-                    f"{title} must be 0 or more. Received {shortly(exact)} {part['unit']}. Omit the sign."
+                    f"{title} must be 0 or more. Received {shortly(exact)} {part['unit']}. Omit the minus sign."
                 )
             object.__setattr__(self, name, exact)
         if self.step is not None:

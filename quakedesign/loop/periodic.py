@@ -174,13 +174,14 @@ class Instants:
         """
         if min(self.measured, self.arrived, self.ramp) < 0 or 2 * self.measured > step:
             raise ParameterError(
-                f"jitter must be 0 or more and at most half a step of {float(step):.4g} s. Received "
-                f"{float(self.measured):.4g} s of measurements, {float(self.arrived):.4g} s of pressures. Shorten it."
+                f"jitter must be from 0 to half a step of {float(step):.4g} s. Received {float(self.measured):.4g} s "
+                f"for measurements and {float(self.arrived):.4g} s for pressures. Reduce the jitter."
             )
         after = self.arrived + self.ramp
         if self.arrived > (part or step) or after > step - part or self.arrived + after > step:
             raise ParameterError(
-                "a pressure must begin and end to change between two samples as they are due. Received one due "
-                f"{float(part):.4g} s after a sample, every {float(step):.4g} s, off by {float(self.arrived):.4g} s, "
-                f"that changes for {float(self.ramp):.4g} s. Shorten that, or change the delay."
+                "a pressure change must begin and end within one sampling interval. Received a change due "
+                f"{float(part):.4g} s after a sample, with the step {float(step):.4g} s, jitter of "
+                f"{float(self.arrived):.4g} s and a ramp of {float(self.ramp):.4g} s. Reduce jitter or ramp, or change "
+                "the delay."
             )

@@ -296,7 +296,7 @@ def design(
     if continuous and objective != OBJECTIVES[0]:
         raise ParameterError(
             f"the objective of a design in continuous time must be {OBJECTIVES[0]}. Received {objective!r}. "
-            "Leave it out, or continuous."
+            "Omit objective, or continuous."
         )
     told: Any = {"objective": objective, "continuous": continuous, "disturbance_class": disturbance_class}
     told["setup"] = replace(setup, diffusion=Fraction(0)) if fault.friction.state_names else setup
@@ -318,13 +318,13 @@ def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any,
         if asked.stress is not None or asked.spread:
             raise ParameterError(
                 f"stress and spread of a design need friction with a state. Received {fault.friction.name}. "
-                "Leave them out."
+                "Omit stress and spread."
             )
         return SlowSlidingDesign()
     if setup.delay or setup.lag:
         raise ParameterError(
-            f"a design for friction with a state goes through rock alone. Received a delay or lag with "
-            f"{fault.friction.name}. Leave them out; guarantee takes both."
+            f"a design for friction with a state has no delay or lag, only a diffusion path. Received a delay or lag "
+            f"with {fault.friction.name}. Omit delay and lag, or use guarantee, which takes both."
         )
     if why := method_of(law).without_state:
         raise UnsupportedError(f"{why}. Received {law.name}. Design an elqr.")

@@ -111,8 +111,8 @@ class GainProblem(Generic[Designed]):
         """
         if self.continuous and self.setup != IDEAL:
             raise ParameterError(
-                "a design in continuous time knows slip and slip rate exactly and acts at once. Received noise, the "
-                "slip alone, a delay, a lag or rock. Leave continuous out."
+                "a design in continuous time needs exact measurements of slip and slip rate, and no delay, lag or "
+                "diffusion path. Received a loop with one of these. Omit continuous, or noise, measured and path."
             )
 
     def by_method(self, law: type[Controller]) -> Designed:

@@ -475,7 +475,7 @@ def _moved(slip: Fraction, rate: Fraction, time: Fraction) -> tuple[Any, Any]:
 def _require(holds: bool, what: str, *values: Fraction) -> None:
     if not holds:
         received = ", ".join(f"{float(v):.4g}" for v in values)
-        raise ParameterError(f"a limit needs {what}. Received {received}. Correct it.")
+        raise ParameterError(f"a performance limit needs {what}. Received {received}.")
 
 
 def _at_least_one(value: Any) -> Any:

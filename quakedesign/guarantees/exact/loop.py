@@ -97,23 +97,24 @@ class Held:
     def __post_init__(self) -> None:
         if min(self.start) < 0:
             raise ParameterError(
-                "initial slip and slip rate are bounds of both signs, 0 or more. Received "
-                f"{shortly(self.initial_slip)} m and {shortly(self.initial_slip_rate)} m/s. Leave out the sign."
+                "bounds of the initial slip and slip rate errors must be 0 or more. Received "
+                f"{shortly(self.initial_slip)} m and {shortly(self.initial_slip_rate)} m/s. Give absolute values."
             )
         if min(self.slip_noise, self.rate_noise) < 0:
             raise ParameterError(
-                "a bound of noise must be 0 or more. Received "
-                f"{shortly(self.slip_noise)} m and {shortly(self.rate_noise)} m/s. Check their signs."
+                "bounds of slip noise and rate noise must be 0 or more. Received "
+                f"{shortly(self.slip_noise)} m and {shortly(self.rate_noise)} m/s. Give absolute values."
             )
         if min(self.jitter, self.delay_jitter, self.averaging, self.ramp) < 0:
             raise ParameterError(
-                f"jitter must be 0 or more, and averaging too. Received {shortly(self.jitter)} s, of the delay "
-                f"{shortly(self.delay_jitter)} s, and {shortly(self.averaging)} s. Leave out the sign."
+                f"jitter, delay jitter, averaging and ramp must be 0 or more. Received {shortly(self.jitter)} s, "
+                f"{shortly(self.delay_jitter)} s, {shortly(self.averaging)} s and {shortly(self.ramp)} s. "
+                "Give absolute values."
             )
         if self.rate_noise and self.law.of_slip_alone:
             raise ParameterError(
-                "noise of the slip rate needs a law that measures it. Received "
-                f"{shortly(self.rate_noise)} m/s and a law of the slip alone. Leave it out."
+                "rate noise needs a law that measures the slip rate. Received the rate noise "
+                f"{shortly(self.rate_noise)} m/s for a law of the slip alone. Omit the rate noise."
             )
         if self.longest_step:
             self._require_no_clock()
@@ -122,8 +123,9 @@ class Held:
         """Refuse intervals that are no range, and what asks for a schedule or a start at rest."""
         if self.longest_step <= self.step:
             raise ParameterError(
-                "the longest step must be longer than the step, the shortest one. Received "
-                f"{shortly(self.longest_step)} s and {shortly(self.step)} s. Exchange them, or leave it out."
+                "the longest step must exceed the step, which is the shortest sampling interval. Received "
+                f"{shortly(self.longest_step)} s and the step {shortly(self.step)} s. Exchange both, or omit the "
+                "longest step."
             )
         first = (v for row in self.law.first for v in row)
         times = (self.ramp, self.jitter, self.delay_jitter, self.averaging)
@@ -133,9 +135,9 @@ class Held:
             or (self.pump and self.pump.rate)
         ):
             raise ParameterError(
-                "samples that follow no clock are known from rest, of a linear law whose pressure acts at once. "
-                "Received a longest step beside a delay, a lag, rock, a start, jitter, means, the rate of a pump or an "
-                "implicit step. Leave one of them out."
+                "aperiodic sampling needs a linear law and errors that are 0 at the start. It has no guarantee with a "
+                "delay, a lag, a diffusion path, jitter, averaging, the rate limit of a pump or an implicit step. "
+                f"Received longest_step {shortly(self.longest_step)} s with one of these. Omit longest_step, or these."
             )
 
     @property
@@ -202,8 +204,9 @@ class Held:
         """
         if self.law.root is not None:
             raise UnsupportedError(
-                "what is proved of a sliding mode tells its implicit root, not its gains. Received one. Take the "
-                "controller of its design, or its gains, scale, weight and authority in the scheme compensated."
+                "a certificate of a sliding mode states the implicit step, not the gains. Received a law with an "
+                "implicit step. Use the controller of the design, or its gains, scale, weight and authority in the "
+                "scheme compensated."
             )
         return laws.SampledController(law=self.law, step=self.step, **self.path, longest=self.longest_step)
 

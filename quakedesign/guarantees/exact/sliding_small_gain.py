@@ -103,9 +103,9 @@ class SlidingClaims:
     def __post_init__(self) -> None:
         every = (self.log_rate, self.log_state, self.slip_error, self.push, self.asked)
         if min(every) <= 0 or max(self.log_rate, self.log_state) > _LARGEST:
+            received = (f"{name} {shortly(v)}" for name, v in zip(self.__dataclass_fields__, every, strict=True))
             raise ParameterError(
-                f"claims must be positive, logarithms at most {_LARGEST}. Received "
-                f"{', '.join(f'{shortly(v)}' for v in every)}. Bound them so."
+                f"claims must be positive, log_rate and log_state at most {_LARGEST}. Received {', '.join(received)}."
             )
 
 
@@ -179,12 +179,15 @@ def loop_of(held: Held, model: SlidingModel, task: SlidingPlant) -> PeriodicLoop
     """
     if held.instants is not None:
         raise ParameterError(
-            "jitter and the rate of a pump are not known of slow sliding. Received some. Leave it out."
+            "slow sliding has no guarantee with jitter, averaging or the rate limit of a pump. Received one of these. "
+            "Omit jitter, averaging and the rate limit."
         )
     if not held.law.of_slip_alone or not (held.lag or held.diffusion):
         raise ParameterError(
-            "slow sliding is guaranteed of a law of the slip alone whose pressure reaches the fault through rock or a "
-            f"lag. Received L^2/D = {shortly(held.diffusion)} s and a lag of {shortly(held.lag)} s. Give one of them."
+            "slow sliding has a guarantee for a law of the slip alone, with a diffusion path or a lag. Received "
+            f"L^2/D = {shortly(held.diffusion)} s and a lag of {shortly(held.lag)} s"
+            f"{'' if held.law.of_slip_alone else ', for a law that uses the slip rate'}. Give diffusion or lag, and a "
+            "law of the slip alone."
         )
     times = {"delay": held.delay, "lag": held.lag, "diffusion": held.diffusion}
     loop = sliding_loop(held.law, model, held.step, **times, noisy=held.noise)

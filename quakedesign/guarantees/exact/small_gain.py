@@ -392,8 +392,8 @@ class SlowGain:
     def __post_init__(self) -> None:
         if not 1 <= self.parts <= MOST_PARTS or self.growth <= 0:
             raise ParameterError(
-                f"a slow gain needs 1 to {MOST_PARTS} parts and a positive growth. Received {self.parts} and "
-                f"{shortly(self.growth)} 1/s. Change them."
+                f"a slowly varying input gain needs 1 to {MOST_PARTS} parts and a positive growth. Received "
+                f"{self.parts} parts and the growth {shortly(self.growth)} 1/s."
             )
 
     def models(self, task: UncertainPlant) -> tuple[NominalModel, ...]:
@@ -406,7 +406,8 @@ class SlowGain:
         """
         if task.friction.rate_slope:
             raise ParameterError(
-                "a slow gain needs friction of the slip alone. Received one of the slip rate. Leave it out."
+                "a slowly varying input gain needs friction that depends on the slip alone. Received friction with "
+                f"rate_slope {shortly(task.friction.rate_slope)} s/m. Omit the slowly varying input gain."
             )
         half = self._half(task)
         middles = (task.beta[0] + (2 * number + 1) * half for number in range(self.parts))

@@ -45,15 +45,15 @@ class Actuator:
             if isinstance(before, FlowStage) and isinstance(after, SampledStage):
                 raise ParameterError(
                     f"stages that act once per sample come first. Received {before.name} before {after.name}. "
-                    "Change their order."
+                    "Exchange these two stages."
                 )
         if len(between := [stage.name for stage in self.sampled if stage.part]) > 1:
             raise ParameterError(
-                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Leave one out."
+                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Omit all but one."
             )
         if len(self._stores) > 1:
             names = ", ".join(stage.name for stage in self._stores)
-            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Leave one out.")
+            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Omit all but one.")
 
     @classmethod
     def meant_for(cls, sampling: "Sampling") -> "Actuator":

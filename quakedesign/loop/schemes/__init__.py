@@ -39,7 +39,7 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
         able = [n for n, one in schemes().items() if is_dataclass(one) and setting in {f.name for f in fields(one)}]
         raise ParameterError(
             f"settings of {setting} are for the schemes {', '.join(sorted(able)) or 'of nobody'}. "
-            f"Received {name}. Use one of them, or leave the settings out."
+            f"Received {name}. Use one of these schemes, or omit {setting}."
         )
     return kind(**settings)
 
@@ -65,7 +65,7 @@ def own_way(
     if (name, told) != (own.scheme, wanted) or step not in (None, period):
         received = "".join(f", {key} {value!r}" for key, value in told.items() if not named)
         raise ParameterError(
-            f"a law of samples runs with the scheme {own} and the step {period!r} s it was designed for. Received "
-            f"{name}{received} and {period if step is None else step!r} s. Leave scheme and step out."
+            f"a sampled law runs with the scheme {own} and the step {period!r} s of its design. Received the scheme "
+            f"{name}{received} and the step {period if step is None else step!r} s. Omit scheme and step."
         )
     return chosen, period, wanted if named else {}

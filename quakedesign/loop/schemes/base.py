@@ -255,8 +255,9 @@ class NoClock:
         whole = all(isinstance(v, int) and not isinstance(v, bool) for v in (self.shortest, self.longest))
         if not (whole and 1 <= self.shortest <= self.longest <= MOST_STEPS):
             raise ParameterError(
-                f"intervals by no clock must be whole numbers of steps, 1 to {MOST_STEPS}, the shortest first. "
-                f"Received {self.shortest!r} and {self.longest!r}. Change them."
+                f"shortest and longest interval of aperiodic sampling must be whole numbers of steps, 1 to "
+                f"{MOST_STEPS}, with shortest <= longest. Received {self.shortest!r} and {self.longest!r}. "
+                "Round both, or exchange them."
             )
         Measurement(seed=self.seed)
 
@@ -342,7 +343,8 @@ class Sampled(Scheme, Decided):
             raise ParameterError(f"authority must be positive and finite. Received {self.authority!r} m²/kg.")
         if self.clock and self.actuator.part:
             raise ParameterError(
-                "by no clock a pressure acts at a sample. Received a delay that is no whole number of steps. Change it."
+                "the delay must be a whole number of steps with aperiodic sampling. Received a delay with a fraction "
+                f"of {self.actuator.part:.4g} of a step. Round the delay."
             )
 
     @property
