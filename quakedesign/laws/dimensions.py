@@ -74,7 +74,7 @@ class CarriedGains:
 
 
 def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction | None = None) -> CarriedGains:
-    """Gains that do on the target what the given ones do on the source.
+    """Gains of the target fault that are equivalent to those of the source fault.
 
     Parameters
     ----------

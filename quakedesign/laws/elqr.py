@@ -17,7 +17,7 @@ FEEDBACKS = ("error", "state")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureLimits:
-    """Where the pressure stops (ERRATA 23), and how fast the integrals come back meanwhile.
+    """Pressure limits (ERRATA 23) and the recovery time of the integrals at a limit.
 
     Attributes
     ----------

@@ -56,7 +56,7 @@ class Power:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ImplicitRoot:
-    """The sum q, and between which lines its root is said to lie for the errors that are claimed of the loop.
+    """Implicit step: the sum q, and a sector bound of its root for the claimed errors.
 
     Attributes
     ----------

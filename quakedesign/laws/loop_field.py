@@ -119,7 +119,7 @@ def _require_known(expression: sp.Expr, known: set[sp.Symbol], what: str) -> Non
 
 
 def require_names(symbols: Iterable[sp.Symbol]) -> None:
-    """Refuse names that a certificate file cannot hold, and equal ones.
+    """Reject names that a certificate file does not admit, and equal names.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def require_names(symbols: Iterable[sp.Symbol]) -> None:
 
 
 def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Symbol]) -> None:
-    """Refuse a root of anything but a gain or constant.
+    """Reject a root of anything but a gain or constant.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Sym
 def require_units(
     units: Mapping[sp.Symbol, sp.Expr], states: Iterable[sp.Symbol], numbers: Iterable[sp.Symbol]
 ) -> None:
-    """Refuse a unit of anything but a state, or one that holds anything but gains, constants and roots.
+    """Reject a unit that is not of a state, or contains more than gains, constants and roots.
 
     Raises
     ------

@@ -89,7 +89,7 @@ class LinearLaw:
 def require_sizes(
     states: tuple[str, ...], own: Matrix, measured: Matrix, output: Row, feedback: Row, seen: int = len(MEASURED)
 ) -> None:
-    """Refuse matrices of a law whose sizes do not fit, and too many states.
+    """Reject matrices of inconsistent sizes, and too many states.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def require_sizes(
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class NominalModel:
-    """Middle of what may be: e2' = s·e1 − w·e2 + β·b·(p − p*) + d, which a law predicts with.
+    """Nominal model of a law: e2' = s·e1 − w·e2 + β·b·(p − p*) + d.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class NominalModel:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
-    """What a law expects, from its model; any numbers give a law, good ones a good one.
+    """Prediction of the slip-rate error by the model of a law; any coefficients define a law.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
 def disturbance_estimate(
     gains: tuple[Fraction, Fraction], weight: Fraction, prediction: Prediction, gain: Fraction
 ) -> LinearLaw:
-    """Feedback of slip and slip rate, and a level d of everything else that the last period showed.
+    """Feedback of slip and slip rate, with an estimate d of the disturbance over the last period.
 
     d ← d + a(e2 − π)/Σγ_j, p = −k1ê1 − k2ê2 − d/(βb) with ê = e as expected when p arrives, and
     π ← of_slip·e1 + of_rate·e2 + Σγ_j(βb·p_j + d). The estimate follows the innovation of the slip rate and has no
@@ -232,7 +232,7 @@ def disturbance_estimate(
 
 
 def require_gain(gain: Fraction) -> None:
-    """Refuse a model whose pressure does nothing, or the wrong thing."""
+    """Reject a model whose input gain is not positive."""
     if gain <= 0:
         raise ParameterError(f"the input gain of a model must be positive. Received {shortly(gain)} m²/kg.")
 
@@ -246,7 +246,7 @@ def answered(
     ahead: Matrix,
     ahead_of_pushes: Matrix,
 ) -> tuple[Row, list[Row]]:
-    """The pressure asked for, and βb·p_j + d for it and every one that waits."""
+    """The commanded pressure, and βb·p_j + d for it and every delayed one."""
     one = Fraction(1)
     before = [combined((gain, row), (one, level)) for row in waiting]
     expected = [
@@ -292,7 +292,7 @@ def combined(*parts: tuple[Fraction, Row]) -> Row:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorPrediction:
-    """What an observer expects of both errors, from its model; any numbers give a law, good ones a good one.
+    """Prediction of both errors by the model of an observer; any coefficients define a law.
 
     Attributes
     ----------
@@ -328,7 +328,7 @@ def slip_observer(
     prediction: ErrorPrediction,
     gain: Fraction,
 ) -> LinearLaw:
-    """Feedback of the slip alone: an observer of slip error, slip-rate error and the level d of everything else.
+    """Feedback of the slip alone: observer of slip error, slip-rate error and disturbance d.
 
     ê ← π + l·(e1 − π1) and d ← d + l3(e1 − π1), p = −k1ê1 − k2ê2 − d/(βb) with ê as expected when p arrives, and π ←
     Φê + Σγ_j(βb·p_j + d). The level has no trend. States: π [m, m/s], d [m/s²], and the pressures p_1, p_2 … asked for
@@ -373,7 +373,7 @@ def slip_observer(
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class PathModel:
-    """What a law expects of fault and path; any numbers give a law, good ones a good one.
+    """Model of fault and diffusion path in a law; any coefficients define a law.
 
     Attributes
     ----------
@@ -419,7 +419,7 @@ class PathModel:
 
 
 def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: Fraction) -> LinearLaw:
-    """Feedback of slip, slip rate and the path's pressures, and a level d of all else that the last period showed.
+    """Feedback of slip, slip rate and path pressures, with an estimate d of the disturbance.
 
     d ← d + a(e2 − π)/Γ2, p = −k1e1 − k2e2 − Σ k_i(q_i + d/(βb)) − d/(βb), π ← Φ2e + βb(Σ m_2iq_i + n2p) + Γ2d, and q ←
     Rq + (1 − R1)p, which is not measured but known. States: π [m/s], d and βb·q [m/s²], for numbers of one size.
@@ -449,7 +449,7 @@ def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: 
 def observer_through_path(
     gains: Row, corrections: tuple[Fraction, Fraction, Fraction], model: PathModel, gain: Fraction
 ) -> LinearLaw:
-    """The same of the slip alone: an observer of slip error, slip-rate error and the level d of everything else.
+    """Feedback of the slip alone through a path: observer of both errors and disturbance d.
 
     ê ← π + l(e1 − π1) and d ← d + l3(e1 − π1), p of ê as that of `estimate_through_path` of e, and π ← Φê + βb(Σ m_iq_i
     + np) + Γd. States: π [m, m/s], d and βb·q [m/s²].
@@ -512,7 +512,7 @@ def _through(
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class RestLimit:
-    """While a fault rests, its pressure is no further below any earlier one than a width.
+    """Limit at rest: the pressure is at most a width below any earlier one while the fault rests.
 
     And, beyond `width`, than `per_slip` for what the reference moved since. A loop whose pressure stays within P of p*,
     where dp*/dr is at most `per_slip`, never reaches a limit with a width of 2P: it takes nothing from what is proved.
@@ -555,7 +555,7 @@ class RestLimit:
 
     @property
     def range(self) -> tuple[Fraction, Fraction, Fraction] | None:
-        """Least and largest pressure, and up to which slip between two samples; None without them."""
+        """Least and largest pressure, and the slip between two samples up to which they hold, or None."""
         return None if self.least is None or self.largest is None else (self.least, self.largest, self.fastest)
 
     def __post_init__(self) -> None:

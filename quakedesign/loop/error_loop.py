@@ -131,7 +131,7 @@ def _off_schedule(loop: PeriodicLoop, instants: Instants, path: "_Path") -> Peri
 def starts(
     law: LinearLaw, size: int, errors: tuple[Fraction, Fraction], noise: tuple[Fraction, Fraction]
 ) -> tuple[Row, ...]:
-    """Columns of the box from which a held loop of so many states starts, see `PeriodicLoop.start`.
+    """Columns of the box of initial states of a sampled loop, see `PeriodicLoop.start`.
 
     Its pressures are 0, the errors within their bounds [m], [m/s], and the law's states what it makes of them as they
     are measured, within bounds of noise.
@@ -219,7 +219,7 @@ def _drift(law: LinearLaw, authority: Fraction, path: _Path) -> Row:
 
 
 def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
-    """States of a law that asks for p without errors and has the rates v: Mz = v and Cz = p, by elimination.
+    """Steady states of a law with zero errors: Mz = v and Cz = p, by elimination.
 
     Raises
     ------
@@ -441,7 +441,7 @@ _ONE = Fraction(1)
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingModel:
-    """Middle of what may be about sliding at V, with v = Ve^y, θ = (D/V)e^z, slip error x, pressure error q = p − p*.
+    """Nominal model about sliding at V: v = Ve^y, θ = (D/V)e^z, slip error x, q = p − p*.
 
     strength·y + weakening·z = −stiffness·x + coefficient·q + e, x′ = V·c·y, z′ = −ρ(c_y·y + c_z·z), ρ = V/D. With all
     slopes 1 this is the linearisation about sliding at V, the same for both laws of the state.
@@ -553,7 +553,7 @@ def sliding_loop(
 
 
 def at_once(model: SlidingModel) -> dict[tuple[str, str], Fraction]:
-    """What an input of size 1 adds to an output at the same instant, by (output, input)."""
+    """Direct feedthrough from each input to each output, by (output, input)."""
     heard = {"log_rate": _ONE, "ageing": model.evolution_slope, "strength": model.direct}
     sizes = {"stress": 1 / model.strength, "left_out": model.coefficient / model.strength}
     return {(output, name): share * size for output, share in heard.items() for name, size in sizes.items()}

@@ -41,7 +41,7 @@ class Segment:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Fading:
-    """An input b·w that dies out after the jump of a segment: |w| ≤ W·(height·e^{−rate·θ} + floor) a time θ after it.
+    """An input b·w that decays after a jump: |w| ≤ W·(height·e^{−rate·θ} + floor) at a time θ after it.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Fading:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Pulse:
-    """An input b·w that is there near the jump of a segment alone, before it or after it: |w| ≤ W.
+    """An input b·w that acts only near the jump of a segment, before or after it: |w| ≤ W.
 
     ∫|w| over the time before the jump, over `before`, and that over the time after it, over `after`, are at most W in
     all.
@@ -96,7 +96,7 @@ class Pulse:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class PeriodicLoop:
-    """x' = Ax + Σ b_i·w_i between jumps; the segments follow each other for ever, the first one at time 0.
+    """x' = Ax + Σ b_i·w_i between jumps; segments repeat periodically for all t ≥ 0, the first at t = 0.
 
     Without any segment there are no jumps: it flows for ever.
 
@@ -149,7 +149,7 @@ class PeriodicLoop:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Instants:
-    """What is due at an instant happens within some time of it, each time anew, whatever the course.
+    """Timing errors of measurements and pressures: any sequence within given bounds [s].
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class Instants:
     ramp: Fraction = Fraction(0)
 
     def require_within(self, step: Fraction, part: Fraction) -> None:
-        """Refuse what may reach another event, for pressures that are due some part of a step after a sample [s].
+        """Reject timing errors that may reach another event; `part` [s] is the delay after a sample.
 
         Raises
         ------

@@ -23,13 +23,13 @@ _LARGEST_RAMP = Fraction(8, 23)
 
 
 def static_friction(fault: Fault) -> Fraction:
-    """μ* [-], friction at rest where the fault starts, exact or rounded."""
+    """Static friction coefficient μ* [-] at the initial slip, exact or rounded."""
     start = sp.nsimplify(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)), rational=True)
     return fraction_of(start) if start.is_Rational else rational(str(sp.N(start, 50)))
 
 
 def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingPlant:
-    """Plant of a fault that slides at V, the first rate of its reference, under a stress of at most `stress` [Pa].
+    """Slow-sliding plant at V, the first rate of the reference, under a stress of at most `stress` [Pa].
 
     The ranges of a, b and D are their values and `spread` of them to both sides [-]; that of μ* follows from a − b.
 

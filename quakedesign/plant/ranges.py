@@ -1,4 +1,4 @@
-"""From a fault's data to the ranges and inputs of its error loop, by rational inequalities.
+"""Ranges and inputs of the error loop from the data of a fault, by rational inequalities.
 
 About p*(t), the pressure that would hold the fault at rest at the reference r(t), the error e = x − (r, r′) follows
 
@@ -28,7 +28,7 @@ _HALVINGS = 7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:
-    """All that is used of friction [-], [1/m], [s/m]: μ at rest at the start, its bounds, and its chords' bounds.
+    """Friction of a plant: μ at rest at t = 0 [-], its bounds [-], and bounds of its chords [1/m], [s/m].
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class UncertainPlant:
 
     @cached_property
     def stress(self) -> Range:
-        """σ′ − p* [Pa] at every reference: a ratio that is monotone in r between the points tried, and in μ and κ."""
+        """Range of σ′ − p* [Pa] along the reference; monotone in μ, κ, and in r between the points tried."""
         law, target = self.friction, self.target_slip
         breaks = {Fraction(0), target}
         breaks |= {(law.static - law.least) / law.weakening} if law.weakening else set()
@@ -203,7 +203,7 @@ class UncertainPlant:
         return bound * self.target_slip / self.operation_time**3
 
     def require_smooth_reference(self) -> None:
-        """Refuse a reference whose acceleration jumps at its start or end.
+        """Reject a reference whose acceleration jumps at its start or end.
 
         Raises
         ------
@@ -218,7 +218,7 @@ class UncertainPlant:
 
     @cached_property
     def model(self) -> NominalModel:
-        """Middle of the ranges."""
+        """Nominal model: middle of the ranges."""
         s, w, beta = ((low + high) / 2 for low, high in (self.slip_chord, self.rate_chord, self.beta))
         return NominalModel(slip=s, rate=w, gain=beta * self.authority)
 

@@ -103,7 +103,7 @@ class SlidingPlant:
             raise ParameterError(f"{name} of {self.name} must be {condition}. Received {value}. Correct the value.")
 
     def differences(self, asked: "SlidingPlant") -> list[str]:
-        """What of another task a proof for this one does not cover, each with both values, SI; empty if everything is.
+        """Differences to another task that a proof for this one does not cover, with both values, SI.
 
         Constants of the fault, V, the plan and the law of friction must be the same; constants of friction, distance,
         swing and stress lie within those of the proof. The name is none of it.
@@ -152,7 +152,7 @@ class SlidingPlant:
 
     @property
     def drift(self) -> Fraction:
-        """How fast p* may leave the plan [Pa/s]."""
+        """Largest rate of p* relative to the planned pressure [Pa/s]."""
         along = max(abs(self.stiffness * self.rate / mu - self.ramp) for mu in self.ranges["coefficient"])
         return along * (1 + self.swing)
 
@@ -177,7 +177,7 @@ WHOLE: Cuts = (None,)
 
 
 def cells(task: SlidingPlant, cuts: Cuts) -> tuple[SlidingPlant, ...]:
-    """The same task on every cell.
+    """The task on every cell of the box.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def cells(task: SlidingPlant, cuts: Cuts) -> tuple[SlidingPlant, ...]:
 
 
 def parts(task: SlidingPlant, axis: str, at: Fraction) -> tuple[SlidingPlant, SlidingPlant]:
-    """Both parts of a box, below and above a cut.
+    """The two parts of a box, below and above a cut.
 
     Raises
     ------

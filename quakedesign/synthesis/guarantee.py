@@ -1,4 +1,4 @@
-"""What is guaranteed of a controller on a fault as it runs, given or designed for it."""
+"""Guarantee of a sampled loop, for given gains or a design."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor

@@ -1,4 +1,4 @@
-"""The files of claims about loops that run (proofs/FORMAT.md), of both kinds: read strictly, written whole."""
+"""Certificate files of guarantees (proofs/FORMAT.md): strict reading, atomic writing."""
 
 import json
 import re
@@ -55,7 +55,7 @@ _ZERO = Fraction(0)
 
 
 def guarantee_document(claim: Claim) -> dict[str, Any]:
-    """What stands in the file."""
+    """Content of the file."""
     about = _of_sliding(claim) if isinstance(claim, SlidingGuarantee) else _of_tracking(claim)
     bounds = {part.name: getattr(claim.claims, part.name) for part in fields(claim.claims)}
     claims = {name: bound.exact for name, bound in bounds.items() if bound is not None}

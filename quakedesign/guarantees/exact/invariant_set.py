@@ -1,4 +1,4 @@
-"""A loop whose samples follow no clock: a set that its state at the samples never leaves, verified in ball arithmetic.
+"""Invariant polytope of a loop with aperiodic sampling, verified in ball arithmetic.
 
 **Loop.** The next sample comes any time T after the last, T_s ≤ T ≤ T_m, each time anew; all else is as it is with a
 clock, and the law is not told T. Let the map of a sample be J = CB, B its reduced row echelon form without rows of
@@ -48,7 +48,7 @@ Row = tuple[Fraction, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InvariantPolytope:
-    """The set, what is said of the inputs, and which facets bound which row.
+    """Invariant polytope, bounds of the inputs, and the facets that bound each row.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ def _even(lines: tuple[tuple[Basis, ...], ...]) -> bool:
 
 
 def reached_bounds(task: UncertainPlant, held: Held, reach: InvariantPolytope) -> Bounds | NoGuarantee:
-    """Bounds of the theorem, or what of it does not hold."""
+    """Bounds of the theorem, or the condition that fails."""
     loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
     with ctx.workprec(_BITS):
         try:
@@ -236,7 +236,7 @@ class _SampleMap:
 
 
 def require_fit(loop: PeriodicLoop, reach: InvariantPolytope) -> None:
-    """Refuse a set of other sizes than those of a loop.
+    """Reject a set whose sizes differ from those of a loop.
 
     Raises
     ------

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class Around(TypedDict, total=False):
-    """What `Held` has besides the law and T_s; what is left out is 0, a pump without limits None."""
+    """Loop setup of `Held` besides the law and T_s; omitted values are 0, a pump without limits None."""
 
     delay: Fraction
     lag: Fraction
@@ -47,7 +47,7 @@ class Around(TypedDict, total=False):
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Held:
-    """A law as it runs: once every T_s, its pressure held, late, through a lag and rock, from what it measures.
+    """A sampled law with its loop setup: T_s, zero-order hold, delay, lag, diffusion path and noise.
 
     Attributes
     ----------
@@ -152,30 +152,30 @@ class Held:
 
     @property
     def start(self) -> tuple[Fraction, Fraction]:
-        """Bounds of the errors at the start [m], [m/s]; 0 and 0 at rest."""
+        """Bounds of the initial errors [m], [m/s]; 0 and 0 at rest."""
         return self.initial_slip, self.initial_slip_rate
 
     @property
     def noise(self) -> dict[str, Fraction]:
-        """Bounds of the noise that there is, by its input of the loop; with jitter all that is measured has some."""
+        """Bounds of the measurement noise by input of the loop; with jitter every measurement has some."""
         measured = (NOISES[0], *NOISES[1:] * (not self.law.of_slip_alone)) if self.off else ()
         return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
 
     @property
     def off(self) -> Fraction:
-        """How far from its instant a measurement may tell of, at most [s]."""
+        """Largest timing error of a measurement [s]."""
         return self.jitter + self.averaging / 2
 
     @property
     def instants(self) -> Instants | None:
-        """How far those of the loop may be off; None where they are not, and a pressure may change at once."""
+        """Timing errors of the loop; None for exact timing and pressures without a ramp."""
         if not (self.off or self.delay_jitter or (self.pump and self.pump.rate)):
             return None
         return Instants(measured=self.off, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
 
     @property
     def slack(self) -> Fraction:
-        """By how much an interval from sample to sample may be longer than the shortest [s]; 0 with a clock."""
+        """Longest less shortest sampling interval [s]; 0 for periodic sampling."""
         return max(self.longest_step - self.step, Fraction(0))
 
     @property
@@ -185,7 +185,7 @@ class Held:
         return min(self.step - part - off, self.step - 2 * off)
 
     def told(self, task: UncertainPlant, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
-        """Bounds of the errors as the law is told them, from those of the true ones at any time [m], [m/s].
+        """Bounds of the measured errors from those of the true errors at any time [m], [m/s].
 
         A measurement that is early or late may be compared with the reference at its instant.
         """
@@ -265,7 +265,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainSpread:
-    """How far the input gain may be off that of a nominal loop [-].
+    """Deviation of the input gain from that of a nominal loop [-].
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The robust small-gain theorem around slow sliding with rate-and-state friction: the slip rate stays below Ve^Y.
+"""Robust small-gain theorem about slow sliding with rate-and-state friction: v ≤ Ve^Y.
 
 **Plant.** Per unit of area, with v = Ve^y, θ = (D/V)e^z, the slip error x, the pressure error q = p − p* and N = σ′ −
 p,
@@ -75,7 +75,7 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingClaims:
-    """What is never exceeded, absolute values.
+    """Claimed bounds of absolute values, for all t ≥ 0.
 
     Attributes
     ----------
@@ -203,7 +203,7 @@ def _moving(task: SlidingPlant) -> dict[str, Fraction]:
 
 
 def model_of(task: SlidingPlant, claims: SlidingClaims) -> SlidingModel | None:
-    """Middle of all that may be; None where the normal stress, or regularised friction, may come near 0."""
+    """Nominal model; None if the normal stress, or regularised friction, may come near 0."""
     low, high = task.normal_stress(claims.push)
     if low <= 0 or (task.regularised and _least_exponent(task, claims) < 1):
         return None
@@ -262,7 +262,7 @@ def channels_of(task: SlidingPlant, held: Held, claims: SlidingClaims, loop: Per
 
 
 def inertia(task: SlidingPlant, held: Held, claims: SlidingClaims) -> Fraction:
-    """By how much the mass makes the stress larger, sup|r|/λ₀ [Pa]."""
+    """Stress equivalent of inertia, sup|r|/λ₀ [Pa]."""
     low, high = task.normal_stress(claims.push)
     (a_low, a), (_, b), (_, mu) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
     grown, moved = exponential(claims.log_rate), _fastest_push(task, held, claims)
@@ -272,7 +272,7 @@ def inertia(task: SlidingPlant, held: Held, claims: SlidingClaims) -> Fraction:
 
 
 def regularisation(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
-    """By how much regularised friction makes the stress larger, N_max·ε [Pa]."""
+    """Stress equivalent of regularised friction, N_max·ε [Pa]."""
     if not task.regularised:
         return _ZERO
     a = task.ranges["direct_effect"][1]

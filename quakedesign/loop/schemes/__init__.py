@@ -1,4 +1,4 @@
-"""Ways to carry a law out over a step, one a file, found by looking into this folder."""
+"""Discretisation schemes of a control law, one a file, discovered in this folder."""
 
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -24,7 +24,7 @@ def schemes() -> dict[str, type[Scheme]]:
 
 @checked
 def simulation_scheme(name: str, **settings: Any) -> Scheme:
-    """Scheme of a given name, or of the user's own as ``module:Class``, with settings other than its own defaults.
+    """Scheme by name, or a user-defined one as ``module:Class``, with the given settings.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
 def own_way(
     controller: Controller | None, scheme: str | Scheme | None, step: float | None, usual: str = "explicit"
 ) -> tuple[str | Scheme, float | None, dict[str, Any]]:
-    """Scheme and step of a run, as asked for, else the usual scheme; a law of samples has its own, and settings for it.
+    """Scheme and step of a run; a sampled law has its own scheme, step and settings.
 
     Raises
     ------
