@@ -48,7 +48,7 @@ def guaranteed(**who):
     one = partial(qd.guarantee, fault)
     asked = [partial(one, gains=GAINS), partial(qd.guarantee, patch), partial(one, gains=GAINS, step=F(1, 10))]
     first, refused, other = answers(asked, **who)
-    assert "slow sliding is guaranteed through rock or a lag" in str(refused)
+    assert "slow sliding needs a diffusion path or a lag" in str(refused)
     return first.to_dict(), str(refused), other.to_dict()
 
 

@@ -81,7 +81,7 @@ def refuse(options: Mapping[str, Any], what: str) -> None:
     ParameterError
     """
     if names := list(given(options)):
-        raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Leave it out.")
+        raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Omit {', '.join(names)}.")
 
 
 def print_json(value: dict[str, Any]) -> None:

@@ -98,7 +98,7 @@ class DesignOptions(WellOptions):
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
         given = vars(self)["diffusion"]
         if loaded.friction.state_names and given is not None and not rational(given, "diffusion"):
-            raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit it for a well near the fault.")
+            raise ParameterError("diffusion must be above 0 s. Received 0 s. Omit --diffusion for a well at the fault.")
         laws = "elqr" if self._behind(loaded) and self.controller == "all" else self._laws
         names = controllers(laws, loaded)
         shown = {"published_scheme": self.published_scheme, "whole_task": self.whole_task}
@@ -118,8 +118,8 @@ class DesignOptions(WellOptions):
         """
         if self.scheme is not None and not self.continuous:
             raise ParameterError(
-                f"--scheme is for gains designed with --continuous, others run as guaranteed. Received {self.scheme}. "
-                "Give both, or none."
+                "--scheme needs --continuous; other designs run in the scheme of their guarantee. Received --scheme "
+                f"{self.scheme} alone. Add --continuous, or omit --scheme."
             )
         options = {name: getattr(self, name) for name in _SHARED} | {"setup": self.setup(measured=self.measured)}
         return {"options": options, "scheme": self.scheme}
@@ -136,7 +136,7 @@ class DesignOptions(WellOptions):
             return self.controller
         if self.controller != "all":
             raise ParameterError(
-                f"--measured slip is for the e-LQR. Received --controller {self.controller}. Leave it out."
+                f"--measured slip is for the e-LQR. Received --controller {self.controller}. Omit --measured."
             )
         return "elqr"
 

@@ -149,7 +149,7 @@ def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | No
     """
     again = next((name for name in names if names.count(name) > 1), None)
     if again is not None:
-        raise ParameterError(f"several faults need names of their own. Received {again} twice. Rename one.")
+        raise ParameterError(f"faults must have different names. Received {again} twice. Rename one of them.")
     if out is None:
         return [None] * len(names)
     if len(names) == 1:

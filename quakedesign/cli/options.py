@@ -105,14 +105,14 @@ def rock(diffusion: str | None, well: str | None, diffusivity: str | None) -> st
         )
         alone = " alone" if " and " not in received else ""
         raise ParameterError(
-            "a well is told by its distance and the diffusivity of the rock, or by L^2/D. Received "
+            "the diffusion path needs the distance of the well and the diffusivity, or L^2/D alone. Received "
             f"{received}{alone}. Give --well and --diffusivity, or --diffusion alone."
         )
     distance, spread = rational(well, "well"), rational(diffusivity, "diffusivity")
     if distance <= 0 or spread <= 0:
         raise ParameterError(
-            f"the distance of a well and a diffusivity must be positive. Received {well} m and {diffusivity} m^2/s. "
-            "Leave out --well for the nearest."
+            f"--well and --diffusivity must be positive. Received {well} m and {diffusivity} m^2/s. "
+            "Omit both for a well at the fault."
         )
     return str(distance**2 / spread)
 
@@ -271,8 +271,8 @@ class LawOptions:
             or told != {"scale": None, "feedforward": "none"}
         ):
             raise ParameterError(
-                "a certificate holds its law, an e-LQR. Received another controller, gains, a scale or a feedforward "
-                f"with {self.certificate}. Leave them out."
+                "--certificate contains the law, an e-LQR. Received another --controller, --gains, --scale or "
+                f"--feedforward with {self.certificate}. Omit these options."
             )
         return certified_choice(fault, self.certificate)
 
@@ -494,8 +494,8 @@ def _stage(stage: type[Stage], told: Mapping[str, Any], step: float) -> Stage | 
     for other in others:
         if told[other.name] is not None and other.default is None:
             raise ParameterError(
-                f"a {other.name} belongs to a {first.name}. Received {told[other.name]:g} {other.unit} alone. "
-                "Give both."
+                f"{other.name} needs {first.name}. Received {other.name} {told[other.name]:g} {other.unit} alone. "
+                f"Add {first.name}, or omit {other.name}."
             )
     return None
 
@@ -647,8 +647,8 @@ class StateOptions:
         """Those of a controlled run that are given."""
         if any(value is not None for value in (self.pressure, self.start, self.hold, self.share)):
             raise ParameterError(
-                "a controlled run starts in steady sliding, and its law sets the pressure. Received pressure, start, "
-                "hold or share. Leave them out."
+                "--pressure, --start, --hold and --share are for runs without a controller. Received one of them with "
+                "a controller. Omit these options."
             )
         return given({"stress": self.stress, "stress_period": self.stress_period})
 
@@ -657,7 +657,7 @@ class StateOptions:
         from quakedesign.simulation import pressure_course
 
         if self.stress is not None or self.stress_period is not None:
-            raise ParameterError("a stress disturbance needs a controller. Received none. Give --controller elqr.")
+            raise ParameterError("--stress needs a controller. Received none. Give --controller elqr.")
         told = given({"start": self.start, "hold": self.hold, "share": self.share})
         return told | ({} if self.pressure is None else {"pressure": pressure_course(self.pressure)})
 
@@ -670,7 +670,7 @@ def require_no_state_options(state: StateOptions, fault: "Fault") -> None:
     if state != NO_STATE:
         raise ParameterError(
             "pressure, start, hold, share and stress need friction with a state. "
-            f"Received {fault.friction.name}. Leave them out."
+            f"Received {fault.friction.name}. Omit these options."
         )
 
 
@@ -742,7 +742,7 @@ class SpreadOptions:
         if not fault.friction.state_names:
             if self != SpreadOptions():
                 raise ParameterError(
-                    f"spread and stress need friction with a state. Received {fault.friction.name}. Leave them out."
+                    f"spread and stress need friction with a state. Received {fault.friction.name}. Omit both."
                 )
             return law.choose(fault, step, path), {}
         from quakedesign.exact import rational
@@ -757,7 +757,8 @@ class SpreadOptions:
         diffusion = path.get("diffusion")
         designed = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=self.stress, spread=off)
         if designed.controller is None or designed.sliding is None:
-            raise ParameterError(f"a campaign needs a law. Received none from design: {designed.details['reason']}.")
+            reason = designed.details["reason"]
+            raise ParameterError(f"a campaign needs a law. Received a design without one: {reason}.")
         told = {"spread": off, "stress": float(designed.sliding.task.stress)}
         return Choice(controller=designed.controller), told | period
 
@@ -774,8 +775,9 @@ def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
 
     if claim.held.delay or claim.held.slip_noise:
         raise ParameterError(
-            "a campaign of slow sliding is told the slip at once and as it is. Received a certificate with a delay or "
-            "noise. Use simulate --certificate."
+            "a campaign of slow sliding needs a loop without delay and slip noise. Received a certificate with a delay "
+            f"of {float(claim.held.delay):g} s and slip noise of {float(claim.held.slip_noise):g} m. "
+            "Use simulate --certificate."
         )
     low, high = claim.task.ranges["direct_effect"]
     off = rational(spread, "spread") or (high - low) / (high + low)
@@ -815,8 +817,8 @@ def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: 
     if foreign := [name for name in changed if name not in (*taken, *_AROUND)]:
         kind = f"friction with a state {'with' if taken is _HELD else 'without'} control"
         raise ParameterError(
-            f"{', '.join(foreign)}: not for {kind}. Received {fault.friction.name}. "
-            f"Leave out what is not among {', '.join((*taken, *more))} and the options of friction with a state."
+            f"{', '.join(foreign)} cannot be used for {kind}. Received {fault.friction.name}. "
+            f"Use {', '.join((*taken, *more))} and the options of friction with a state only."
         )
     return {taken[name]: value for name, value in changed.items() if name in taken}
 
@@ -824,8 +826,9 @@ def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: 
 def _require_designed(options: dict[str, Any]) -> None:
     if options["controller"] != "elqr" or tuple(options["gains"]) not in (("published",), ("designed",)):
         raise ParameterError(
-            "friction with a state is controlled by elqr with designed gains; no sliding mode, as the slip rate "
-            f"follows the pressure at once. Received {options['controller']}. Give --controller elqr."
+            "friction with a state needs the controller elqr with designed gains; sliding modes do not apply, since "
+            f"the slip rate responds to the pressure without delay. Received {options['controller']} with the gains "
+            f"{' '.join(map(str, options['gains']))}. Give --controller elqr, and omit --gains."
         )
 
 

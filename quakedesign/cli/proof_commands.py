@@ -144,9 +144,11 @@ def check(
     from quakedesign.checking import check_files
 
     if not files:
-        raise ParameterError("check needs at least one certificate file. Received none. Give a path.")
+        raise ParameterError(
+            "check needs at least one certificate file. Received none. Give the path of a certificate."
+        )
     if out is not None and not rocq:
-        raise ParameterError("--out is the folder of --rocq. Received it alone. Add --rocq or leave it out.")
+        raise ParameterError("--out needs --rocq. Received --out alone. Add --rocq, or omit --out.")
     verdicts = check_files(files, fault)
     kept = [path for path in dict.fromkeys(files) if verdicts[str(path)][0] in ("proved", "refuted")]
     written = _write_rocq(kept, out or Path("quakedesign-rocq"), force) if rocq else {}
@@ -226,7 +228,9 @@ def sos(
     new_file(out, "proof file", force=force)
     asked = (polynomial, on, multiplier, margin, degree, products)
     if gram is not None and asked != (None, (), None, "0", None, None):
-        raise PolynomialError("--gram is a file that says what is asked. Received more. Leave the rest out.")
+        raise PolynomialError(
+            "--gram FILE contains the polynomial and its options. Received others as well. Give --gram alone."
+        )
     if gram is not None:
         answer = read_gram(gram).verify()
     elif polynomial is None:
@@ -305,7 +309,9 @@ def attraction(
         new_file(path, what, force=force)
     rates, function = read_field(field)
     if everywhere and (degree, shape) != (None, None):
-        raise PolynomialError("--degree and --shape are of a region. Received --everywhere as well. Leave one out.")
+        raise PolynomialError(
+            "--degree and --shape cannot be used with --everywhere. Received both. Omit --everywhere, or these two."
+        )
     if everywhere:
         region = Region.of(stability(rates, function))
     else:

@@ -1,4 +1,4 @@
-"""Peaks of the loop that runs, proved: `task` reads the fault, `norms` the loop, `theorem` joins them."""
+"""Proved peaks of sampled loops: norms of the nominal loop, and a robust small-gain theorem."""
 
 from quakedesign.arguments import attach
 

@@ -65,7 +65,7 @@ _GROWS = 1 + 1e-6  # a factor per sample; eigenvalues that are 1 twice are round
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class LoopAnswer:
-    """Guarantee of one loop, or why there is none.
+    """Guarantee of one loop, or the reason why there is none.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class LoopAnswer:
         return self.found.proved
 
     def lines(self) -> list[str]:
-        """For people: the sentence first, then what was seen."""
+        """Lines of text: the guarantee first, then the worst case found."""
         if not self.found.proved:
             said = [self.found.sentence()]
             if self.asked_step is not None:
@@ -139,7 +139,7 @@ class LoopAnswer:
 
     @property
     def differentiator_bound(self) -> UpperBound | None:
-        """λ_d [m/s³] from which on the differentiator tells what is proved; None for a law without one."""
+        """Least λ_d [m/s³] of the differentiator for the guarantee; None for a law without one."""
         if not self.found.proved or measured_by(self.found.held.law) != MEASURED[2]:
             return None
         return UpperBound(least_bound(self.found.slip_acceleration, self.found.held.slip_noise, self.found.held.step))
@@ -165,7 +165,7 @@ class LoopAnswer:
         ]
 
     def limit_lines(self) -> list[str]:
-        """What no controller can do at the same T_s, for people; empty where that is not known."""
+        """Performance limits at the same T_s, as text; empty if unknown."""
         limit = self.limit
         if limit is None or not self.found.proved:
             return []
@@ -194,7 +194,7 @@ class LoopAnswer:
 
     @property
     def limit(self) -> SmallestPeak | None:
-        """What no controller can do at the same T_s and delay, told as much; None for the class ``rate``."""
+        """Performance limit at the same T_s, delay and measurements; None for the class ``rate``."""
         if not self.found.proved or self.found.task.change is not None:
             return None
         held = self.found.held
@@ -204,7 +204,7 @@ class LoopAnswer:
 
     @property
     def leaves_with_stick(self) -> bool:
-        """Whether a course with stick was found beyond the claims."""
+        """Whether the stick–slip plant exceeds the claims in the worst case found."""
         if not self.found.proved or self.worst_with_stick is None:
             return False
         claims, seen = self.found.claims, self.worst_with_stick
@@ -303,7 +303,7 @@ def _widths(found: Guarantee) -> list[tuple[Fraction, str]]:
 
 
 def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> LoopAnswer:
-    """A guarantee beside the worst that a search finds on its loop; about a second.
+    """A guarantee with the worst case found on its loop; about a second.
 
     Where a course with stick leaves a claim of a slow input gain, that of any gain takes its place if it is wider than
     the course.
@@ -359,7 +359,7 @@ _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of a
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingAnswer:
-    """Guarantee of slow sliding, or why there is none.
+    """Guarantee of slow sliding, or the reason why there is none.
 
     Attributes
     ----------
@@ -381,7 +381,7 @@ class SlidingAnswer:
 
     @cached_property
     def worst(self) -> WorstSliding | None:
-        """The worst that a search finds, beside a guarantee; some tenths of a second for every corner of the box."""
+        """Worst case found (lower bound); some tenths of a second for every corner of the box."""
         return worst_sliding(self.found) if self.found.proved else None
 
     def lines(self) -> list[str]:
@@ -392,7 +392,7 @@ class SlidingAnswer:
         return [f"proved: {self.found.sentence()}", f"worst found without inertia: {seen}"]
 
     def limit_lines(self) -> list[str]:
-        """What no controller can do at the same T_s; none is known."""
+        """Performance limits at the same T_s; none is known."""
         return []
 
     def task_lines(self) -> list[str]:
@@ -449,26 +449,29 @@ def answer_sliding(
     box = fault.box
     if controller != "elqr" or any((box.stiffness, box.damping, box.authority)):
         raise UnsupportedError(
-            "slow sliding is guaranteed of elqr, with the box of a, b and D_c that a spread gives; sliding modes do "
-            "not apply to it, as the slip rate follows the pressure at once. Received "
-            f"{controller} and the box {box.name}. Give --controller elqr, --box paper and --spread."
+            "slow sliding has a guarantee for the controller elqr, with the box of a, b and D_c given by --spread; "
+            "sliding modes do not apply, since the slip rate responds to the pressure without delay. Received the "
+            f"controller {controller} and the box {box.name}. Give --controller elqr, --box paper and --spread."
         )
     if not 0 <= spread < 1:
         meant = f": {float(spread):g} % is {float(spread) / 100:g}" if 1 <= spread < 100 else ""
-        raise ParameterError(f"a spread must be from 0 to below 1. Received {shortly(spread)}. Change it{meant}.")
+        raise ParameterError(f"spread must be from 0 to below 1. Received {shortly(spread)}. Give a fraction{meant}.")
     if stress is not None and stress <= 0:
-        raise ParameterError(f"a stress must be above 0. Received {shortly(stress)} Pa. Change it, or leave it out.")
+        raise ParameterError(
+            f"stress must be positive. Received {shortly(stress)} Pa. Omit stress for the largest that can be proved."
+        )
     if not (around.get("lag") or around.get("diffusion")):
         raise ParameterError(
-            "slow sliding is guaranteed through rock or a lag between well and fault. Received neither. Give "
-            "--diffusion, such as '833 s', or --lag."
+            "slow sliding needs a diffusion path or a lag between well and fault. Received neither. Give --diffusion, "
+            "such as '833 s', or --lag."
         )
     held_over = rational(fault.sampling_time) if step is None else step
     task = slow_sliding_plant(fault, stress or _TRIFLE, spread)
     pump = around.pop("pump", None)
     if pump is not None and pump.rate is not None:
         raise ParameterError(
-            f"the rate of a pump is not known of slow sliding. Received {shortly(pump.rate)} Pa/s. Leave it out."
+            "slow sliding has no guarantee with the rate limit of a pump. Received the rate limit "
+            f"{shortly(pump.rate)} Pa/s. Omit the rate limit."
         )
     prove = _proof(pump, tell, given=stress is not None)
     tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)

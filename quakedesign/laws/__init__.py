@@ -1,4 +1,4 @@
-"""Laws, one a file, found by looking into this folder; and the gains that the paper prints."""
+"""Control laws, one a file, discovered in this folder; and the gains of the paper."""
 
 from quakedesign.arguments import attach
 

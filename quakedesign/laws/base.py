@@ -1,4 +1,4 @@
-"""What every law offers to the proof, and what one that acts on a fault offers besides."""
+"""Base classes of laws: closed loop for proofs, and controllers of a fault."""
 
 import tomllib
 from abc import ABC, abstractmethod
@@ -23,7 +23,7 @@ from quakedesign.text import shown
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Signals:
-    """What a control law may read.
+    """Signals that a control law may use.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Signals:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Sampling:
-    """How a law of samples runs, and in no other way: with the scheme, the numbers and the T_s of what is proved of it.
+    """Sampling of a sampled law: scheme, settings, T_s and path of its guarantee.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ L = TypeVar("L", bound="Law", covariant=True)
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class BaseGains(Generic[L]):
-    """Gains of a law with λ = 1, the bound on |h'| that they are meant for, and where they come from.
+    """Gains of a law with λ = 1, their bound on |h'|, and their source.
 
     Attributes
     ----------
@@ -181,7 +181,7 @@ class Law(ABC):
 
     @classmethod
     def base_gains(cls) -> tuple[BaseGains[Self], ...]:
-        """Return gains that are known to be good, in the order in which a design tries them.
+        """Return base gains with a proof, in the order in which a design tries them.
 
         Raises
         ------
@@ -205,7 +205,7 @@ class Law(ABC):
 
     @property
     def lipschitz_limit(self) -> Fraction | None:
-        """Bound on |h'| [m/s³] from which on no certificate exists; None where the law knows of none."""
+        """Least |h'| [m/s³] for which no certificate exists; None if the law states none."""
         return None
 
     @classmethod
@@ -227,7 +227,7 @@ Designed = TypeVar("Designed", covariant=True)
 
 @runtime_checkable
 class DesignProblem(Protocol[Designed]):
-    """What a law is asked for when it is to find gains for a fault, and what it may ask for in turn.
+    """Design problem of a law for a fault, with the services that its design may use.
 
     Searches for proofs stand behind it, so that a law need not know them; see `quakedesign.synthesis.design`, also for
     its options ``objective``, ``continuous``, ``feedforward``, ``measured`` and ``noise``.
@@ -241,10 +241,10 @@ class DesignProblem(Protocol[Designed]):
         """Gains by the method of the family that a law belongs to."""
 
     def assessed(self, controller: "Controller") -> Designed:
-        """Verdict on gains that the law has found itself."""
+        """Verdict on gains of the law's own design."""
 
     def undecided(self, name: str, reason: str) -> Designed:
-        """Answer of a law that found no gains."""
+        """Result of a law without gains."""
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -261,43 +261,43 @@ class Controller(Law):
 
     @property
     def sampling(self) -> Sampling | None:
-        """How a law of samples runs; None for a law in continuous time, which any scheme runs."""
+        """Sampling of a sampled law; None for a law in continuous time, for which any scheme is possible."""
         return None
 
     @property
     def sampling_time(self) -> float | None:
-        """T_s [s] of a law of samples; None in continuous time."""
+        """T_s [s] of a sampled law; None in continuous time."""
         return float(self.sampling.step) if self.sampling else None
 
     def other_step(self, fault: Fault) -> str:
-        """That a law of samples does not run at the T_s of a fault, for which it is not proved; empty if it does."""
+        """Note that a sampled law has another T_s than the fault; empty if both are equal."""
         if self.sampling_time in (None, fault.sampling_time):
             return ""
         return f"NOT for the fault's T_s = {fault.sampling_time:g} s: it runs once every {self.sampling_time:.4g} s"
 
     @property
     def of_slip(self) -> Any:
-        """Matrices of a linear law of samples that is told the slip alone (`quakedesign.laws.LinearLaw`), or None."""
+        """Matrices of a sampled linear law that measures the slip alone (`LinearLaw`), or None."""
         return None
 
     @property
     def while_moving(self) -> "Controller":
-        """The law of a fault that moves, without what it does at rest alone."""
+        """The law without its limit at rest."""
         return self
 
     @property
     def scale(self) -> Fraction | None:
-        """λ [-], which stretches the loop; None for a law without."""
+        """Scale λ [-] of the loop; None for a law without."""
         return None
 
     @property
     def divisor(self) -> Fraction | None:
-        """μ0N̂0 [m²/kg], by which ν is divided; None for a law that asks for pressures."""
+        """Divisor μ0N̂0 [m²/kg] of ν; None for a law that computes the pressure directly."""
         return None
 
     @property
     def feedforward(self) -> FeedForward:
-        """What is added to ν from what is known of the plant."""
+        """Feed-forward of the nominal plant, added to ν."""
         return NONE
 
     @classmethod
@@ -306,17 +306,19 @@ class Controller(Law):
         return cls.from_values(values)
 
     def scaled(self, scale: str | float | Fraction) -> Self:
-        """Return the same base gains with another λ; refused by a law without."""
-        raise ParameterError(f"a scale belongs to a sliding mode. Received {self.name}. Leave it out.")
+        """Return the same base gains with another λ; raises for a law without."""
+        raise ParameterError(f"scale is for sliding modes. Received a scale for {self.name}. Omit the scale.")
 
     def with_divisor(self, divisor: Fraction) -> Self:
-        """Return the same gains with another divisor; refused by a law without."""
-        raise ParameterError(f"{self.name} has no divisor. Received the divisor {divisor}. Leave it out.")
+        """Return the same gains with another divisor; raises for a law without."""
+        raise ParameterError(f"{self.name} has no divisor. Received the divisor {divisor}. Omit the divisor.")
 
     def with_feedforward(self, feedforward: FeedForward) -> Self:
-        """Return the same law with another feed-forward; any but none is refused by a law without."""
+        """Return the same law with another feed-forward; raises for a law without."""
         if feedforward != NONE:
-            raise ParameterError(f"a feed-forward belongs to a sliding mode. Received {self.name}. Leave it out.")
+            raise ParameterError(
+                f"feedforward is for sliding modes. Received {feedforward.name} for {self.name}. Omit feedforward."
+            )
         return self
 
     @classmethod
@@ -330,7 +332,7 @@ class Controller(Law):
 
     @abstractmethod
     def pressure(self, signals: Signals) -> sp.Expr:
-        """Fluid pressure p [Pa] that the law asks for."""
+        """Commanded fluid pressure p [Pa]."""
 
     @abstractmethod
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:

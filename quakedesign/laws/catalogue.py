@@ -1,4 +1,4 @@
-"""Laws by name, found by looking into this folder; and the gains that the paper prints."""
+"""Control laws by name, discovered in this folder; and the gains of the paper."""
 
 import tomllib
 from dataclasses import replace
@@ -27,7 +27,7 @@ def laws() -> dict[str, type[Law]]:
 
 
 def law(name: str) -> type[Law]:
-    """Law of a given name, or of the user's own as ``module:Class``.
+    """Law by name, or a user-defined one as ``module:Class``.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def control_laws() -> dict[str, type[Controller]]:
 
 
 def control_law(name: str | type[Controller]) -> type[Controller]:
-    """Control law of a given name, or of the user's own, as a class or as ``module:Class``.
+    """Control law by name, or a user-defined one as a class or as ``module:Class``.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def published(fault_name: str) -> dict[str, Controller]:
 
 
 def family(name: str) -> tuple[BaseGains[Law], ...]:
-    """Base gains of a law that are known to be good, in the order in which a design tries them.
+    """Base gains of a law with a proof, in the order in which a design tries them.
 
     Raises
     ------

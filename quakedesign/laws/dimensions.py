@@ -74,7 +74,7 @@ class CarriedGains:
 
 
 def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction | None = None) -> CarriedGains:
-    """Gains that do on the target what the given ones do on the source.
+    """Gains of the target fault that are equivalent to those of the source fault.
 
     Parameters
     ----------
@@ -168,13 +168,13 @@ def _solved(conditions: list[sp.Expr], unknown: list[sp.Symbol], bases: list[sp.
     reduced, pivots = sp.linear_eq_to_matrix(conditions, *unknown, *bases)[0].rref()
     if any(pivot >= len(unknown) for pivot in pivots):
         raise ParameterError(
-            f"the terms of {law} do not fit together: no units of its gains make each term fit what it adds to. "
-            "Check exponents, and make every constant with a unit a gain."
+            f"the terms of {law} must have consistent units: no units of its gains make each sum consistent. "
+            "Check the exponents, and make every constant with a unit a gain."
         )
     free = [symbol.name for i, symbol in enumerate(unknown) if i not in pivots]
     if free:
         raise ParameterError(
-            f"the terms of {law} leave the unit of {', '.join(free)} open. Every gain must appear alone."
+            f"the terms of {law} do not determine the unit of {', '.join(free)}. Replace products of gains by one gain."
         )
     forms = {}
     for row, pivot in enumerate(pivots):

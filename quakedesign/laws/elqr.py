@@ -17,7 +17,7 @@ FEEDBACKS = ("error", "state")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureLimits:
-    """Where the pressure stops (ERRATA 23), and how fast the integrals come back meanwhile.
+    """Pressure limits (ERRATA 23) and the recovery time of the integrals at a limit.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class PressureLimits:
             raise ParameterError(
                 "limits must be lowest < 0 < highest with a positive recovery_time. Received "
                 f"{float(self.lowest):.4g} Pa, {float(self.highest):.4g} Pa, {float(self.recovery_time):.4g} s. "
-                "Withdrawal is negative."
+                "Give the withdrawal as a negative pressure."
             )
 
 
@@ -71,7 +71,7 @@ class ExtendedLQR(Controller):
         super().__post_init__()
         if self.limits is not None and not self.gains["k4"]:
             raise ParameterError(
-                "limits need k4 other than 0, through which the integrals are driven back. Received 0."
+                "k4 must not be 0 in a law with limits, whose anti-windup acts through k4. Received 0. Omit limits."
             )
         require_known(self.feedback, FEEDBACKS, "feedback")
 

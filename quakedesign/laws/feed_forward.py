@@ -1,4 +1,4 @@
-"""What a law may add to ν from what is known of the plant."""
+"""Feed-forward terms of ν from the nominal plant."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -40,7 +40,7 @@ class FeedForward:
             object.__setattr__(self, part, rational(getattr(self, part), f"feed-forward {part}"))
 
     def acceleration(self, slip: sp.Expr, slip_rate: sp.Expr, reference_acceleration: sp.Expr) -> sp.Expr:
-        """What is added to ν [m/s²] at x1 [m], x2 [m/s] and r'' [m/s²]."""
+        """Feed-forward of ν [m/s²] at x1 [m], x2 [m/s] and r'' [m/s²]."""
         parts = zip(
             (self.stiffness, self.damping, self.inertia), (slip, slip_rate, reference_acceleration), strict=True
         )

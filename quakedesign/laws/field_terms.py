@@ -1,4 +1,4 @@
-"""A closed loop as plain data: what a certificate file says of it, before it is bound to numbers."""
+"""A closed loop as plain data, as in a certificate file, without gains."""
 
 import dataclasses
 from collections.abc import Mapping

@@ -48,14 +48,15 @@ class Power:
         sound = 0 <= low <= high and 0 <= power.numerator <= MOST_EXPONENT and power.denominator <= MOST_EXPONENT
         if not sound or (self.argument not in SIGNALS and (isinstance(self.argument, str) or not self.argument)):
             raise ParameterError(
-                "a term of an implicit step needs 0 <= factor, an exponent p/q with p, q at most 6 that is not "
-                f"negative, and slip, rate or a sum. Received {shortly(low)} to {shortly(high)} and {power}."
+                f"a term of an implicit step needs a factor of 0 or more, an exponent p/q with 0 <= p, q <= "
+                f"{MOST_EXPONENT}, and the argument slip, rate or a sum. Received the factor {shortly(low)} to "
+                f"{shortly(high)} and the exponent {power}."
             )
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ImplicitRoot:
-    """The sum q, and between which lines its root is said to lie for the errors that are claimed of the loop.
+    """Implicit step: the sum q, and a sector bound of its root for the claimed errors.
 
     Attributes
     ----------
@@ -76,12 +77,13 @@ class ImplicitRoot:
     remainder: Fraction = Fraction(0)
 
     def __post_init__(self) -> None:
-        if not 0 < sum(1 for _ in _all_terms(self.pull)) <= MOST_TERMS:
-            raise ParameterError(f"an implicit step must have 1 to {MOST_TERMS} terms. Received none or more.")
+        count = sum(1 for _ in _all_terms(self.pull))
+        if not 0 < count <= MOST_TERMS:
+            raise ParameterError(f"an implicit step must have 1 to {MOST_TERMS} terms. Received {count}.")
         if not 0 <= self.slopes[0] <= self.slopes[1] <= 1 or self.remainder < 0:
             raise ParameterError(
-                "slopes of an implicit step must be ordered within [0, 1], its remainder not negative. Received "
-                f"{self.slopes[0]}, {self.slopes[1]}, {self.remainder}."
+                "slopes of an implicit step must be ordered within [0, 1], and its remainder 0 or more. Received the "
+                f"slopes {self.slopes[0]} and {self.slopes[1]}, and the remainder {self.remainder}."
             )
 
     @property

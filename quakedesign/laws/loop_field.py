@@ -42,7 +42,7 @@ def sound_states(states: Mapping[sp.Symbol, int], domain: str) -> dict[sp.Symbol
     signed = [s for s in states if any(getattr(s, f"is_{kind}") is not None for kind in _KINDS)]
     if signed:
         raise ParameterError(
-            f"a state takes both signs. Received {signed[0]}, declared otherwise. Declare it with real=True only."
+            f"states must be declared real only. Received {signed[0]}, declared with a sign. Declare it with real=True."
         )
     most = _HEAVIEST if domain == "cells" else 1
     wrong = {s: w for s, w in states.items() if not 1 <= w <= most}
@@ -119,7 +119,7 @@ def _require_known(expression: sp.Expr, known: set[sp.Symbol], what: str) -> Non
 
 
 def require_names(symbols: Iterable[sp.Symbol]) -> None:
-    """Refuse names that a certificate file cannot hold, and equal ones.
+    """Reject names that a certificate file does not admit, and equal names.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def require_names(symbols: Iterable[sp.Symbol]) -> None:
 
 
 def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Symbol]) -> None:
-    """Refuse a root of anything but a gain or constant.
+    """Reject a root of anything but a gain or constant.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Sym
 def require_units(
     units: Mapping[sp.Symbol, sp.Expr], states: Iterable[sp.Symbol], numbers: Iterable[sp.Symbol]
 ) -> None:
-    """Refuse a unit of anything but a state, or one that holds anything but gains, constants and roots.
+    """Reject a unit that is not of a state, or contains more than gains, constants and roots.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def require_units(
     order, known = tuple(states), set(numbers)
     for state, unit in units.items():
         if state not in order:
-            raise ParameterError(f"units belong to states, {', '.join(map(str, order))}. Received one of {state}.")
+            raise ParameterError(f"units belong to states, {', '.join(map(str, order))}. Received a unit of {state}.")
         _require_exact(sp.sympify(unit), f"the unit of {state}")
         _require_known(sp.sympify(unit), known, f"the unit of {state}")
 
@@ -259,8 +259,8 @@ def _require_bounded(speeds: Mapping[str, Iterable[Term]]) -> None:
         for of, exponent, kind in (factor for term in terms for factor in term.factors if factor[1] < 0):
             power = f"|{of}|^({exponent})" if kind == "a" else f"⌈{of}⌋^({exponent})"
             raise CertificateError(
-                f"every rate must be bounded near the origin. Received one of {state} with {power}, which is unbounded "
-                f"where {of} = 0. Multiply it by a power of {of} that makes up for it."
+                f"every rate must be bounded near the origin. Received {power} in the rate of {state}, unbounded at "
+                f"{of} = 0. Multiply this term by a power of {of} with a larger exponent."
             )
 
 

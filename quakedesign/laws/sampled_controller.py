@@ -58,7 +58,7 @@ def cut_off(
     *,
     within: tuple[sp.Expr, ...] | None = None,
 ) -> tuple[sp.Expr, ...]:
-    """The pressure [Pa] that is applied at a sample in place of what is asked for, and `RestLimit.STATES` after it.
+    """Applied pressure [Pa] within the limit at rest, and `RestLimit.STATES` afterwards.
 
     Parameters
     ----------
@@ -181,13 +181,15 @@ class SampledController(Controller):
 
     @classmethod
     def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
-        """Refuse: gains in order do not make its matrices."""
-        raise UnsupportedError("a sampled law is made from its matrices, not from gains in order. Use LinearLaw.")
+        """Raises: a sampled law is given by its matrices."""
+        raise UnsupportedError("a sampled law is given by its matrices, not by gains in order. Use LinearLaw.")
 
     @classmethod
     def loop_field(cls) -> LoopField:
-        """Refuse: it has no loop in continuous time."""
-        raise UnsupportedError("a sampled law has no loop in continuous time. Use a guarantee of the loop that runs.")
+        """Raises: a sampled law has no closed loop in continuous time."""
+        raise UnsupportedError(
+            "a sampled law has no closed loop in continuous time. Use the guarantee of the sampled loop."
+        )
 
 
 def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Expr:
@@ -215,7 +217,7 @@ def compensation_answered(rate_error: Any, end_rate: Any, estimate: Any, gain: A
 
 
 def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearLaw:
-    """The compensated step as matrices; its states are e2⁻, T_sB0·p⁻ and T_sB0·d, all in m/s, for numbers of one size.
+    """The compensated step as matrices, with the states e2⁻, T_sB0·p⁻ and T_sB0·d [m/s].
 
     The first sample, before which there is none, says nothing of the disturbance: there e2⁻ = e2.
 
@@ -234,8 +236,8 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
     """
     if not 0 < weight <= 1 or gain <= 0:
         raise ParameterError(
-            "a compensated step needs a weight in (0, 1] and a positive gain. Received "
-            f"{float(weight):.4g} and {float(gain):.4g}. Change them."
+            "a compensated step needs a weight in (0, 1] and a positive gain. Received the weight "
+            f"{float(weight):.4g} and the gain {float(gain):.4g}. Correct whichever is outside."
         )
     known = before, pushed, estimate, _, rate_error, end_rate = sp.symbols("before pushed estimate e1 e2 w")
     share, size = to_sympy(weight), to_sympy(gain)

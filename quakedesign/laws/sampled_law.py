@@ -71,13 +71,13 @@ class LinearLaw:
         require_sizes(self.states, self.update, self.measured, self.output, self.feedback, seen)
         if self.first and [len(row) for row in self.first] != [len(MEASURED)] * len(self.states):
             raise ParameterError(
-                f"first of a linear law needs {len(self.states)} rows of {len(MEASURED)} entries, or none. Received "
-                f"{len(self.first)} rows. Complete them."
+                f"first of a linear law must have {len(self.states)} rows of {len(MEASURED)} entries, or be empty. "
+                f"Received rows of {', '.join(str(len(row)) for row in self.first)} entries."
             )
         if self.applied and len(self.applied) != len(self.states):
             raise ParameterError(
-                f"applied of a linear law needs {len(self.states)} entries, or none. Received {len(self.applied)}. "
-                "Complete them."
+                f"applied of a linear law must have {len(self.states)} entries, one a state, or be empty. "
+                f"Received {len(self.applied)}."
             )
 
     @property
@@ -89,31 +89,30 @@ class LinearLaw:
 def require_sizes(
     states: tuple[str, ...], own: Matrix, measured: Matrix, output: Row, feedback: Row, seen: int = len(MEASURED)
 ) -> None:
-    """Refuse matrices of a law whose sizes do not fit, and too many states.
+    """Reject matrices of inconsistent sizes, and too many states.
 
     Raises
     ------
     ParameterError
     """
     n = len(states)
-    fits = (
-        n <= MOST_STATES
-        and len(set(states)) == n
-        and [len(row) for row in own] == [n] * n
-        and [len(row) for row in measured] == [seen] * n
-        and len(output) == n
-        and len(feedback) == seen
-    )
-    if not fits:
+    if n > MOST_STATES or len(set(states)) != n:
         raise ParameterError(
-            f"a linear law needs F of n × n, G of n × {seen}, C of n and D of {seen} entries, n at most {MOST_STATES} "
-            f"states of different names. Received {n} states ({', '.join(states)}) and other sizes. Complete them."
+            f"a linear law needs at most {MOST_STATES} states with different names. "
+            f"Received {n}: {', '.join(states[: MOST_STATES + 1])}."
         )
+    rows = {"F": (own, n, n), "G": (measured, n, seen), "C": ((output,), 1, n), "D": ((feedback,), 1, seen)}
+    for name, (matrix, height, width) in rows.items():
+        if [len(row) for row in matrix] != [width] * height:
+            raise ParameterError(
+                f"matrix {name} of a linear law with {n} states must be {height} × {width}. Received "
+                f"{len(matrix)} rows of {', '.join(str(len(row)) for row in matrix) or 'no'} entries."
+            )
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class NominalModel:
-    """Middle of what may be: e2' = s·e1 − w·e2 + β·b·(p − p*) + d, which a law predicts with.
+    """Nominal model of a law: e2' = s·e1 − w·e2 + β·b·(p − p*) + d.
 
     Attributes
     ----------
@@ -132,7 +131,7 @@ class NominalModel:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
-    """What a law expects, from its model; any numbers give a law, good ones a good one.
+    """Prediction of the slip-rate error by the model of a law; any coefficients define a law.
 
     Attributes
     ----------
@@ -160,8 +159,9 @@ class Prediction:
     def __post_init__(self) -> None:
         if len(self.of_pushes) != len(self.ahead_of_pushes) + 1 or not sum(self.of_pushes):
             raise ParameterError(
-                "a prediction needs pushes from 0 and from 1 sample ago on, those of the next sample not zero in all. "
-                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)}. Complete them."
+                "of_pushes of a prediction must have one entry more than ahead_of_pushes, with a sum other than 0. "
+                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)} entries, and the sum "
+                f"{shortly(sum(self.of_pushes))}."
             )
 
 
@@ -200,7 +200,7 @@ def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
 def disturbance_estimate(
     gains: tuple[Fraction, Fraction], weight: Fraction, prediction: Prediction, gain: Fraction
 ) -> LinearLaw:
-    """Feedback of slip and slip rate, and a level d of everything else that the last period showed.
+    """Feedback of slip and slip rate, with an estimate d of the disturbance over the last period.
 
     d ← d + a(e2 − π)/Σγ_j, p = −k1ê1 − k2ê2 − d/(βb) with ê = e as expected when p arrives, and
     π ← of_slip·e1 + of_rate·e2 + Σγ_j(βb·p_j + d). The estimate follows the innovation of the slip rate and has no
@@ -232,9 +232,9 @@ def disturbance_estimate(
 
 
 def require_gain(gain: Fraction) -> None:
-    """Refuse a model whose pressure does nothing, or the wrong thing."""
+    """Reject a model whose input gain is not positive."""
     if gain <= 0:
-        raise ParameterError(f"the gain of a model must be positive. Received {shortly(gain)} m²/kg. Check its sign.")
+        raise ParameterError(f"the input gain of a model must be positive. Received {shortly(gain)} m²/kg.")
 
 
 def answered(
@@ -246,7 +246,7 @@ def answered(
     ahead: Matrix,
     ahead_of_pushes: Matrix,
 ) -> tuple[Row, list[Row]]:
-    """The pressure asked for, and βb·p_j + d for it and every one that waits."""
+    """The commanded pressure, and βb·p_j + d for it and every delayed one."""
     one = Fraction(1)
     before = [combined((gain, row), (one, level)) for row in waiting]
     expected = [
@@ -292,7 +292,7 @@ def combined(*parts: tuple[Fraction, Row]) -> Row:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorPrediction:
-    """What an observer expects of both errors, from its model; any numbers give a law, good ones a good one.
+    """Prediction of both errors by the model of an observer; any coefficients define a law.
 
     Attributes
     ----------
@@ -317,8 +317,8 @@ class ErrorPrediction:
     def __post_init__(self) -> None:
         if len(self.of_pushes) != len(self.ahead_of_pushes) + 1:
             raise ParameterError(
-                "a prediction needs pushes from 0 and from 1 sample ago on. "
-                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)}. Complete them."
+                "of_pushes of a prediction must have one entry more than ahead_of_pushes. "
+                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)} entries."
             )
 
 
@@ -328,7 +328,7 @@ def slip_observer(
     prediction: ErrorPrediction,
     gain: Fraction,
 ) -> LinearLaw:
-    """Feedback of the slip alone: an observer of slip error, slip-rate error and the level d of everything else.
+    """Feedback of the slip alone: observer of slip error, slip-rate error and disturbance d.
 
     ê ← π + l·(e1 − π1) and d ← d + l3(e1 − π1), p = −k1ê1 − k2ê2 − d/(βb) with ê as expected when p arrives, and π ←
     Φê + Σγ_j(βb·p_j + d). The level has no trend. States: π [m, m/s], d [m/s²], and the pressures p_1, p_2 … asked for
@@ -373,7 +373,7 @@ def slip_observer(
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class PathModel:
-    """What a law expects of fault and path; any numbers give a law, good ones a good one.
+    """Model of fault and diffusion path in a law; any coefficients define a law.
 
     Attributes
     ----------
@@ -400,10 +400,16 @@ class PathModel:
     def __post_init__(self) -> None:
         n = max(map(len, self.of_pressures), default=0)
         sizes = [len(row) for row in (*self.kept, *self.of_pressures)]
-        if sizes != [n] * (n + 2) or len(self.of_pressures) != 2 or len(self.of_asked) != 2 or not self.of_constant[1]:
+        if sizes != [n] * (n + 2) or len(self.of_pressures) != 2 or len(self.of_asked) != 2:
             raise ParameterError(
-                f"a model of {n} pressures needs {n} × {n} numbers of how they are kept, and a constant pressure must "
-                "move the fault. Received another one. Complete it."
+                f"a path model with {n} pressures needs kept of {n} × {n}, of_pressures of 2 × {n} and of_asked of 2 "
+                f"entries. Received {len(self.kept)} and {len(self.of_pressures)} rows of "
+                f"{', '.join(map(str, sizes)) or 'no'} entries, and {len(self.of_asked)} entries of of_asked."
+            )
+        if not self.of_constant[1]:
+            raise ParameterError(
+                "the gain of a path model from a constant pressure to the slip rate must not be 0. Received 0. "
+                "Correct of_asked or of_pressures."
             )
 
     @property
@@ -413,7 +419,7 @@ class PathModel:
 
 
 def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: Fraction) -> LinearLaw:
-    """Feedback of slip, slip rate and the path's pressures, and a level d of all else that the last period showed.
+    """Feedback of slip, slip rate and path pressures, with an estimate d of the disturbance.
 
     d ← d + a(e2 − π)/Γ2, p = −k1e1 − k2e2 − Σ k_i(q_i + d/(βb)) − d/(βb), π ← Φ2e + βb(Σ m_2iq_i + n2p) + Γ2d, and q ←
     Rq + (1 − R1)p, which is not measured but known. States: π [m/s], d and βb·q [m/s²], for numbers of one size.
@@ -443,7 +449,7 @@ def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: 
 def observer_through_path(
     gains: Row, corrections: tuple[Fraction, Fraction, Fraction], model: PathModel, gain: Fraction
 ) -> LinearLaw:
-    """The same of the slip alone: an observer of slip error, slip-rate error and the level d of everything else.
+    """Feedback of the slip alone through a path: observer of both errors and disturbance d.
 
     ê ← π + l(e1 − π1) and d ← d + l3(e1 − π1), p of ê as that of `estimate_through_path` of e, and π ← Φê + βb(Σ m_iq_i
     + np) + Γd. States: π [m, m/s], d and βb·q [m/s²].
@@ -476,8 +482,8 @@ def _through(
     count, own = len(model.kept), len(names)
     if len(gains) != 2 + count or gain <= 0:
         raise ParameterError(
-            f"a law with a model of {count} pressures needs {2 + count} gains and a positive gain of the model. "
-            f"Received {len(gains)} and {shortly(gain)} m²/kg. Complete them."
+            f"a law with a path model of {count} pressures needs {2 + count} gains and a positive input gain of the "
+            f"model. Received {len(gains)} gains and the input gain {shortly(gain)} m²/kg."
         )
     path = [unit_row(len(level), {own + i: Fraction(1)}) for i in range(count)]
     away = [combined((1 / gain, q), (1 / gain, level)) for q in path]
@@ -506,7 +512,7 @@ def _through(
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class RestLimit:
-    """While a fault rests, its pressure is no further below any earlier one than a width.
+    """Limit at rest: the pressure is at most a width below any earlier one while the fault rests.
 
     And, beyond `width`, than `per_slip` for what the reference moved since. A loop whose pressure stays within P of p*,
     where dp*/dr is at most `per_slip`, never reaches a limit with a width of 2P: it takes nothing from what is proved.
@@ -549,19 +555,18 @@ class RestLimit:
 
     @property
     def range(self) -> tuple[Fraction, Fraction, Fraction] | None:
-        """Least and largest pressure, and up to which slip between two samples; None without them."""
+        """Least and largest pressure, and the slip between two samples up to which they hold, or None."""
         return None if self.least is None or self.largest is None else (self.least, self.largest, self.fastest)
 
     def __post_init__(self) -> None:
         if (self.least is None) != (self.largest is None) or not (self.least or 0) <= 0 <= (self.largest or 0):
             ends = [None if end is None else f"{shortly(end)} Pa" for end in (self.least, self.largest)]
             raise ParameterError(
-                "least and largest pressure of a limit at rest must have 0 between them, both or none of them given. "
-                f"Received {ends[0]} and {ends[1]}. Change them."
+                "least and largest of a limit at rest must be both omitted, or least <= 0 <= largest. "
+                f"Received least {ends[0]} and largest {ends[1]}."
             )
-        if self.width <= 0 or min(self.per_slip, self.resolution, self.fastest) < 0:
-            raise ParameterError(
-                "a limit at rest needs a positive width, and no other number below 0. Received "
-                f"{shortly(self.width)} Pa, {shortly(self.per_slip)} Pa/m and {shortly(self.resolution)} m. "
-                "Check their signs."
-            )
+        if self.width <= 0:
+            raise ParameterError(f"width of a limit at rest must be positive. Received {shortly(self.width)} Pa.")
+        for name, unit in (("per_slip", "Pa/m"), ("resolution", "m"), ("fastest", "m")):
+            if (value := getattr(self, name)) < 0:
+                raise ParameterError(f"{name} of a limit at rest must be 0 or more. Received {shortly(value)} {unit}.")

@@ -1,4 +1,4 @@
-"""What stands between law and fault, each element stated once: loops as exact matrices, schemes, actuators, sensors."""
+"""Loop setup between law and fault: exact loop matrices, schemes, actuators and sensors."""
 
 from quakedesign.arguments import attach
 

@@ -1,4 +1,4 @@
-"""A control law as sampled schemes read it: expressions in the signals of one sample, with their numbers set apart."""
+"""Discrete control law: expressions in the signals of one sample, with numbers as parameters."""
 
 from dataclasses import dataclass
 from typing import Any

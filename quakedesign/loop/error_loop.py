@@ -131,7 +131,7 @@ def _off_schedule(loop: PeriodicLoop, instants: Instants, path: "_Path") -> Peri
 def starts(
     law: LinearLaw, size: int, errors: tuple[Fraction, Fraction], noise: tuple[Fraction, Fraction]
 ) -> tuple[Row, ...]:
-    """Columns of the box from which a held loop of so many states starts, see `PeriodicLoop.start`.
+    """Columns of the box of initial states of a sampled loop, see `PeriodicLoop.start`.
 
     Its pressures are 0, the errors within their bounds [m], [m/s], and the law's states what it makes of them as they
     are measured, within bounds of noise.
@@ -158,18 +158,18 @@ class _Path:
         step, delay, lag, diffusion = self.step, self.delay, self.lag, self.diffusion
         if step <= 0 or not 0 <= delay <= MOST_PERIODS * step or lag < 0:
             raise ParameterError(
-                f"a held loop needs a positive step, a delay of 0 to {MOST_PERIODS} steps and a lag of 0 or more. "
-                f"Received {shortly(step)} s, {shortly(delay)} s, {shortly(lag)} s. Shorten the delay."
+                f"step must be positive, delay 0 to {MOST_PERIODS} steps, and lag 0 or more. Received the step "
+                f"{shortly(step)} s, the delay {shortly(delay)} s and the lag {shortly(lag)} s. Shorten the delay."
             )
         if diffusion and SHORTEST * diffusion < step:
             raise ParameterError(
-                f"diffusion must take at least T_s/{SHORTEST}, here {float(step / SHORTEST):.4g} s, or nothing. "
-                f"Received {shortly(diffusion)} s. Leave it out."
+                f"the diffusion time L^2/D must be 0, or at least T_s/{SHORTEST} = {float(step / SHORTEST):.4g} s. "
+                f"Received {shortly(diffusion)} s. Omit diffusion, or shorten the step."
             )
         if diffusion and self.watched:
             raise ParameterError(
-                "jitter and the rate of a pump are known of pressures that reach the fault at once or through a lag. "
-                f"Received rock of {shortly(diffusion)} s. Leave one of them out."
+                "jitter, averaging and the rate limit of a pump have no guarantee with a diffusion path. Received "
+                f"L^2/D = {shortly(diffusion)} s with one of them. Omit diffusion, or jitter, averaging and rate limit."
             )
 
     @property
@@ -219,7 +219,7 @@ def _drift(law: LinearLaw, authority: Fraction, path: _Path) -> Row:
 
 
 def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
-    """States of a law that asks for p without errors and has the rates v: Mz = v and Cz = p, by elimination.
+    """Steady states of a law with zero errors: Mz = v and Cz = p, by elimination.
 
     Raises
     ------
@@ -238,8 +238,8 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
             pivots.append((column, pivot))
     if any(row[n] for row in rows):
         raise ParameterError(
-            "a law must be able to ask for a constant pressure without errors. Received one that cannot. "
-            "Give it an integral or an estimate of the disturbance."
+            "a law must have a steady state with zero errors and a constant pressure. Received a law without "
+            "integral action. Add an integral of the slip error, or an estimate of the disturbance."
         )
     solution = [Fraction(0)] * n
     for column, pivot in reversed(pivots):
@@ -441,7 +441,7 @@ _ONE = Fraction(1)
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingModel:
-    """Middle of what may be about sliding at V, with v = Ve^y, θ = (D/V)e^z, slip error x, pressure error q = p − p*.
+    """Nominal model about sliding at V: v = Ve^y, θ = (D/V)e^z, slip error x, q = p − p*.
 
     strength·y + weakening·z = −stiffness·x + coefficient·q + e, x′ = V·c·y, z′ = −ρ(c_y·y + c_z·z), ρ = V/D. With all
     slopes 1 this is the linearisation about sliding at V, the same for both laws of the state.
@@ -553,7 +553,7 @@ def sliding_loop(
 
 
 def at_once(model: SlidingModel) -> dict[tuple[str, str], Fraction]:
-    """What an input of size 1 adds to an output at the same instant, by (output, input)."""
+    """Direct feedthrough from each input to each output, by (output, input)."""
     heard = {"log_rate": _ONE, "ageing": model.evolution_slope, "strength": model.direct}
     sizes = {"stress": 1 / model.strength, "left_out": model.coefficient / model.strength}
     return {(output, name): share * size for output, share in heard.items() for name, size in sizes.items()}

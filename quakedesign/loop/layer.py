@@ -43,7 +43,7 @@ _SHORT = Fraction(1, 10**20)  # δ
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Layer:
-    """The rock between well and fault.
+    """Diffusion path between well and fault.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ MEASURED = ("slip-and-rate", "slip", "differentiator")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pump:
-    """Limits of the pressure at the valve; None where there are none.
+    """Limits of the pressure at the valve; None for no limit.
 
     Attributes
     ----------
@@ -50,12 +50,13 @@ class Pump:
         alone = (self.least is None) != (self.largest is None)
         if alone or not low <= 0 <= high or (self.least is not None and low == high):
             raise ParameterError(
-                "the least and the largest pressure of a pump must have 0 between them. Received "
-                f"{shortly(low)} Pa and {shortly(high)} Pa. Change their signs."
+                "the least pressure of a pump must be 0 or less, the largest 0 or more, and both be given. Received "
+                f"{shortly(low)} Pa and {shortly(high)} Pa. Give the withdrawal as negative, the injection as positive."
             )
         if self.rate is not None and self.rate <= 0:
             raise ParameterError(
-                f"the rate limit of a pump must be positive. Received {shortly(self.rate)} Pa/s. Omit it for none."
+                f"the rate limit of a pump must be positive. Received {shortly(self.rate)} Pa/s. "
+                "Omit the rate limit if the pump has none."
             )
 
     @property
@@ -64,7 +65,7 @@ class Pump:
         return None if self.least is None or self.largest is None else (self.least, self.largest)
 
     def exceeded(self, low: LowerBound, high: UpperBound) -> str:
-        """Why pressures between two bounds exceed the limits; empty where they do not."""
+        """Reason why pressures between two bounds exceed the limits; empty if they do not."""
         if self.limits is None or (self.limits[0] <= low and high <= self.limits[1]):
             return ""
         return (
@@ -73,7 +74,7 @@ class Pump:
         )
 
     def too_slow(self, step: UpperBound | None, time: Fraction) -> str:
-        """Why a change of the pressure may take longer than a time [s]; empty where it does not."""
+        """Reason why a pressure change may take longer than a time [s]; empty if it does not."""
         if self.rate is None or (step is not None and step <= self.rate * time):
             return ""
         most = "of any size" if step is None else f"of {step.quantity('Pa')}"
@@ -111,7 +112,7 @@ def quantity(unit: str, text: str, default: Fraction | None = Fraction(0)) -> An
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopSetup:
-    """What lies between a control law and the fault: sampling, delay, actuator, diffusion path, noise, initial errors.
+    """Loop setup: sampling, delay, actuator, diffusion path, noise, initial errors.
 
     Every field is given as a number in the SI unit, a decimal or p/q as text, or a text with a unit, such as
     ``LoopSetup(step="184 ms", slip_noise="5 um")``, and is held as a `Fraction` in the SI unit. None means: not given.
@@ -217,7 +218,7 @@ class LoopSetup:
             exact = exact_value(value, part["unit"], title)
             if exact < 0:
                 raise ParameterError(
-                    f"{title} must be 0 or more. Received {shortly(exact)} {part['unit']}. Omit the sign."
+                    f"{title} must be 0 or more. Received {shortly(exact)} {part['unit']}. Omit the minus sign."
                 )
             object.__setattr__(self, name, exact)
         if self.step is not None:
@@ -287,7 +288,7 @@ _NOT_OF_A_LOOP = ("step", "measured", "averaging_time", "saturation", "withdrawa
 
 
 def require_step(step: Fraction) -> None:
-    """Refuse a sampling time [s] for which no loop is computed in floating point.
+    """Reject a sampling time [s] for which no loop is computed in floating point.
 
     Raises
     ------

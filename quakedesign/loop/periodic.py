@@ -41,7 +41,7 @@ class Segment:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Fading:
-    """An input b·w that dies out after the jump of a segment: |w| ≤ W·(height·e^{−rate·θ} + floor) a time θ after it.
+    """An input b·w that decays after a jump: |w| ≤ W·(height·e^{−rate·θ} + floor) at a time θ after it.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Fading:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Pulse:
-    """An input b·w that is there near the jump of a segment alone, before it or after it: |w| ≤ W.
+    """An input b·w that acts only near the jump of a segment, before or after it: |w| ≤ W.
 
     ∫|w| over the time before the jump, over `before`, and that over the time after it, over `after`, are at most W in
     all.
@@ -96,7 +96,7 @@ class Pulse:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class PeriodicLoop:
-    """x' = Ax + Σ b_i·w_i between jumps; the segments follow each other for ever, the first one at time 0.
+    """x' = Ax + Σ b_i·w_i between jumps; segments repeat periodically for all t ≥ 0, the first at t = 0.
 
     Without any segment there are no jumps: it flows for ever.
 
@@ -149,7 +149,7 @@ class PeriodicLoop:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Instants:
-    """What is due at an instant happens within some time of it, each time anew, whatever the course.
+    """Timing errors of measurements and pressures: any sequence within given bounds [s].
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class Instants:
     ramp: Fraction = Fraction(0)
 
     def require_within(self, step: Fraction, part: Fraction) -> None:
-        """Refuse what may reach another event, for pressures that are due some part of a step after a sample [s].
+        """Reject timing errors that may reach another event; `part` [s] is the delay after a sample.
 
         Raises
         ------
@@ -174,13 +174,14 @@ class Instants:
         """
         if min(self.measured, self.arrived, self.ramp) < 0 or 2 * self.measured > step:
             raise ParameterError(
-                f"jitter must be 0 or more and at most half a step of {float(step):.4g} s. Received "
-                f"{float(self.measured):.4g} s of measurements, {float(self.arrived):.4g} s of pressures. Shorten it."
+                f"jitter must be from 0 to half a step of {float(step):.4g} s. Received {float(self.measured):.4g} s "
+                f"for measurements and {float(self.arrived):.4g} s for pressures. Reduce the jitter."
             )
         after = self.arrived + self.ramp
         if self.arrived > (part or step) or after > step - part or self.arrived + after > step:
             raise ParameterError(
-                "a pressure must begin and end to change between two samples as they are due. Received one due "
-                f"{float(part):.4g} s after a sample, every {float(step):.4g} s, off by {float(self.arrived):.4g} s, "
-                f"that changes for {float(self.ramp):.4g} s. Shorten that, or change the delay."
+                "a pressure change must begin and end within one sampling interval. Received a change due "
+                f"{float(part):.4g} s after a sample, with the step {float(step):.4g} s, jitter of "
+                f"{float(self.arrived):.4g} s and a ramp of {float(self.ramp):.4g} s. Reduce jitter or ramp, or change "
+                "the delay."
             )

@@ -23,13 +23,13 @@ _LARGEST_RAMP = Fraction(8, 23)
 
 
 def static_friction(fault: Fault) -> Fraction:
-    """μ* [-], friction at rest where the fault starts, exact or rounded."""
+    """Static friction coefficient μ* [-] at the initial slip, exact or rounded."""
     start = sp.nsimplify(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)), rational=True)
     return fraction_of(start) if start.is_Rational else rational(str(sp.N(start, 50)))
 
 
 def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingPlant:
-    """Plant of a fault that slides at V, the first rate of its reference, under a stress of at most `stress` [Pa].
+    """Slow-sliding plant at V, the first rate of the reference, under a stress of at most `stress` [Pa].
 
     The ranges of a, b and D are their values and `spread` of them to both sides [-]; that of μ* follows from a − b.
 
@@ -41,9 +41,9 @@ def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fracti
     if fault.friction.name not in _LAWS or fault.friction.stress_sensitivity:  # type: ignore[attr-defined]
         sensitivity = getattr(fault.friction, "stress_sensitivity", 0)
         raise UnsupportedError(
-            f"a guarantee of slow sliding needs friction of a law {', '.join(_LAWS)}, its state deaf to the normal "
-            f"stress. Received {fault.friction.name}{f', stress_sensitivity {sensitivity:g}' * bool(sensitivity)}. "
-            "Simulate it."
+            f"a guarantee of slow sliding needs a friction law among {', '.join(_LAWS)}, with stress_sensitivity 0. "
+            f"Received {fault.friction.name}{f', stress_sensitivity {sensitivity:g}' * bool(sensitivity)}. "
+            "Simulate this fault instead."
         )
     state_law, regularised = _LAWS[fault.friction.name]
     if getattr(fault.friction, "evolution", "") == "slip":
@@ -52,8 +52,8 @@ def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fracti
     reference = SlidingReference(task=fault.reference)
     if reference.swing >= 1:
         raise UnsupportedError(
-            f"a guarantee of slow sliding needs a ramp below {_LARGEST_RAMP}, with which the rate of the reference "
-            f"doubles. Received {fault.reference.ramp:g}. Make it smaller, or simulate it."
+            f"a guarantee of slow sliding needs a ramp below {_LARGEST_RAMP}, at which the reference rate doubles. "
+            f"Received the ramp {fault.reference.ramp:g}. Reduce the ramp, or simulate this fault instead."
         )
     rate = reference.first_rate
     named = {axis: rational(getattr(fault.friction, axis)) for axis in AXES[:3]}
@@ -111,7 +111,7 @@ def uncertain_plant(fault: Fault, *, rate_limited: bool = False) -> UncertainPla
     amplitude, change = fault.disturbance_bounds
     if rate_limited and given.constant:
         raise ParameterError(
-            "the class rate needs a disturbance that starts at 0. Received a constant one of "
+            "the disturbance class rate needs a disturbance that is 0 at t = 0. Received a constant disturbance of "
             f"{given.constant!r} m/s^2. Use the class amplitude."
         )
     stage = sp.Symbol("s")

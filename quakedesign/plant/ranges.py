@@ -1,4 +1,4 @@
-"""From a fault's data to the ranges and inputs of its error loop, by rational inequalities.
+"""Ranges and inputs of the error loop from the data of a fault, by rational inequalities.
 
 About p*(t), the pressure that would hold the fault at rest at the reference r(t), the error e = x − (r, r′) follows
 
@@ -19,6 +19,7 @@ from math import comb
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
+from quakedesign.exact import shortly
 from quakedesign.laws import NominalModel
 
 Range = tuple[Fraction, Fraction]
@@ -27,7 +28,7 @@ _HALVINGS = 7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:
-    """All that is used of friction [-], [1/m], [s/m]: μ at rest at the start, its bounds, and its chords' bounds.
+    """Friction of a plant: μ at rest at t = 0 [-], its bounds [-], and bounds of its chords [1/m], [s/m].
 
     Attributes
     ----------
@@ -91,22 +92,30 @@ class UncertainPlant:
 
     def __post_init__(self) -> None:
         law = self.friction
-        rock = (self.density, self.shear_modulus, self.length, self.normal_stress)
-        positive = (*rock, law.least, self.target_slip, self.operation_time)
-        nonnegative = (self.damping, law.weakening, law.strengthening, law.rate_slope, self.amplitude)
-        sound = (
-            min(positive) > 0
-            and min(nonnegative) >= 0
-            and all(0 <= v < 1 for v in self.spreads)
-            and law.least <= law.static <= law.largest
-            and (self.change is None or self.change >= 0)
-        )
-        if not sound:
-            raise ParameterError(f"the data of {self.name} must be physical. Received others. Check their signs.")
+        least, static, largest = law.least, law.static, law.largest
+        for name in ("density", "shear_modulus", "length", "normal_stress", "target_slip", "operation_time"):
+            self._require(getattr(self, name) > 0, name, "positive", getattr(self, name))
+        self._require(least > 0, "least friction coefficient", "positive", least)
+        for name in ("damping", "amplitude"):
+            self._require(getattr(self, name) >= 0, name, "0 or more", getattr(self, name))
+        for name in ("weakening", "strengthening", "rate_slope"):
+            self._require(getattr(law, name) >= 0, f"friction {name}", "0 or more", getattr(law, name))
+        for name, value in zip(("stiffness", "damping", "authority"), self.spreads, strict=True):
+            self._require(0 <= value < 1, f"spread of {name}", "from 0 to below 1", value)
+        between = f"between the least, {shortly(least)}, and the largest, {shortly(largest)}"
+        self._require(least <= static <= largest, "static friction coefficient", between, static)
+        if self.change is not None:
+            self._require(self.change >= 0, "disturbance rate", "0 or more", self.change)
         if not _rises_from_rest_to_rest(self.shape):
             raise ParameterError(
-                "the reference's shape must rise from 0 to 1 with slope 0 at both ends. Received another. "
-                "Give the coefficients, lowest power first."
+                f"the shape of the reference of {self.name} must rise from 0 to 1 with slope 0 at both ends. "
+                f"Received the coefficients {', '.join(map(shortly, self.shape))}. Give them lowest power first."
+            )
+
+    def _require(self, holds: bool, name: str, condition: str, value: Fraction) -> None:
+        if not holds:
+            raise ParameterError(
+                f"{name} of {self.name} must be {condition}. Received {shortly(value)}. Correct the value."
             )
 
     def _spread(self, value: Fraction, number: int) -> Range:
@@ -139,7 +148,7 @@ class UncertainPlant:
 
     @cached_property
     def stress(self) -> Range:
-        """σ′ − p* [Pa] at every reference: a ratio that is monotone in r between the points tried, and in μ and κ."""
+        """Range of σ′ − p* [Pa] along the reference; monotone in μ, κ, and in r between the points tried."""
         law, target = self.friction, self.target_slip
         breaks = {Fraction(0), target}
         breaks |= {(law.static - law.least) / law.weakening} if law.weakening else set()
@@ -199,7 +208,7 @@ class UncertainPlant:
         return bound * self.target_slip / self.operation_time**3
 
     def require_smooth_reference(self) -> None:
-        """Refuse a reference whose acceleration jumps at its start or end.
+        """Reject a reference whose acceleration jumps at its start or end.
 
         Raises
         ------
@@ -208,13 +217,13 @@ class UncertainPlant:
         bent = _derived(self.shape, 2)
         if bent[0] or sum(bent):
             raise ParameterError(
-                "a law that uses the slip rate itself needs a reference that starts and ends without acceleration. "
-                f"Received one of {self.name} that does not. Feed back the errors."
+                "state feedback of the slip rate needs a reference that starts and ends without acceleration. "
+                f"Received the reference of {self.name}, whose acceleration jumps there. Use feedback 'error'."
             )
 
     @cached_property
     def model(self) -> NominalModel:
-        """Middle of the ranges."""
+        """Nominal model: middle of the ranges."""
         s, w, beta = ((low + high) / 2 for low, high in (self.slip_chord, self.rate_chord, self.beta))
         return NominalModel(slip=s, rate=w, gain=beta * self.authority)
 

@@ -11,7 +11,7 @@ from typing import get_args
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
-from quakedesign.exact import six_digits
+from quakedesign.exact import shortly, six_digits
 from quakedesign.loop import StateLaw
 
 # ----------------------------------------------------------------------
@@ -83,19 +83,27 @@ class SlidingPlant:
     regularised: bool = False
 
     def __post_init__(self) -> None:
-        ends = [self.ranges[axis] for axis in AXES] if set(self.ranges) == set(AXES) else []
-        positive = (self.density, self.shear_modulus, self.length, self.rate, *(low for low, _ in ends))
-        ordered = len(ends) == len(AXES) and all(low <= high for low, high in ends) and 0 <= self.swing < 1
-        if not ordered or min(positive) <= 0 or min(self.damping, self.distance, self.ramp, self.stress) < 0:
+        if set(self.ranges) != set(AXES):
             raise ParameterError(
-                f"slow sliding needs ordered ranges of {', '.join(AXES)} above 0, density, modulus, length and rate "
-                "above 0, damping, distance, ramp and stress not below, a swing from 0 to below 1. Received others for "
-                f"{self.name}."
+                f"ranges of {self.name} must be given for {', '.join(AXES)}. "
+                f"Received {', '.join(self.ranges) or 'none'}."
             )
+        for axis, (low, high) in self.ranges.items():
+            ends = f"{shortly(low)} to {shortly(high)}"
+            self._require(0 < low <= high, f"range of {axis}", "positive, its lower end first", ends)
+        for name in ("density", "shear_modulus", "length", "rate"):
+            self._require(getattr(self, name) > 0, name, "positive", shortly(getattr(self, name)))
+        for name in ("damping", "distance", "ramp", "stress"):
+            self._require(getattr(self, name) >= 0, name, "0 or more", shortly(getattr(self, name)))
+        self._require(0 <= self.swing < 1, "swing", "from 0 to below 1", shortly(self.swing))
         require_known(self.state_law, get_args(StateLaw), "state_law")
 
+    def _require(self, holds: bool, name: str, condition: str, value: str) -> None:
+        if not holds:
+            raise ParameterError(f"{name} of {self.name} must be {condition}. Received {value}. Correct the value.")
+
     def differences(self, asked: "SlidingPlant") -> list[str]:
-        """What of another task a proof for this one does not cover, each with both values, SI; empty if everything is.
+        """Differences to another task that a proof for this one does not cover, with both values, SI.
 
         Constants of the fault, V, the plan and the law of friction must be the same; constants of friction, distance,
         swing and stress lie within those of the proof. The name is none of it.
@@ -144,7 +152,7 @@ class SlidingPlant:
 
     @property
     def drift(self) -> Fraction:
-        """How fast p* may leave the plan [Pa/s]."""
+        """Largest rate of p* relative to the planned pressure [Pa/s]."""
         along = max(abs(self.stiffness * self.rate / mu - self.ramp) for mu in self.ranges["coefficient"])
         return along * (1 + self.swing)
 
@@ -169,7 +177,7 @@ WHOLE: Cuts = (None,)
 
 
 def cells(task: SlidingPlant, cuts: Cuts) -> tuple[SlidingPlant, ...]:
-    """The same task on every cell.
+    """The task on every cell of the box.
 
     Raises
     ------
@@ -187,14 +195,14 @@ def cells(task: SlidingPlant, cuts: Cuts) -> tuple[SlidingPlant, ...]:
             boxes += reversed(parts(box, *cut))
     if boxes or len(cuts) != 2 * len(leaves) - 1 or len(leaves) > MOST_CELLS:
         raise ParameterError(
-            f"a box must be cut into 1 to {MOST_CELLS} cells, with one cut less. Received {len(cuts)} entries and "
-            f"{len(leaves)} cells. Complete them."
+            f"n cells of a box, n from 1 to {MOST_CELLS}, need 2n - 1 entries of cuts. Received {len(cuts)} entries "
+            f"for {len(leaves)} cells. Add or remove entries."
         )
     return tuple(leaves)
 
 
 def parts(task: SlidingPlant, axis: str, at: Fraction) -> tuple[SlidingPlant, SlidingPlant]:
-    """Both parts of a box, below and above a cut.
+    """The two parts of a box, below and above a cut.
 
     Raises
     ------
@@ -204,7 +212,8 @@ def parts(task: SlidingPlant, axis: str, at: Fraction) -> tuple[SlidingPlant, Sl
     low, high = task.ranges.get(axis, (at, at))
     if not low < at < high:
         raise ParameterError(
-            f"a cut must be across one of {', '.join(AXES)}, inside its box. Received {axis} at {at}. Check it."
+            f"a cut must be along one of {', '.join(AXES)}, strictly within its range. Received {axis} at "
+            f"{shortly(at)}. Move the cut."
         )
     below, above = ({**task.ranges, axis: ends} for ends in ((low, at), (at, high)))
     return replace(task, ranges=below), replace(task, ranges=above)

@@ -135,7 +135,7 @@ class Told:
 
     @property
     def noisy(self) -> bool:
-        """Whether noise hides anything: what is known exactly of the slip rate tells as much as both."""
+        """Whether measurement noise limits controllers: noisy slip, and a noisy or unmeasured slip rate."""
         return bool(self.slip_noise and (self._alone or self.rate_noise))
 
     @property
@@ -265,7 +265,7 @@ class SlidingLimits(Limits):
 
     @property
     def beyond(self) -> bool:
-        """Whether no controller can hold the fault through the rock that was asked about."""
+        """Whether the given diffusion path is infeasible for every controller."""
         farthest = self.largest_diffusion_time.impossible_beyond
         return farthest is not None and self.rock > farthest
 
@@ -282,7 +282,7 @@ class SlidingLimits(Limits):
 
     @property
     def natural_peak(self) -> float | None:
-        """None: it takes a cycle to know."""
+        """None: it needs a simulated cycle."""
         return None
 
     def to_dict(self) -> dict[str, Any]:
@@ -295,7 +295,7 @@ class SlidingLimits(Limits):
 
 
 def above_the_reference(found: SlidingGuarantee) -> UpperBound:
-    """What is proved of the slip rate, less V [m/s]."""
+    """Proved bound of the slip rate, less V [m/s]."""
     return UpperBound(found.peak_slip_rate - found.task.rate)
 
 
@@ -314,7 +314,7 @@ def limits(
     prove: bool = True,
     **given: Quantity | None,
 ) -> Limits:
-    """What no controller can do with a fault whose disturbance is of the class ``amplitude``.
+    """Performance limits of every controller for a disturbance of the class ``amplitude``.
 
     With friction that has a state: in slow sliding along its task, of the nominal plant linearised there.
 

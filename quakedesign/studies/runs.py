@@ -89,7 +89,7 @@ _SHOWN = 500  # D_c/V of a slow task that are run: the loop settles within some 
 
 @dataclass(frozen=True, kw_only=True)
 class StateRun:
-    """A run, and what it comes to.
+    """A simulation of a fault with a state, and its result.
 
     Attributes
     ----------
@@ -252,7 +252,7 @@ def run_state(
 
 
 def natural_run(fault: Fault) -> StateRun:
-    """What a fault does that is loaded at the reference rate of its law, with inertia: its cycle, or that it creeps.
+    """Natural behaviour at the reference rate of the friction law, with inertia: cycle or creep.
 
     Where one method cannot go on another one is taken, and without inertia if there is none: the run says which. Where
     none can it says why, in `failed`.
@@ -310,7 +310,7 @@ def designed_run(
 
 @dataclass(frozen=True, kw_only=True)
 class HeldRun:
-    """A controlled run, and what it comes to.
+    """A controlled simulation, and its result.
 
     Attributes
     ----------
@@ -476,7 +476,7 @@ def sensor(
     quantum: float = 0.0,
     inner_steps: int = 1,
 ) -> Measurement | OutputFeedback:
-    """What a law is told: exact or noisy states, or estimates from the noisy slip.
+    """Sensor of a law: exact or noisy states, or estimates from the noisy slip.
 
     Parameters
     ----------
@@ -530,7 +530,7 @@ def sensor(
 
 
 def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, *, scheme: str = "explicit") -> Premise:
-    """Whether λ_d exceeds what slip and law ask of it, jointly with the sampling period (ERRATA 21).
+    """Premise: λ_d exceeds the bound of slip and law, jointly with the sampling period (ERRATA 21).
 
     The largest |x1''| comes from a run with exact states over 4000 sampling periods. The condition is sufficient for
     the differentiator to follow, not necessary for the loop to work. Where that run diverges, nothing is certified.
@@ -585,7 +585,7 @@ PUBLISHED, DESIGNED, CONTINUOUS = ("published",), ("designed",), ("continuous",)
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """Controller, and what is certified of it without asking a solver.
+    """Controller with its certified claim, without a solver.
 
     Attributes
     ----------
@@ -601,7 +601,7 @@ class Choice:
     claim: Guarantee | SlidingGuarantee | None = None
 
     def noise(self, seed: int) -> Measurement:
-        """What the controller is told wrongly at most by its guarantee, anywhere within that; none without one."""
+        """Bounds of the measurement errors in the guarantee of the controller; none without one."""
         held = self.claim.held if self.claim else None
         off = {name: float(bound) for name, bound in held.noise.items()} if held else {}
         return Measurement(**off, seed=seed, bounded=True) if off else EXACT
@@ -778,7 +778,7 @@ def run_single(
     initial: Mapping[str, float] | None = None,
     **settings: Any,
 ) -> tuple[Trajectory, list[Premise]]:
-    """Run a loop, and say which premises hold that a run decides.
+    """Simulate a loop, and decide the premises that a simulation can decide.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What sampling does to a law: every scheme beside the published controllers, orders, noise and input gain."""
+"""Effect of sampling on a law: all schemes, published controllers, orders, noise, input gain."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ class SchemeRow:
 
 @dataclass(frozen=True, kw_only=True)
 class SamplingReport:
-    """How a law bears sampling.
+    """Report of the effect of sampling on a law.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Gains carried between faults, as the command ``scale`` tells it."""
+"""Gains scaled from one fault to another, as in the command ``scale``."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

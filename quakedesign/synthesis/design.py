@@ -42,7 +42,7 @@ from quakedesign.synthesis.method import GainProblem, SlowSlidingDesign, method_
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Design:
-    """A controller for one fault, what is proved of it, and under which premises.
+    """A controller for one fault, its proof, and the premises of the proof.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Design:
 
     @property
     def measurement(self) -> Measurement | None:
-        """What the controller is told in a run, with the noise that it is designed for; None without."""
+        """Sensor of a simulation with the noise of the design; None without."""
         slip, rate = float(self.setup.slip_noise), float(self.setup.rate_noise)
         return Measurement(slip_noise=slip, rate_noise=rate, bounded=True) if slip or rate else None
 
@@ -112,7 +112,7 @@ class Design:
 
     @property
     def other_step(self) -> str:
-        """That a law of samples does not run at the fault's T_s, for which it is not proved; empty if it does."""
+        """Note that a sampled law has another T_s than the fault; empty if both are equal."""
         return self.controller.other_step(self.fault) if self.controller else ""
 
     @property
@@ -136,7 +136,7 @@ class Design:
         return method_of(type(law)).variants(self.fault, law, self.certificate) if law else ()
 
     def certified_peaks(self, disturbance_class: str = "amplitude") -> ContinuousPeaks | NoGuarantee:
-        """How far an e-LQR lets slip, slip rate and pressure go at most if the pressure acts at once.
+        """Certified peaks of slip, slip rate and pressure of an e-LQR in continuous time.
 
         What holds for the law as it runs is `guarantee`.
 
@@ -157,7 +157,7 @@ class Design:
 
     @property
     def guarantee(self) -> Guarantee | SlidingGuarantee | NoGuarantee:
-        """What is proved of the law as it runs, once per T_s, p held; or why nothing.
+        """Guarantee of the sampled law with zero-order hold, or the reason why there is none.
 
         A law of samples has its own T_s, a sliding mode of samples runs in the scheme ``compensated``; the integrals of
         an e-LQR in continuous time are summed over the T_s of the fault. Computed when asked for unless it is known.
@@ -172,14 +172,14 @@ class Design:
 
     @property
     def compensation(self) -> Compensation | None:
-        """A sliding mode of samples with its guarantee; None for another law."""
+        """A sampled sliding mode with its guarantee; None for another law."""
         law, found = self.controller, self.guarantee
         if law is None or law.sampling is None or isinstance(found, SlidingGuarantee):
             return None
         return method_of(type(law)).compensation(law, found)
 
     def held_loop(self) -> HeldLoop | None:
-        """What is decided of an e-LQR when p is held over the fault's sampling time; None for another law."""
+        """Stability of an e-LQR with zero-order hold over the fault's T_s; None for another law."""
         law = self.controller
         return method_of(type(law)).held_loop(self.fault, law) if law else None
 
@@ -296,7 +296,7 @@ def design(
     if continuous and objective != OBJECTIVES[0]:
         raise ParameterError(
             f"the objective of a design in continuous time must be {OBJECTIVES[0]}. Received {objective!r}. "
-            "Leave it out, or continuous."
+            "Omit objective, or continuous."
         )
     told: Any = {"objective": objective, "continuous": continuous, "disturbance_class": disturbance_class}
     told["setup"] = replace(setup, diffusion=Fraction(0)) if fault.friction.state_names else setup
@@ -318,13 +318,13 @@ def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any,
         if asked.stress is not None or asked.spread:
             raise ParameterError(
                 f"stress and spread of a design need friction with a state. Received {fault.friction.name}. "
-                "Leave them out."
+                "Omit stress and spread."
             )
         return SlowSlidingDesign()
     if setup.delay or setup.lag:
         raise ParameterError(
-            f"a design for friction with a state goes through rock alone. Received a delay or lag with "
-            f"{fault.friction.name}. Leave them out; guarantee takes both."
+            f"a design for friction with a state has no delay or lag, only a diffusion path. Received a delay or lag "
+            f"with {fault.friction.name}. Omit delay and lag, or use guarantee, which takes both."
         )
     if why := method_of(law).without_state:
         raise UnsupportedError(f"{why}. Received {law.name}. Design an elqr.")
@@ -332,7 +332,7 @@ def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any,
 
 
 def assess(fault: Fault, controller: Controller) -> Design:
-    """Judge given gains on a fault: verdict, certificate and premises.
+    """Verdict, certificate and premises of given gains on a fault.
 
     Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's
     sectors. A law that certificates cannot express yet is ``UNDECIDED``. The verdict on a law of samples is that on its

@@ -1,4 +1,4 @@
-"""What is guaranteed of a controller on a fault as it runs, given or designed for it."""
+"""Guarantee of a sampled loop, for given gains or a design."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
@@ -157,9 +157,9 @@ def guarantee(
         usual = (tuple(gains), scheme, objective, disturbance_class) == ((), None, OBJECTIVES[0], CLASSES[0])
         if not usual or setup.given().keys() - set(_OF_SLOW_SLIDING):
             raise ParameterError(
-                "slow sliding is guaranteed of a designed law of the slip alone under any stress of an amplitude, from "
-                "steady sliding. Received gains, a scheme, noise of the slip rate, an objective, a class, an initial "
-                "slip or slip rate, jitter or averaging. Leave them out."
+                "slow sliding has a guarantee for a designed law of the slip alone, from steady sliding, under a "
+                "stress of bounded amplitude. Received gains, a scheme, rate noise, an objective, a disturbance class, "
+                "an initial slip or slip rate, jitter or averaging. Omit these options."
             )
         tell: Any = {} if progress is None else {"tell": progress}
         return answer_sliding(
@@ -173,7 +173,7 @@ def guarantee(
         )
     if stress is not None or off:
         raise ParameterError(
-            f"stress and spread need friction with a state. Received {fault.friction.name}. Leave them out."
+            f"stress and spread need friction with a state. Received {fault.friction.name}. Omit both."
         )
     require_known(disturbance_class, CLASSES, "class")
     task, law = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)

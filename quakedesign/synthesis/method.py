@@ -49,7 +49,7 @@ L = TypeVar("L", bound=Controller)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowSlidingDesign:
-    """What is asked of a law that holds a fault with a state in slow sliding; see `quakedesign.synthesis.design`.
+    """Design problem of slow sliding for friction with a state; see `quakedesign.synthesis.design`.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class SlowSlidingDesign:
 
 @dataclass(frozen=True, kw_only=True)
 class GainProblem(Generic[Designed]):
-    """Gains that are wanted for a fault; see `quakedesign.synthesis.design`.
+    """Design problem of gains for a fault; see `quakedesign.synthesis.design`.
 
     Attributes
     ----------
@@ -99,11 +99,11 @@ class GainProblem(Generic[Designed]):
 
     @property
     def task(self) -> UncertainPlant:
-        """What a guarantee uses of the fault."""
+        """Uncertain plant of the fault, as a guarantee uses it."""
         return uncertain_plant(self.fault, rate_limited=self.disturbance_class == "rate")
 
     def require_exact_in_continuous_time(self) -> None:
-        """Refuse a design in continuous time that is told less than slip and slip rate as they are.
+        """Reject a design in continuous time without exact slip and slip rate.
 
         Raises
         ------
@@ -111,8 +111,8 @@ class GainProblem(Generic[Designed]):
         """
         if self.continuous and self.setup != IDEAL:
             raise ParameterError(
-                "a design in continuous time knows slip and slip rate exactly and acts at once. Received noise, the "
-                "slip alone, a delay, a lag or rock. Leave continuous out."
+                "a design in continuous time needs exact measurements of slip and slip rate, and no delay, lag or "
+                "diffusion path. Received a loop with one of these. Omit continuous, or noise, measured and path."
             )
 
     def by_method(self, law: type[Controller]) -> Designed:
@@ -132,7 +132,7 @@ class GainProblem(Generic[Designed]):
         premises: tuple[Premise, ...] = (),
         **more: Any,
     ) -> Designed:
-        """Gains with what was found of them, premises of what runs first.
+        """Gains with their results; premises of the sampled loop come first.
 
         The verdict is that on the certificate unless given; of a law of samples it is that on what runs.
         """
@@ -153,7 +153,7 @@ class GainProblem(Generic[Designed]):
         return self.answer(fault=self.fault, controller=controller, certificate=certificate, premises=known, **found)
 
     def undecided(self, name: str, reason: str, runs: NoGuarantee | None = None, **more: Any) -> Designed:
-        """Answer where no gains were found."""
+        """Result without gains."""
         none: dict[str, Any] = {"controller": None, "certificate": None, "premises": (), "details": {"reason": reason}}
         none |= {"disturbance_class": self.disturbance_class, "setup": self.setup}
         return self.answer(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none, **more)
@@ -161,7 +161,7 @@ class GainProblem(Generic[Designed]):
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """What is asked of a law as it runs; see `quakedesign.synthesis.answer`."""
+    """Problem of a guarantee of the sampled loop."""
 
     gains: tuple[str, ...] = ()
     objective: str = OBJECTIVES[0]
@@ -169,7 +169,7 @@ class Wanted:
     setup: LoopSetup = IDEAL
 
     def require_all_measured(self) -> None:
-        """Refuse a law that gets the slip alone where it needs the slip rate as well."""
+        """Reject measurements of the slip alone for a law that needs the slip rate."""
         if self.setup.measured != MEASURED[0]:
             raise ParameterError(
                 "measured is for a designed e-LQR, all other laws need slip and slip rate. "
@@ -196,7 +196,7 @@ def linear_about_a_reference(controller: Controller) -> bool:
 
 
 class DesignMethod(Generic[L]):
-    """How laws of a family are designed and judged; this one, for laws of no family, knows what they say themselves.
+    """Design method of a family of laws; this one is for laws of no family.
 
     Attributes
     ----------
@@ -239,13 +239,13 @@ class DesignMethod(Generic[L]):
         return tuple(linear_premises(fault, controller, certificate)) if known else (), None
 
     def guarantee(self, fault: Fault, task: UncertainPlant, controller: L, setup: LoopSetup) -> Guarantee | NoGuarantee:
-        """What is proved of the law as it runs on a task of the fault, with the noise of a loop setup."""
+        """Guarantee of the sampled law on a task of the fault, with the noise of a loop setup."""
         return NoGuarantee(
             reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
         )
 
     def certified_peaks(self, fault: Fault, controller: L, disturbance_class: str) -> ContinuousPeaks | NoGuarantee:
-        """How far slip, slip rate and pressure go at most if the pressure acts at once."""
+        """Certified peaks of slip, slip rate and pressure in continuous time."""
         return NoGuarantee(reason=f"no bound of peaks of {controller.title} is known here", small_gain=None)
 
     def compensation(self, controller: L, found: Guarantee | NoGuarantee) -> Compensation | None:
@@ -253,7 +253,7 @@ class DesignMethod(Generic[L]):
         return None
 
     def held_loop(self, fault: Fault, controller: L) -> HeldLoop | None:
-        """What is decided when p is held over the fault's sampling time; None where nothing is."""
+        """Stability with zero-order hold over the fault's T_s; None if undefined."""
         return None
 
     def variants(self, fault: Fault, controller: L, certificate: Certificate | None) -> tuple[Variant, ...]:
@@ -296,7 +296,7 @@ def left_out(fault: Fault) -> dict[str, str]:
 
 
 class Samples(DesignMethod[SampledController]):
-    """Laws without a loop in continuous time: what is guaranteed of them as they run is all."""
+    """Design method of sampled laws, which have a guarantee only in the sampled loop."""
 
     name: ClassVar[str] = "samples"
     family: ClassVar[type] = SampledController
@@ -314,6 +314,6 @@ class Samples(DesignMethod[SampledController]):
     def guarantee(
         self, fault: Fault, task: UncertainPlant, controller: SampledController, setup: LoopSetup
     ) -> Guarantee | NoGuarantee:
-        """At its own T_s, behind its own delay, lag and diffusion path."""
+        """At its own T_s, with its own delay, lag and diffusion path."""
         own, noise = controller.sampling.path, setup.noise
         return best_guarantee(task, Held(law=controller.law, step=controller.step, **own, **noise))

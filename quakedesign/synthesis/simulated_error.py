@@ -1,4 +1,4 @@
-"""Gains that err least at a given sampling time, as simulated on a fault, among gains with a proof."""
+"""Gains with a proof and the least simulated error at a given sampling time."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -32,7 +32,7 @@ _NO_AIM = ("min_pressure", "settled_from", "steps", "seconds")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialSampling:
-    """How a set of gains is tried out.
+    """Simulation settings for trials of gains.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ def sampling(
     step: float | None = None,
     duration: float | None = None,
 ) -> TrialSampling:
-    """Read how gains shall be tried out on a fault.
+    """Simulation settings for trials on a fault.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def sampling(
 def synthesise_sampled(
     trial: TrialSampling, *, degrees: Iterable[int] | None = None, rounds: int = 80
 ) -> Synthesis | None:
-    """Find base gains with a proof for |h'| ≤ 1 and a range of β whose sampled run errs least.
+    """Find base gains with a proof for |h'| ≤ 1 and a range of β, with the least simulated error.
 
     By the method of Nelder and Mead on the logarithms of the gains, from the gains of the smallest norm and from the
     best of the literature; every point is screened before it is simulated. The figure is measured on one window of one

@@ -56,13 +56,13 @@ class SlidingModes(DesignMethod[SlidingMode]):
         problem.require_exact_in_continuous_time()
         if problem.setup.path:
             raise UnsupportedError(
-                f"sliding modes are designed for a pressure that acts at once. Received a delay, a lag or rock with "
-                f"{law.name}. Design an elqr; guarantee says what is proved of a sliding mode behind them."
+                f"sliding modes are designed without delay, lag and diffusion path. Received one of these with "
+                f"{law.name}. Design an elqr, or use guarantee for a sliding mode with given gains."
             )
         if problem.feedforward != NONE and not problem.continuous:
             raise ParameterError(
-                "a feed-forward has no guarantee with the pressure held over T_s. "
-                f"Received {problem.feedforward.name!r}. Design with continuous, or leave it out."
+                "feedforward has no guarantee with zero-order hold. "
+                f"Received {problem.feedforward.name!r}. Design with continuous, or omit feedforward."
             )
         base, certificate = _proved_base(problem.fault, law)
         if problem.continuous:

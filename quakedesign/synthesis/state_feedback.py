@@ -1,4 +1,4 @@
-"""Linear state feedback with integral action: Riccati equations, quadratic V, guarantees of the loop that runs."""
+"""Linear state feedback with integral action: Riccati equations, quadratic V, guarantees."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -53,8 +53,8 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         """As it runs, or with an exact proof about any constant reference in continuous time."""
         if problem.feedforward != NONE:
             raise ParameterError(
-                f"a feed-forward is part of sliding-mode laws. Received {problem.feedforward.name!r} with {law.name}. "
-                "Leave it out."
+                f"feedforward is for sliding modes. Received {problem.feedforward.name!r} with {law.name}. "
+                "Omit feedforward."
             )
         problem.require_exact_in_continuous_time()
         if problem.fault.friction.state_names:
@@ -93,7 +93,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         if wanted.gains and not differs:
             wanted.require_all_measured()
         if wanted.scheme not in (None, "explicit"):
-            raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {wanted.scheme!r}. Leave it out.")
+            raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {wanted.scheme!r}. Omit scheme.")
         around: Any = setup.around()
         if wanted.gains:
             summed = summed_integrals(_four(wanted.gains), step)
@@ -125,7 +125,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
 
 def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
     if len(gains) != 4:
-        raise ParameterError(f"gains must be four numbers, k1 to k4. Received {len(gains)}. Leave them out to design.")
+        raise ParameterError(f"gains must be four numbers, k1 to k4. Received {len(gains)}. Omit gains to design them.")
     return tuple(rational(v, f"k{i}") for i, v in enumerate(gains, 1))
 
 
@@ -155,9 +155,9 @@ def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     usual = OBJECTIVES[0], CLASSES[0]
     if problem.continuous or (problem.objective, problem.disturbance_class) != usual or problem.setup.noise:
         raise ParameterError(
-            "a law for friction with a state is designed as it runs, told the slip as it is, with the objective "
-            f"{OBJECTIVES[0]}, for any stress of an amplitude. Received continuous, noise, another objective or class "
-            "rate. Leave them out; guarantee takes noise of the slip."
+            "a law for friction with a state is designed for the sampled loop without noise, with the objective "
+            f"{OBJECTIVES[0]} and the disturbance class {CLASSES[0]}. Received continuous, noise, another objective "
+            "or class. Omit these options, or use guarantee, which takes slip noise."
         )
     wanted, fault = problem.sliding, problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))

@@ -71,8 +71,8 @@ def test_a_delay_is_periods_and_a_part_of_one(delay, samples, part):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ({"storage": 1.0}, "storage belongs to a diffusion"),
-        ({"withdrawal": 1.0}, "withdrawal belongs to a saturation"),
+        ({"storage": 1.0}, "storage needs diffusion"),
+        ({"withdrawal": 1.0}, "withdrawal needs saturation"),
         ({"saturation": -1.0}, "lowest and highest"),
         ({"quantum": 0.0}, "quantum"),
         ({"diffusion": 0.0}, "time"),

@@ -406,7 +406,7 @@ def test_only_proofs_of_every_file_and_files_for_coqc_are_code_zero(call, monkey
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [([], "check needs at least one certificate file"), (["a.json", "--out", "b"], "--out is the folder of --rocq")],
+    [([], "check needs at least one certificate file"), (["a.json", "--out", "b"], "--out needs --rocq")],
 )
 def test_a_check_of_nothing_or_into_nothing_is_refused(call, arguments, said):
     code, _, err = call("check", *arguments)
@@ -472,7 +472,7 @@ def test_a_polynomial_is_judged(call, monkeypatch, tmp_path, verdict, code, with
 )
 def test_a_file_of_gram_says_all_that_is_asked(call, more):
     code, _, err = call("sos", *more, "--gram", "g.json")
-    assert (code, "--gram is a file that says what is asked" in err) == (2, True)
+    assert (code, "--gram FILE contains the polynomial" in err) == (2, True)
 
 
 def test_a_polynomial_and_a_constraint_may_begin_with_a_sign(call):
@@ -537,7 +537,7 @@ def test_a_region_is_code_zero_where_a_level_is_proved(
 def test_what_is_of_a_region_is_not_asked_of_all(call, tmp_path, more):
     (tmp_path / "field.toml").write_text('[field]\nx = "-x"\n')
     code, _, err = call("attraction", "field.toml", "--everywhere", *more)
-    assert (code, "--degree and --shape are of a region" in err) == (2, True)
+    assert (code, "--degree and --shape cannot be used with --everywhere" in err) == (2, True)
 
 
 @pytest.mark.parametrize("option", ["--out", "--above", "--inclusion"])

@@ -70,7 +70,7 @@ def test_a_run_that_is_not_what_is_proved_says_so(capsys, more, outside):
         ("creeping-patch", (), "rate [m/s] 0.000001 there"),
         ("real-fault", (), "about friction with a state where that of the fault has one"),
         ("crustal-patch", ("--lag", "2 s"), "lag cannot be used with"),
-        ("crustal-patch", ("--controller", "cta"), "a certificate holds its law"),
+        ("crustal-patch", ("--controller", "cta"), "--certificate contains the law"),
     ],
 )
 def test_it_is_for_its_fault_and_as_it_is(capsys, fault, more, said):
@@ -91,7 +91,7 @@ def test_a_delay_and_noise_of_the_proof_are_in_the_run(capsys, monkeypatch, tmp_
     )
     assert (code, json.loads(out)["stages"]) == (0, ["delay"])
     assert seen["transducer"] == Transducer(quantum=2e-6)
-    with pytest.raises(ParameterError, match="a delay or noise"):
+    with pytest.raises(ParameterError, match=r"a certificate with a delay of .* and slip noise of"):
         SpreadOptions().choose(CRUSTAL, LawOptions(certificate=tmp_path / "late.json"), None, {})
 
 

@@ -46,7 +46,7 @@ def test_compare_prints_the_keys_of_design_and_writes_nothing(short, capsys, tmp
 def test_a_scheme_is_refused_for_laws_of_samples_which_run_as_they_were_designed(command, short, capsys):
     code, out, err = run(capsys, command, str(short), "--controller", "cta", "--scheme", "compensated")
     assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
-    assert "--scheme is for gains designed with --continuous" in err
+    assert "--scheme needs --continuous" in err
 
 
 def test_designs_are_compared_in_the_scheme_asked_for(short, capsys):

@@ -72,7 +72,7 @@ def test_jitter_steps_of_a_reading_and_of_a_differentiator_are_those_of_python(r
     for part in ("quantum=1.5e-07", "inner_steps=10"):
         assert part in told["measurement"]
     for alone, said in (
-        (("--jitter", "1"), "a jitter belongs to a delay"),
+        (("--jitter", "1"), "jitter needs delay"),
         (("--slip-quantum", "1 um"), "the quantum of the slip belongs to a differentiator"),
         (("--differentiator-steps", "2"), "the number of steps belongs to a differentiator"),
     ):

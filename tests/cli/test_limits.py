@@ -101,7 +101,7 @@ def test_noise_forbids_more(capsys):
     ("given", "said"),
     [
         (("crustal-patch", "--slip-noise", "1 um"), "no limit of slow sliding is known for noise"),
-        (("crustal-patch", "--stress", "0 Pa"), "a stress must be above 0"),
+        (("crustal-patch", "--stress", "0 Pa"), "stress must be positive"),
         (("real-fault", "--stress", "1 kPa"), "stress needs friction with a state"),
     ],
 )
@@ -190,7 +190,10 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
         assert run(*patch, *others) == 2
     assert run(*patch, "--delay", "1 s") == 2
     errors = capsys.readouterr().err.splitlines()
-    assert ["a well is told by" in errors[0], "must be positive" in errors[1]] == [True, True]
+    assert ["the diffusion path needs the distance of the well" in errors[0], "must be positive" in errors[1]] == [
+        True,
+        True,
+    ]
     assert errors[2].endswith("limits of slow sliding know a lag and rock alone. Received delay. Leave them out.")
 
 

@@ -82,19 +82,22 @@ def test_a_locked_fault_starts_with_an_aged_state(capsys, patch):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (("--controller", "cta"), "no sliding mode"),
+        (("--controller", "cta"), "sliding modes do not apply"),
         (("--controller", "elqr", "--gains", "1", "2"), "designed gains"),
         (
             ("--controller", "elqr", "--rate-noise-deviation", "1 um/s"),
-            "rate_noise: not for friction with a state with control",
+            "rate_noise cannot be used for friction with a state with control",
         ),
-        (("--controller", "elqr", "--storage", "1e-4 m^3/Pa"), "storage: not for friction with a state with control"),
-        (("--controller", "elqr", "--start", "late"), "starts in steady sliding"),
-        (("--controller", "elqr", "--drift", "1e-9"), "drift: not for friction with a state with control"),
+        (
+            ("--controller", "elqr", "--storage", "1e-4 m^3/Pa"),
+            "storage cannot be used for friction with a state with control",
+        ),
+        (("--controller", "elqr", "--start", "late"), "are for runs without a controller"),
+        (("--controller", "elqr", "--drift", "1e-9"), "drift cannot be used for friction with a state with control"),
         (("--controller", "elqr", "--method", "radau"), "method must be one of"),
-        (("--diffusion", "10 s"), "diffusion: not for friction with a state without control"),
+        (("--diffusion", "10 s"), "diffusion cannot be used for friction with a state without control"),
         (("--stress", "1 kPa"), "needs a controller"),
-        (("--saturation", "1 MPa"), "saturation: not for friction with a state"),
+        (("--saturation", "1 MPa"), "saturation cannot be used for friction with a state"),
         (("--plant", "coulomb"), "one of smooth, quasi-dynamic"),
         (("--start", "early"), "one of steady, locked, late"),
         (("--start", "locked"), "Give --hold"),
@@ -117,7 +120,7 @@ def test_what_does_not_apply_is_refused_in_one_line(capsys, patch, given, said):
         (("sampling",), "a study of sampling needs a friction law of slip and slip rate alone"),
         (
             ("guarantee", "--controller", "cta"),
-            "sliding modes do not apply to it, as the slip rate follows",
+            "sliding modes do not apply, since the slip rate responds",
         ),
     ],
 )

@@ -32,7 +32,7 @@ def limited(limits, recovery_time):
         (lambda: PressureLimits(lowest=F(1), highest=F(2)), "limits must be lowest < 0 < highest"),
         (
             lambda: replace(DESIGN.controller, gains={**DESIGN.controller.gains, "k4": 0}, limits=LIMITS),
-            "limits need k4 other than 0",
+            "k4 must not be 0 in a law with limits",
         ),
     ],
 )  # fmt: skip

@@ -333,9 +333,9 @@ def test_a_law_of_the_user_is_carried_by_its_terms(factors):
 @pytest.mark.parametrize(
     ("kind", "message"),
     [
-        (Careless, "do not fit together"),
-        (Hidden, "do not fit together"),
-        (Silent, "unit of w open"),
+        (Careless, "must have consistent units"),
+        (Hidden, "must have consistent units"),
+        (Silent, "do not determine the unit of w"),
         (Foreign, "mystery"),
     ],
 )

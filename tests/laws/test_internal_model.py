@@ -88,24 +88,25 @@ def test_a_constant_pressure_against_a_disturbance_is_a_steady_state():
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "said"),
     [
-        {"kept": MODEL.kept[:2]},
-        {"kept": (*MODEL.kept, MODEL.kept[0])},
-        {"kept": tuple(row[:2] for row in MODEL.kept)},
-        {"of_pressures": MODEL.of_pressures[::-1] * 2},
-        {"of_asked": (F(1), -sum(MODEL.of_pressures[1]))},
+        ({"kept": MODEL.kept[:2]}, "kept of 3 × 3, .* Received 2 and 2 rows"),
+        ({"kept": (*MODEL.kept, MODEL.kept[0])}, "kept of 3 × 3, .* Received 4 and 2 rows"),
+        ({"kept": tuple(row[:2] for row in MODEL.kept)}, "rows of 2, 2, 2, 3, 3 entries"),
+        ({"of_pressures": MODEL.of_pressures[::-1] * 2}, "of_pressures of 2 × 3 .* Received 3 and 4 rows"),
+        ({"of_asked": (F(1),)}, "of_asked of 2 entries.* 1 entries of of_asked"),
+        ({"of_asked": (F(1), -sum(MODEL.of_pressures[1]))}, "must not be 0. Received 0"),
     ],
 )
-def test_sizes_that_do_not_fit_and_pressures_that_move_nothing_are_refused(wrong):
+def test_sizes_that_do_not_fit_and_pressures_that_move_nothing_are_refused(wrong, said):
     assert replace(MODEL, of_asked=(F(-1), F(1))).of_asked == (-1, 1)
-    with pytest.raises(ParameterError, match="a model of 3 pressures needs 3 × 3 numbers"):
+    with pytest.raises(ParameterError, match=said):
         replace(MODEL, **wrong)
 
 
 @pytest.mark.parametrize(("gains", "gain"), [(GAINS[:4], GAIN), ((*GAINS, F(1)), GAIN), (GAINS, F(0)), (GAINS, F(-1))])
 def test_other_gains_are_refused(gains, gain):
-    with pytest.raises(ParameterError, match="a model of 3 pressures needs 5 gains and a positive gain"):
+    with pytest.raises(ParameterError, match="a path model of 3 pressures needs 5 gains and a positive input gain"):
         estimate_through_path(gains, WEIGHT, MODEL, gain)
-    with pytest.raises(ParameterError, match="a model of 3 pressures needs 5 gains and a positive gain"):
+    with pytest.raises(ParameterError, match="a path model of 3 pressures needs 5 gains and a positive input gain"):
         observer_through_path(gains, CORRECTIONS, MODEL, gain)

@@ -97,7 +97,9 @@ def test_the_gain_of_a_model_is_positive(gain):
     [((F(1), F(1)), ()), ((F(1),), ((F(1), F(1)),)), ((F(0),), ()), ((F(1), F(-1)), ((F(1), F(1)),))],
 )
 def test_a_prediction_needs_pushes_that_fit_and_act(pushes, ahead):
-    with pytest.raises(ParameterError, match=f"Received {len(pushes)} and {len(ahead)}"):
+    with pytest.raises(
+        ParameterError, match=f"Received {len(pushes)} and {len(ahead)} entries, and the sum {sum(pushes)}"
+    ):
         Prediction(of_slip=F(0), of_rate=F(1), of_pushes=pushes, ahead_of_pushes=ahead)
 
 
@@ -117,22 +119,22 @@ def test_as_many_states_as_are_said_fit():
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "said"),
     [
-        sizes(13),
-        sizes(2, 3),
-        sizes(2) | {"states": ("z", "z")},
-        sizes(2) | {"update": ((F(0), F(0)), (F(0),))},
-        sizes(2) | {"update": ((F(0), F(0)),)},
-        sizes(2) | {"measured": ((F(0), F(0)), (F(0), F(0), F(0)))},
-        sizes(2) | {"measured": ((F(0), F(0)),)},
-        sizes(2) | {"output": (F(1),)},
-        sizes(2) | {"feedback": (F(1),)},
-        sizes(2) | {"root": ROOT},
+        (sizes(13), "needs at most 12 states .*Received 13"),
+        (sizes(2, 3), "matrix G of a linear law with 2 states must be 2 × 2. Received 2 rows of 3, 3 entries"),
+        (sizes(2) | {"states": ("z", "z")}, "different names. Received 2: z, z"),
+        (sizes(2) | {"update": ((F(0), F(0)), (F(0),))}, "matrix F .* 2 × 2. Received 2 rows of 2, 1 entries"),
+        (sizes(2) | {"update": ((F(0), F(0)),)}, "matrix F .* 2 × 2. Received 1 rows of 2 entries"),
+        (sizes(2) | {"measured": ((F(0), F(0)), (F(0), F(0), F(0)))}, "matrix G .* Received 2 rows of 2, 3 entries"),
+        (sizes(2) | {"measured": ((F(0), F(0)),)}, "matrix G .* Received 1 rows of 2 entries"),
+        (sizes(2) | {"output": (F(1),)}, "matrix C .* 1 × 2. Received 1 rows of 1 entries"),
+        (sizes(2) | {"feedback": (F(1),)}, "matrix D .* 1 × 2. Received 1 rows of 1 entries"),
+        (sizes(2) | {"root": ROOT}, "matrix G of a linear law with 2 states must be 2 × 3"),
     ],
 )
-def test_sizes_that_do_not_fit_are_refused(wrong):
-    with pytest.raises(ParameterError, match=f"linear law needs .*Received {len(wrong['states'])} states"):
+def test_sizes_that_do_not_fit_are_refused(wrong, said):
+    with pytest.raises(ParameterError, match=said):
         LinearLaw(**wrong)
 
 

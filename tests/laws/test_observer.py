@@ -75,7 +75,7 @@ def test_it_does_without_the_slip_rate():
 
 
 def test_a_prediction_of_one_push_too_few_is_refused():
-    with pytest.raises(ParameterError, match=r"pushes from 0 and from 1 sample ago on\. Received 1 and 1"):
+    with pytest.raises(ParameterError, match=r"one entry more than ahead_of_pushes\. Received 1 and 1 entries"):
         ErrorPrediction(
             of_errors=((F(1), F(0)), (F(0), F(1))), of_pushes=((F(1), F(1)),), ahead_of_pushes=((F(1), F(1)),)
         )

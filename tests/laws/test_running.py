@@ -172,7 +172,7 @@ def test_its_gains_are_not_told():
 
 
 def test_it_is_not_made_from_gains_in_order():
-    with pytest.raises(UnsupportedError, match="made from its matrices"):
+    with pytest.raises(UnsupportedError, match="given by its matrices"):
         SampledController.from_values(())
 
 

@@ -60,7 +60,7 @@ def test_sympys_own_signs_and_absolute_values_are_signed_powers():
         ({"gains": (k, k)}, "must be different.*Received 'k' twice"),
         ({"gains": (k, sp.Symbol("d"))}, "must be different.*Received 'd' twice"),
         ({"gains": (k, sp.Symbol("k'"))}, 'must be different.*Received "k\'"'),
-        ({"units": {a: k}}, "units belong to states, x, y. Received one of a"),
+        ({"units": {a: k}}, "units belong to states, x, y. Received a unit of a"),
         ({"units": {y: a}}, "the unit of y must hold only k. Received a"),
         ({"units": {y: k / 3.0}}, "must be exact and finite"),
         ({"roots": {a: y}}, "the root a must be that of a gain or constant. Received y"),
@@ -73,7 +73,7 @@ def test_what_no_certificate_could_mean_is_refused(changed, message):
 
 def test_a_state_of_one_sign_is_refused():
     slip = sp.Symbol("x", positive=True)
-    with pytest.raises(ParameterError, match=r"takes both signs\. Received x"):
+    with pytest.raises(ParameterError, match=r"declared real only\. Received x"):
         loop(states={slip: 2, y: 1}, field={slip: y, y: FIELD[y].subs(x, slip)})
 
 

@@ -75,14 +75,14 @@ def test_the_held_loop_tends_to_it():
 
 def test_a_law_without_an_integral_is_refused():
     law = ContinuousLaw(states=(), rates=(), measured=(), output=(), feedback=(F(-1), F(-1)))
-    with pytest.raises(ParameterError, match="constant pressure"):
+    with pytest.raises(ParameterError, match="zero errors and a constant pressure"):
         continuous_loop(law, MODEL, AUTHORITY)
 
 
 def test_sizes_that_do_not_fit_and_missing_gains_are_refused():
     with pytest.raises(ParameterError, match="four"):
         exact_integrals(GAINS[:3])
-    with pytest.raises(ParameterError, match="2 entries"):
+    with pytest.raises(ParameterError, match="matrix G of a linear law with 1 states must be 1 × 2"):
         ContinuousLaw(states=("a",), rates=((F(0),),), measured=((F(0),),), output=(F(1),), feedback=(F(0), F(0)))
 
 

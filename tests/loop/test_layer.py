@@ -145,7 +145,7 @@ def test_a_layer_that_is_faster_than_bounds_can_follow_is_refused():
     fastest = held_loop(law, MODEL, F(2), F(1, 5), diffusion=F(1, 160))
     assert fastest.states == ("e1", "e2", "xi1", "xi2", "valve", *LAYERS, "stepped")
     for time in (F(1, 161), F(-1)):
-        with pytest.raises(ParameterError, match="diffusion must take at least T_s/32"):
+        with pytest.raises(ParameterError, match="at least T_s/32"):
             held_loop(law, MODEL, F(2), F(1, 5), diffusion=time)
 
 

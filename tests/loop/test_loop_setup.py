@@ -30,7 +30,7 @@ def test_quantities_with_units_become_exact_numbers_in_si_units():
         ({"step": "1e10 s"}, ParameterError, "step must be positive, between 1e-9 s and 1e9 s"),
         ({"measured": "slips"}, ParameterError, "measured must be .*slip"),
         ({"withdrawal": "1 MPa"}, ParameterError, "withdrawal needs saturation"),
-        ({"saturation": "0 Pa"}, ParameterError, "must have 0 between them"),
+        ({"saturation": "0 Pa"}, ParameterError, "the largest 0 or more"),
         ({"rate_limit": "0 Pa/s"}, ParameterError, "rate limit of a pump must be positive"),
     ],
 )

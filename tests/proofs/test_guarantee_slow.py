@@ -106,7 +106,9 @@ def test_a_gain_that_may_jump_or_acts_at_once_is_not_slow_whatever_is_claimed(fr
     raw["loop"] = raw["loop"] if friction else CONTINUOUS
     with pytest.raises(checker.Refused, match="slow_gain needs friction of the slip alone and a law of samples"):
         checker.verify(copy.deepcopy(raw))
-    with pytest.raises(CertificateError, match=r"slow gain needs friction of the slip alone|is for a law of samples"):
+    with pytest.raises(
+        CertificateError, match=r"input gain needs friction that depends on the slip alone|is for a law of samples"
+    ):
         parse_guarantee(json.dumps(raw))
 
 
@@ -133,7 +135,7 @@ def test_the_models_are_the_middles_of_the_parts():
     middles = [float(model.gain / TASK.authority) for model in replace(SLOW, parts=4).models(TASK)]
     assert middles == pytest.approx([low + (high - low) * (2 * k + 1) / 8 for k in range(4)], rel=1e-12)
     sheared = replace(TASK, friction=replace(TASK.friction, rate_slope=F(1, 10)))
-    with pytest.raises(ParameterError, match="friction of the slip alone"):
+    with pytest.raises(ParameterError, match="friction that depends on the slip alone"):
         SLOW.models(sheared)
 
 

@@ -149,10 +149,10 @@ def test_laws_that_do_not_apply_are_left_out_with_their_reason():
         ("real-fault", {"stress": 1e3}, "need friction with a state"),
         ("real-fault", {"spread": "0.1"}, "need friction with a state"),
         ("crustal-patch", {"diffusion": 0}, "above 0 s"),
-        ("crustal-patch", {"continuous": True}, "designed as it runs"),
-        ("crustal-patch", {"disturbance_class": "rate"}, "for any stress of an amplitude"),
-        ("crustal-patch", {"slip_noise": "1e-6"}, "guarantee takes noise of the slip"),
-        ("crustal-patch", {"spread": 1}, "a spread must be from 0 to below 1"),
+        ("crustal-patch", {"continuous": True}, "designed for the sampled loop"),
+        ("crustal-patch", {"disturbance_class": "rate"}, "designed for the sampled loop without noise"),
+        ("crustal-patch", {"slip_noise": "1e-6"}, "guarantee, which takes slip noise"),
+        ("crustal-patch", {"spread": 1}, "spread must be from 0 to below 1"),
     ],
 )
 def test_what_does_not_apply_is_refused(fault, asked, said):

@@ -451,7 +451,7 @@ def test_gains_of_another_step_are_not_read_off():
         replace(claim.held.law, update=((F(0), F(0), F(1, 9)), *claim.held.law.update[1:])),
         replace(claim.held.law, feedback=(*claim.held.law.feedback[:2], F(0))),
     ):
-        with pytest.raises(UnsupportedError, match="read off the implicit step of a 2-CTA or a 2-DIA"):
+        with pytest.raises(UnsupportedError, match="follow from a certificate of a 2-CTA or a 2-DIA"):
             recovered(replace(claim, held=replace(claim.held, law=law)))
     assert recovered(claim).weight == F(7, 20)
 

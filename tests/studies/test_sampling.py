@@ -71,7 +71,7 @@ def test_gains_without_a_certificate_are_run_with_other_scales_beside_the_limit_
 
 
 def test_a_linear_law_has_no_scale():
-    with pytest.raises(ParameterError, match="scale belongs"):
+    with pytest.raises(ParameterError, match="scale is for sliding modes"):
         sampling_report(OWN, LINEAR, scales=("2",), duration=0.1)
 
 

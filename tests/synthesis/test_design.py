@@ -168,7 +168,7 @@ def test_what_a_law_cannot_be_told_is_refused(real):
         ("cta", {"slip_noise": "1e-6"}),
         ("dia", {"rate_noise": 1e-6}),
     ):
-        with pytest.raises(ParameterError, match="knows slip and slip rate exactly"):
+        with pytest.raises(ParameterError, match="needs exact measurements of slip and slip rate"):
             qd.design(real, law, continuous=True, **options)
 
 

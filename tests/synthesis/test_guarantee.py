@@ -43,7 +43,7 @@ def test_what_is_no_quantity_and_belongs_to_another_friction_is_refused(more, er
     "more", [{"gains": GAINS}, {"objective": "peak"}, {"rate_noise": "1 um/s"}, {"jitter": "1 ms"}]
 )
 def test_slow_sliding_refuses_what_it_has_no_use_for(more):
-    with pytest.raises(ParameterError, match="slow sliding is guaranteed of a designed law of the slip alone"):
+    with pytest.raises(ParameterError, match="slow sliding has a guarantee for a designed law of the slip alone"):
         qd.guarantee(qd.load_fault("crustal-patch"), lag="1 s", **more)
 
 

@@ -1,4 +1,4 @@
-"""The files of claims about loops that run (proofs/FORMAT.md), of both kinds: read strictly, written whole."""
+"""Certificate files of guarantees (proofs/FORMAT.md): strict reading, atomic writing."""
 
 import json
 import re
@@ -64,7 +64,7 @@ _ZERO = Fraction(0)
 
 
 def guarantee_document(claim: Claim) -> dict[str, Any]:
-    """What stands in the file."""
+    """Content of the file."""
     if isinstance(claim, Guarantee | ContinuousPeaks):
         about = _of_tracking(claim)
     else:

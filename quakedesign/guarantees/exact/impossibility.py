@@ -55,7 +55,7 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingPush:
-    """A linearised fault in slow sliding and the stress that may push it.
+    """A linearised fault in slow sliding and its stress disturbance.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class SlidingPush:
 
     @property
     def authority(self) -> Fraction:
-        """μ [-], what a pressure is worth beside a stress."""
+        """μ [-], the ratio of the input gains of pressure and stress."""
         return self.model.coefficient
 
     @property
@@ -185,7 +185,7 @@ _IMPOSSIBILITY_ZERO = Fraction(0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SmallestPeak:
-    """No controller keeps both errors below these.
+    """Lower bounds of both errors for every controller.
 
     Attributes
     ----------
@@ -475,7 +475,7 @@ def _moved(slip: Fraction, rate: Fraction, time: Fraction) -> tuple[Any, Any]:
 def _require(holds: bool, what: str, *values: Fraction) -> None:
     if not holds:
         received = ", ".join(f"{float(v):.4g}" for v in values)
-        raise ParameterError(f"a limit needs {what}. Received {received}. Correct it.")
+        raise ParameterError(f"a performance limit needs {what}. Received {received}.")
 
 
 def _at_least_one(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""A loop whose samples follow no clock: a set that its state at the samples never leaves, verified in ball arithmetic.
+"""Invariant polytope of a loop with aperiodic sampling, verified in ball arithmetic.
 
 **Loop.** The next sample comes any time T after the last, T_s ≤ T ≤ T_m, each time anew; all else is as it is with a
 clock, and the law is not told T. Let the map of a sample be J = CB, B its reduced row echelon form without rows of
@@ -48,7 +48,7 @@ Row = tuple[Fraction, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InvariantPolytope:
-    """The set, what is said of the inputs, and which facets bound which row.
+    """Invariant polytope, bounds of the inputs, and the facets that bound each row.
 
     Attributes
     ----------
@@ -75,23 +75,30 @@ class InvariantPolytope:
     def __post_init__(self) -> None:
         size, count = len(self.facets[0]) if self.facets else 0, len(self.facets)
         bases = [basis for lines in (self.at_samples, self.between) for line in lines for basis in line]
-        fits = (
-            0 < size <= count <= MOST_FACETS
-            and size <= MOST_SIZE
-            and len(bases) <= MOST_BASES
-            and all(max(abs(v.numerator), v.denominator) < LARGEST for row in self.facets for v in row)
-            and {len(row) for row in self.facets} == {size}
-            and len(self.at_samples) == count
-            and all(_even(lines) for lines in (self.at_samples, self.between))
-            and all(len(basis) == size and all(0 <= i < count for i in basis) for basis in bases)
-            and min(self.inputs, default=-1) >= 0
-        )
-        if not fits:
-            raise ParameterError(
-                f"a reach needs at most {MOST_FACETS} facets of one size, at most {MOST_SIZE}, in numbers below 1e20, "
-                f"so many of them at the ends of 1 to {MOST_PIECES} pieces for every facet and output, at most "
-                f"{MOST_BASES} times in all, and inputs of 0 or more. Received others. Complete it."
-            )
+        small = all(max(abs(v.numerator), v.denominator) < LARGEST for row in self.facets for v in row)
+        within = all(len(basis) == size and all(0 <= i < count for i in basis) for basis in bases)
+        conditions = {
+            f"facets must be 1 to {MOST_FACETS} rows, at least as many as entries of a row": 0
+            < size
+            <= count
+            <= MOST_FACETS,
+            f"facets must have at most {MOST_SIZE} entries each": size <= MOST_SIZE,
+            f"bases must be at most {MOST_BASES} in all": len(bases) <= MOST_BASES,
+            "numerators and denominators of facets must be below 1e20": small,
+            "facets must have the same number of entries": {len(row) for row in self.facets} == {size},
+            "at_samples must have one row for each facet": len(self.at_samples) == count,
+            f"at_samples and between must have the same 1 to {MOST_PIECES} pieces in every row": all(
+                _even(lines) for lines in (self.at_samples, self.between)
+            ),
+            "a basis must have as many numbers of facets as a facet has entries": within,
+            "inputs must be given, 0 or more each": min(self.inputs, default=-1) >= 0,
+        }
+        for condition, holds in conditions.items():
+            if not holds:
+                raise ParameterError(
+                    f"{condition} in an invariant set. Received {count} facets of {size} entries, {len(bases)} bases "
+                    f"in {len(self.at_samples)} and {len(self.between)} rows, and {len(self.inputs)} inputs."
+                )
 
 
 def _even(lines: tuple[tuple[Basis, ...], ...]) -> bool:
@@ -100,7 +107,7 @@ def _even(lines: tuple[tuple[Basis, ...], ...]) -> bool:
 
 
 def reached_bounds(task: UncertainPlant, held: Held, reach: InvariantPolytope) -> Bounds | NoGuarantee:
-    """Bounds of the theorem, or what of it does not hold."""
+    """Bounds of the theorem, or the condition that fails."""
     loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
     with ctx.workprec(_BITS):
         try:
@@ -223,11 +230,13 @@ class _SampleMap:
         try:
             return _rows(self.facets, basis).inv()
         except ZeroDivisionError:
-            raise ParameterError("facets that bound a row must be independent. Received others.") from None
+            raise ParameterError(
+                f"facets that bound an output must be linearly independent. Received the dependent facets {basis}."
+            ) from None
 
 
 def require_fit(loop: PeriodicLoop, reach: InvariantPolytope) -> None:
-    """Refuse a set of other sizes than those of a loop.
+    """Reject a set whose sizes differ from those of a loop.
 
     Raises
     ------
@@ -237,8 +246,8 @@ def require_fit(loop: PeriodicLoop, reach: InvariantPolytope) -> None:
     given = len(reach.facets[0]), len(reach.between), len(reach.inputs)
     if sizes != given:
         raise ParameterError(
-            f"a reach of this loop has facets of {sizes[0]} entries, {sizes[1]} outputs and {sizes[2]} inputs. "
-            f"Received {given[0]}, {given[1]} and {given[2]}. Look for it anew."
+            f"an invariant set of this loop must have facets of {sizes[0]} entries, {sizes[1]} outputs and {sizes[2]} "
+            f"inputs. Received {given[0]} entries, {given[1]} outputs and {given[2]} inputs. Search for the set again."
         )
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class Around(TypedDict, total=False):
-    """What `Held` has besides the law and T_s; what is left out is 0, a pump without limits None."""
+    """Loop setup of `Held` besides the law and T_s; omitted values are 0, a pump without limits None."""
 
     delay: Fraction
     lag: Fraction
@@ -47,7 +47,7 @@ class Around(TypedDict, total=False):
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Held:
-    """A law as it runs: once every T_s, its pressure held, late, through a lag and rock, from what it measures.
+    """A sampled law with its loop setup: T_s, zero-order hold, delay, lag, diffusion path and noise.
 
     Attributes
     ----------
@@ -97,23 +97,24 @@ class Held:
     def __post_init__(self) -> None:
         if min(self.start) < 0:
             raise ParameterError(
-                "initial slip and slip rate are bounds of both signs, 0 or more. Received "
-                f"{shortly(self.initial_slip)} m and {shortly(self.initial_slip_rate)} m/s. Leave out the sign."
+                "bounds of the initial slip and slip rate errors must be 0 or more. Received "
+                f"{shortly(self.initial_slip)} m and {shortly(self.initial_slip_rate)} m/s. Give absolute values."
             )
         if min(self.slip_noise, self.rate_noise) < 0:
             raise ParameterError(
-                "a bound of noise must be 0 or more. Received "
-                f"{shortly(self.slip_noise)} m and {shortly(self.rate_noise)} m/s. Check their signs."
+                "bounds of slip noise and rate noise must be 0 or more. Received "
+                f"{shortly(self.slip_noise)} m and {shortly(self.rate_noise)} m/s. Give absolute values."
             )
         if min(self.jitter, self.delay_jitter, self.averaging, self.ramp) < 0:
             raise ParameterError(
-                f"jitter must be 0 or more, and averaging too. Received {shortly(self.jitter)} s, of the delay "
-                f"{shortly(self.delay_jitter)} s, and {shortly(self.averaging)} s. Leave out the sign."
+                f"jitter, delay jitter, averaging and ramp must be 0 or more. Received {shortly(self.jitter)} s, "
+                f"{shortly(self.delay_jitter)} s, {shortly(self.averaging)} s and {shortly(self.ramp)} s. "
+                "Give absolute values."
             )
         if self.rate_noise and self.law.of_slip_alone:
             raise ParameterError(
-                "noise of the slip rate needs a law that measures it. Received "
-                f"{shortly(self.rate_noise)} m/s and a law of the slip alone. Leave it out."
+                "rate noise needs a law that measures the slip rate. Received the rate noise "
+                f"{shortly(self.rate_noise)} m/s for a law of the slip alone. Omit the rate noise."
             )
         if self.longest_step:
             self._require_no_clock()
@@ -122,8 +123,9 @@ class Held:
         """Refuse intervals that are no range, and what asks for a schedule or a start at rest."""
         if self.longest_step <= self.step:
             raise ParameterError(
-                "the longest step must be longer than the step, the shortest one. Received "
-                f"{shortly(self.longest_step)} s and {shortly(self.step)} s. Exchange them, or leave it out."
+                "the longest step must exceed the step, which is the shortest sampling interval. Received "
+                f"{shortly(self.longest_step)} s and the step {shortly(self.step)} s. Exchange both, or omit the "
+                "longest step."
             )
         first = (v for row in self.law.first for v in row)
         times = (self.ramp, self.jitter, self.delay_jitter, self.averaging)
@@ -133,9 +135,9 @@ class Held:
             or (self.pump and self.pump.rate)
         ):
             raise ParameterError(
-                "samples that follow no clock are known from rest, of a linear law whose pressure acts at once. "
-                "Received a longest step beside a delay, a lag, rock, a start, jitter, means, the rate of a pump or an "
-                "implicit step. Leave one of them out."
+                "aperiodic sampling needs a linear law and errors that are 0 at the start. It has no guarantee with a "
+                "delay, a lag, a diffusion path, jitter, averaging, the rate limit of a pump or an implicit step. "
+                f"Received longest_step {shortly(self.longest_step)} s with one of these. Omit longest_step, or these."
             )
 
     @property
@@ -150,30 +152,30 @@ class Held:
 
     @property
     def start(self) -> tuple[Fraction, Fraction]:
-        """Bounds of the errors at the start [m], [m/s]; 0 and 0 at rest."""
+        """Bounds of the initial errors [m], [m/s]; 0 and 0 at rest."""
         return self.initial_slip, self.initial_slip_rate
 
     @property
     def noise(self) -> dict[str, Fraction]:
-        """Bounds of the noise that there is, by its input of the loop; with jitter all that is measured has some."""
+        """Bounds of the measurement noise by input of the loop; with jitter every measurement has some."""
         measured = (NOISES[0], *NOISES[1:] * (not self.law.of_slip_alone)) if self.off else ()
         return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
 
     @property
     def off(self) -> Fraction:
-        """How far from its instant a measurement may tell of, at most [s]."""
+        """Largest timing error of a measurement [s]."""
         return self.jitter + self.averaging / 2
 
     @property
     def instants(self) -> Instants | None:
-        """How far those of the loop may be off; None where they are not, and a pressure may change at once."""
+        """Timing errors of the loop; None for exact timing and pressures without a ramp."""
         if not (self.off or self.delay_jitter or (self.pump and self.pump.rate)):
             return None
         return Instants(measured=self.off, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
 
     @property
     def slack(self) -> Fraction:
-        """By how much an interval from sample to sample may be longer than the shortest [s]; 0 with a clock."""
+        """Longest less shortest sampling interval [s]; 0 for periodic sampling."""
         return max(self.longest_step - self.step, Fraction(0))
 
     @property
@@ -183,7 +185,7 @@ class Held:
         return min(self.step - part - off, self.step - 2 * off)
 
     def told(self, task: UncertainPlant, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
-        """Bounds of the errors as the law is told them, from those of the true ones at any time [m], [m/s].
+        """Bounds of the measured errors from those of the true errors at any time [m], [m/s].
 
         A measurement that is early or late may be compared with the reference at its instant.
         """
@@ -202,8 +204,9 @@ class Held:
         """
         if self.law.root is not None:
             raise UnsupportedError(
-                "what is proved of a sliding mode tells its implicit root, not its gains. Received one. Take the "
-                "controller of its design, or its gains, scale, weight and authority in the scheme compensated."
+                "a certificate of a sliding mode states the implicit step, not the gains. Received a law with an "
+                "implicit step. Use the controller of the design, or its gains, scale, weight and authority in the "
+                "scheme compensated."
             )
         return laws.SampledController(law=self.law, step=self.step, **self.path, longest=self.longest_step)
 
@@ -262,7 +265,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainSpread:
-    """How far the input gain may be off that of a nominal loop [-].
+    """Deviation of the input gain from that of a nominal loop [-].
 
     Attributes
     ----------

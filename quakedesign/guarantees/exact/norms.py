@@ -144,7 +144,9 @@ def _sums(flow: Any, rows: Any, state: Any) -> tuple[Any, Any]:
             break
         within = _larger(within, absolute(step) * within)
         step, piece = step * step, 2 * piece
-    raise ParameterError("the nominal loop must be stable. Received one that is not seen to be. Change the gains.")
+    raise ParameterError(
+        "the nominal loop must be stable. Received a loop whose stability is not proved. Change the gains."
+    )
 
 
 def _columns(whole: Any, first: int, end: int) -> Any:

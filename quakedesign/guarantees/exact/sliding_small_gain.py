@@ -1,4 +1,4 @@
-"""The robust small-gain theorem around slow sliding with rate-and-state friction: the slip rate stays below Ve^Y.
+"""Robust small-gain theorem about slow sliding with rate-and-state friction: v ≤ Ve^Y.
 
 **Plant.** Per unit of area, with v = Ve^y, θ = (D/V)e^z, the slip error x, the pressure error q = p − p* and N = σ′ −
 p,
@@ -75,7 +75,7 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingClaims:
-    """What is never exceeded, absolute values.
+    """Claimed bounds of absolute values, for all t ≥ 0.
 
     Attributes
     ----------
@@ -103,9 +103,9 @@ class SlidingClaims:
     def __post_init__(self) -> None:
         every = (self.log_rate, self.log_state, self.slip_error, self.push, self.asked)
         if min(every) <= 0 or max(self.log_rate, self.log_state) > _LARGEST:
+            received = (f"{name} {shortly(v)}" for name, v in zip(self.__dataclass_fields__, every, strict=True))
             raise ParameterError(
-                f"claims must be positive, logarithms at most {_LARGEST}. Received "
-                f"{', '.join(f'{shortly(v)}' for v in every)}. Bound them so."
+                f"claims must be positive, log_rate and log_state at most {_LARGEST}. Received {', '.join(received)}."
             )
 
 
@@ -179,12 +179,15 @@ def loop_of(held: Held, model: SlidingModel, task: SlidingPlant) -> PeriodicLoop
     """
     if held.instants is not None:
         raise ParameterError(
-            "jitter and the rate of a pump are not known of slow sliding. Received some. Leave it out."
+            "slow sliding has no guarantee with jitter, averaging or the rate limit of a pump. Received one of these. "
+            "Omit jitter, averaging and the rate limit."
         )
     if not held.law.of_slip_alone or not (held.lag or held.diffusion):
         raise ParameterError(
-            "slow sliding is guaranteed of a law of the slip alone whose pressure reaches the fault through rock or a "
-            f"lag. Received L^2/D = {shortly(held.diffusion)} s and a lag of {shortly(held.lag)} s. Give one of them."
+            "slow sliding has a guarantee for a law of the slip alone, with a diffusion path or a lag. Received "
+            f"L^2/D = {shortly(held.diffusion)} s and a lag of {shortly(held.lag)} s"
+            f"{'' if held.law.of_slip_alone else ', for a law that uses the slip rate'}. Give diffusion or lag, and a "
+            "law of the slip alone."
         )
     times = {"delay": held.delay, "lag": held.lag, "diffusion": held.diffusion}
     loop = sliding_loop(held.law, model, held.step, **times, noisy=held.noise)
@@ -200,7 +203,7 @@ def _moving(task: SlidingPlant) -> dict[str, Fraction]:
 
 
 def model_of(task: SlidingPlant, claims: SlidingClaims) -> SlidingModel | None:
-    """Middle of all that may be; None where the normal stress, or regularised friction, may come near 0."""
+    """Nominal model; None if the normal stress, or regularised friction, may come near 0."""
     low, high = task.normal_stress(claims.push)
     if low <= 0 or (task.regularised and _least_exponent(task, claims) < 1):
         return None
@@ -259,7 +262,7 @@ def channels_of(task: SlidingPlant, held: Held, claims: SlidingClaims, loop: Per
 
 
 def inertia(task: SlidingPlant, held: Held, claims: SlidingClaims) -> Fraction:
-    """By how much the mass makes the stress larger, sup|r|/λ₀ [Pa]."""
+    """Stress equivalent of inertia, sup|r|/λ₀ [Pa]."""
     low, high = task.normal_stress(claims.push)
     (a_low, a), (_, b), (_, mu) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
     grown, moved = exponential(claims.log_rate), _fastest_push(task, held, claims)
@@ -269,7 +272,7 @@ def inertia(task: SlidingPlant, held: Held, claims: SlidingClaims) -> Fraction:
 
 
 def regularisation(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
-    """By how much regularised friction makes the stress larger, N_max·ε [Pa]."""
+    """Stress equivalent of regularised friction, N_max·ε [Pa]."""
     if not task.regularised:
         return _ZERO
     a = task.ranges["direct_effect"][1]

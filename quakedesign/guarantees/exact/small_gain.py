@@ -160,7 +160,7 @@ _HALVINGS = 96
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """What no course of the uncertain quantities exceeds, from its start, for ever.
+    """Bounds for every course of the uncertain quantities and all t ≥ 0.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ class Bounds:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class NoGuarantee:
-    """Why a loop has none.
+    """Reason why a loop has no guarantee.
 
     Attributes
     ----------
@@ -347,7 +347,7 @@ def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
 
 
 def unshifted(task: UncertainPlant) -> Fraction:
-    """What b·(p − p*) is more than the push of the loop, p* being shifted in the class ``rate`` [m/s²]."""
+    """Difference of b·(p − p*) and the loop's matched disturbance, p* shifted in class ``rate`` [m/s²]."""
     if task.change is None:
         return _ZERO
     return task.amplitude / ((task.beta[0] + task.beta[1]) / 2 if task.friction.rate_slope else 1)
@@ -372,7 +372,7 @@ _ONE_OVER_E = Fraction(3679, 10000)  # from above
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlowGain:
-    """How a proof uses that the input gain is slow: see `theorem`.
+    """Slowly varying input gain as used by a proof.
 
     Attributes
     ----------
@@ -392,8 +392,8 @@ class SlowGain:
     def __post_init__(self) -> None:
         if not 1 <= self.parts <= MOST_PARTS or self.growth <= 0:
             raise ParameterError(
-                f"a slow gain needs 1 to {MOST_PARTS} parts and a positive growth. Received {self.parts} and "
-                f"{shortly(self.growth)} 1/s. Change them."
+                f"a slowly varying input gain needs 1 to {MOST_PARTS} parts and a positive growth. Received "
+                f"{self.parts} parts and the growth {shortly(self.growth)} 1/s."
             )
 
     def models(self, task: UncertainPlant) -> tuple[NominalModel, ...]:
@@ -406,14 +406,15 @@ class SlowGain:
         """
         if task.friction.rate_slope:
             raise ParameterError(
-                "a slow gain needs friction of the slip alone. Received one of the slip rate. Leave it out."
+                "a slowly varying input gain needs friction that depends on the slip alone. Received friction with "
+                f"rate_slope {shortly(task.friction.rate_slope)} s/m. Omit the slowly varying input gain."
             )
         half = self._half(task)
         middles = (task.beta[0] + (2 * number + 1) * half for number in range(self.parts))
         return tuple(replace(task.model, gain=middle * task.authority) for middle in middles)
 
     def spread(self, task: UncertainPlant, slip_error: Fraction) -> GainSpread:
-        """How far the gain is off while the slip error stays below a bound [m]."""
+        """Deviation of the input gain while the slip error stays below a bound [m]."""
         law = task.friction
         slope = max(law.weakening, law.strengthening) * task.area_per_mass[1] / task.authority
         return GainSpread(
@@ -467,7 +468,7 @@ _SECTOR_HALVINGS = 10
 
 
 def holds(root: ImplicitRoot, step: Fraction, slip: Fraction, rate: Fraction) -> bool:
-    """Whether the lines are shown to enclose the root for |e1| ≤ slip [m] and |e2| ≤ rate [m/s]; False: not shown."""
+    """Whether the sector is proved to enclose the root for |e1| ≤ slip [m] and |e2| ≤ rate [m/s]."""
     last = slip / step
     low, high = root.slopes
     with ctx.workprec(_BITS):

@@ -45,7 +45,7 @@ MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Claims:
-    """What is never exceeded.
+    """Claimed bounds of errors and pressures, for all t ≥ 0.
 
     Attributes
     ----------
@@ -222,7 +222,7 @@ class Guarantee:
 
     @property
     def peak_slip_rate(self) -> UpperBound:
-        """What the slip rate never exceeds [m/s]."""
+        """Bound of the slip rate [m/s], for all t ≥ 0."""
         return self.claims.peak_slip_rate
 
     @property
@@ -232,7 +232,7 @@ class Guarantee:
 
     @property
     def rest_limit(self) -> RestLimit | None:
-        """A limit that the valve's pressure never reaches; None where nothing is claimed of it, or the law not told.
+        """Limit at rest that the valve pressure never reaches; None without a valve claim or `applied`.
 
         What the law asks for acts a delay later, while the reference moves on. A fault that moves by less than its
         measurement tells, or by a hundredth of the reference's largest rate, rests. Pressures that are
@@ -258,7 +258,7 @@ class Guarantee:
 
     @property
     def slip_acceleration(self) -> UpperBound:
-        """What |e1″| never exceeds [m/s²], from |p − p*| as the claims of the pressure follow from it."""
+        """Bound of |e1″| [m/s²], from |p − p*| of the pressure claims."""
         task, claims, (low, high) = self.task, self.claims, self.task.rest_pressure
         away = max(claims.largest_pressure - high, low - claims.least_pressure)
         slip, rate = (max(map(abs, chord)) for chord in (task.slip_chord, task.rate_chord))
@@ -495,7 +495,7 @@ PREMISES = (
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ContinuousPeaks:
-    """Claims about a law in continuous time, which no computer runs; `check` decides them.
+    """Claims about a law in continuous time; `check` decides them.
 
     Attributes
     ----------
@@ -583,7 +583,7 @@ _SPREADS = ("stiffness", "damping", "authority")
 
 
 def differences(proved: UncertainPlant, asked: UncertainPlant) -> list[str]:
-    """What of a task is not covered by the task of a proof, each with both values, SI; empty if everything is.
+    """Differences of a task that a proof does not cover, with both values, SI; empty if none.
 
     Constants of the fault and its reference must be the same; friction, ranges and disturbance lie within those of the
     proof. The name is none of it.
@@ -656,13 +656,13 @@ class SlidingGuarantee:
 
     @property
     def covers(self) -> str:
-        """For what it holds, in short."""
+        """Short statement of the conditions."""
         stress = LowerBound(self.task.stress).quantity("Pa")
         return f"the stated constants of friction and every shear stress disturbance up to {stress}, {self.lasts}"
 
     @property
     def lasts(self) -> str:
-        """For how long it holds, in short."""
+        """Short statement of the time range."""
         return f"while the reference goes {float(self.task.distance):.4g} m"
 
     def __repr__(self) -> str:

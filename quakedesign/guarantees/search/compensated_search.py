@@ -71,7 +71,7 @@ def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -
     """
     pull, feed_forward, _ = _derived(DiscreteLaw.of(controller, 0.0))
     if feed_forward != 0:
-        raise UnsupportedError("a law with a feed-forward has no guarantee in an implicit step. Use feedforward none.")
+        raise UnsupportedError("an implicit step has no guarantee with a feed-forward. Use feedforward none.")
     numbers = {discrete_law.step: to_sympy(step), discrete_law.authority: to_sympy(authority)}
     return _terms(-pull.xreplace(numbers))
 
@@ -95,7 +95,7 @@ def _term(expression: sp.Expr) -> Power:
         inner = _NAMES.get(core.args[0]) or _terms(core.args[0])
         return Power(factor=_enclosed(factor), exponent=fraction_of(core.args[1]), argument=inner)
     raise UnsupportedError(
-        "an implicit step with a guarantee needs a pressure that is a falling sum of signed powers. "
+        "a guarantee of an implicit step needs a pressure that is a sum of signed powers with negative factors. "
         f"Received the term {expression}. Use another law."
     )
 
@@ -383,8 +383,8 @@ def recovered(found: Guarantee) -> Compensation:
             if compensated_law(again, weight, gain) == law:
                 return Compensation(controller=controller, found=found)
     raise UnsupportedError(
-        "gains are read off the implicit step of a 2-CTA or a 2-DIA in the scheme compensated. Received a certificate "
-        "of another law. Take the controller of its design, or its gains, scale, weight and authority in that scheme."
+        "gains follow from a certificate of a 2-CTA or a 2-DIA in the scheme compensated. Received a certificate of "
+        "another law. Use the controller of its design, or its gains, scale, weight and authority in that scheme."
     )
 
 

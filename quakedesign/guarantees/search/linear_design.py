@@ -220,8 +220,8 @@ def design_held(
     require_known(objective, OBJECTIVES, "objective")
     if step <= 0 or not 0 <= delay <= MOST_DELAY * step or lag < 0:
         raise ParameterError(
-            f"a design needs a positive step, a delay of 0 to {MOST_DELAY} steps and a lag of 0 or more. Received "
-            f"{float(step):.4g} s, {float(delay):.4g} s, {float(lag):.4g} s. Shorten the delay."
+            f"step must be positive, delay 0 to {MOST_DELAY} steps, and lag 0 or more. Received the step "
+            f"{float(step):.4g} s, the delay {float(delay):.4g} s and the lag {float(lag):.4g} s. Shorten the delay."
         )
     laws = _Laws.of(task, step, measured, around)
     if isinstance(laws, NoGuarantee):
@@ -893,7 +893,10 @@ def certified_peaks(
     """
     require_known(disturbance_class, CLASSES, "disturbance class", UnknownNameError)
     if controller.offset:
-        raise ParameterError("a certified peak needs a law that starts with p = 0. Received one with an offset.")
+        raise ParameterError(
+            "a certified peak needs a law with p = 0 at the start. Received the offset "
+            f"{float(controller.offset):.4g} Pa. Use the offset 0."
+        )
     law = exact_integrals(tuple(controller.gains.values()), of_state=controller.feedback == "state")
     needed = 1 + any(law.of_reference)
     if len(law.states) < needed:

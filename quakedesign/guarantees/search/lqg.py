@@ -181,21 +181,23 @@ def require_surroundings(around: Around) -> None:
         value = told.get(name, Fraction(0))
         if value < 0:
             what = name.replace("_", " ")
-            raise ParameterError(f"{what} must be 0 or more. Received {shortly(value)} {unit}. Leave out the sign.")
+            raise ParameterError(
+                f"{what} must be 0 or more. Received {shortly(value)} {unit}. Give its absolute value."
+            )
 
 
 def why_no_law(step: Fraction, measured: str, around: Around) -> str:
     """Why there are no laws for a loop; empty if there are."""
     if around.get("longest_step") and measured != MEASURED[0]:
-        return "samples that follow no clock are designed for with slip and slip rate measured"
+        return "aperiodic sampling needs slip and slip rate measured"
     if measured == MEASURED[2] and any(around.get(name) for name in _NOT_BY_DIFFERENCES):
-        return "what a differentiator tells is known from rest, at the instants of a clock, without a lag or rock"
+        return "a differentiator needs zero initial errors, and no jitter, averaging, lag or diffusion path"
     if not around.get("diffusion"):
         return ""
     if SHORTEST * around["diffusion"] < step:
-        return f"a layer of L^2/D = {float(around['diffusion']):.4g} s is faster than T_s/{SHORTEST}; leave it out"
+        return f"L^2/D = {float(around['diffusion']):.4g} s is below T_s/{SHORTEST}; omit the diffusion path"
     known = path_modes(step, around, observed=measured == "slip") >= _FEWEST_MODES
-    return "" if known else "a law that knows delay and layer has too many states"
+    return "" if known else "a law with models of the delay and of the diffusion path has too many states"
 
 
 def family_of(task: UncertainPlant, step: Fraction, measured: str, around: Around) -> LawFamily:
@@ -463,8 +465,8 @@ def _gains(update: list[list[Fraction]], seen: Any, w: Weights) -> tuple[list[Fr
         spread = solve_discrete_are(own.T, told.T, np.diag([w.slip_noise, w.state_noise, w.level_noise]), np.eye(1))
     except (LinAlgError, ValueError):
         raise ParameterError(
-            "slow sliding needs a step and a path that its instability lets be. Received ones for which Riccati's "
-            "equation has no solution. Shorten them."
+            "step, delay and diffusion time must be short compared with the growth of the instability of slow sliding. "
+            "Received values for which the Riccati equation has no solution. Shorten the step or the diffusion path."
         ) from None
     gains = of_pressure.T @ value @ of_state / (w.pressure + of_pressure.T @ value @ of_pressure)
     corrections = spread[:, 0] / (spread[0, 0] + 1)

@@ -337,7 +337,8 @@ def _cut(task: SlidingPlant, held: Held, claims: SlidingClaims, left: list[int],
             return (None,)
     if not wide or left[0] < 1:
         raise ParameterError(
-            f"a box must fall into at most {MOST_CELLS} cells on which its claims follow. Received one that does not."
+            f"the claims must be proved on at most {MOST_CELLS} cells of the box. Received a box that needs more. "
+            "Reduce the spread, or raise the claims."
         )
     left[0] -= 1
     middles = {axis: (task.ranges[axis][0] + task.ranges[axis][1]) / 2 for axis in wide}

@@ -1,4 +1,4 @@
-"""What lies between the pressure that a law asks for and the pressure in the fault, one stage a file."""
+"""Actuator stages between the commanded pressure and the pressure in the fault, one stage a file."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""What every stage of an actuator offers."""
+"""Base classes of actuator stages."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Option:
-    """What a command line asks about a stage.
+    """Command-line option of a stage.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Stage(ABC):
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Memory before anything has been injected."""
+        """Initial memory of the stage, with zero pressure."""
         return ()
 
 
@@ -83,7 +83,7 @@ class SampledStage(Stage):
 
 
 class FlowStage(Stage):
-    """A stage with a motion of its own, integrated along with the plant."""
+    """A dynamic stage, integrated together with the plant."""
 
     @property
     @abstractmethod
@@ -100,7 +100,7 @@ class FlowStage(Stage):
 
     @property
     def stores(self) -> bool:
-        """Whether `flows` knows volume and flow rate."""
+        """Whether `flows` contains volume and flow rate."""
         return type(self).flows is not FlowStage.flows
 
     def flows(self, numbers: Any, memory: list[Any], pressure: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Stages in a row."""
+"""Actuator as a chain of stages."""
 
 import math
 from itertools import pairwise
@@ -18,7 +18,7 @@ LONGEST = 2.5  # of a substep times the fastest rate: below the limits 2.78 and 
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Actuator:
-    """From the pressure that a law asks for to the pressure in the fault.
+    """Chain of stages from the commanded pressure to the pressure in the fault.
 
     Attributes
     ----------
@@ -45,25 +45,25 @@ class Actuator:
             if isinstance(before, FlowStage) and isinstance(after, SampledStage):
                 raise ParameterError(
                     f"stages that act once per sample come first. Received {before.name} before {after.name}. "
-                    "Change their order."
+                    "Exchange these two stages."
                 )
         if len(between := [stage.name for stage in self.sampled if stage.part]) > 1:
             raise ParameterError(
-                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Leave one out."
+                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Omit all but one."
             )
         if len(self._stores) > 1:
             names = ", ".join(stage.name for stage in self._stores)
-            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Leave one out.")
+            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Omit all but one.")
 
     @classmethod
     def meant_for(cls, sampling: "Sampling") -> "Actuator":
-        """Delay, lag and rock for which a law of samples is designed; without stages where it is for none."""
+        """Actuator with the delay, lag and diffusion path of a sampled law; no stages if it has none."""
         step, kinds = float(sampling.step), {kind.name: kind for kind in (Delay, Lag, Diffusion)}
         times: dict[str, Any] = {name: float(time) for name, time in sampling.path.items() if time}
         return cls(stages=tuple(kinds[name].asked(step, **{name: time}) for name, time in times.items()))
 
     def completed(self, other: "Actuator") -> "Actuator":
-        """The same, and along the signal those stages of another one of whose kind it has none."""
+        """Actuator extended by the stages of another one whose kind it lacks."""
         known = {stage.name for stage in self.stages}
         more = (stage for stage in other.stages if stage.name not in known)
         along = sorted((*self.stages, *more), key=lambda stage: (isinstance(stage, FlowStage), stage.place))
@@ -76,22 +76,22 @@ class Actuator:
 
     @property
     def flowing(self) -> tuple[FlowStage, ...]:
-        """Stages that move between samples."""
+        """Stages with dynamics between samples."""
         return tuple(stage for stage in self.stages if isinstance(stage, FlowStage))
 
     @property
     def part(self) -> float:
-        """Share of a sampling period after which what leaves the sampled stages at a sample acts."""
+        """Fraction of a sampling period after which the output of the sampled stages acts."""
         return sum(stage.part for stage in self.sampled)
 
     @property
     def flow_start(self) -> tuple[float, ...]:
-        """Memory of the flowing stages at the start."""
+        """Initial memory of the dynamic stages."""
         return tuple(value for stage in self.flowing for value in stage.start)
 
     @property
     def stores(self) -> bool:
-        """Whether volume and flow rate are known."""
+        """Whether volume and flow rate are computed."""
         return bool(self._stores)
 
     @property
@@ -99,11 +99,11 @@ class Actuator:
         return [stage for stage in self.flowing if stage.stores]
 
     def substeps(self, step: float) -> int:
-        """Least number of substeps of a step [s] that no stage is too fast for."""
+        """Least number of substeps of a step [s] that resolves every stage."""
         return max((math.ceil(step * stage.fastest / LONGEST) for stage in self.flowing), default=1)
 
     def require_resolved(self, substep: float) -> None:
-        """Refuse a substep [s] that a stage is too fast for.
+        """Reject a substep [s] that does not resolve a stage.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class Actuator:
                 )
 
     def hold(self, numbers: list[Any], memory: list[Any], pressure: Any, step: float) -> tuple[Any, Any, list[Any]]:
-        """Pressure [Pa] that is held, how much more [Pa] was asked for than there is, and the memory afterwards."""
+        """Held pressure [Pa], excess of the commanded pressure [Pa], and the memory afterwards."""
         kept: list[Any] = []
         excess: Any = 0.0
         for stage, own, past in zip(self.sampled, *_split(self.sampled, numbers, memory), strict=True):

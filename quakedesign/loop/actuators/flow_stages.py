@@ -137,7 +137,7 @@ class Diffusion(FlowStage):
 
     @classmethod
     def of_time(cls, time: float, *, storage: float | None = None, cells: int = 16) -> Self:
-        """Layer of which only τ = L²/D [s] is known; it is given the length of 1 m, which changes nothing.
+        """Layer with given τ = L²/D [s]; its length of 1 m is arbitrary.
 
         Raises
         ------

@@ -18,7 +18,7 @@ _SAME = 1e-9  # of a sampling period
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Delay(SampledStage):
-    """What is computed from one measurement acts some samples later; before that, nothing is injected.
+    """Delay of the pressure by a number of samples; zero pressure before.
 
     Attributes
     ----------
@@ -85,12 +85,12 @@ class Delay(SampledStage):
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Nothing asked for yet [Pa], oldest first; with jitter the age of what acts [samples] and the generator."""
+        """Queue of zero pressures [Pa], oldest first; with jitter also age [samples] and generator."""
         queue = (0.0,) * (self.samples + self.jitter)
         return (*queue, float(self.samples), *generator(self.seed)) if self.jitter else queue
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
-        """Pressure of the queue that is as old as the delay; see `SampledStage.apply`."""
+        """Pressure of the queue whose age is the delay; see `SampledStage.apply`."""
         import casadi as ca
 
         longest = self.samples + self.jitter
@@ -190,11 +190,11 @@ class RateLimit(SampledStage):
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Pressure held before the start [Pa]."""
+        """Initial pressure [Pa]."""
         return (0.0,)
 
     def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
-        """Pressure that can be reached; see `SampledStage.apply`."""
+        """Rate-limited pressure; see `SampledStage.apply`."""
         import casadi as ca
 
         (rate,), (held,) = numbers, memory
@@ -208,7 +208,7 @@ class RateLimit(SampledStage):
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Saturation(SampledStage):
-    """Cuts the pressure off at two bounds (ERRATA 23).
+    """Saturates the pressure at two bounds (ERRATA 23).
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Ways to carry a law out over a step, one a file, found by looking into this folder."""
+"""Discretisation schemes of a control law, one a file, discovered in this folder."""
 
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -24,7 +24,7 @@ def schemes() -> dict[str, type[Scheme]]:
 
 @checked
 def simulation_scheme(name: str, **settings: Any) -> Scheme:
-    """Scheme of a given name, or of the user's own as ``module:Class``, with settings other than its own defaults.
+    """Scheme by name, or a user-defined one as ``module:Class``, with the given settings.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
         able = [n for n, one in schemes().items() if is_dataclass(one) and setting in {f.name for f in fields(one)}]
         raise ParameterError(
             f"settings of {setting} are for the schemes {', '.join(sorted(able)) or 'of nobody'}. "
-            f"Received {name}. Use one of them, or leave the settings out."
+            f"Received {name}. Use one of these schemes, or omit {setting}."
         )
     return kind(**settings)
 
@@ -48,7 +48,7 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
 def own_way(
     controller: Controller | None, scheme: str | Scheme | None, step: float | None, usual: str = "explicit"
 ) -> tuple[str | Scheme, float | None, dict[str, Any]]:
-    """Scheme and step of a run, as asked for, else the usual scheme; a law of samples has its own, and settings for it.
+    """Scheme and step of a run; a sampled law has its own scheme, step and settings.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def own_way(
     if (name, told) != (own.scheme, wanted) or step not in (None, period):
         received = "".join(f", {key} {value!r}" for key, value in told.items() if not named)
         raise ParameterError(
-            f"a law of samples runs with the scheme {own} and the step {period!r} s it was designed for. Received "
-            f"{name}{received} and {period if step is None else step!r} s. Leave scheme and step out."
+            f"a sampled law runs with the scheme {own} and the step {period!r} s of its design. Received the scheme "
+            f"{name}{received} and the step {period if step is None else step!r} s. Omit scheme and step."
         )
     return chosen, period, wanted if named else {}

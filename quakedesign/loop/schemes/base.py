@@ -28,7 +28,7 @@ from quakedesign.loop.sensing.measurement import EXACT, Measurement, Sensor, gen
 
 
 class Stepped(ABC):
-    """What a scheme asks of the closed loop that it carries over a step; the functions work on CasADi SX.
+    """Closed loop as a scheme needs it; the functions work on CasADi SX.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Scheme(ABC):
     name: ClassVar[str]
 
     def memory(self, loop: Stepped, step: float) -> dict[str, float]:
-        """Entries of the memory with their values at the start; none unless told."""
+        """Entries of the memory with their initial values; none by default."""
         return {}
 
     @abstractmethod
@@ -105,7 +105,7 @@ class Scheme(ABC):
         return None
 
     def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:
-        """Further signals (SX) at the start of a step, by the names of `described`; none unless told."""
+        """Further signals (SX) at the start of a step, by the names of `described`; none by default."""
         return {}
 
     @property
@@ -138,7 +138,7 @@ SIGNALS = (
 
 @dataclass(frozen=True)
 class Decision:
-    """What a controller decides at one sample.
+    """Result of a controller at one sample.
 
     Attributes
     ----------
@@ -156,7 +156,7 @@ class Decision:
 
 
 class Decided(ABC):
-    """What a controller does with a law at one sample: one part of a scheme that samples.
+    """Sampled part of a scheme: evaluation of a law at one sample.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ def control_step(kind: type[Decided], law: DiscreteLaw) -> ControlStep:
 
 
 def slope_of(pressure: sp.Expr, integral: sp.Symbol) -> sp.Expr:
-    """Slope of the pressure in an integral state; 0 where the law limits itself and so looks after its own windup."""
+    """Derivative of the pressure by an integral state; 0 if the law has its own anti-windup."""
     limited = pressure.has(sp.Min, sp.Max, sp.Piecewise)
     return sp.Integer(0) if limited else sp.diff(pressure, integral)
 
@@ -233,7 +233,7 @@ MOST_STEPS = 1000
 
 @dataclass(frozen=True, kw_only=True)
 class NoClock:
-    """The next sample comes any whole number of steps after the last, drawn anew each time, each equally likely.
+    """Aperiodic sampling: intervals of shortest to longest steps, uniformly distributed.
 
     Attributes
     ----------
@@ -255,21 +255,22 @@ class NoClock:
         whole = all(isinstance(v, int) and not isinstance(v, bool) for v in (self.shortest, self.longest))
         if not (whole and 1 <= self.shortest <= self.longest <= MOST_STEPS):
             raise ParameterError(
-                f"intervals by no clock must be whole numbers of steps, 1 to {MOST_STEPS}, the shortest first. "
-                f"Received {self.shortest!r} and {self.longest!r}. Change them."
+                f"shortest and longest interval of aperiodic sampling must be whole numbers of steps, 1 to "
+                f"{MOST_STEPS}, with shortest <= longest. Received {self.shortest!r} and {self.longest!r}. "
+                "Round both, or exchange them."
             )
         Measurement(seed=self.seed)
 
     @classmethod
     def of(cls, shortest: Fraction, longest: Fraction) -> Self:
-        """In 8 to 100 steps of the shortest interval [s], so many that the longest is nearly reached, never passed."""
+        """Aperiodic sampling with 8 to 100 steps in the shortest interval [s]; never above the longest."""
         ratio = longest / shortest
         grain = max(GRAINS, key=lambda count: (Fraction(int(count * ratio), count), -count))
         return cls(shortest=grain, longest=min(int(grain * ratio), MOST_STEPS))
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Steps to wait for the first sample, none, and the generator."""
+        """Steps until the first sample, which are none, and the generator."""
         return (0.0, *generator(self.seed))
 
     def after(self, memory: list[Any]) -> tuple[Any, list[Any]]:
@@ -342,7 +343,8 @@ class Sampled(Scheme, Decided):
             raise ParameterError(f"authority must be positive and finite. Received {self.authority!r} m²/kg.")
         if self.clock and self.actuator.part:
             raise ParameterError(
-                "by no clock a pressure acts at a sample. Received a delay that is no whole number of steps. Change it."
+                "the delay must be a whole number of steps with aperiodic sampling. Received a delay with a fraction "
+                f"of {self.actuator.part:.4g} of a step. Round the delay."
             )
 
     @property

@@ -99,8 +99,8 @@ class Inclusion:
     def __post_init__(self) -> None:
         if direction(self.pull) not in (0, -1):
             raise ParameterError(
-                "an implicit step needs a law whose pressure never rises with slip and slip rate at the end of the "
-                "step. Received one that may. Check the signs of its gains, or use the scheme explicit."
+                "an implicit step needs a pressure that never increases with slip and slip rate at the end of the "
+                "step. Received a law whose pressure may. Check the signs of its gains, or use the scheme explicit."
             )
         for argument in self.arguments:
             self._linear(argument)
@@ -160,8 +160,8 @@ class Inclusion:
         slope = sp.expand_mul(part).coeff(end_rate)
         if argument not in (end_slip, end_rate) and not slope.is_positive:
             raise ParameterError(
-                "an implicit step needs signs of arguments that grow at least linearly with slip or slip rate. "
-                f"Received the sign of {argument}. Use the scheme explicit."
+                "every argument of a sign must grow at least linearly with slip or slip rate in an implicit step. "
+                f"Received {argument}. Use the scheme explicit."
             )
         return slope
 
@@ -249,8 +249,8 @@ def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:
     way = direction(argument)
     if not way:
         raise ParameterError(
-            f"an implicit step needs signs of arguments that rise with slip and slip rate. Received {argument}. "
-            "Use the scheme explicit."
+            "every argument of a sign must increase with slip and slip rate in an implicit step. "
+            f"Received {argument}. Use the scheme explicit."
         )
     moving = argument.as_independent(end_slip, end_rate, as_Add=False)[1]
     return (direction(moving) or 1) * moving, way

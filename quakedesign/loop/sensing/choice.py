@@ -236,7 +236,9 @@ def smallest_bound(
         For n_d ≥ 2.
     """
     if differentiator.order != 1:
-        raise ParameterError(f"a bound exists for order 1 alone. Received {differentiator.order}. Take order=1.")
+        raise ParameterError(
+            f"order must be 1 for the smallest bound of a differentiator. Received {differentiator.order}. Use order=1."
+        )
 
     def holds(exponent: float) -> bool:
         tried = replace(differentiator, bound=10.0**exponent)

@@ -333,7 +333,10 @@ class OutputFeedback(Sensor):
             if not isinstance(stage, SlipStage):
                 raise ParameterError(f"stages must be Transducer, Averaging and the like. Received {stage!r}.")
             if stage.hardware and not hardware:
-                raise ParameterError(f"hardware comes first. Received {stage!r} after software. Change their order.")
+                raise ParameterError(
+                    f"stages in hardware must come before those in software. Received {stage!r} after software. "
+                    "Reorder the stages."
+                )
             hardware = stage.hardware
 
     @property

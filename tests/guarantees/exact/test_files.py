@@ -181,7 +181,7 @@ def test_noise_of_a_slip_rate_that_is_not_measured_is_refused_by_both():
     raw = json.loads(guarantee_text(claim("observer")))
     text = json.dumps(changed(raw, ("loop", "noise", "rate"), "1/100000"))
     assert "needs a law that measures it" in standalone(text)
-    assert "needs a law that measures it" in package(text)
+    assert "needs a law that measures the slip rate" in package(text)
 
 
 def test_a_file_of_before_noise_is_one_without():

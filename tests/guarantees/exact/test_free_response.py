@@ -284,7 +284,7 @@ def test_an_implicit_step_begins_with_the_slip_rate_that_it_is_told_noise_includ
 
 @pytest.mark.parametrize("bound", ["initial_slip", "initial_slip_rate"])
 def test_a_bound_has_no_sign(bound):
-    with pytest.raises(ParameterError, match="initial slip and slip rate are bounds of both signs, 0 or more"):
+    with pytest.raises(ParameterError, match="bounds of the initial slip and slip rate errors must be 0 or more"):
         replace(stored().held, **{bound: F(-1)})
 
 

@@ -65,5 +65,5 @@ def test_what_are_no_four_gains_is_refused(gains):
 
 
 def test_a_law_without_any_integral_is_refused():
-    with pytest.raises(ParameterError, match="Give it an integral"):
+    with pytest.raises(ParameterError, match="Add an integral of the slip error"):
         qd.guarantee(LAB, gains=[1e7, 1e4, 0, 0])

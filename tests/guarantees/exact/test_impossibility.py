@@ -212,7 +212,7 @@ def test_nothing_is_impossible_without_a_disturbance_and_little_without_an_insta
     ],
 )
 def test_meaningless_times_and_pressures_are_refused(call):
-    with pytest.raises(ParameterError, match="a limit needs"):
+    with pytest.raises(ParameterError, match="a performance limit needs"):
         call()
 
 

@@ -255,7 +255,7 @@ def test_other_files_have_no_longest_interval(name, longest, said):
 def test_what_is_wrong_with_a_set_is_said():
     alike = changed(("reach", "at_samples", 3, 2), lambda basis: [basis[0]] * len(basis))
     assert "must be independent" in standalone(alike)
-    assert "must be independent" in parse_guarantee(json.dumps(alike)).bounds().reason
+    assert "must be linearly independent" in parse_guarantee(json.dumps(alike)).bounds().reason
     assert "bounds of the inputs must be" in standalone(changed(("reach", "inputs", 0), "-1"))
     for new, said in (
         (lambda lines: [line * 5 for line in lines], "must have 1 to 32 pieces"),
@@ -413,7 +413,7 @@ def test_an_implicit_step_and_an_interval_no_longer_than_the_step_are_refused_fo
     raw["loop"]["longest"] = "1/5"
     assert "must be of a linear law from rest" in standalone(raw)
     assert "must be longer than step" in standalone(changed(("loop", "longest"), "1/1000"))
-    with pytest.raises(ParameterError, match="must be longer than the step"):
+    with pytest.raises(ParameterError, match="must exceed the step"):
         replace(claim().held, longest_step=claim().held.step)
 
 
@@ -432,13 +432,13 @@ def test_an_implicit_step_and_an_interval_no_longer_than_the_step_are_refused_fo
     ids=lambda more: next(iter(more)),
 )
 def test_what_a_set_does_not_know_of_is_refused_before_its_size_is_looked_at(more):
-    with pytest.raises(ParameterError, match="samples that follow no clock are known from rest"):
+    with pytest.raises(ParameterError, match="aperiodic sampling needs a linear law"):
         replace(claim().held, **more)
 
 
 def test_a_law_that_starts_from_what_it_measures_needs_a_clock():
     law = claim().held.law
-    with pytest.raises(ParameterError, match="samples that follow no clock are known from rest"):
+    with pytest.raises(ParameterError, match="aperiodic sampling needs a linear law"):
         replace(claim().held, law=replace(law, first=((F(0), F(1)), (F(0), F(0)))))
 
 
@@ -485,3 +485,25 @@ def test_with_a_clock_no_set_is_looked_at():
     known = claim()
     found = guarantee(known.task, replace(known.held, longest_step=F(0)), reach=known.reach)
     assert "need no set" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda s: {"facets": ()}, "facets must be 1 to"),
+        (lambda s: {"facets": (*s.facets[:-1], s.facets[-1][:-1])}, "facets must have the same number of entries"),
+        (lambda s: {"facets": ((F(10) ** 20, *s.facets[0][1:]), *s.facets[1:])}, "must be below 1e20"),
+        (lambda s: {"at_samples": s.at_samples[:-1]}, "at_samples must have one row for each facet"),
+        (lambda s: {"between": ((), *s.between[1:])}, "must have the same 1 to 32 pieces in every row"),
+        (
+            lambda s: {"between": ((s.between[0][0][:-1], *s.between[0][1:]), *s.between[1:])},
+            "a basis must have as many",
+        ),
+        (lambda s: {"inputs": (F(-1), *s.inputs[1:])}, "inputs must be given, 0 or more each"),
+        (lambda s: {"inputs": ()}, "inputs must be given, 0 or more each"),
+    ],
+)
+def test_the_condition_that_a_set_misses_is_named(wrong, said):
+    found = claim().reach
+    with pytest.raises(ParameterError, match=f"{said}.* in an invariant set. Received "):
+        replace(found, **wrong(found))

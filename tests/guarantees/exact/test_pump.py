@@ -25,7 +25,7 @@ def stored(**changes):
 
 @pytest.mark.parametrize(("least", "largest"), [("1", "2"), ("-2", "-1"), ("0", "0"), ("1/1000000000", "5")])
 def test_nothing_is_between_the_limits_of_a_pump(least, largest):
-    with pytest.raises(ParameterError, match="must have 0 between them"):
+    with pytest.raises(ParameterError, match="least pressure of a pump must be 0 or less"):
         Pump(least=F(least), largest=F(largest))
 
 

@@ -50,7 +50,7 @@ def test_parts_have_their_middles(parts, gains):
 
 
 def test_friction_of_the_rate_has_no_slow_gain():
-    with pytest.raises(ParameterError, match="needs friction of the slip alone"):
+    with pytest.raises(ParameterError, match="needs friction that depends on the slip alone"):
         SLOW.models(replace(BY_HAND, friction=replace(FRICTION, rate_slope=F(1, 10))))
 
 

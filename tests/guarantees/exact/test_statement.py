@@ -128,7 +128,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     said = Guarantee(task=TASK, held=quiet, claims=CLAIMS).sentence()
     assert "held over 1 s, with the slip alone measured, for every" in said
     assert Held(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
-    with pytest.raises(ParameterError, match="needs a law that measures it"):
+    with pytest.raises(ParameterError, match="needs a law that measures the slip rate"):
         replace(quiet, rate_noise=F(1))
     for name in ("slip_noise", "rate_noise"):
         with pytest.raises(ParameterError, match="must be 0 or more"):
@@ -155,7 +155,7 @@ def test_a_law_runs_once_a_step_without_delay_and_lag_unless_it_has_an_implicit_
     held = Held(law=HELD.law, step=F(1, 10))
     assert (held.delay, held.lag) == (0, 0)
     assert (held.controller.law, held.controller.step) == (held.law, F(1, 10))
-    with pytest.raises(UnsupportedError, match="tells its implicit root, not its gains"):
+    with pytest.raises(UnsupportedError, match="states the implicit step, not the gains"):
         _ = ROOTED.controller
 
 
@@ -270,7 +270,7 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     said = Guarantee(task=TASK, held=mean, claims=CLAIMS).sentence()
     assert "held over 0.1 s, each measurement a mean over 0.0333333 s around its time, each measurement within" in said
     for name in ("jitter", "delay_jitter", "averaging", "ramp"):
-        with pytest.raises(ParameterError, match="jitter must be 0 or more"):
+        with pytest.raises(ParameterError, match="jitter, delay jitter, averaging and ramp must be 0 or more"):
             replace(HELD, **{name: F(-1, 10**9)})
 
 

@@ -99,9 +99,9 @@ def test_friction_that_strengthens_or_depends_on_the_rate_widens_the_ranges():
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        ({"density": F(-1)}, "physical"),
-        ({"amplitude": F(-1)}, "physical"),
-        ({"spreads": (F(1), F(0), F(0))}, "physical"),
+        ({"density": F(-1)}, "density of .* must be positive"),
+        ({"amplitude": F(-1)}, "amplitude of .* must be 0 or more"),
+        ({"spreads": (F(1), F(0), F(0))}, "spread of stiffness .* must be from 0 to below 1"),
         ({"shape": (F(0), F(1))}, "shape"),  # begins with a jump of the slip rate
         ({"shape": (F(0), F(0), F(9), F(-8))}, "shape"),  # ends with one
         ({"shape": (F(0), F(0), F(33), F(-62), F(30))}, "shape"),  # falls near the end
@@ -115,7 +115,7 @@ def test_data_that_the_derivation_does_not_cover_are_refused(change, match):
 def test_the_class_rate_needs_a_start_at_zero():
     fault = load_fault("real-fault").with_disturbance(Disturbance(constant=1e-4, amplitude=1e-4, frequency=0.5))
     assert uncertain_plant(fault).amplitude == F(2, 10**4)
-    with pytest.raises(ParameterError, match="starts at 0"):
+    with pytest.raises(ParameterError, match="is 0 at t = 0"):
         uncertain_plant(fault, rate_limited=True)
 
 

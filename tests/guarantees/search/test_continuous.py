@@ -135,7 +135,7 @@ def test_along_the_whole_reference_the_published_law_stays_within_what_is_certif
 def test_a_constant_disturbance_is_of_the_class_amplitude_only(real, designed):
     constant = real.with_disturbance(Disturbance(constant=-2e-4))
     assert isinstance(certified_peaks(constant, designed), ContinuousPeaks)
-    with pytest.raises(ParameterError, match="starts at 0"):
+    with pytest.raises(ParameterError, match="needs a disturbance that is 0 at t = 0"):
         certified_peaks(constant, designed, disturbance_class="rate")
 
 
@@ -168,7 +168,7 @@ def test_limits_count_only_where_the_pressure_reaches_them(real, designed, peaks
 def test_what_is_not_covered_is_refused(real, designed):
     with pytest.raises(UnknownNameError, match=r"amplitude, rate\. Received 'any'"):
         certified_peaks(real, designed, disturbance_class="any")
-    with pytest.raises(ParameterError, match="starts with p = 0"):
+    with pytest.raises(ParameterError, match="law with p = 0 at the start"):
         certified_peaks(real, replace(designed, offset=F(10)))
 
 

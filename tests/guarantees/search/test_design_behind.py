@@ -89,12 +89,18 @@ def test_the_command_designs_the_e_lqr_alone_behind_a_path():
             "cta",
             {"lag": "0.02"},
             UnsupportedError,
-            "sliding modes are designed for a pressure that acts at",
+            "sliding modes are designed without delay, lag and diffusion path",
         ),
-        ("real-fault", "elqr", {"lag": "0.02", "continuous": True}, ParameterError, "acts at once"),
+        (
+            "real-fault",
+            "elqr",
+            {"lag": "0.02", "continuous": True},
+            ParameterError,
+            "and no delay, lag or diffusion path",
+        ),
         ("real-fault", "elqr", {"lag": -1}, ParameterError, "lag must be 0 or more. Received -1 s"),
-        ("crustal-patch", "elqr", {"lag": 1}, ParameterError, "goes through rock alone"),
-        ("crustal-patch", "elqr", {"delay": 1}, ParameterError, "goes through rock alone"),
+        ("crustal-patch", "elqr", {"lag": 1}, ParameterError, "has no delay or lag, only a diffusion path"),
+        ("crustal-patch", "elqr", {"delay": 1}, ParameterError, "has no delay or lag, only a diffusion path"),
     ],
 )
 def test_what_no_design_knows_is_refused(fault, law, more, error, said):

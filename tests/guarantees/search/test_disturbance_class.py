@@ -51,7 +51,7 @@ def test_a_design_whose_proof_is_asked_for_later_is_judged_by_its_class(tide):
 @pytest.mark.parametrize("law", ["elqr", "cta"])
 def test_a_push_that_is_there_at_once_has_no_rate_and_another_class_is_none(law):
     pushed = replace(REAL, disturbance=Disturbance(constant=1e-4, amplitude=1e-4, frequency=0.69))
-    with pytest.raises(ParameterError, match="class rate needs a disturbance that starts at 0"):
+    with pytest.raises(ParameterError, match="class rate needs a disturbance that is 0 at t = 0"):
         qd.design(pushed, law, disturbance_class="rate")
     with pytest.raises(ParameterError, match=r"class must be one of amplitude, rate\. .*Did you mean rate\?"):
         qd.design(REAL, law, disturbance_class="rates")

@@ -126,7 +126,7 @@ def test_more_noise_is_guaranteed_less():
         ({"measured": "slip", "gains": ("1", "1", "1", "1")}, "measured is for a designed e-LQR"),
         ({"measured": "slip", "controller": "cta"}, "measured is for a designed e-LQR"),
         ({"slip_noise": F(-1)}, "slip noise must be 0 or more. Received -1 m"),
-        ({"measured": "slip", "rate_noise": F(1)}, "needs a law that measures it"),
+        ({"measured": "slip", "rate_noise": F(1)}, "needs a law that measures the slip rate"),
     ],
 )
 def test_what_cannot_be_measured_so_is_refused(wrong, said):

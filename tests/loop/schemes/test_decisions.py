@@ -161,13 +161,17 @@ def test_a_law_runs_as_asked_for_unless_it_is_one_of_samples():
 @pytest.mark.parametrize(
     ("scheme", "period", "received"),
     [
-        ("explicit", None, r"Received explicit and 0\.1 s"),
-        (None, 0.2, r"Received compensated and 0\.2 s"),
-        (simulation_scheme("explicit"), 0.1, r"Received explicit, weight None, authority None and 0\.1 s"),
+        ("explicit", None, r"Received the scheme explicit and the step 0\.1 s"),
+        (None, 0.2, r"Received the scheme compensated and the step 0\.2 s"),
+        (
+            simulation_scheme("explicit"),
+            0.1,
+            r"Received the scheme explicit, weight None, authority None and the step 0\.1 s",
+        ),
         (
             simulation_scheme("compensated", weight=0.5, authority=3e-8),
             None,
-            r"weight 0\.5, authority 3e-08 and 0\.1 s",
+            r"weight 0\.5, authority 3e-08 and the step 0\.1 s",
         ),
     ],
 )

@@ -174,5 +174,5 @@ def test_direction_knows_odd_powers_and_gives_up_on_the_rest():
 
 def test_a_law_that_pushes_is_refused():
     law = DiscreteLaw.of(control_law("cta").from_values(("7", "5", "2.3", "-1.1")), 0.0)
-    with pytest.raises(ParameterError, match="never rises"):
+    with pytest.raises(ParameterError, match="never increases"):
         inclusion(backward_euler(law)[0])

@@ -88,7 +88,7 @@ def test_a_second_derivative_that_jumps_meets_no_bound_on_the_third():
     found = joint_condition(LAB, PUBLISHED["elqr"], d, acceleration=0.0035)
     assert (found.required, found.ratio, found.holds) == (math.inf, math.inf, False)
     assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["ratio"] is None
-    with pytest.raises(ParameterError, match="order 1"):
+    with pytest.raises(ParameterError, match="order must be 1"):
         smallest_bound(LAB, PUBLISHED["elqr"], d, acceleration=0.0035)
 
 

@@ -171,7 +171,7 @@ def test_the_function_of_a_sensor_carries_its_memory():
 
 def test_what_cannot_be_is_refused():
     differentiator = Differentiator(bound=1.0, step=1e-3)
-    with pytest.raises(ParameterError, match="hardware comes first"):
+    with pytest.raises(ParameterError, match="hardware must come before"):
         OutputFeedback(stages=(Averaging(samples=2), Transducer()), differentiator=differentiator)
     with pytest.raises(ParameterError, match="stages"):
         OutputFeedback(stages=(differentiator,), differentiator=differentiator)

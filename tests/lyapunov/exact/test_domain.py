@@ -285,7 +285,7 @@ def test_variants_start_with_the_laws_own_and_name_each_once(found):
 )
 def test_a_design_with_feed_forward_has_every_premise(preset, name):
     fault = qd.load_fault(preset)
-    with pytest.raises(ParameterError, match="a feed-forward has no guarantee with the pressure held"):
+    with pytest.raises(ParameterError, match="feedforward has no guarantee with zero-order hold"):
         qd.design(fault, "cta", feedforward=name)
     design = qd.design(fault, "cta", feedforward=name, continuous=True)
     assert str(design.verdict) == "proved"
@@ -299,7 +299,7 @@ def test_the_linear_law_takes_none():
         qd.design(REAL, "elqr", feedforward="nominal")
     law = control_law("elqr").from_values((1, 1, 1, 1))
     assert law.feedforward.name == "none"
-    with pytest.raises(ParameterError, match=r"belongs to a sliding mode. Received elqr"):
+    with pytest.raises(ParameterError, match=r"feedforward is for sliding modes. Received nominal for elqr"):
         law.with_feedforward(feed_forward("nominal", REAL, F(1)))
 
 

@@ -358,7 +358,7 @@ def test_the_command_writes_the_proof_of_the_part_of_a_shape(tmp_path, capsys):
     assert f"that is so wherever 4*x^2 <= {facts['shape_level']} (3.9999" in out
     assert run(capsys, "check", tmp_path / "part.json")[0] == 0
     code, _, said = run(capsys, *line[:2], "--everywhere", "--degree", "2")
-    assert (code, "--degree and --shape are of a region" in said) == (2, True)
+    assert (code, "--degree and --shape cannot be used with --everywhere" in said) == (2, True)
 
 
 def test_the_command_says_what_is_not_so_everywhere(tmp_path, capsys):
