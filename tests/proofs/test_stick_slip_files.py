@@ -184,7 +184,7 @@ FORMS = [
 ]
 
 
-@pytest.mark.parametrize(("change", "reason"), FORMS, ids=lambda value: str(value)[:50])
+@pytest.mark.parametrize(("change", "reason"), FORMS, ids=[reason[:40] for _, reason in FORMS])
 def test_a_file_of_another_form_is_refused_by_both(change, reason):
     document = changed(box(), change)
     refused(document, reason)

@@ -14,7 +14,8 @@ from scipy.spatial import HalfspaceIntersection
 
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
 from quakedesign.laws.sampled_controller import integral_symbols, law_expressions, r, r_rate
-from quakedesign.laws.stick_slip_law import StickSlipController, StickSlipLaw
+from quakedesign.laws.stick_slip_controller import StickSlipController
+from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.symbolic import plant
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "stick_slip_real-fault.json"
