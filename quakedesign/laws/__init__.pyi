@@ -29,3 +29,5 @@ from .sampled_law import observer_through_path as observer_through_path
 from .sampled_law import slip_observer as slip_observer
 from .sampled_law import summed_integrals as summed_integrals
 from .sliding_mode import SlidingMode as SlidingMode
+from .stick_slip_controller import StickSlipController as StickSlipController
+from .stick_slip_law import StickSlipLaw as StickSlipLaw

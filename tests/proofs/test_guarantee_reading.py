@@ -509,7 +509,7 @@ def test_a_slow_gain_is_refused_from_a_file_that_breaks_its_rules():
         (steady | {"slow_gain": slow | {"more": "1"}}, "exactly the keys growth, parts"),
         (steady | {"more": "1"}, "exactly the keys"),
         (at_once | {"slow_gain": slow}, "slow_gain is for a law of samples"),
-        (HELD | {"slow_gain": slow}, "friction of the slip alone"),
+        (HELD | {"slow_gain": slow}, "friction that depends on the slip alone"),
         (steady | {"slow_gain": slow | {"parts": 17}}, "1 to 16 parts"),
         (5, "an object"),
         (None, "an object"),

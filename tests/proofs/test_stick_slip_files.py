@@ -13,7 +13,7 @@ from stick_slip_box import CLAIMS, STICK, box, period_of
 from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError
 from quakedesign.guarantees import read_guarantee
-from quakedesign.guarantees.exact import stick_slip as package
+from quakedesign.guarantees.exact import stick_slip_set as package
 from quakedesign.lyapunov.exact.claim import Verdict
 
 PATH = Path(__file__).parents[2] / "proofs" / "certificates" / "stick_slip_real-fault.json"
@@ -42,6 +42,7 @@ def times(share):
 def refused(document, reason=None):
     with pytest.raises(CHECK.Refused, match=reason):
         CHECK.check(json.dumps(document))
+    return True
 
 
 def package_refuses(document):
@@ -63,9 +64,9 @@ def test_both_prove_the_stored_file_and_say_the_same_entries():
         "friction any function of the slip alone within its bounds and slopes, whether the fault slides or sticks",
         "every 23/125 s",
         "any acceleration of at most 0.00032 m/s^2; from rest, along the reference, for all t >= 0",
-        "never exceeds 0.0001563 m/s",
-        "at most 1.68e-05 m behind and 3.684e-05 m ahead of the reference",
-        "pressure from -1.425e+07 Pa to 1.408e+07 Pa",
+        "never exceeds 0.0001569 m/s",
+        "at most 1.49e-05 m behind and 3.725e-05 m ahead of the reference",
+        "pressure from -1.426e+07 Pa to 1.408e+07 Pa",
     ):
         assert part in said
 
@@ -95,7 +96,7 @@ def replace_ranges(found, ours):
 
 @pytest.mark.parametrize("name", CLAIMS)
 def test_a_claim_one_per_cent_smaller_is_refused(name):
-    refused(changed(stored(), (("claims", name), times("99/100"))), f"claim {name} must follow")
+    assert refused(changed(stored(), (("claims", name), times("99/100"))), f"claim {name} must follow")
 
 
 @pytest.mark.slow
@@ -187,7 +188,7 @@ FORMS = [
 @pytest.mark.parametrize(("change", "reason"), FORMS, ids=[reason[:40] for _, reason in FORMS])
 def test_a_file_of_another_form_is_refused_by_both(change, reason):
     document = changed(box(), change)
-    refused(document, reason)
+    assert refused(document, reason)
     assert package_refuses(document)
 
 
@@ -223,6 +224,8 @@ CONDITIONS = [
     ("short against damping and slope", "too long against the damping", (("fault", "damping"), "400")),
     ("short against damping and slope", "too long against the damping", (("fault", "damping"), "3000")),
     ("short against damping and slope", "too long against the damping", (("fault", "damping"), "80")),
+    ("short against damping and slope", "too long against the damping",
+     (("fault",), lambda old: old | {"damping": "100", "spreads": old["spreads"] | {"damping": "1/100"}})),
     ("large enough for the condition of rest", "too small for the condition of rest",
      (("disturbance", "amplitude"), "1/90")),
     ("facet 0 must hold after a period that slides", "may leave the polytope", (("loop", "slip_gain"), "3/2")),
@@ -231,8 +234,8 @@ CONDITIONS = [
 
 @pytest.mark.parametrize(("reason", "theirs", "change"), CONDITIONS)
 def test_what_the_theorem_needs_is_asked_for_by_both(reason, theirs, change):
-    document = changed(box(), change, (("claims", "peak_slip_rate"), "9"))
-    refused(document, reason)
+    document = changed(box(), change)
+    assert refused(document, reason)
     assert theirs in read_guarantee(document).bounds().reason
 
 
@@ -243,16 +246,14 @@ FORGED = {
     "ahead more": ((*FACETS, 0), times("99/100")),
     "level less": ((*FACETS, 2), times("101/100")),
     "another facet less": ((*FACETS, 163), times("101/100")),
-    "another facet more": ((*FACETS, 163), times("99/100")),
     "no multipliers": (MULTIPLIERS, lambda old: [["0"] * 5] * len(old)),
     "few bases": (("set", "sliding", 0), lambda old: old[:2]),
-    "few bases at rest": (("set", "resting", 0), lambda old: old[:2]),
 }
 
 
 @pytest.mark.parametrize("change", FORGED.values(), ids=FORGED)
 def test_a_forged_set_is_refused(change):
-    refused(changed(stored(), change))
+    assert refused(changed(stored(), change))
 
 
 @pytest.mark.slow

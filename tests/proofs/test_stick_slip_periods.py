@@ -1,10 +1,16 @@
-"""Bounds of a period of the stick-slip plant in the standalone checker, against courses of such plants."""
+"""Bounds of a period of the stick-slip plant in both checkers, against courses of such plants."""
 
+from collections import defaultdict
 from functools import cache
+from itertools import chain
 
 import numpy as np
 import pytest
+from flint import ctx
 from stick_slip_box import STICK, box, period_of
+
+from quakedesign.guarantees import read_guarantee
+from quakedesign.guarantees.exact import stick_slip_set as package
 
 ONE = float(STICK.ONE)
 COURSES, STEPS = 3000, 400
@@ -125,3 +131,99 @@ def test_no_plant_that_ends_at_rest_is_beyond_its_bound(facet):
         rows = np.array([[float(v) for v in line] for line, _ in polytope.lines])
         limits = np.array([float(end) for _, end in polytope.lines])
         assert (rows @ points - limits[:, None])[-7:, mine].max() <= SLACK  # condition of rest, slip until the stop
+
+
+@cache
+def packages():
+    """What every facet becomes by the package's functions, by slice or combination and whether the cut-off counts."""
+    claim = read_guarantee(box())
+    task, held, reach, own = claim.task, claim.held, claim.reach, period()
+    found = package.ranges(task, reach.box[0] + task.reference_rates[0] * held.step, own.push, reach.box[1] * held.step)
+    given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
+    functions = defaultdict(list)
+    with ctx.workprec(package.BITS):
+        of_period = package.Period.of(package.BALLS, task, held, found)
+        sliding = package.sliding_rows(of_period, *map(package._ball_array, given))
+        resting = package.resting_rows(package.EXACT, task, held, found, *map(package._exact_array, given))
+        for rows in chain(sliding, resting):
+            for facet, row, constant in zip(rows.which, rows.factors, rows.constants, strict=True):
+                functions[rows.place, facet, rows.cut].append(([float(v) for v in row], float(constant)))
+    return functions
+
+
+def most(listed, points):
+    return np.max([np.dot(row, points) + constant for row, constant in listed], axis=0)
+
+
+@pytest.mark.parametrize("facet", range(11))
+def test_no_plant_is_beyond_the_bounds_of_the_package(facet):
+    functions, row = packages(), period().reach.facets[facet]
+    for seed in (1, 2, 3):
+        before, place, v, after, slip, rests = courses(seed)
+        reached = np.array([float(n) for n in row]) @ after
+        for one in range(3):
+            bound = most(functions[one, facet, False], before)
+            if row[2] > 0:
+                cut = most(functions[one, facet, True], before)
+                bound = np.where(after[1] == 0, np.maximum(bound, cut), bound)
+            assert (reached - bound)[(place == one) & ~rests].max() <= SLACK
+        for one, signs, combination in ((0, (True, False), 0), (1, (True,), 2), (1, (False,), 4), (2, (False,), 5)):
+            mine = (place == one) & rests & np.isin(v >= 0, signs)
+            bound = most(functions[package.SLICES + combination, facet, False], np.vstack([before, slip]))
+            assert (reached - bound)[mine].max(initial=-1.0) <= SLACK
+
+
+def by_formula(facet, given, chord, beta, pair):
+    """F, what multiplies y and what multiplies H, without a cut-off, as FORMAT.md writes them, in floats."""
+    p = period()
+    step, level, slip = (float(v) for v in (p.law.step, p.law.level, p.law.slip))
+    (s, ds), (w, dw) = ((float(low + high) / 2, float(high - low) / 2) for low, high in (p.slope, p.damping))
+    steep = float(p.slope[1])
+    times = np.linspace(0, step, 2001)
+    roots = np.roots([1, w, -s])
+    x_of = ((np.exp(roots[0] * times) - np.exp(roots[1] * times)) / (roots[0] - roots[1])).real
+    y_of = np.gradient(x_of, times, edge_order=2)
+
+    def parts(m1, m2):
+        response = np.abs(m1 * x_of + m2 * y_of)[::-1]
+        area = [np.trapezoid(response * times**j, times) for j in range(4)]
+        q = 1 / (1 - steep * step**2 / 2)
+        of_y = ds * q * area[1] + dw * (area[0] + steep * q * area[2])
+        return area[0], of_y, (ds * q * area[2] + dw * steep * q * area[3]) / 2 + dw * area[1]
+
+    n1, _, n3 = (float(v) for v in facet)
+    b, flag = float(p.task.b), float(given[1])
+    m2 = float(facet[1]) + n3 * level
+    m2 = (max(m2, 0) if flag else m2) + float(given[0])
+    factors = [n1 + n3 * (slip - chord / (b * at)) for at in pair]
+    factors = [max(m, 0) if flag else m for m in factors]
+    m1 = factors[pair.index(beta)]
+    off = abs(n3 * chord) * (pair[1] - 1) ** 2 / (4 * b * pair[1]) if any(factors) else 0
+    area, of_y, of_force = parts(m1, m2)
+    _, lone_y, lone_force = parts(1, 0)
+    whole = [np.trapezoid(v, times) for v in (x_of, y_of)]
+    pushed = -b * beta * (m1 * whole[0] + m2 * whole[1] + of_force)
+    by_rate = m1 * x_of[-1] + m2 * y_of[-1] - n3 * slip * step / 2 + of_y + off * (x_of[-1] + lone_y)
+    return pushed, by_rate, area + of_force + off * (whole[0] + lone_force)
+
+
+@pytest.mark.parametrize("facet", range(11))
+def test_bounds_of_a_slide_are_those_that_are_written(facet):
+    """In the slice where the fault is behind, at r' = 0, where v is -return_rate times the slip error."""
+    p = period()
+    row, given = p.reach.facets[facet], p.reach.multipliers[facet]
+    found = [function for place, function in p.sliding(row, given, cut=False) if place == 0][::2]
+    pair = [float(beta) for beta in p.task.beta]
+    wanted = [by_formula(row, given, float(chord), beta, pair) for chord in p.chord for beta in pair]
+    for function, (pushed, by_rate, by_force) in zip(found, wanted, strict=True):
+        values_of = [number(v) for v in function.more]
+        size = 1e-3 * (abs(pushed) + abs(by_rate) + 0.01)
+        assert values_of[2] == pytest.approx(pushed, abs=size)
+        assert values_of[1] == pytest.approx(by_rate + pushed * float(p.law.rate), abs=3 * size)
+        still = (
+            float(p.law.step * p.bend)
+            / 2
+            * max(0, -float(p.law.target) * pushed - float(row[2] * (p.law.level + p.law.slip * p.law.step / 2)))
+        )
+        late = 0 if row[0] <= 0 else still
+        assert number(function.beside) == pytest.approx(by_force * float(p.force) + late, abs=size)

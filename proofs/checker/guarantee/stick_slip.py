@@ -188,9 +188,6 @@ class Period:
             Near.of(square[i][0]) * Near(within.rows[0][1], 0) + Near.of(square[i][1]) * Near(within.rows[1][1], 0)
             for i in (0, 1)
         ]
-        share = self.per_slip * step**2 / 2 + dw * step * (1 + self.slope[1] * self.growth * step**2)
-        spread = self.task.b * (self.task.beta[1] - self.task.beta[0]) * max(self.push[1], zero)
-        need(share * spread <= self.force, "the disturbance must outweigh the range of the input gain")
         alone = self.integrals(one, zero)
         of_rate, of_force = self.others(alone)
         off = (self.task.beta[1] - 1) ** 2 / (4 * self.task.beta[1] * self.task.b)  # of a chord of 1/beta
@@ -325,6 +322,10 @@ class Period:
                     for function in self.stopped(facet, multipliers, end):
                         within = polytope.largest(function, which) <= ONE
                         need(within, f"facet {which} must hold after a period that ends at rest. It may not")
+        step = self.law.step
+        share = self.per_slip * step**2 / 2 + self.per_rate * step * (1 + self.slope[1] * self.growth * step**2)
+        spread = self.task.b * (self.task.beta[1] - self.task.beta[0]) * max(self.push[1], Fraction(0))
+        need(share * spread <= self.force, "the disturbance must outweigh the range of the input gain")
 
     def bounds(self) -> dict[str, Fraction]:
         """What the set gives, by claims."""

@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import asdict, fields
 from fractions import Fraction
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, Union, cast
 
@@ -42,6 +44,7 @@ from quakedesign.sos.exact.strict import (
     texts,
     with_keys,
 )
+from quakedesign.text import shown
 
 if TYPE_CHECKING:
     from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
@@ -65,6 +68,8 @@ _ZERO = Fraction(0)
 
 def guarantee_document(claim: Claim) -> dict[str, Any]:
     """Content of the file."""
+    if not hasattr(claim, "claims"):
+        raise ParameterError(f"a claim must be a guarantee. Received {shown(claim)}. Prove one with guarantee.")
     if isinstance(claim, Guarantee | ContinuousPeaks):
         about = _of_tracking(claim)
     else:
@@ -121,9 +126,9 @@ def read_guarantee(raw: Any) -> Claim:
     try:
         kind = kind_of(raw)
         if kind == STICK_SLIP:
-            from quakedesign.guarantees.exact.stick_slip_files import read_stick_slip
-
-            return read_stick_slip(raw)
+            headed(raw, {"fault", "reference", "disturbance", "loop", "set", "claims"}, STICK_SLIP)
+            reader = partial(read_claims, raw=raw)
+            return cast("StickSlipGuarantee", _stick_slip().read_stick_slip(raw, read_task(raw), reader))
         return _read_sliding(raw) if kind == SLOW_SLIDING else _read_tracking(raw)
     except ParameterError as error:
         raise CertificateError(str(error)) from None
@@ -168,10 +173,13 @@ def task_document(task: UncertainPlant) -> dict[str, Any]:
     }
 
 
-def _of_stick_slip(claim: "StickSlipGuarantee") -> dict[str, Any]:
-    from quakedesign.guarantees.exact.stick_slip_files import stick_slip_document
+def _stick_slip() -> Any:
+    """Module of files about the stick–slip plant, loaded for these alone: it takes NumPy."""
+    return import_module("quakedesign.guarantees.exact.stick_slip_files")
 
-    return {"kind": STICK_SLIP, **task_document(claim.task), **stick_slip_document(claim)}
+
+def _of_stick_slip(claim: "StickSlipGuarantee") -> dict[str, Any]:
+    return {"kind": STICK_SLIP, **task_document(claim.task), **_stick_slip().stick_slip_document(claim)}
 
 
 def _of_sliding(claim: SlidingGuarantee) -> dict[str, Any]:

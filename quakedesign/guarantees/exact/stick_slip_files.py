@@ -1,10 +1,11 @@
 """Files of guarantees on the stick–slip plant (proofs/FORMAT.md)."""
 
+from collections.abc import Callable
 from typing import Any
 
 from quakedesign.exact import exact_text
-from quakedesign.guarantees.exact.guarantee_files import read_claims, read_task
-from quakedesign.guarantees.exact.stick_slip import (
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipClaims, StickSlipGuarantee
+from quakedesign.guarantees.exact.stick_slip_set import (
     COMBINATIONS,
     MOST_BASES,
     MOST_FACETS,
@@ -12,10 +13,9 @@ from quakedesign.guarantees.exact.stick_slip import (
     SampledStickSlip,
     StickSlipPolytope,
 )
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipClaims, StickSlipGuarantee
 from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
-from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
-from quakedesign.sos.exact.strict import headed, listed, need, read_exactly, read_row, texts, with_keys
+from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.sos.exact.strict import listed, need, read_exactly, read_row, texts, with_keys
 
 
 def stick_slip_document(claim: StickSlipGuarantee) -> dict[str, Any]:
@@ -35,10 +35,14 @@ def stick_slip_document(claim: StickSlipGuarantee) -> dict[str, Any]:
     }
 
 
-def read_stick_slip(raw: Any) -> StickSlipGuarantee:
-    """Claim from a parsed file. Raises CertificateError or ParameterError where it breaks a rule of FORMAT.md."""
-    headed(raw, {"fault", "reference", "disturbance", "loop", "set", "claims"}, STICK_SLIP)
-    task = read_task(raw)
+def read_stick_slip(raw: Any, task: UncertainPlant, claims: Callable[[type], Any]) -> StickSlipGuarantee:
+    """Claim from a parsed file, its task, and a reader of claims of a kind.
+
+    Raises
+    ------
+    CertificateError, ParameterError
+        When the file breaks a rule of FORMAT.md.
+    """
     need(task.change is None, "a bounded change of the disturbance is not used where the fault sticks")
     step, *gains = read_exactly(raw["loop"], ("step", *GAIN_UNITS)).values()
     given = with_keys(raw["set"], {"facets", "multipliers", "sliding", "resting"})
@@ -54,7 +58,7 @@ def read_stick_slip(raw: Any) -> StickSlipGuarantee:
         task=task,
         held=SampledStickSlip(law=StickSlipLaw(**dict(zip(GAIN_UNITS, gains, strict=True))), step=step),
         reach=StickSlipPolytope(facets=facets, multipliers=multipliers, sliding=sliding, resting=resting),
-        claims=read_claims(StickSlipClaims, raw),
+        claims=claims(StickSlipClaims),
     )
 
 

@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+from quakedesign import laws
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.statement import above
-from quakedesign.guarantees.exact.stick_slip import (
+from quakedesign.guarantees.exact.stick_slip_set import (
     SampledStickSlip,
     StickSlipBounds,
     StickSlipPolytope,
@@ -106,9 +107,7 @@ class StickSlipGuarantee:
     @property
     def controller(self) -> "StickSlipController":
         """The law for `simulate`."""
-        from quakedesign.laws.stick_slip_controller import StickSlipController
-
-        return StickSlipController(law=self.held.law, step=self.held.step)
+        return laws.StickSlipController(law=self.held.law, step=self.held.step)
 
     def bounds(self) -> StickSlipBounds | NoGuarantee:
         """What the theorem gives, computed anew."""

@@ -13,7 +13,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from quakedesign.errors import ParameterError
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.exact.stick_slip import (
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee, stick_slip_guarantee
+from quakedesign.guarantees.exact.stick_slip_set import (
     COMBINATIONS,
     SLICES,
     Constraint,
@@ -31,7 +32,6 @@ from quakedesign.guarantees.exact.stick_slip import (
     sliding_rows,
     stop_bounds,
 )
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee, stick_slip_guarantee
 from quakedesign.guarantees.search.estimate import short
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.ranges import UncertainPlant

@@ -6,40 +6,49 @@
     y′ = −w·y + G(ξ) + φ + λ,   G(0) = −bβU,   G′(ξ) ∈ [S⁻, S⁺],   λ ≥ 0, λy = 0,
 
 exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ − φ1, whose slope is −κ − N̂μ′(σ′ − p). While the fault
-rests nothing changes. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is checked.
+rests nothing changes. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is
+checked.
 
-**Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion is
-one of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the block
-before the next sample, and the period ends with y = 0. So each period is either the *sliding* map, with y ≥ 0 and ξ ≥ 0
-at its end, or the *rest* map with a slip D until the last stop.
+**Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion
+is one of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the
+block before the next sample, and the period ends with y = 0. So each period is either the *sliding* map, with y ≥ 0
+and ξ ≥ 0 at its end, or the *rest* map with a slip D until the last stop.
 
-**Sliding map.** With S0 the middle and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are linear
-in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Before, ξ(t) ≤ (t·y + t²/2·(H − bβU))/(1 −
-S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0. With U fixed, σ = s/(bβ) makes terms in 1/β, which exceed their
-chord over the range of β by at most `gap` times the slip that there would be without pressure.
+**Sliding map.** With S0 the middle and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are
+linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Before, ξ(t) ≤ (t·y + t²/2·(H −
+bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
 **Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, partial integration gives D = f(0)y + ∫f·(G + φ)dt up to the
 stop. As G ≤ −H + |S⁻|(D − ξ) before it, and what G lacks of that falls with the slip,
 
     D·(1 − |S⁻|T²/2 − δ) ≤ f(0)·y + 2H·(e^{wx} − 1 − wx)/w²,   x = (1 − θ)T,
 
-for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and δ the width of its range times (e^{wx} − 1)/w. At the stop
-bβU ≥ H + s·D for some s in [S⁻, S⁺], so that b·β_max·U ≥ H − |S⁻|D.
+for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and δ the width of its range times (e^{wx} − 1)/w. Besides,
+bβ·U ≥ H + G(D)-part: b·β_max·U ≥ H − |S⁻|D.
 
-**Law.** `StickSlipLaw`; d = D + p*(x1), D its level, moves by −σξ [Pa] besides, σ = s/(bβ) at the end of the period, s
-a chord slope at σ′ − p*. State at the samples: z = (e1, y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no
-facet exceeds 1 after either map; each is the largest value of a linear function on a polytope, bounded by multipliers
-of three or four constraints, which a file names.
+Which D and U there are depends on r′ at the sample. So that ends of r′ decide, the U of the least one counts in this
+condition.
 
-**Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ = −wy′
-+ Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
+**Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. Where a facet falls with it and r′
+counts as 0, it may be 0 for r′ up to max|r″|T/2.
+
+**Input gain.** For β between its ends let ψ be what 1/β lacks of its chord. Where U ≥ 0 let the chord of a factor m1
+of ξ stand for it, which is at most |n3·s|ψ/b larger, and ξ ≥ 0: products with β lack as much as the bβU in that ξ
+takes off. Where U < 0 let the chord of β·m1, over β: all that has U is convex in β. So |n3·s|ψ/b counts with y and H
+alone.
+
+**Law.** `StickSlipLaw`; d = D_level + p*(x1) moves by −σξ [Pa] besides, σ = S_chord/(bβ). State at the samples: z =
+(e1, y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet exceeds 1 after either map; each is the largest
+value of a linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
+
+**Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ =
+−wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache
-from itertools import chain
+from itertools import chain, product
 from math import comb
 from typing import Any
 
@@ -73,6 +82,9 @@ COMBINATIONS = (
     (2, False, 0, 0),
     (2, False, 0, 1),
 )
+LEAST = (0, 0, 2, 2, 4, 5, 5)
+"""The combination with the least r′ of the same slice and sign, whose condition of rest stands for all r′."""
+_AT_REST = (*zip(LEAST, COMBINATIONS, strict=True), (4, (1, False, 1, 0)))
 Basis = tuple[int, ...]
 
 
@@ -348,31 +360,41 @@ class Period:
         )
 
     def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
-        """Bounds of ∫|g(T − t)|t^j dt for j = 0 to 3, g = `of_slip`·ξ + `of_rate`·y of an impulse.
+        """∫h(t)·t^j dt for j = 0 to 3, h(t) ≥ |g(T − t)|, g = `of_slip`·ξ + `of_rate`·y of an impulse.
 
-        On a piece |g| is below the chord of its ends plus h²/8·max|g″|: all four are integrals of this one function.
+        On a piece h is the chord of its ends plus h²/8·max|g″|. All integrals are of this one function, as what they
+        multiply may be negative alone.
         """
         number, h = self.back.number, self.held.step / NODES
         above = (abs(of_slip) * self.bent[0] + abs(of_rate) * self.bent[1]) * number(h**2 / 8)
         sizes = abs(of_slip[:, None] * self.impulses[0] + of_rate[:, None] * self.impulses[1]) + above[:, None]
         sizes = sizes[:, ::-1]  # from the start of the period on
-        found: list[Any] = []
-        for j in range(4):
-            weights = [self.back.number(weight * h ** (j + 1)) for weight in _moments(j)]
-            found.append((sizes * np.array(weights, dtype=object if sizes.dtype == object else float)).sum(axis=1))
-        return found
+        return [
+            sum((sizes[:, i] * number(weight * h ** (j + 1)) for i, weight in enumerate(line)), 0 * sizes[:, 0])
+            for j, line in enumerate(_WEIGHTS)
+        ]
+
+    def more(self, whole: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """What the ranges of slope and damping add to factors of y and of H − bβU."""
+        number, found = self.back.number, self.found
+        growth = 1 / (1 - found.slope[1] * self.held.step**2 / 2)
+        per_slip = number((found.slope[1] - found.slope[0]) / 2 * growth)
+        per_rate, steepest = number((found.damping[1] - found.damping[0]) / 2), number(found.slope[1] * growth)
+        of_rate = per_slip * whole[1] + per_rate * (whole[0] + steepest * whole[2])
+        return of_rate, (per_slip * whole[2] + per_rate * steepest * whole[3]) / 2 + per_rate * whole[1]
 
 
-@cache
-def _moments(power: int) -> tuple[Fraction, ...]:
-    """∫ of the hat functions at 0 … `NODES` times t^j."""
-    found = [_ZERO] * (NODES + 1)
-    for i in range(NODES):
-        for k in range(power + 1):
-            part = comb(power, k) * Fraction(i) ** (power - k)
-            found[i] += part / ((k + 1) * (k + 2))
-            found[i + 1] += part / (k + 2)
-    return tuple(found)
+def _weights() -> list[list[Fraction]]:
+    """Integrals of hat functions at 0 to NODES times t^j, j = 0 to 3."""
+    found = [[_ZERO] * (NODES + 1) for _ in range(4)]
+    for j, line in enumerate(found):
+        for i, k in product(range(NODES), range(j + 1)):
+            line[i] += Fraction(comb(j, k) * i ** (j - k), (k + 1) * (k + 2))
+            line[i + 1] += Fraction(comb(j, k) * i ** (j - k), k + 2)
+    return found
+
+
+_WEIGHTS = _weights()
 
 
 def gap(beta: Range) -> Fraction:
@@ -424,31 +446,39 @@ class _Carried:
     push0: Fraction
     of_error: np.ndarray
     constant: np.ndarray
-    late: np.ndarray
-    rising: np.ndarray
+    rising: np.ndarray  # of r′ itself
+    kept: np.ndarray  # up to which r′ the reference may stand still, where r′ counts as 0 and n1 > 0
 
-    def constants(self, back: Numbers, which: np.ndarray, pushed: np.ndarray) -> np.ndarray:
-        """Constants of facets, of which `pushed` is the factor of U.
-
-        r(t + T) − r(t) is within max|r″|T²/2 of T·r′, and never negative: where r′ = 0, n1 > 0 and nothing else of the
-        function rises with r′, it counts as nothing.
-        """
-        needed = self.rising[which] | ~(pushed >= 0).astype(bool)
-        return np.asarray(self.constant[which] + back.array(needed.astype(float).tolist()) * self.late[which])
+    def moved(self, pushed: np.ndarray | int, which: np.ndarray) -> np.ndarray:
+        """What r′ adds while the reference stands still, with a factor of −r′ that the plant adds."""
+        rising = self.rising[which] - pushed
+        return np.asarray(self.kept[which] * (rising + abs(rising)) / 2)
 
 
-def _carried(back: Numbers, task: UncertainPlant, held: SampledStickSlip, facets: np.ndarray) -> Iterator[_Carried]:
+_Combination = tuple[int, bool, int, int]
+
+
+def _carried(
+    back: Numbers,
+    task: UncertainPlant,
+    held: SampledStickSlip,
+    facets: np.ndarray,
+    ends: Sequence[tuple[int, _Combination]],
+) -> Iterator[_Carried]:
     number, law, step = back.number, held.law, held.step
     n1, _, n3 = facets.T
     fastest, bend = task.reference_rates
     predicted = n3 * number(law.level_gain + law.slip_gain * step / 2)
-    for place, combination in enumerate(COMBINATIONS):
+    for place, combination in ends:
         push, push0, (q1, q0) = push_row(held, fastest, combination)
         p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
-        falls = (back.middle(n1) > 0) & ((back.middle(n3) >= 0) | (not combination[1])) & (not (q1 or q0))
+        # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative: it may be 0 for r' up to max|r''|T/2
+        moves = np.where(back.middle(n1) > 0, float(bool(q1 or q0)), 1.0)
+        late = back.array(moves.tolist()) * abs(n1) * number(bend * step**2 / 2)
         of_error = n1 - n1 * number(step * q1) - predicted * number(p1)
-        constant, late = -n1 * number(step * q0) - predicted * number(p0), abs(n1) * number(bend * step**2 / 2)
-        yield _Carried(place, push, push0, of_error, constant, late, ~falls)
+        constant = late - n1 * number(step * q0) - predicted * number(p0)
+        kept = back.array((1 - moves).tolist()) * number(bend * step / 2)
+        yield _Carried(place, push, push0, of_error, constant, -predicted * int(combination[1]), kept)
 
 
 def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
@@ -465,12 +495,15 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
     n1, n2, n3 = facets.T
     everyone, raised = np.arange(len(facets)), np.flatnonzero(back.middle(n3) > 0)
     level, slip, half = number(law.level_gain), number(law.slip_gain), number(step / 2)
-    growth = 1 / (1 - found.slope[1] * step**2 / 2)
-    per_slip = number((found.slope[1] - found.slope[0]) / 2 * growth)
-    per_rate = number((found.damping[1] - found.damping[0]) / 2)
-    steepest, bound = number(found.slope[1] * growth), number(task.amplitude)
-    steep = gap(task.beta) * 2 * growth / task.authority * step
-    carried = list(_carried(back, task, held, facets))
+    bound, off = number(task.amplitude), number(gap(task.beta) / task.authority)
+    lone, none = back.array([Fraction(1)]), back.array([_ZERO])
+    gaps = [
+        (own + part[0]) * off
+        for own, part in zip(
+            (period.of_rate[0], period.of_force[0]), period.more(period.integrals(lone, none)), strict=True
+        )
+    ]
+    carried = list(_carried(back, task, held, facets, list(enumerate(COMBINATIONS))))
     for cut in (False, True):
         which = raised if cut else everyone
         if not len(which):
@@ -483,20 +516,20 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
             chords = [number(end / (beta * task.authority)) for beta in task.beta]
             of_slips = [back.without(plain - a3 * chord, flag) for chord in chords]
             bent = (back.middle(of_slips[0]) != 0) | (back.middle(of_slips[1]) != 0)  # else no slip counts
-            curved = back.array(bent.astype(float).tolist()) * abs(a3) * number(abs(end) * steep)
+            curved = back.array(bent.astype(float).tolist()) * abs(a3) * number(abs(end))
             for beta, of_slip in zip(task.beta, of_slips, strict=True):
                 whole = period.integrals(of_slip, of_rate)
-                of_force = (per_slip * whole[2] + per_rate * steepest * whole[3]) / 2 + per_rate * whole[1]
+                of_y, of_force = period.more(whole)
                 own = of_slip * period.of_force[0] + of_rate * period.of_force[1] + of_force
                 pushed = -number(beta * task.authority) * own
-                of_y = per_slip * whole[1] + per_rate * (whole[0] + steepest * whole[2]) + curved
-                of_y = of_y + of_slip * period.of_rate[0] + of_rate * period.of_rate[1]
+                of_y = of_y + curved * gaps[0] + of_slip * period.of_rate[0] + of_rate * period.of_rate[1]
                 of_y = of_y if cut else of_y - a3 * slip * half
-                force = bound * (whole[0] + of_force + curved * half)
+                force = bound * (whole[0] + of_force + curved * gaps[1])
                 for part in carried:
                     factors = [pushed * number(v) for v in part.push]
                     columns = [part.of_error[which] + factors[0], of_y + factors[1], a3 + factors[2]]
-                    constants = part.constants(back, which, pushed) + pushed * number(part.push0) + force
+                    constants = part.constant[which] + pushed * number(part.push0) + force
+                    constants = constants + part.moved(pushed * number(law.target_gain), which)
                     yield Rows(COMBINATIONS[part.place][0], which, np.column_stack(columns), constants, cut)
 
 
@@ -514,7 +547,7 @@ def resting_rows(
     rises = back.middle(n3) > 0
     raised, lowered = np.flatnonzero(rises), np.flatnonzero(~rises)
     slip, half = number(law.slip_gain), number(held.step / 2)
-    for part in _carried(back, task, held, facets):
+    for part in _carried(back, task, held, facets, _AT_REST):
         for end in found.chord:
             chord = number(end / task.authority)
             for which, share in ((raised, 0), (raised, 1), (lowered, None)):
@@ -523,7 +556,7 @@ def resting_rows(
                 a1, a3 = n1[which], n3[which]
                 cut_off = a3 * slip * (multipliers[which][:, 4] if share is None else share)
                 factors = np.column_stack([part.of_error[which], -cut_off * half, a3, a1 - a3 * chord + cut_off])
-                yield Rows(SLICES + part.place, which, factors, part.constants(back, which, 0 * a1))
+                yield Rows(SLICES + part.place, which, factors, part.constant[which] + part.moved(0, which))
 
 
 # ----------------------------------------------------------------------
@@ -542,7 +575,11 @@ def slices(task: UncertainPlant, held: SampledStickSlip) -> tuple[tuple[Constrai
 def polytopes(
     task: UncertainPlant, held: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], found: Ranges | None
 ) -> list[list[Constraint]]:
-    """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, D) where ranges are known."""
+    """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, D) where ranges are known.
+
+    The condition of rest depends on r′. That of the least one holds wherever one of another does, so that on what it
+    leaves ends of r′ decide.
+    """
     one = Fraction(1)
     own: list[Constraint] = [(row, one) for row in facets]
     own.append(((_ZERO, -one, _ZERO), _ZERO))
@@ -552,10 +589,8 @@ def polytopes(
         return flat
     lines = stop_bounds(task, held, found)
     most = task.beta[1] * task.authority
-    for combination in COMBINATIONS:
-        # U falls with r': the condition is taken at the least r' of the combination, so that r' stays free
-        least = combination[0], combination[1], int(combination[:2] == (1, True)), 0
-        push, push0, _ = push_row(held, task.reference_rates[0], least)
+    for combination in (COMBINATIONS[place] for place in LEAST):
+        push, push0, _ = push_row(held, task.reference_rates[0], combination)
         larger = (*(-most * v for v in push), found.slope[0])
         room = most * push0 - task.amplitude
         tall: list[Constraint] = [((*row, _ZERO), b) for row, b in flat[combination[0]]]
@@ -664,14 +699,14 @@ def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolyto
     found = ranges(task, ahead + fastest * held.step, push, rate * held.step)
     if found.slope[1] * held.step**2 >= 1:
         raise ParameterError("T_s is too long against the weakening of friction")
-    if _bracket(task, held, found, push[1]) > task.amplitude:
-        raise ParameterError("the disturbance is too small against what the range of the input gain makes of U")
-    constraints, count = polytopes(task, held, reach.facets, found), len(reach.facets)
+    constraints = polytopes(task, held, reach.facets, found)
     longest = max(min(g * rate + h for g, h in stop_bounds(task, held, found)), Fraction(1, 10**30))
     if task.amplitude + found.slope[0] * longest < 0:
         raise ParameterError("the disturbance is too small for the condition of rest")
     verifiers = [
-        Verifier(lines, bases, sizes if len(bases[0]) == 3 else [*sizes, longest], place=place, facets=count)
+        Verifier(
+            lines, bases, sizes if len(bases[0]) == 3 else [*sizes, longest], place=place, facets=len(reach.facets)
+        )
         for place, (lines, bases) in enumerate(zip(constraints, (*reach.sliding, *reach.resting), strict=True))
     ]
     period = Period.of(BALLS, task, held, found)
@@ -683,6 +718,8 @@ def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolyto
             if not top <= 1:
                 kind = "slides" if rows.place < SLICES else "ends at rest"
                 raise ParameterError(f"the state may leave the polytope through facet {facet} in a period that {kind}")
+    if _bracket(task, held, found, push[1]) > task.amplitude:
+        raise ParameterError("the disturbance is too small against what the range of the input gain makes of U")
     moved = fastest * held.step
     return StickSlipBounds(
         behind=lag + moved,
@@ -696,7 +733,8 @@ def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolyto
 def _bracket(task: UncertainPlant, held: SampledStickSlip, found: Ranges, push: Fraction) -> Fraction:
     """What |a| ≤ H + δS·ξ + δw·y loses at most where ξ and y of one β stand beside the U of another [m/s²].
 
-    As long as it is below H, the bounds in 1/β are convex where the chord of `gap` needs them to be.
+    As long as it is below H, |a| has a bound of 0 or more at both ends of β, also where the response of a facet changes
+    its sign between them.
     """
     step, growth = held.step, 1 / (1 - found.slope[1] * held.step**2 / 2)
     width, damping = (found.slope[1] - found.slope[0]) / 2, (found.damping[1] - found.damping[0]) / 2
