@@ -125,8 +125,8 @@ def named(
         ) from error
     if not isclass(found) or not issubclass(found, kind) or isabstract(found) or not hasattr(found, "name"):
         raise UnknownNameError(
-            f"{what} must be a class with a name that derives from {kind.__name__} and leaves nothing abstract. "
-            f"Received {shown(name)}. Complete it."
+            f"{what} must be a concrete class derived from {kind.__name__}, with an attribute name. "
+            f"Received {shown(name)}. Define its abstract methods and name."
         )
     _imported.update(base.__module__ for base in found.__mro__ if base.__module__.partition(".")[0] not in _OURS)
     return cast(type[Kind], found)

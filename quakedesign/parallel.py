@@ -490,7 +490,7 @@ class Cluster(Given):
         except (OSError, ValueError) as error:
             said = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise SimulationError(
-                f"a scheduler must answer at {address!r}. {said}. Start one with 'dask scheduler', or leave it out."
+                f"a scheduler must answer at {address!r}. {said}. Start one with 'dask scheduler', or omit scheduler."
             ) from None
         try:
             self._client.wait_for_workers(1, timeout=_PATIENCE)
@@ -558,7 +558,7 @@ def crew_of(workers: int | None, scheduler: str | None = None, executor: Executo
         When the scheduler cannot be reached.
     """
     if scheduler and executor:
-        raise ParameterError("give a scheduler or an executor. Received both. Leave one out.")
+        raise ParameterError("give a scheduler or an executor. Received both. Omit one of them.")
     if executor is not None:
         return Given(executor, workers)
     return Cluster(scheduler) if scheduler else Processes(workers)

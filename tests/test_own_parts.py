@@ -236,9 +236,9 @@ def test_pages_say_that_files_run_no_code():
     [
         ("own_parts:Nothing", "fails with AttributeError"),
         ("no_such_module:Law", "fails with ModuleNotFoundError: No module named 'no_such_module'"),
-        ("own_parts:Fraction", "a class with a name that derives from Controller"),
-        ("own_parts:Controller", "leaves nothing abstract"),
-        ("own_parts:X1", "a class with a name"),
+        ("own_parts:Fraction", "a concrete class derived from Controller"),
+        ("own_parts:Controller", "must be a concrete class"),
+        ("own_parts:X1", "with an attribute name"),
         (":PID", "fails with ValueError"),
     ],
 )

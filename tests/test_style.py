@@ -23,3 +23,13 @@ def test_every_test_asserts_something():
     ]
     assert len(functions) > 1000
     assert [(file, node.name) for file, node in functions if not asserts(node)] == []
+
+
+VAGUE = ("Received others", "Leave it out", "Leave them out", "Change them", "Complete them", "Check their signs")
+"""Ends of messages that do not say which quantity is meant."""
+
+
+def test_messages_name_the_quantity_in_their_remedy():
+    texts = {path: path.read_text(encoding="utf-8") for path in (ROOT / "quakedesign").rglob("*.py")}
+    assert len(texts) > 200
+    assert [(path.name, text) for path, said in texts.items() for text in VAGUE if text in said] == []

@@ -229,7 +229,8 @@ def sos(
     asked = (polynomial, on, multiplier, margin, degree, products)
     if gram is not None and asked != (None, (), None, "0", None, None):
         raise PolynomialError(
-            "--gram FILE contains the polynomial and its options. Received others as well. Give --gram alone."
+            "--gram FILE contains the polynomial and its options. Received --gram with a polynomial or options. "
+            "Give --gram alone."
         )
     if gram is not None:
         answer = read_gram(gram).verify()

@@ -86,7 +86,7 @@ class Table:
         with self.problems.collected():
             if len(spelt) > 1:
                 raise ScenarioError(
-                    f"{self._name(name)} must be given once. Received {' and '.join(spelt)}. Leave one out."
+                    f"{self._name(name)} must be given once. Received {' and '.join(spelt)}. Omit one of them."
                 )
         return spelt[0] if len(spelt) == 1 else name
 

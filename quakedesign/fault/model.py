@@ -330,7 +330,7 @@ class Reference:
         require_positive(target_slip=self.target_slip, operation_time=self.operation_time)
         if self.ramp is not None and not 0 < self.ramp < 1:
             raise ParameterError(
-                f"ramp must be above 0 and below 1. Received {self.ramp!r}. Leave it out for a constant rate."
+                f"ramp must be above 0 and below 1. Received {self.ramp!r}. Omit ramp for a constant rate."
             )
         require_ordinary(0, target_slip=self.target_slip)
         require_ordinary(operation_time=self.operation_time)
@@ -591,8 +591,8 @@ class Fault:
         problems.refuse()
         if self.reference.ramp is not None and not self.friction.state_names:
             raise ParameterError(
-                f"a ramp beside a constant rate needs friction with a state. Received {self.reference.ramp!r} with "
-                f"{self.friction.name}, whose reference is a smooth ramp from rest to rest. Leave it out."
+                f"ramp needs friction with a state, whose reference has a constant rate. Received the ramp "
+                f"{self.reference.ramp!r} with {self.friction.name}, whose reference is smooth already. Omit ramp."
             )
         if self.reference.operation_time < 1000 * self.sampling_time:
             raise ParameterError(

@@ -173,7 +173,9 @@ def _less_one(square: Square, index: int) -> tuple[Fraction, Square]:
         less = replace(square, gram=(*square.gram[:place], square.gram[place] - margin, *square.gram[place + 1 :]))
         if is_definite(integer_gram(less)):
             return margin, less
-    raise CertificateError("a Gram matrix of the multiplier must be positive definite. Received another.")
+    raise CertificateError(
+        f"the Gram matrix of the multiplier must be positive definite. Received a {size} x {size} matrix that is not."
+    )
 
 
 def _sums(asked: Statement, squares: Sequence[Square], margin: Fraction) -> IntegerWitness:

@@ -153,7 +153,8 @@ class PressureCourse:
                 f"Received {len(self.times)} and {len(self.pressures)}. Leave out those on a straight line."
             )
         if not all(map(is_finite, (*self.times, *self.pressures))):
-            raise ParameterError("times [s] and pressures [Pa] must be finite. Received others. Check the numbers.")
+            wrong = next(value for value in (*self.times, *self.pressures) if not is_finite(value))
+            raise ParameterError(f"times [s] and pressures [Pa] must be finite. Received {wrong!r}.")
         thrice = any(late <= early for early, late in zip(self.times, self.times[2:], strict=False))
         if thrice or any(late < early for early, late in pairwise(self.times)):
             raise ParameterError(

@@ -85,7 +85,9 @@ def _free_plant(fault: Fault, controller: Controller | None, names: tuple[str, .
     fault.require_memoryless("free parameters")
     known = (*plant.PARAMETERS, *fault.friction.quantities())
     if controller is not None:
-        raise ParameterError("free parameters are those of a fault without a controller. Received one. Leave it out.")
+        raise ParameterError(
+            f"free parameters need a fault without a controller. Received the controller {controller.name}. Omit one."
+        )
     for name in names:
         if name not in known or names.count(name) > 1:
             raise ParameterError(
@@ -442,8 +444,8 @@ def _between(controller: Controller, actuator: Actuator | None) -> tuple[Fractio
     late = [stage for stage in actuator.sampled if isinstance(stage, Delay) and not stage.jitter and own]
     if others := [stage.name for stage in actuator.sampled if stage not in late]:
         raise UnsupportedError(
-            "a loop transfer function has a lag, rock and, for a law of samples, a delay without jitter. Received "
-            f"{', '.join(others)}. Leave them out, or simulate."
+            "a loop transfer function takes a lag, a diffusion path and, for a sampled law, a delay without jitter. "
+            f"Received {', '.join(others)}. Omit these stages, or simulate."
         )
     periods = sum((stage.samples + Fraction(stage.part) for stage in late), Fraction(0))
     return periods * (own.step if own else 0), Actuator(stages=actuator.flowing)

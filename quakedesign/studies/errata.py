@@ -124,7 +124,7 @@ def find_rows(numbers: Iterable[int | str] = ()) -> tuple[ErrataRow, ...]:
             first, last = min(map(int, known)), max(map(int, known))
             raise UnknownNameError(
                 f"row of the errata must be a whole number from {first} to {last}. Received {number!r}. "
-                "Leave it out to run every row."
+                "Omit the row to run every row."
             )
     return tuple(known[n] for n in wanted) if wanted else errata_rows()
 

@@ -429,7 +429,7 @@ def _require_plain(fault: Fault, told: Told) -> None:
         )
     if more := told.setup.given().keys() - {"lag", "diffusion"}:
         raise ParameterError(
-            f"limits of slow sliding know a lag and rock alone. Received {', '.join(sorted(more))}. Leave them out."
+            f"limits of slow sliding take lag and diffusion only. Received {', '.join(sorted(more))}. Omit these."
         )
 
 

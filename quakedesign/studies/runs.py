@@ -447,7 +447,7 @@ def _start(
     wanted: dict[str, tuple[str, ...]] = {"steady": (), "locked": ("hold",), "late": ("share",)}
     require_known(kind, wanted, "start", UnknownNameError)
     if others := [name for name, value in given.items() if value is not None and name not in wanted[kind]]:
-        raise ParameterError(f"{others[0]} belongs to another start than {kind}. Received both. Leave one out.")
+        raise ParameterError(f"{others[0]} cannot be used with the start {kind}. Received both. Omit {others[0]}.")
     if kind == "steady":
         return sliding(fault, rate)
     if kind == "late":
@@ -518,7 +518,7 @@ def sensor(
     if noise.rate_noise:
         raise ParameterError(
             "with a differentiator the slip alone is measured. "
-            f"Received rate noise {noise.rate_noise:g} m/s. Leave it out."
+            f"Received rate noise {noise.rate_noise:g} m/s. Omit the rate noise."
         )
     transducer = Transducer(deviation=noise.slip_noise, bandwidth=bandwidth, quantum=quantum, seed=noise.seed)
     stages: list[SlipStage] = [transducer] if transducer.start or quantum else []
@@ -703,11 +703,11 @@ def choice(
     if law.divisor is None:
         if scale is None and feedforward == "none":
             return Choice(controller=law, lipschitz=base)
-        raise ParameterError(f"a scale and a feed-forward belong to a sliding mode. Received {name}. Leave them out.")
+        raise ParameterError(f"scale and feedforward are for sliding modes. Received {name}. Omit both.")
     if law.sampling is not None and feedforward != "none":
         raise ParameterError(
-            "a feed-forward has no guarantee with the pressure held over T_s, as designed gains run. "
-            f"Received {feedforward}. Give --gains continuous, or leave it out."
+            "feedforward has no guarantee with zero-order hold, which designed gains use. "
+            f"Received {feedforward}. Give --gains continuous, or omit feedforward."
         )
     scaled = law if scale is None else law.scaled(rational(scale, "scale"))
     known = feed_forward(feedforward, fault, law.divisor)

@@ -194,7 +194,7 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
         True,
         True,
     ]
-    assert errors[2].endswith("limits of slow sliding know a lag and rock alone. Received delay. Leave them out.")
+    assert errors[2].endswith("limits of slow sliding take lag and diffusion only. Received delay. Omit these.")
 
 
 def test_designs_are_proved_with_the_whole_setup(monkeypatch, capsys):

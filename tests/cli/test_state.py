@@ -101,7 +101,7 @@ def test_a_locked_fault_starts_with_an_aged_state(capsys, patch):
         (("--plant", "coulomb"), "one of smooth, quasi-dynamic"),
         (("--start", "early"), "one of steady, locked, late"),
         (("--start", "locked"), "Give --hold"),
-        (("--hold", "1 year"), "hold belongs to another start"),
+        (("--hold", "1 year"), "hold cannot be used with the start steady"),
         (("--pressure", "50 MPa"), "opens"),
         (("--drift=-1e-9",), "loading_rate must be positive"),
         (("--method", "rk4"), "method must be one of"),

@@ -80,5 +80,5 @@ def test_a_ramp_needs_friction_with_a_state(tmp_path):
     assert ramped.reference.ramp == 0.05
     assert parse_fault(fault_toml(ramped), "again") == ramped
     path.write_text(fault_toml(load_fault("real-fault")).replace("[task]", "[task]\nramp = 0.05"))
-    with pytest.raises(ParameterError, match="a ramp beside a constant rate needs friction with a state"):
+    with pytest.raises(ParameterError, match="ramp needs friction with a state"):
         load_fault(path)

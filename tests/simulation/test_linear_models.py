@@ -245,5 +245,5 @@ def test_rock_answers_as_its_cells_do():
     [(AT_ONCE, Saturation(lowest=-1e7, highest=1e7)), (AT_ONCE, Delay(samples=1, jitter=1)), (LAW, Delay(samples=1))],
 )
 def test_stages_that_are_not_linear_and_delays_without_samples_have_no_transfer_function(law, stage):
-    with pytest.raises(UnsupportedError, match=rf"has a lag, rock and.*Received {stage.name}"):
+    with pytest.raises(UnsupportedError, match=rf"takes a lag, a diffusion path and.*Received {stage.name}"):
         qd.loop_transfer(REAL, law, actuator=Actuator(stages=(stage,)))

@@ -39,7 +39,7 @@ def test_scale_and_feed_forward_are_exact():
 
 @pytest.mark.parametrize("more", [{"scale": "2"}, {"feedforward": "nominal"}])
 def test_a_linear_law_has_neither_scale_nor_feed_forward(more):
-    with pytest.raises(ParameterError, match="belong to a sliding mode"):
+    with pytest.raises(ParameterError, match="scale and feedforward are for sliding modes"):
         chosen_controller(LAB, "elqr", ("published",), **more)
 
 

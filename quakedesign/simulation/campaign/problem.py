@@ -316,13 +316,13 @@ class SlidingProblem(CampaignProblem):
         require_known(self.plant, PLANTS, "plant of a fault with a state", UnknownNameError)
         if self.controller is None or self.controller.of_slip is None or self.controller.sampling is None:
             raise ParameterError(
-                "a campaign with friction that has a state needs a law of samples that is told the slip alone. "
-                f"Received {self.controller}. Give an elqr that design found."
+                "a campaign for friction with a state needs a sampled law that measures the slip alone. "
+                f"Received {self.controller}. Give an elqr from design."
             )
         if self.scheme != simulation_scheme("explicit", actuator=getattr(self.scheme, "actuator", DIRECT)):
             raise ParameterError(
-                "slow sliding is told the slip as it is and has a solver of its own. Received another scheme, noise, a "
-                "sensor or substeps. Leave them out."
+                "a campaign of slow sliding needs the scheme explicit, exact slip and its own solver. Received another "
+                "scheme, noise, a sensor or substeps. Omit these."
             )
 
     @cached_property

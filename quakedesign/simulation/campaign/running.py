@@ -216,15 +216,15 @@ def campaign_problem(
     if fault.friction.state_names:
         if load not in (None, Load()) or initial_slip or initial_slip_rate:
             raise ParameterError(
-                "friction with a state starts in steady sliding and is pushed by a stress. Received a load or an "
-                f"initial slip or slip rate with {fault.friction.name}. Leave them out."
+                "friction with a state needs steady sliding as initial condition and a stress as disturbance. Received "
+                f"a load, an initial slip or an initial slip rate with {fault.friction.name}. Omit these."
             )
         space = sliding_space(fault, rational(spread, "spread"))
         solver = "cvodes" if method == DormandPrince.name else method
         return SlidingProblem(**told, space=space, method=solver, stress=stress, stress_period=stress_period)
     if spread or stress:
         raise ParameterError(
-            f"spread and stress need friction with a state. Received {fault.friction.name}. Leave them out."
+            f"spread and stress need friction with a state. Received {fault.friction.name}. Omit both."
         )
     space = Space.of(fault, initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
     return SteppedProblem(**told, space=space, method=integrator(method), load=load or Load())

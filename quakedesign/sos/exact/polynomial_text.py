@@ -535,7 +535,7 @@ def _constraint(given: Any, names: tuple[str, ...]) -> tuple[str, dict[Exponents
     else:
         kind, polynomial = _read_relation(given, names)
     if not polynomial:
-        raise PolynomialError(f"a constraint must say something. Received {given}, which is always true. Leave it out.")
+        raise PolynomialError(f"a constraint must not be always true. Received {given}. Omit this constraint.")
     return kind, polynomial
 
 

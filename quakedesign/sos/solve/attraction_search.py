@@ -387,7 +387,7 @@ def region_of_attraction(
     """
     if not _FINEST <= relative < 1:
         raise PolynomialError(
-            f"relative must be from {_FINEST:g} to below 1. Received {relative!r}. Leave it out for 1e-4."
+            f"relative must be from {_FINEST:g} to below 1. Received {relative!r}. Omit relative for 1e-4."
         )
     claim = _claim(field, V)
     inner = _shape(field, shape, degree)

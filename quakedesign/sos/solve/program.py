@@ -153,7 +153,8 @@ class Program:
             rows[i][j] != rows[j][i] for i in range(size) for j in range(i)
         ):
             raise PolynomialError(
-                f"a matrix inequality needs a symmetric {size} x {size} matrix. Received another one."
+                f"a matrix inequality with {size} rows needs a symmetric {size} x {size} matrix. "
+                "Received a matrix that is not square or not symmetric."
             )
         self._definite.append(rows)
 
@@ -444,7 +445,7 @@ class Membership:
         """
         unknown = [e for e in polynomial if e not in self.template.polynomial]
         if unknown:
-            raise PolynomialError(f"monomials must be those of the template. Received another one: {unknown[0]}.")
+            raise PolynomialError(f"monomials must be those of the template. Received {unknown[0]}.")
         asked = polynomial
         if len(self.template.multiplier) != 1 or any(map(any, self.template.multiplier)):
             asked = replace(self.template, polynomial={e: Fraction(c) for e, c in polynomial.items()}).target

@@ -108,10 +108,15 @@ def _square(product: tuple[int, ...], gram: Any, basis: Any, names: tuple[str, .
     upper = tuple(Fraction(float(matrix[i, j])) for i in range(len(elements)) for j in range(i, len(elements)))
     distinct = {tuple(sorted(as_polynomial(b).items())) for b in elements}
     if not elements or () in distinct or len(distinct) < len(elements):
-        raise PolynomialError("a basis must have different elements other than zero. Received another one.")
+        raise PolynomialError(
+            f"a basis must have one or more elements, all different and not zero. Received {len(elements)} elements, "
+            f"{len(distinct - {()})} of them different and not zero."
+        )
     square = in_echelon_form(Square(product=product, basis=elements, gram=upper))
     if {} in square.basis:
-        raise PolynomialError("elements of a basis must be linearly independent. Received others. Drop one.")
+        raise PolynomialError(
+            f"the {len(elements)} elements of a basis must be linearly independent. Received dependent ones. Omit one."
+        )
     return square
 
 
@@ -250,7 +255,10 @@ def read_gram(path: str | Path) -> GramFile:
             f"{path} must be JSON, or .mat as MATLAB's save -v7 writes. Received: {reason}."
         ) from None
     if not isinstance(raw, dict) or set(raw) != _KEYS:
-        raise PolynomialError(f"{path} must have exactly the keys {', '.join(sorted(_KEYS))}. Received others.")
+        received = ", ".join(sorted(map(str, raw))) if isinstance(raw, dict) else type(raw).__name__
+        raise PolynomialError(
+            f"{path} must have exactly the keys {', '.join(sorted(_KEYS))}. Received {shown(received or 'none')}."
+        )
     return _gram_file(raw)
 
 
@@ -269,7 +277,10 @@ def _number(written: str) -> Fraction | str:
 def _gram_file(raw: dict[str, Any]) -> GramFile:
     names, polynomial, basis = raw["variables"], raw["polynomial"], raw["basis"]
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or not isinstance(basis, list):
-        raise PolynomialError("variables must be a list of names, and basis a list. Received others.")
+        raise PolynomialError(
+            "variables must be a list of names, and basis a list. "
+            f"Received {shown(names)} and a basis of type {type(basis).__name__}."
+        )
     given = polynomial if isinstance(polynomial, str) else _terms(polynomial, len(names))
     return GramFile(variables=tuple(names), polynomial=given, gram=raw["gram"], basis=basis)
 

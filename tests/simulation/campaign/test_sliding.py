@@ -118,10 +118,10 @@ def test_what_a_run_goes_through_is_the_actuators(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"controller": None}, "needs a law of samples that is told the slip alone"),
-        ({"controller": published("real-fault")["elqr"]}, "needs a law of samples"),
+        ({"controller": None}, "needs a sampled law that measures the slip alone"),
+        ({"controller": published("real-fault")["elqr"]}, "needs a sampled law"),
         ({"load": Load(drift=1e-9)}, "Received a load"),
-        ({"initial_slip": 1e-3}, "Received a load or an initial slip"),
+        ({"initial_slip": 1e-3}, "Received a load, an initial slip"),
         (
             {"scheme": simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-6))},
             "Received another scheme, noise",
@@ -141,7 +141,7 @@ def test_what_does_not_apply_is_refused(wrong, said):
 
 def test_a_law_that_is_told_more_than_the_slip_or_has_no_samples_is_refused(monkeypatch):
     told_the_rate = SampledController(law=summed_integrals((Fraction(1),) * 4, STEP), step=STEP)
-    said = "needs a law of samples that is told the slip alone"
+    said = "needs a sampled law that measures the slip alone"
     with pytest.raises(ParameterError, match=said):
         replace(PROBLEM, controller=told_the_rate)
     monkeypatch.setattr(SampledController, "sampling", None)
