@@ -667,24 +667,23 @@ class WorstStickSlip:
     slip_rate: float
 
 
-def worst_stick_slip(found: StickSlipGuarantee, *, runs: int = 240, periods: int = 150) -> WorstStickSlip:
-    """Worst case of runs that choose, period by period, what takes them farthest in one direction.
+def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstStickSlip:
+    """Worst case of courses from rest that are continued, period by period, from the states that lie farthest out.
 
-    β is constant in a run, as it is nearly in a fault; the slope of friction is any of its range in each period, and
-    the disturbance changes its sign at most once in each. Directions are the facets of the invariant polytope.
+    For each facet of the invariant polytope the state that is farthest in its direction is kept. β is constant in a
+    course, as it is nearly in a fault; the slope of friction is either end of its range in each period, and the
+    disturbance changes its sign at most once in each.
     """
-    task, held = found.task, found.held
-    reach = _Reach.of(task, held)
-    facets = np.array(found.reach.facets, dtype=float)
-    facets = facets[np.arange(runs) % len(facets)]
-    states, extremes = np.zeros((runs, 3)), np.zeros(3)
-    high = np.arange(runs) // 2 % 2 == 0  # which end of β
-    for _ in range(periods):
-        after = reach.simulated(states)  # (runs, choices, 3); choices: β is the slower half
-        half = after.shape[1] // 2
-        own = np.where(high[:, None, None], after[:, :half], after[:, half:])
-        best = np.einsum("rcs,rs->rc", own, facets).argmax(axis=1)
-        states = own[np.arange(runs), best]
+    reach = _Reach.of(found.task, found.held)
+    facets, extremes = np.array(found.reach.facets, dtype=float), np.zeros(3)
+    for high in (False, True):  # which end of β
+        states = np.zeros((1, 3))
+        for _ in range(periods):
+            after = reach.simulated(states)
+            half = after.shape[1] // 2  # β is the slower half of the choices
+            own = after[:, half:] if high else after[:, :half]
+            states = np.vstack([states, own.reshape(-1, 3)])
+            states = states[np.unique((facets @ states.T).argmax(axis=1))]
         extremes = np.maximum(extremes, [-states[:, 0].min(), states[:, 0].max(), states[:, 1].max()])
     behind, ahead, rate = (float(v) for v in extremes)
     return WorstStickSlip(behind=behind, ahead=ahead, slip_rate=rate)

@@ -14,6 +14,7 @@ from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import guarantee_document, load_guarantee, read_guarantee
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipClaims, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import gap, ranges, stick_slip_bounds, stop_bounds
+from quakedesign.guarantees.search.stick_slip_design import worst_stick_slip
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.lyapunov import Verdict
 
@@ -204,6 +205,14 @@ def test_claims_are_rounded_outward(bounds):
 def test_what_the_theorem_does_not_know_is_refused(given):
     with pytest.raises(ParameterError, match=r"stick-slip plant"):
         qd.guarantee(qd.load_fault("real-fault"), plant="stick-slip", **given)
+
+
+def test_the_worst_case_found_lies_within_the_claims_and_not_far_below(proof):
+    """Two thirds and more of what is claimed is reached, so that the claims are no looser than by half."""
+    worst = worst_stick_slip(proof)
+    assert 0.65 * proof.claims.peak_slip_rate < worst.slip_rate < proof.claims.peak_slip_rate
+    assert 0.65 * proof.claims.slip_ahead < worst.ahead < proof.claims.slip_ahead
+    assert 0 < worst.behind < proof.claims.slip_behind
 
 
 @pytest.mark.slow
