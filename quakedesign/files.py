@@ -242,7 +242,11 @@ def _locked(folder: Path) -> int:
 
 def _discard(folder: Path) -> None:
     """Remove a folder once what was moved aside is back in its place, or replaced."""
-    for held in (folder / ASIDE).glob("*"):
+    try:
+        aside = list((folder / ASIDE).glob("*"))
+    except OSError:  # no such folder can be
+        aside = []
+    for held in aside:
         if not (place := folder.parent / held.name).exists():
             os.replace(held, place)
     shutil.rmtree(folder, ignore_errors=True)

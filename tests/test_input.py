@@ -5,7 +5,7 @@ import os
 import pytest
 
 from quakedesign.errors import CertificateError, OutputError, ScenarioError
-from quakedesign.files import parse_toml, read_text, require_room
+from quakedesign.files import discard_all, parse_toml, read_text, require_room
 
 
 def read(path):
@@ -53,6 +53,7 @@ def test_a_place_that_cannot_be_is_refused_before_the_work(name, tmp_path):
     with pytest.raises(OutputError, match=r"must have a name of at most 200 bytes|folder that can be written"):
         require_room(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
+    discard_all()  # nothing is kept of a place that cannot be
 
 
 def test_the_longest_name_has_room_for_its_neighbours(tmp_path):

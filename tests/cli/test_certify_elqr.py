@@ -145,4 +145,4 @@ def test_a_design_is_reported_with_the_guarantee_of_the_loop_that_ran(capsys, tm
 
 def test_a_diffusion_of_zero_is_not_taken_for_one_that_is_not_given(capsys, tmp_path):
     code, _, err = run(capsys, "design", "crustal-patch", "--diffusion", "0", "--out", str(tmp_path / "o"))
-    assert (code, "a diffusion must be above 0 s. Received 0 s" in err) == (2, True)
+    assert (code, "diffusion must be above 0 s. Received 0 s" in err) == (2, True)

@@ -52,7 +52,7 @@ def test_terms_are_multiples_of_powers_of_an_end_or_of_such_a_sum():
     ],
 )
 def test_what_may_rise_or_is_no_such_power_is_refused(term):
-    with pytest.raises(UnsupportedError, match="falling sum of signed powers"):
+    with pytest.raises(UnsupportedError, match="sum of signed powers with negative factors"):
         _term(term)
 
 
