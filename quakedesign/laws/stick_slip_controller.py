@@ -15,12 +15,12 @@ from quakedesign.laws.base import Controller, Sampling, Signals
 from quakedesign.laws.loop_field import LoopField
 from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
 
-STATES = ("level", "predicted_rate", "last_rate", "last_slip")
-
 
 @dataclass(frozen=True, kw_only=True)
 class StickSlipController(Controller):
-    """The law as a controller of a simulation: one step every T_s by the scheme ``explicit``, its states `STATES`.
+    """The law as a controller of a simulation: one step every T_s by the scheme ``explicit``.
+
+    Its states are the level D [Pa], the predicted slip rate [m/s], and the slip rate [m/s] and slip [m] measured last.
 
     Attributes
     ----------

@@ -4,13 +4,14 @@ from collections.abc import Callable
 from typing import Any
 
 from quakedesign.exact import exact_text
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipClaims, StickSlipGuarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.guarantees.exact.stick_slip_set import (
     COMBINATIONS,
     MOST_BASES,
     MOST_FACETS,
     SLICES,
     SampledStickSlip,
+    StickSlipClaims,
     StickSlipPolytope,
 )
 from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw

@@ -1,16 +1,15 @@
 """A guarantee on the stick–slip plant as a statement that checks itself."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from quakedesign import laws
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.exact.statement import above
 from quakedesign.guarantees.exact.stick_slip_set import (
     SampledStickSlip,
-    StickSlipBounds,
+    StickSlipClaims,
     StickSlipPolytope,
     stick_slip_bounds,
 )
@@ -19,57 +18,6 @@ from quakedesign.plant.ranges import UncertainPlant
 
 if TYPE_CHECKING:
     from quakedesign.laws.stick_slip_controller import StickSlipController
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StickSlipClaims:
-    """What is never exceeded.
-
-    Attributes
-    ----------
-    slip_behind, slip_ahead : UpperBound
-        How far the slip is behind and ahead of the reference at most [m].
-    peak_slip_rate : UpperBound
-        [m/s].
-    least_pressure, largest_pressure : LowerBound, UpperBound
-        [Pa].
-    """
-
-    slip_behind: UpperBound
-    slip_ahead: UpperBound
-    peak_slip_rate: UpperBound
-    least_pressure: LowerBound
-    largest_pressure: UpperBound
-
-    @classmethod
-    def of(cls, bounds: StickSlipBounds) -> "StickSlipClaims":
-        """Rounded outward to four digits."""
-        return cls(
-            slip_behind=UpperBound(above(bounds.behind)),
-            slip_ahead=UpperBound(above(bounds.ahead)),
-            peak_slip_rate=UpperBound(above(bounds.slip_rate)),
-            least_pressure=LowerBound(-above(-bounds.least_pressure)),
-            largest_pressure=UpperBound(above(bounds.largest_pressure)),
-        )
-
-    def follow(self, bounds: StickSlipBounds) -> bool:
-        """Whether the claims follow from bounds."""
-        return (
-            self.slip_behind >= bounds.behind
-            and self.slip_ahead >= bounds.ahead
-            and self.peak_slip_rate >= bounds.slip_rate
-            and self.least_pressure <= bounds.least_pressure
-            and self.largest_pressure >= bounds.largest_pressure
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Exact numbers as texts, SI."""
-        return {
-            "slip_behind": self.slip_behind.exact,
-            "slip_ahead": self.slip_ahead.exact,
-            "peak_slip_rate": self.peak_slip_rate.exact,
-            "pressure": [self.least_pressure.exact, self.largest_pressure.exact],
-        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +57,7 @@ class StickSlipGuarantee:
         """The law for `simulate`."""
         return laws.StickSlipController(law=self.held.law, step=self.held.step)
 
-    def bounds(self) -> StickSlipBounds | NoGuarantee:
+    def bounds(self) -> StickSlipClaims | NoGuarantee:
         """What the theorem gives, computed anew."""
         try:
             return stick_slip_bounds(self.task, self.held, self.reach)
@@ -119,22 +67,20 @@ class StickSlipGuarantee:
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         bounds = self.bounds()
-        sound = isinstance(bounds, StickSlipBounds) and self.claims.follow(bounds)
+        sound = isinstance(bounds, StickSlipClaims) and self.claims.follow(bounds)
         return Verdict.PROVED if sound else Verdict.UNDECIDED
 
     def sentence(self) -> str:
         """What is guaranteed, for people; bounds rounded outward, what it is guaranteed for inward."""
         task, held, claims = self.task, self.held, self.claims
         stress = LowerBound(task.amplitude / task.area_per_mass[1])
-        when = f"held over {UpperBound(held.step):.6g} s"
         size = f"{LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
         return (
-            f"from rest, {when}, for every disturbance of at most {size} and all friction of the box: the slip "
-            f"rate never exceeds "
-            f"{claims.peak_slip_rate:.3g} m/s, whether the fault slides or sticks, and the slip stays between "
-            f"{claims.slip_behind:.3g} m behind and {claims.slip_ahead:.3g} m ahead of the reference, "
-            f"the pressure between "
-            f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}, for all t >= 0"
+            f"from rest, held over {UpperBound(held.step):.6g} s with exact measurements of slip and slip rate, for "
+            f"every disturbance of at most {size}, for all friction and constant parameters of the box: the slip rate never "
+            f"exceeds {claims.peak_slip_rate:.3g} m/s, whether the fault slides or sticks, the slip stays between "
+            f"{claims.slip_behind:.3g} m behind and {claims.slip_ahead:.3g} m ahead of the reference, the pressure "
+            f"between {claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}, for all t >= 0"
         )
 
 
@@ -146,4 +92,4 @@ def stick_slip_guarantee(
         bounds = stick_slip_bounds(task, held, reach)
     except ParameterError as error:
         return NoGuarantee(reason=str(error), small_gain=None)
-    return StickSlipGuarantee(task=task, held=held, reach=reach, claims=StickSlipClaims.of(bounds))
+    return StickSlipGuarantee(task=task, held=held, reach=reach, claims=bounds.rounded())

@@ -56,8 +56,9 @@ import numpy as np
 from flint import arb, ctx
 
 from quakedesign.errors import ParameterError
-from quakedesign.exact import end_of
+from quakedesign.exact import LowerBound, UpperBound, end_of, shortly
 from quakedesign.guarantees.exact.norms import absolute, ball, majorant, matrix
+from quakedesign.guarantees.exact.statement import above
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.ranges import Range, UncertainPlant
 
@@ -123,31 +124,31 @@ class StickSlipPolytope:
         bases = [(basis, 3) for line in self.sliding for basis in line]
         bases += [(basis, 4) for line in self.resting for basis in line]
         axes = tuple((index, sign) for index, sign in ((0, 1), (1, 1), (2, 1), (0, -1), (2, -1)))
-        fits = (
-            5 <= count <= MOST_FACETS
-            and len(bases) <= MOST_BASES
-            and {len(row) for row in self.facets} == {3}
-            and all(
-                row[index] * sign > 0 and not any(v for i, v in enumerate(row) if i != index)
+        conditions = {
+            f"have 5 to {MOST_FACETS} facets": 5 <= count <= MOST_FACETS,
+            "have facets of 3 entries": {len(row) for row in self.facets} == {3},
+            "begin with facets along +e1, +y, +d, -e1 and -d alone": all(
+                row[index : index + 1] and row[index] * sign > 0 and sum(map(bool, row)) == 1
                 for row, (index, sign) in zip(self.facets, axes, strict=False)
-            )
-            and len(self.multipliers) == count
-            and all(
+            ),
+            "have 5 multipliers for each facet": [len(row) for row in self.multipliers] == [5] * count,
+            "have multipliers >= 0, 0 or 1, of any sign, 0 or 1, and from 0 to 1": all(
                 len(row) == 5 and row[0] >= 0 <= row[4] <= 1 and row[1] in (0, 1) and row[3] in (0, 1)
                 for row in self.multipliers
-            )
-            and len(self.sliding) == SLICES
-            and len(self.resting) == len(COMBINATIONS)
-            and all(self.sliding)
-            and all(self.resting)
-            and all(len(basis) == size and 0 <= min(basis) for basis, size in bases)
-        )
-        if not fits:
-            raise ParameterError(
-                f"a polytope of a stick-slip loop needs 5 to {MOST_FACETS} facets of 3 entries, the first five along "
-                "+e1, +y, +d, -e1 and -d, 5 multipliers for each, and bases of 3 constraints for 3 slices "
-                "and of 4 for 7 combinations. Received other sizes. Search for it again."
-            )
+            ),
+            f"have bases for {SLICES} slices and {len(COMBINATIONS)} combinations": (
+                len(self.sliding) == SLICES
+                and len(self.resting) == len(COMBINATIONS)
+                and all((*self.sliding, *self.resting))
+            ),
+            "have bases of 3 constraints for slices and of 4 for combinations, by numbers from 0": all(
+                len(basis) == size and min(basis) >= 0 for basis, size in bases
+            ),
+            f"have at most {MOST_BASES} bases": len(bases) <= MOST_BASES,
+        }
+        for condition, holds in conditions.items():
+            if not holds:
+                raise ParameterError(f"a polytope of the stick-slip plant must {condition}. Search for it again.")
 
     @property
     def box(self) -> tuple[Fraction, ...]:
@@ -176,28 +177,57 @@ class SampledStickSlip:
 
     def __post_init__(self) -> None:
         if self.step <= 0:
-            raise ParameterError("T_s must be positive")
+            raise ParameterError(f"T_s must be positive, got {shortly(self.step)} s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StickSlipBounds:
-    """What the theorem gives.
+class StickSlipClaims:
+    """What is never exceeded: as the theorem gives it, or as it is claimed.
 
     Attributes
     ----------
-    behind, ahead : Fraction
+    slip_behind, slip_ahead : UpperBound
         How far the slip is behind and ahead of the reference at most [m].
-    slip_rate : Fraction
+    peak_slip_rate : UpperBound
         [m/s].
-    least_pressure, largest_pressure : Fraction
+    least_pressure, largest_pressure : LowerBound, UpperBound
         [Pa].
     """
 
-    behind: Fraction
-    ahead: Fraction
-    slip_rate: Fraction
-    least_pressure: Fraction
-    largest_pressure: Fraction
+    slip_behind: UpperBound
+    slip_ahead: UpperBound
+    peak_slip_rate: UpperBound
+    least_pressure: LowerBound
+    largest_pressure: UpperBound
+
+    def rounded(self) -> "StickSlipClaims":
+        """Rounded outward to four digits."""
+        return StickSlipClaims(
+            slip_behind=UpperBound(above(self.slip_behind)),
+            slip_ahead=UpperBound(above(self.slip_ahead)),
+            peak_slip_rate=UpperBound(above(self.peak_slip_rate)),
+            least_pressure=LowerBound(-above(-self.least_pressure)),
+            largest_pressure=UpperBound(above(self.largest_pressure)),
+        )
+
+    def follow(self, proved: "StickSlipClaims") -> bool:
+        """Whether these claims follow from what is proved."""
+        return (
+            self.slip_behind >= proved.slip_behind
+            and self.slip_ahead >= proved.slip_ahead
+            and self.peak_slip_rate >= proved.peak_slip_rate
+            and self.least_pressure <= proved.least_pressure
+            and self.largest_pressure >= proved.largest_pressure
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts, SI."""
+        return {
+            "slip_behind": self.slip_behind.exact,
+            "slip_ahead": self.slip_ahead.exact,
+            "peak_slip_rate": self.peak_slip_rate.exact,
+            "pressure": [self.least_pressure.exact, self.largest_pressure.exact],
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -439,7 +469,7 @@ def push_row(
 
 @dataclass(frozen=True, slots=True)
 class _Carried:
-    """What the law and the reference make of facets in a combination, whatever the plant does."""
+    """What the law and the reference make of facets in a combination, before the plant."""
 
     place: int
     push: tuple[Fraction, Fraction, Fraction]
@@ -601,7 +631,7 @@ def polytopes(
 
 
 class Verifier:
-    """Bounds of linear functions on one polytope, from multipliers of named constraints; exact whatever floats say."""
+    """Bounds of linear functions on one polytope; floats propose multipliers of constraints, rationals decide."""
 
     def __init__(
         self,
@@ -679,7 +709,7 @@ def _middles(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return middles, radii
 
 
-def stick_slip_bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipBounds:
+def stick_slip_bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
     """Bounds of the theorem.
 
     Raises
@@ -687,11 +717,16 @@ def stick_slip_bounds(task: UncertainPlant, held: SampledStickSlip, reach: Stick
     ParameterError
         With what of it does not hold.
     """
-    with ctx.workprec(BITS):
-        return _bounds(task, held, reach)
+    try:
+        with ctx.workprec(BITS), np.errstate(all="ignore"):
+            return _bounds(task, held, reach)
+    except ParameterError:
+        raise
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # no float proposes multipliers of such numbers
+        raise ParameterError("numbers of the loop and its polytope must be of a size that floats hold") from None
 
 
-def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipBounds:
+def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
     ahead, rate, up, lag, down = reach.box
     fastest = task.reference_rates[0]
     sizes = [max(ahead, lag), rate, max(up, down)]
@@ -721,12 +756,12 @@ def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolyto
     if _bracket(task, held, found, push[1]) > task.amplitude:
         raise ParameterError("the disturbance is too small against what the range of the input gain makes of U")
     moved = fastest * held.step
-    return StickSlipBounds(
-        behind=lag + moved,
-        ahead=ahead + moved,
-        slip_rate=rate,
-        least_pressure=found.rest_pressure[0] - push[1],
-        largest_pressure=found.rest_pressure[1] - push[0],
+    return StickSlipClaims(
+        slip_behind=UpperBound(lag + moved),
+        slip_ahead=UpperBound(ahead + moved),
+        peak_slip_rate=UpperBound(rate),
+        least_pressure=LowerBound(found.rest_pressure[0] - push[1]),
+        largest_pressure=UpperBound(found.rest_pressure[1] - push[0]),
     )
 
 

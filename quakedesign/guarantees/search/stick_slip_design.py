@@ -42,7 +42,7 @@ TUNINGS = tuple((level, slip, back, 1.3) for level, slip in ((0.5, 0.5), (0.7, 0
 _SETTLED, _FEW, _MANY = 1e-4, 150, 250  # change of extents, vertices kept in comparisons and for a polytope
 _ROUNDS, _SUBSTEPS = 60, 12
 _FACETS = 130
-_PERIODS, _TURNS, _REFINED = 4, 200, (8, 15, 22, 29)
+_PERIODS, _TURNS, _REFINED = 4, 110, (8, 15, 22, 29)
 _TINY = 1e-12  # of a height: rounding
 _LITTLE = 1.01  # of a height that one step to where a policy leads may make of it
 _NEARLY = 0.93  # of the factor of y that keeps a facet where it is in a slow slide
@@ -624,6 +624,8 @@ def design_stick_slip(
     tell : callable
         Called with what is done, and the fraction done [-].
     """
+    if not task.amplitude:
+        return NoGuarantee(reason="the stick-slip theorem needs a disturbance above 0 m/s^2", small_gain=None)
     candidates = []
     for tuning in TUNINGS:
         law = tuned(task, step, tuning)

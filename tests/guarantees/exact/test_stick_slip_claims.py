@@ -1,5 +1,6 @@
 """The decision about a stick–slip certificate: each condition, each claim, and files."""
 
+import json
 from dataclasses import replace
 from fractions import Fraction as F
 from math import exp
@@ -12,11 +13,13 @@ import quakedesign as qd
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import guarantee_document, load_guarantee, read_guarantee
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipClaims, stick_slip_guarantee
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text
+from quakedesign.guarantees.exact.stick_slip_guarantee import stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import gap, ranges, stick_slip_bounds, stop_bounds
-from quakedesign.guarantees.search.stick_slip_design import worst_stick_slip
+from quakedesign.guarantees.search.stick_slip_design import design_stick_slip, worst_stick_slip
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import uncertain_plant
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "stick_slip_real-fault.json"
 
@@ -33,9 +36,9 @@ def bounds(proof):
 
 def test_the_stored_certificate_holds_and_reaches_what_was_asked(proof, bounds):
     assert proof.claims.follow(bounds)
-    assert bounds.slip_rate < F("1.6e-4")
-    assert bounds.behind < F("2.0e-5")
-    assert bounds.ahead < F("3.8e-5")  # 3.7e-5 was asked for
+    assert bounds.peak_slip_rate < F("1.6e-4")
+    assert bounds.slip_behind < F("2.0e-5")
+    assert bounds.slip_ahead < F("3.8e-5")  # 3.7e-5 was asked for
 
 
 @pytest.mark.parametrize("name", ["slip_behind", "slip_ahead", "peak_slip_rate", "least_pressure", "largest_pressure"])
@@ -140,24 +143,64 @@ def test_a_file_is_read_as_it_was_written(proof):
         read_guarantee(document | {"disturbance": document["disturbance"] | {"change": "1"}})
 
 
+HUGE = "1" + "0" * 399
+
+
 @pytest.mark.parametrize(
-    "forged",
+    ("forged", "reason"),
     [
-        lambda s: s | {"facets": s["facets"][:4]},
-        lambda s: s | {"facets": [["1", "1", "1"], *s["facets"][1:]]},
-        lambda s: s | {"multipliers": [["-1", "0", "0", "0", "0"], *s["multipliers"][1:]]},
-        lambda s: s | {"multipliers": [["0", "2", "0", "0", "0"], *s["multipliers"][1:]]},
-        lambda s: s | {"multipliers": s["multipliers"][1:]},
-        lambda s: s | {"sliding": s["sliding"][:2]},
-        lambda s: s | {"sliding": [[[0, 1]], *s["sliding"][1:]]},
-        lambda s: s | {"resting": [[], *s["resting"][1:]]},
-        lambda s: s | {"resting": [[["0", "1", "2", "3"]], *s["resting"][1:]]},
+        (lambda s: {"facets": s["facets"][:4], "multipliers": s["multipliers"][:4]}, "have 5 to 400 facets"),
+        (lambda s: {"facets": [["1", "1", "1"], *s["facets"][1:]]}, "begin with facets along"),
+        (lambda s: {"facets": [["-1", "0", "0"], *s["facets"][1:]]}, "begin with facets along"),
+        (lambda s: {"multipliers": [["-1", "0", "0", "0", "0"], *s["multipliers"][1:]]}, "multipliers >= 0"),
+        (lambda s: {"multipliers": [["0", "2", "0", "0", "0"], *s["multipliers"][1:]]}, "multipliers >= 0"),
+        (lambda s: {"multipliers": [["0", "0", "0", "2", "0"], *s["multipliers"][1:]]}, "multipliers >= 0"),
+        (lambda s: {"multipliers": [["0", "0", "0", "0", "-1"], *s["multipliers"][1:]]}, "multipliers >= 0"),
+        (lambda s: {"multipliers": [["0", "0", "0", "0", "2"], *s["multipliers"][1:]]}, "multipliers >= 0"),
+        (lambda s: {"multipliers": s["multipliers"][1:]}, "5 multipliers for each facet"),
+        (lambda s: {"sliding": s["sliding"][:2]}, "3"),
+        (lambda s: {"sliding": [[[0, 1]], *s["sliding"][1:]]}, "3"),
+        (lambda s: {"sliding": [[[0, 1, -1]], *s["sliding"][1:]]}, "by numbers from 0"),
+        (lambda s: {"resting": [[], *s["resting"][1:]]}, "bases for 3 slices and 7 combinations"),
+        (lambda s: {"resting": [[["0", "1", "2", "3"]], *s["resting"][1:]]}, "must be integers"),
+        (lambda s: {"resting": [s["resting"][0][:1] * 40_000, *s["resting"][1:]]}, "at most 40000 bases"),
     ],
 )
-def test_a_forged_set_is_refused(proof, forged):
+def test_a_forged_set_is_refused(proof, forged, reason):
     document = guarantee_document(proof)
-    with pytest.raises(CertificateError):
-        read_guarantee(document | {"set": forged(document["set"])})
+    with pytest.raises(CertificateError, match=reason):
+        read_guarantee(document | {"set": document["set"] | forged(document["set"])})
+
+
+@pytest.mark.parametrize("place", [("set", "facets", 0, 0), ("set", "facets", 6, 1), ("set", "multipliers", 7, 2)])
+@pytest.mark.parametrize("value", [HUGE, f"1/{HUGE}"])
+def test_numbers_that_no_float_holds_decide_nothing(proof, place, value):
+    document = json.loads(guarantee_text(proof))
+    entry = document
+    for key in place[:-1]:
+        entry = entry[key]
+    entry[place[-1]] = value
+    claim = read_guarantee(document)
+    if place[1] == "multipliers" and value != HUGE:
+        assert claim.check() is not None  # as good as 0
+    else:
+        assert claim.check() is Verdict.UNDECIDED
+
+
+def test_facets_of_two_lengths_are_no_polytope(proof):
+    rows = proof.reach.facets
+    with pytest.raises(ParameterError, match="facets of 3 entries"):
+        replace(proof.reach, facets=(*rows[:-1], rows[-1][:2]))
+
+
+def test_a_sampling_time_must_be_positive(proof):
+    with pytest.raises(ParameterError, match="T_s must be positive, got 0 s"):
+        replace(proof.held, step=F(0))
+
+
+def test_without_a_disturbance_the_answer_says_what_is_needed():
+    task = uncertain_plant(qd.load_fault("real-fault", disturbance="0 m/s^2"))
+    assert "disturbance above 0" in design_stick_slip(task, F(23, 125)).reason
 
 
 def test_bases_that_name_no_constraint_decide_nothing(proof):
@@ -194,9 +237,9 @@ def test_a_run_on_the_plant_that_sticks_stays_within_the_claims(proof):
 
 
 def test_claims_are_rounded_outward(bounds):
-    claims = StickSlipClaims.of(bounds)
+    claims = bounds.rounded()
     assert claims.follow(bounds)
-    assert claims.peak_slip_rate <= bounds.slip_rate * F(1001, 1000)
+    assert claims.peak_slip_rate <= bounds.peak_slip_rate * F(1001, 1000)
 
 
 @pytest.mark.parametrize(
