@@ -93,8 +93,8 @@ def answer_stick_slip(
     """
     if unknown := setup.given().keys() - {"step"}:
         raise ParameterError(
-            f"a guarantee on the stick-slip plant knows no {', '.join(sorted(unknown))}: it is proved for exact "
-            "measurements and a pressure that acts at once. Omit the quantity, or omit plant"
+            f"a guarantee on the stick-slip plant is proved for exact measurements and a pressure that acts at once. "
+            f"Received {', '.join(sorted(unknown))}. Omit the quantity, or omit plant."
         )
     task = uncertain_plant(fault)
     step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)

@@ -115,7 +115,7 @@ def guarantee(
         Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
     plant : str
         ``continued``: the plant without stick, its friction continued to negative slip rates; ``stick-slip``: friction
-        holds the fault at rest and it never slips backward. The second designs a law of its own, an e-LQR with a
+        holds the fault at rest and it never slips backward. The second designs an e-LQR with a
         prediction that is never negative (`StickSlipLaw`), for exact measurements and a pressure that acts at once.
     progress : callable, optional
         Called with what a search for rate-and-state friction or the stick–slip plant does, and the fraction done [-].
@@ -138,6 +138,11 @@ def guarantee(
     setup = setup.with_given(**given)
     require_known(plant, PLANTS, "plant")
     if plant == PLANTS[1]:
+        if fault.friction.state_names:
+            raise ParameterError(
+                f"friction with a state never rests, so that the stick-slip plant is no other. Received "
+                f"{fault.friction.name}. Omit plant."
+            )
         usual = (control_law(controller).name, tuple(gains), scheme, disturbance_class) == (
             "elqr",
             (),

@@ -75,12 +75,13 @@ class StickSlipGuarantee:
         task, held, claims = self.task, self.held, self.claims
         stress = LowerBound(task.amplitude / task.area_per_mass[1])
         size = f"{LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
+        pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
         return (
-            f"from rest, held over {UpperBound(held.step):.6g} s with exact measurements of slip and slip rate, for "
-            f"every disturbance of at most {size}, for all friction and constant parameters of the box: the slip rate never "
-            f"exceeds {claims.peak_slip_rate:.3g} m/s, whether the fault slides or sticks, the slip stays between "
-            f"{claims.slip_behind:.3g} m behind and {claims.slip_ahead:.3g} m ahead of the reference, the pressure "
-            f"between {claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}, for all t >= 0"
+            f"from rest, held over {UpperBound(held.step):.6g} s with exact measurements of slip and slip rate, "
+            f"for every disturbance of at most {size}, for all friction and constant parameters of the box: "
+            f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, whether the fault slides or sticks, "
+            f"the slip stays between {claims.slip_behind:.3g} m behind and {claims.slip_ahead:.3g} m ahead of the "
+            f"reference, the pressure between {pressures}, for all t >= 0"
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
-from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import guarantee_document, load_guarantee, read_guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
@@ -82,6 +82,10 @@ def test_backward_slip_is_excluded_by_the_shear_stress(proof):
     ranges(proof.task, F("1.9"), (F(0), F(0)), F(0))
     with pytest.raises(ParameterError, match="slip backward"):
         ranges(replace(proof.task, amplitude=F("0.1")), F("1.9"), (F(0), F(0)), F(0))
+    growing = replace(proof.task, growths=(F("-0.2"), F(0)))  # 0.68 1/s² in all: up to 1.9719 m, less for H
+    ranges(growing, F("1.18"), (F(0), F(0)), F(0))
+    with pytest.raises(ParameterError, match="slip backward"):
+        ranges(growing, F("1.187"), (F(0), F(0)), F(0))
 
 
 def test_a_period_that_is_long_against_the_plant_is_refused(proof):
@@ -256,6 +260,19 @@ def test_the_worst_case_found_lies_within_the_claims_and_not_far_below(proof):
     assert 0.65 * proof.claims.peak_slip_rate < worst.slip_rate < proof.claims.peak_slip_rate
     assert 0.65 * proof.claims.slip_ahead < worst.ahead < proof.claims.slip_ahead
     assert 0 < worst.behind < proof.claims.slip_behind
+
+
+def test_friction_with_a_state_never_rests():
+    with pytest.raises(ParameterError, match="never rests"):
+        qd.guarantee(qd.load_fault("crustal-patch"), plant="stick-slip")
+
+
+@pytest.mark.parametrize(
+    "given", [{"stress": "1 kPa"}, {"spread": "0.1"}, {"objective": "both"}, {"gains": [1, 2, 3, 4]}]
+)
+def test_what_a_design_for_the_stick_slip_plant_does_not_take_is_refused(given):
+    with pytest.raises((ParameterError, UnknownNameError)):
+        qd.guarantee(qd.load_fault("real-fault"), plant="stick-slip", **given)
 
 
 @pytest.mark.slow
