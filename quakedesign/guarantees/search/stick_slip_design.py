@@ -40,16 +40,21 @@ Tell = Callable[[str, float], None]
 TUNINGS = tuple((level, slip, back, 1.3) for level, slip in ((0.5, 0.5), (0.7, 0.5), (0.3, 0.3)) for back in (0.3, 0.1))
 """Shares of the innovations that the estimate takes, of the slip error that a period takes back, and the input gain."""
 _SETTLED, _FEW, _MANY = 1e-4, 150, 250  # change of extents, vertices kept in comparisons and for a polytope
-_ROUNDS, _SUBSTEPS = 60, 12
-_FACETS = 130
-_PERIODS, _TURNS, _REFINED = 4, 110, (8, 15, 22, 29)
+_ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of one: they only propose
+_FACETS = 130  # of the first polytope
+_PERIODS, _TURNS, _REFINED = 4, 110, (8, 15, 22, 29)  # in which a policy is followed; turns; those that add facets
 _TINY = 1e-12  # of a height: rounding
 _LITTLE = 1.01  # of a height that one step to where a policy leads may make of it
 _NEARLY = 0.93  # of the factor of y that keeps a facet where it is in a slow slide
-_ADDED, _MOST, _ALIKE, _WIDER, _KEPT, _FOLLOWED = 35, 270, 1 - 1e-8, 1e-5, 0.6, 14
+_ADDED, _MOST = 35, 270  # facets added at once, and in all: a check takes 1.3 s for each hundred
+_ALIKE, _WIDER = 1 - 1e-8, 1e-5  # cosine of normals that count as one; room of a facet that rest leaves where it is
+_KEPT, _FOLLOWED = (
+    0.6,
+    14,
+)  # share of the growth kept where facets are added; turns after the last before heights only grow
 _MARGINS = 2e-7, 2e-6, 2e-5  # by which the last polytope is larger than the images that it must hold
 _FAR = 30  # times the first extents, from where on a set counts as unbounded
-_RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)
+_RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried: of a size, and of the present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
 _TRIED = 3  # laws for which a polytope is searched
 _DIGITS = 7
