@@ -239,6 +239,15 @@ def test_what_the_theorem_needs_is_asked_for_by_both(reason, theirs, change):
     assert theirs in read_guarantee(document).bounds().reason
 
 
+def test_the_disturbance_must_outweigh_the_range_of_the_input_gain():
+    period = period_of(stored())
+    period.sliding, period.resting = lambda *_: iter(()), list
+    period.verify()
+    period.push = period.push[0], F(10**9)
+    with pytest.raises(CHECK.Refused, match="outweigh the range of the input gain"):
+        period.verify()
+
+
 FORGED = {
     "y less": ((*FACETS, 1), times("101/100")),
     "y more": ((*FACETS, 1), times("99/100")),

@@ -13,6 +13,7 @@ import quakedesign as qd
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import guarantee_document, load_guarantee, read_guarantee
+from quakedesign.guarantees.exact import stick_slip_set
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.guarantees.exact.stick_slip_guarantee import stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import gap, ranges, stick_slip_bounds, stop_bounds
@@ -210,6 +211,70 @@ def test_without_a_disturbance_the_answer_says_what_is_needed():
 def test_bases_that_name_no_constraint_decide_nothing(proof):
     reach = replace(proof.reach, sliding=(((0, 1, 9999),), *proof.reach.sliding[1:]))
     assert "by their numbers" in stick_slip_guarantee(proof.task, proof.held, reach).reason
+
+
+@pytest.mark.parametrize(("kind", "reason"), [("sliding", "in a period that slides"), ("resting", "that ends at rest")])
+def test_each_map_is_decided(proof, kind, reason):
+    """One vertex a polytope bounds no facet well, in the map whose vertices are missing."""
+    few = tuple(line[:1] for line in getattr(proof.reach, kind))
+    # U is bounded by the vertices of the slices as well, so that these keep theirs but for the first slice
+    lines = few if kind == "resting" else (few[0], *proof.reach.sliding[1:])
+    assert reason in stick_slip_guarantee(proof.task, proof.held, replace(proof.reach, **{kind: lines})).reason
+
+
+def test_a_vertex_of_dependent_constraints_is_left_out(proof, bounds):
+    more = tuple((*line, (0, 0, 0)) for line in proof.reach.sliding)
+    assert stick_slip_bounds(proof.task, proof.held, replace(proof.reach, sliding=more)) == bounds
+
+
+def test_a_disturbance_must_outweigh_the_range_of_the_input_gain(proof, monkeypatch):
+    """The condition, and its size here: delta-S q T²/2 b (beta1 - 1) U+ with S from -0.48 to 1.3798 1/s²."""
+    found = ranges(proof.task, F(1, 1000), (F(0), F(0)), F(0))
+    width, growth = (1.3786 + 0.48) / 2, 1 / (1 - 1.3786 * 0.184**2 / 2)
+    size = width * growth * 0.184**2 / 2 * 1.8824e-8 * 0.425 * 40_000
+    assert float(stick_slip_set._bracket(proof.task, proof.held, found, F(40_000))) == pytest.approx(size, rel=2e-3)
+    assert stick_slip_set._bracket(proof.task, proof.held, found, F(-1)) == 0
+    monkeypatch.setattr(stick_slip_set, "sliding_rows", lambda *_: iter(()))
+    monkeypatch.setattr(stick_slip_set, "resting_rows", lambda *_: iter(()))
+    stick_slip_bounds(proof.task, proof.held, proof.reach)
+    monkeypatch.setattr(stick_slip_set, "_bracket", lambda *_: proof.task.amplitude + F(1, 10**9))
+    with pytest.raises(ParameterError, match="range of the input gain"):
+        stick_slip_bounds(proof.task, proof.held, proof.reach)
+
+
+def test_a_period_that_ends_at_rest_is_bounded_for_every_reference_rate(proof):
+    """n·z after the period, written out, for r' at both ends of each slice and sign of the target rate."""
+    task, held, facets = proof.task, proof.held, proof.reach.facets
+    found = ranges(task, F(1, 1000), (F(0), F(0)), F(0))
+    given = [np.array(rows, dtype=object) for rows in (facets, proof.reach.multipliers)]
+    rows = list(stick_slip_set.resting_rows(stick_slip_set.EXACT, task, held, found, *given))
+    law, step, fastest = held.law, held.step, task.reference_rates[0]
+    turn, rng = fastest / law.return_rate, np.random.default_rng(4)
+    for place, low, high, ends in (
+        (0, -8 * turn, F(0), lambda _: (F(0), fastest)),
+        (2, F(0), turn, lambda e1: (law.return_rate * e1, fastest)),
+        (4, F(0), turn, lambda e1: (F(0), law.return_rate * e1)),
+        (5, turn, 8 * turn, lambda _: (F(0), fastest)),
+    ):
+        for _ in range(6):
+            share = [F(int(v), 1000) for v in rng.integers(1, 999, 4)]
+            e1, y, d, slip = (
+                low + (high - low) * share[0],
+                F("1e-4") * share[1],
+                F(20_000) * share[2],
+                F("1e-5") * share[3],
+            )
+            tops = np.full(len(facets), -np.inf)
+            for row in (row for row in rows if row.place == stick_slip_set.SLICES + place):
+                values = row.factors @ np.array([e1, y, d, slip], dtype=object) + row.constants
+                tops[row.which] = np.maximum(tops[row.which], values.astype(float))
+            for rate in ends(e1):
+                predicted = max(rate - law.return_rate * e1, F(0))
+                innovation = -step * predicted / 2 + max(slip - step * y / 2, F(0))
+                for chord in found.chord:
+                    level = d - chord / task.authority * slip - law.level_gain * predicted + law.slip_gain * innovation
+                    after = [float(n1 * (e1 + slip - step * rate) + n3 * level) for n1, _, n3 in facets]
+                    assert (tops >= np.array(after) - 1e-12 * np.abs(tops)).all()
 
 
 def test_the_sentence_has_no_condition_about_negative_slip_rates(proof):
