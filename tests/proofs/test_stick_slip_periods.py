@@ -227,3 +227,27 @@ def test_bounds_of_a_slide_are_those_that_are_written(facet):
         )
         late = 0 if row[0] <= 0 else still
         assert number(function.beside) == pytest.approx(by_force * float(p.force) + late, abs=size)
+
+
+@pytest.mark.parametrize("cut", [False, True])
+@pytest.mark.parametrize("facet", range(11))
+def test_both_checkers_bound_a_slide_alike(facet, cut):
+    """The same functions on every slice: two programs, written apart, with the numbers of one format."""
+    p = period()
+    own = [
+        (
+            [float(v) + number(m) for v, m in zip(f.row, f.more, strict=True)],
+            float(f.constant) + number(f.beside),
+            place,
+        )
+        for place, f in p.sliding(p.reach.facets[facet], p.reach.multipliers[facet], cut)
+    ]
+    for place in range(3):
+        mine = [(row, constant) for row, constant, at in own if at == place]
+        theirs = packages()[place, facet, cut]
+        if not theirs:  # the innovation is cut off only where that raises the facet
+            assert cut
+            assert p.reach.facets[facet][2] <= 0
+            continue
+        for (row, constant), (other, rest) in zip(sorted(mine), sorted(theirs), strict=True):
+            assert [*row, constant] == pytest.approx([*other, rest], rel=1e-9, abs=1e-12)

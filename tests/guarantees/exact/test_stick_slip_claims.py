@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 import quakedesign as qd
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
@@ -211,6 +212,25 @@ def test_without_a_disturbance_the_answer_says_what_is_needed():
 def test_bases_that_name_no_constraint_decide_nothing(proof):
     reach = replace(proof.reach, sliding=(((0, 1, 9999),), *proof.reach.sliding[1:]))
     assert "by their numbers" in stick_slip_guarantee(proof.task, proof.held, reach).reason
+
+
+def test_pressures_are_those_of_the_farthest_states(proof, bounds):
+    """U = 1/b-scaled push by linear programs of another solver; p* from the balance of forces at both ends of mu."""
+    law, rows = proof.held.law, np.array(proof.reach.facets, dtype=float)
+    size = 1 / np.abs(rows[:5].sum(axis=1))[[0, 1, 2]]
+    push = np.array([float(law.target_gain * law.return_rate), float(law.rate_gain), 1.0]) * size
+    low, high = (
+        linprog(
+            sign * push, A_ub=rows * size, b_ub=np.ones(len(rows)), bounds=[(None, None), (0, None), (None, None)]
+        ).fun
+        for sign in (1, -1)
+    )
+    least = low - float(law.target_gain * proof.task.reference_rates[0])  # the reference at its fastest
+    slip = 0.785 + float(bounds.slip_ahead)
+    stresses = [(0.3353 * 5e7 - (0.48 - 3.2e-6) * s / 8e-8) / mu for s in (0, slip) for mu in (0.2353, 0.3353)]
+    most = (0.3353 * 5e7 - (0.48 - 3.2e-6) * 0.1 * 5527 / 2000 / 8e-8) / 0.2353  # where mu can first be at its least
+    assert float(bounds.least_pressure) == pytest.approx(5e7 - max(most, *stresses[1::2]) + high, rel=1e-6)
+    assert float(bounds.largest_pressure) == pytest.approx(5e7 - min(stresses[1::2]) - least, rel=1e-6)
 
 
 @pytest.mark.parametrize(("kind", "reason"), [("sliding", "in a period that slides"), ("resting", "that ends at rest")])
