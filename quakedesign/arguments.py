@@ -73,7 +73,7 @@ if TYPE_CHECKING:
 else:
 
     def checked_dataclass(**options: Any) -> Callable[[type], type]:
-        """Dataclass that checks what it is made of, and what its methods take, whoever has loaded it."""
+        """Dataclass that checks the arguments of its construction and methods, loaded by a public name or not."""
         return lambda kind: checked(dataclasses.dataclass(**options)(kind))
 
 
@@ -130,7 +130,7 @@ def _accept(function: Callable[..., Any], name: str) -> Callable[[Any], Any]:
     hints = get_type_hints(get_args(hint)[0])
 
     def entries(values: Mapping[str, Any]) -> Mapping[str, Any]:
-        for key in values.keys() - hints.keys():
+        for key in [key for key in values if key not in hints][:1]:
             raise ParameterError(f"{_name(function)} cannot be called like this: there is no argument {key!r}.")
         return {key: _accepted(function, key, hints[key], value) for key, value in values.items()}
 

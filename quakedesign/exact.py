@@ -145,9 +145,20 @@ def float_below(value: Fraction) -> float:
 def shortly(value: Fraction | float) -> str:
     """A number as floats are written, or six digits of one that no float holds."""
     try:
-        return f"{float(value):.6g}"
+        number = float(value)
     except OverflowError:
         return six_digits(Fraction(value))
+    return f"{number:.6g}" if number or not value else six_digits(Fraction(value))
+
+
+def apart(*values: Fraction) -> tuple[str, ...]:
+    """Numbers in few digits, at least six, that tell those apart which differ: a value and the limit that it misses."""
+    texts, count = tuple(map(shortly, values)), len(set(values))
+    for digits in (9, 12, 24):
+        if len(set(map(Fraction, texts))) == count:
+            return texts
+        texts = tuple(f"{Decimal(v.numerator) / Decimal(v.denominator):.{digits}g}" for v in values)
+    return texts if len(set(map(Fraction, texts))) == count else tuple(map(exact_text, values))
 
 
 def six_digits(value: Fraction) -> str:

@@ -10,16 +10,18 @@ from enum import Enum
 from fractions import Fraction
 from inspect import isclass, isfunction, signature
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 import pytest
 import sympy as sp
 
 import quakedesign as qd
-from quakedesign.arguments import matches
+from quakedesign.arguments import checked, matches
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.fault import Disturbance, Reference, UncertaintyBox
 from quakedesign.guarantees import Claims, guarantee
+from quakedesign.guarantees.exact.loop import Around
 from quakedesign.laws import Law, summed_integrals
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.loop import Diffusion
@@ -224,3 +226,12 @@ def test_numbers_in_collections_are_those_of_python():
 def test_one_number_and_masked_ones_are_no_collection(values):
     with pytest.raises(ParameterError, match=r"values of Law\.from_values must be a tuple"):
         ExtendedLQR.from_values(values)
+
+
+def of_a_loop(**around: Unpack[Around]) -> None:
+    """Take arguments by the names of a typed dictionary."""
+
+
+def test_of_several_unknown_arguments_the_first_is_named():
+    with pytest.raises(ParameterError, match="there is no argument 'colour'"):
+        checked(of_a_loop)(lag=Fraction(1), colour=1, **{f"unknown{i}": i for i in range(20)})

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError
-from quakedesign.exact import float_above, float_below, fraction_of_float, nearest, rational, six_digits
+from quakedesign.exact import apart, float_above, float_below, fraction_of_float, nearest, rational, shortly, six_digits
 
 
 @pytest.mark.parametrize(
@@ -131,3 +131,25 @@ def test_a_percentage_is_told_as_a_share(written, instead):
     with pytest.raises(ParameterError) as refused:
         rational(written, "spread")
     assert str(refused.value).endswith(f"Write for example {instead}")
+
+
+def test_a_number_that_is_not_0_is_not_written_as_0():
+    assert shortly(F(-1, 10**400)) == "-1e-400"
+    assert shortly(F(10**400)) == "1.00000e+400"
+    assert (shortly(F(0)), shortly(0.0), shortly(F(1, 3))) == ("0", "0", "0.333333")
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        ((F(1), F(2)), ("1", "2")),
+        ((F(1), F(1)), ("1", "1")),
+        ((F(1, 3), F(1, 3) + F(1, 10**5), F(1)), ("0.333333", "0.333343", "1")),
+        ((F(1), 1 + F(1, 10**8)), ("1", "1.00000001")),
+        ((F(1), 1 + F(1, 10**20)), ("1", "1.00000000000000000001")),
+        ((F(1), 1 + F(1, 10**40)), ("1", f"{10**40 + 1}/{10**40}")),
+        ((F(1), F(1), 1 + F(1, 10**8)), ("1", "1", "1.00000001")),
+    ],
+)
+def test_numbers_that_differ_are_written_apart(values, texts):
+    assert apart(*values) == texts

@@ -264,15 +264,17 @@ class LawOptions:
         told = {"scale": self.scale, "feedforward": self.feedforward}
         if self.certificate is None:
             return optional_choice(fault, self.controller, self.gains, **told, step=step, path=path)
-        usual = [type(self)().controller, "elqr"]
-        if (
-            self.controller not in usual
-            or self.gains != ("published",)
-            or told != {"scale": None, "feedforward": "none"}
-        ):
+        usual, own = type(self)(), {"gains": " ".join(self.gains)}
+        given = {"controller": self.controller, **own, **told}
+        unlike = [
+            f"--{name} {value}"
+            for name, value in given.items()
+            if getattr(self, name) != getattr(usual, name) and (name, value) != ("controller", "elqr")
+        ]
+        if unlike:
             raise ParameterError(
-                "--certificate contains the law, an e-LQR. Received another --controller, --gains, --scale or "
-                f"--feedforward with {self.certificate}. Omit these options."
+                f"--certificate contains the law, an e-LQR. Received {', '.join(unlike)} with {self.certificate}. "
+                "Omit these options."
             )
         return certified_choice(fault, self.certificate)
 

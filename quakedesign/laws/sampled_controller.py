@@ -15,11 +15,11 @@ import sympy as sp
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.exact import fraction_of, to_sympy
+from quakedesign.exact import apart, fraction_of, to_sympy
 from quakedesign.laws.base import Controller, Sampling, Signals
 from quakedesign.laws.implicit_root import ImplicitRoot
 from quakedesign.laws.loop_field import LoopField
-from quakedesign.laws.sampled_law import LinearLaw, RestLimit
+from quakedesign.laws.sampled_law import LinearLaw, RestLimit, require_gain
 from quakedesign.symbolic import plant
 
 # ----------------------------------------------------------------------
@@ -234,11 +234,10 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
     ------
     ParameterError
     """
-    if not 0 < weight <= 1 or gain <= 0:
-        raise ParameterError(
-            "a compensated step needs a weight in (0, 1] and a positive gain. Received the weight "
-            f"{float(weight):.4g} and the gain {float(gain):.4g}. Correct whichever is outside."
-        )
+    if not 0 < weight <= 1:
+        received, _ = apart(weight, Fraction(1))
+        raise ParameterError(f"weight of a compensated step must be above 0 and at most 1. Received {received}.")
+    require_gain(gain)
     known = before, pushed, estimate, _, rate_error, end_rate = sp.symbols("before pushed estimate e1 e2 w")
     share, size = to_sympy(weight), to_sympy(gain)
     level = followed(rate_error, before, pushed / size, estimate / size, share, size)

@@ -11,7 +11,7 @@ from typing import Literal
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
-from quakedesign.exact import shortly
+from quakedesign.exact import apart, shortly
 from quakedesign.laws.sampled_law import NOISES, LinearLaw, Matrix, NominalModel, Row, require_sizes, unit_row
 from quakedesign.loop.layer import MODES, Layer
 from quakedesign.loop.periodic import EVEN, Fading, Instants, PeriodicLoop, Pulse, Segment
@@ -156,15 +156,21 @@ class _Path:
 
     def __post_init__(self) -> None:
         step, delay, lag, diffusion = self.step, self.delay, self.lag, self.diffusion
-        if step <= 0 or not 0 <= delay <= MOST_PERIODS * step or lag < 0:
+        if step <= 0:
+            raise ParameterError(f"step of a loop must be positive. Received {shortly(step)} s.")
+        if not 0 <= delay <= MOST_PERIODS * step:
+            received, longest = apart(delay, MOST_PERIODS * step)
             raise ParameterError(
-                f"step must be positive, delay 0 to {MOST_PERIODS} steps, and lag 0 or more. Received the step "
-                f"{shortly(step)} s, the delay {shortly(delay)} s and the lag {shortly(lag)} s. Shorten the delay."
+                f"delay must be 0 to {MOST_PERIODS} steps, here {longest} s. Received {received} s. "
+                f"{'Shorten the delay, or lengthen the step.' if delay > 0 else 'Omit the minus sign.'}"
             )
+        if lag < 0:
+            raise ParameterError(f"lag must be 0 or more. Received {shortly(lag)} s. Omit the minus sign.")
         if diffusion and SHORTEST * diffusion < step:
+            least, received = apart(step / SHORTEST, diffusion)
             raise ParameterError(
-                f"the diffusion time L^2/D must be 0, or at least T_s/{SHORTEST} = {float(step / SHORTEST):.4g} s. "
-                f"Received {shortly(diffusion)} s. Omit diffusion, or shorten the step."
+                f"the diffusion time L^2/D must be 0, or at least T_s/{SHORTEST} = {least} s. "
+                f"Received {received} s. Omit diffusion, or shorten the step."
             )
         if diffusion and self.watched:
             raise ParameterError(

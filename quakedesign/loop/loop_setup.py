@@ -46,12 +46,17 @@ class Pump:
     rate: Fraction | None = None
 
     def __post_init__(self) -> None:
-        low, high = self.least or Fraction(0), self.largest or Fraction(0)
-        alone = (self.least is None) != (self.largest is None)
-        if alone or not low <= 0 <= high or (self.least is not None and low == high):
+        if (self.least is None) != (self.largest is None):
+            given = "largest" if self.least is None else "least"
             raise ParameterError(
-                "the least pressure of a pump must be 0 or less, the largest 0 or more, and both be given. Received "
-                f"{shortly(low)} Pa and {shortly(high)} Pa. Give the withdrawal as negative, the injection as positive."
+                "the least pressure of a pump must be given with the largest. "
+                f"Received the {given} pressure alone. Give both."
+            )
+        if self.limits and not (self.limits[0] <= 0 <= self.limits[1] and self.limits[0] < self.limits[1]):
+            low, high = map(shortly, self.limits)
+            raise ParameterError(
+                "the least pressure of a pump must be 0 or less, the largest 0 or more, and they must differ. Received "
+                f"{low} Pa and {high} Pa. Give the withdrawal as negative, the injection as positive."
             )
         if self.rate is not None and self.rate <= 0:
             raise ParameterError(

@@ -11,7 +11,6 @@ ranges. r stands still outside [0, t_op].
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise, product
@@ -19,14 +18,14 @@ from math import comb
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
-from quakedesign.exact import shortly
+from quakedesign.exact import apart, shortly
 from quakedesign.laws import NominalModel
 
 Range = tuple[Fraction, Fraction]
 _HALVINGS = 7
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:
     """Friction of a plant: μ at rest at t = 0 [-], its bounds [-], and bounds of its chords [1/m], [s/m].
 
@@ -102,8 +101,12 @@ class UncertainPlant:
             self._require(getattr(law, name) >= 0, f"friction {name}", "0 or more", getattr(law, name))
         for name, value in zip(("stiffness", "damping", "authority"), self.spreads, strict=True):
             self._require(0 <= value < 1, f"spread of {name}", "from 0 to below 1", value)
-        between = f"between the least, {shortly(least)}, and the largest, {shortly(largest)}"
-        self._require(least <= static <= largest, "static friction coefficient", between, static)
+        if not least <= static <= largest:
+            low, received, high = apart(least, static, largest)
+            raise ParameterError(
+                f"static friction coefficient of {self.name} must be between the least, {low}, and the largest, "
+                f"{high}. Received {received}. Correct the value."
+            )
         if self.change is not None:
             self._require(self.change >= 0, "disturbance rate", "0 or more", self.change)
         if not _rises_from_rest_to_rest(self.shape):

@@ -11,7 +11,7 @@ from typing import get_args
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
-from quakedesign.exact import shortly, six_digits
+from quakedesign.exact import apart, shortly, six_digits
 from quakedesign.loop import StateLaw
 
 # ----------------------------------------------------------------------
@@ -89,7 +89,7 @@ class SlidingPlant:
                 f"Received {', '.join(self.ranges) or 'none'}."
             )
         for axis, (low, high) in self.ranges.items():
-            ends = f"{shortly(low)} to {shortly(high)}"
+            ends = " to ".join(apart(low, high))
             self._require(0 < low <= high, f"range of {axis}", "positive, its lower end first", ends)
         for name in ("density", "shear_modulus", "length", "rate"):
             self._require(getattr(self, name) > 0, name, "positive", shortly(getattr(self, name)))

@@ -191,18 +191,18 @@ def test_a_law_is_chosen_by_its_options_or_by_its_certificate():
 
 @pytest.mark.usefixtures("choices")
 @pytest.mark.parametrize(
-    ("kind", "wrong"),
+    ("kind", "wrong", "received"),
     [
-        (LawOptions, {"controller": "dia"}),
-        (LawOptions, {"controller": "none"}),
-        (NoLawOptions, {"controller": "cta"}),
-        (LawOptions, {"gains": ("1", "2")}),
-        (LawOptions, {"scale": "1"}),
-        (LawOptions, {"feedforward": "nominal"}),
+        (LawOptions, {"controller": "dia"}, "--controller dia with a"),
+        (LawOptions, {"controller": "none"}, "--controller none with a"),
+        (NoLawOptions, {"controller": "cta"}, "--controller cta with a"),
+        (LawOptions, {"gains": ("1", "2")}, "--gains 1 2 with a"),
+        (LawOptions, {"controller": "elqr", "scale": "1"}, "--scale 1 with a"),
+        (LawOptions, {"feedforward": "nominal", "scale": "2"}, "--scale 2, --feedforward nominal with a"),
     ],
 )
-def test_a_certificate_holds_its_law(kind, wrong):
-    with pytest.raises(ParameterError, match="--certificate contains the law"):
+def test_a_certificate_holds_its_law(kind, wrong, received):
+    with pytest.raises(ParameterError, match=rf"--certificate contains the law, an e-LQR\. Received {received}\."):
         kind(certificate="a", **wrong).choose(LAB)
 
 

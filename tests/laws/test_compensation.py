@@ -74,9 +74,16 @@ def test_a_weight_of_one_forgets_the_estimate():
     assert compensated(ROOT, F(1), GAIN).update[2] == (-1, -1, 0)
 
 
-@pytest.mark.parametrize(("weight", "gain"), [(F(0), GAIN), (F(2), GAIN), (WEIGHT, F(0))])
-def test_impossible_weights_and_gains_are_refused(weight, gain):
-    with pytest.raises(ParameterError, match="compensated step"):
+@pytest.mark.parametrize(
+    ("weight", "gain", "said"),
+    [
+        (F(0), GAIN, r"^weight of a compensated step must be above 0 and at most 1\. Received 0\."),
+        (1 + F(1, 10**8), GAIN, r"^weight of a compensated step .* Received 1\.00000001\."),
+        (WEIGHT, F(0), r"^the input gain of a model must be positive\. Received 0 "),
+    ],
+)
+def test_impossible_weights_and_gains_are_refused(weight, gain, said):
+    with pytest.raises(ParameterError, match=said):
         compensated(ROOT, weight, gain)
 
 

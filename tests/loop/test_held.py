@@ -180,10 +180,21 @@ def test_a_law_without_integral_action_is_refused():
         held_loop(PROPORTIONAL, MODEL, AUTHORITY, STEP)
 
 
-@pytest.mark.parametrize("wrong", [{"step": F(0)}, {"delay": F(9)}, {"delay": F(-1, 9)}, {"lag": F(-1)}])
-def test_times_that_make_no_loop_are_refused(wrong):
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"step": F(0)}, r"^step of a loop must be positive\. Received 0 s"),
+        ({"step": F(-1), "delay": F(-8)}, r"^step of a loop must be positive\. Received -1 s"),
+        ({"delay": F(9)}, r"^delay must be 0 to 8 steps, here 1\.6 s\. Received 9 s\. Shorten the delay"),
+        ({"step": F(1), "delay": 8 + F(1, 10**9)}, r"here 8 s\. Received 8\.000000001 s"),
+        ({"delay": F(-1, 9)}, r"^delay must be 0 to 8 steps, .* Received -0\.111111 s\. Omit the minus sign"),
+        ({"lag": F(-1)}, r"^lag must be 0 or more\. Received -1 s"),
+        ({"step": F(32), "diffusion": 1 - F(1, 10**8)}, r"= 1 s\. Received 0\.99999999 s"),
+    ],
+)
+def test_times_that_make_no_loop_are_refused(wrong, said):
     given = {"step": STEP} | wrong
-    with pytest.raises(ParameterError, match="step must be positive, delay 0 to 8 steps, and lag 0 or more"):
+    with pytest.raises(ParameterError, match=said):
         held_loop(ESTIMATE, MODEL, AUTHORITY, **given)
 
 
@@ -243,7 +254,7 @@ def test_the_estimate_rests_on_the_disturbance_that_its_model_has():
 def test_the_longest_delay_is_eight_periods():
     loop = held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=8 * STEP)
     assert loop.states == ("e1", "e2", *ESTIMATE.states, *(f"waiting{i}" for i in range(8)), "valve")
-    with pytest.raises(ParameterError, match="delay 0 to 8 steps"):
+    with pytest.raises(ParameterError, match="delay must be 0 to 8 steps"):
         held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=8 * STEP + F(1, 10**9))
     assert held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=F(1, 10**9)).segments[0].duration == F(1, 10**9)
 

@@ -38,6 +38,11 @@ def test_data_that_may_vanish(name):
         ({"rate_slope": F(-1)}, "friction rate_slope of .* must be 0 or more. Received -1"),
         ({"static": F(9)}, "static friction coefficient of .* must be between the least, .* Received 9"),
         ({"static": F(1, 1000)}, "static friction coefficient of .* must be between the least, .* Received 0.001"),
+        (
+            {"static": F(1, 2) + F(1, 10**9), "largest": F(1, 2)},
+            r"the largest, 0\.5\. Received 0\.500000001\.",
+        ),
+        ({"static": float("nan")}, "static of Friction must be a Fraction. Received nan"),
     ],
 )
 def test_friction_of_a_fault(changes, said):
@@ -86,6 +91,8 @@ def test_the_swing_of_slow_sliding(swing):
 def test_ranges_of_slow_sliding(ends):
     with pytest.raises(ParameterError, match=r"^range of critical_slip of .* must be positive, its lower end first"):
         replace(SLIDING, ranges={**SLIDING.ranges, "critical_slip": ends})
+    with pytest.raises(ParameterError, match=r"Received 1\.00000001 to 1\."):
+        replace(SLIDING, ranges={**SLIDING.ranges, "critical_slip": (1 + F(1, 10**8), F(1))})
     with pytest.raises(
         ParameterError, match=r"^ranges of .* must be given for direct_effect, .* Received critical_slip"
     ):

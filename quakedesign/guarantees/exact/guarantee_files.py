@@ -250,8 +250,8 @@ def _read_tracking(raw: Any) -> Guarantee | ContinuousPeaks:
         held = _held(loop, _start(raw["start"]) if "start" in more else {})
         reach = _reach(raw["reach"]) if "reach" in more else None
         free = bool(held.longest_step)
-        need(free == (reach is not None), "samples that follow no clock need a reach, and no others have one")
-        need(not free or slow_gain is None, "samples that follow no clock have no slow gain")
+        need(free == (reach is not None), "reach must be given for aperiodic sampling, and for that alone")
+        need(not free or slow_gain is None, "aperiodic sampling must have no slow gain")
         claim = Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
         if reach is not None:
             require_fit(claim.loop, reach)

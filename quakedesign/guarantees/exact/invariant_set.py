@@ -30,7 +30,9 @@ from typing import Any
 
 from flint import arb, arb_mat, ctx, fmpq, fmpq_mat
 
+from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
+from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.loop import Channel, Held, channels_of
 from quakedesign.guarantees.exact.norms import absolute, ball, column, majorant, matrix, upper
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, unshifted
@@ -46,7 +48,7 @@ Basis = tuple[int, ...]
 Row = tuple[Fraction, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class InvariantPolytope:
     """Invariant polytope, bounds of the inputs, and the facets that bound each row.
 
@@ -75,30 +77,55 @@ class InvariantPolytope:
     def __post_init__(self) -> None:
         size, count = len(self.facets[0]) if self.facets else 0, len(self.facets)
         bases = [basis for lines in (self.at_samples, self.between) for line in lines for basis in line]
-        small = all(max(abs(v.numerator), v.denominator) < LARGEST for row in self.facets for v in row)
-        within = all(len(basis) == size and all(0 <= i < count for i in basis) for basis in bases)
-        conditions = {
-            f"facets must be 1 to {MOST_FACETS} rows, at least as many as entries of a row": 0
-            < size
-            <= count
-            <= MOST_FACETS,
-            f"facets must have at most {MOST_SIZE} entries each": size <= MOST_SIZE,
-            f"bases must be at most {MOST_BASES} in all": len(bases) <= MOST_BASES,
-            "numerators and denominators of facets must be below 1e20": small,
-            "facets must have the same number of entries": {len(row) for row in self.facets} == {size},
-            "at_samples must have one row for each facet": len(self.at_samples) == count,
-            f"at_samples and between must have the same 1 to {MOST_PIECES} pieces in every row": all(
-                _even(lines) for lines in (self.at_samples, self.between)
+        sizes = sorted({len(row) for row in self.facets})
+        large = [v for row in self.facets for v in row if max(abs(v.numerator), v.denominator) >= LARGEST]
+        outside = [basis for basis in bases if len(basis) != size or not all(0 <= i < count for i in basis)]
+        negative = [bound for bound in self.inputs if bound < 0]
+        conditions: tuple[tuple[str, bool, str], ...] = (
+            (
+                f"facets must be 1 to {MOST_FACETS} rows, at least as many as entries of a row",
+                0 < size <= count <= MOST_FACETS,
+                f"{count} rows of {size} entries",
             ),
-            "a basis must have as many numbers of facets as a facet has entries": within,
-            "inputs must be given, 0 or more each": min(self.inputs, default=-1) >= 0,
-        }
-        for condition, holds in conditions.items():
-            if not holds:
-                raise ParameterError(
-                    f"{condition} in an invariant set. Received {count} facets of {size} entries, {len(bases)} bases "
-                    f"in {len(self.at_samples)} and {len(self.between)} rows, and {len(self.inputs)} inputs."
+            (f"facets must have at most {MOST_SIZE} entries each", size <= MOST_SIZE, f"{size}"),
+            (f"bases must be at most {MOST_BASES} in all", len(bases) <= MOST_BASES, f"{len(bases)}"),
+            (
+                "numerators and denominators of facets must be below 1e20",
+                not large,
+                "" if not large else f"the entry {shortly(large[0])}, of larger ones",
+            ),
+            ("facets must have the same number of entries", len(sizes) == 1, f"rows of {_listed(sizes)} entries"),
+            (
+                "at_samples must have one row for each facet",
+                len(self.at_samples) == count,
+                f"{len(self.at_samples)} rows for {count} facets",
+            ),
+            *(
+                (
+                    f"rows of {name} must have the same number of bases, 2 to {MOST_PIECES + 1},",
+                    _even(lines),
+                    f"rows of {_listed(sorted({len(line) for line in lines}))} bases",
                 )
+                for name, lines in (("at_samples", self.at_samples), ("between", self.between))
+            ),
+            (
+                f"a basis must be {size} numbers of facets, from 0 to below {count}",
+                not outside,
+                "" if not outside else f"{outside[0]}",
+            ),
+            (
+                "inputs must be given, 0 or more each",
+                bool(self.inputs) and not negative,
+                shortly(negative[0]) if negative else "none",
+            ),
+        )
+        for condition, holds, received in conditions:
+            if not holds:
+                raise ParameterError(f"{condition} in an invariant set. Received {received}. Search for the set again.")
+
+
+def _listed(numbers: list[int]) -> str:
+    return ", ".join(map(str, numbers)) or "no"
 
 
 def _even(lines: tuple[tuple[Basis, ...], ...]) -> bool:

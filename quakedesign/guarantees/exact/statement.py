@@ -296,7 +296,7 @@ class Guarantee:
         when = f"held over {_seconds(held.step)}"
         if held.longest_step:
             shortest, longest = UpperBound(held.step), LowerBound(held.longest_step)
-            when = f"held over anything from {shortest:.6g} s to {longest:.6g} s, by no clock"
+            when = f"held over sampling intervals from {shortest:.6g} s to {longest:.6g} s in any order"
         when += f", {_seconds(held.delay)} late" if held.delay else ""
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
         when += f", through rock of L^2/D = {_seconds(held.diffusion)} from well to fault" if held.diffusion else ""
@@ -415,7 +415,9 @@ def _slow_claims(task: UncertainPlant, held: Held, slow_gain: SlowGain) -> Claim
 
 def _slow_gains(task: UncertainPlant, held: Held, slow_gain: SlowGain) -> Gains | NoGuarantee:
     if held.longest_step:
-        return NoGuarantee(reason="samples that follow no clock have no slow gain", small_gain=None)
+        return NoGuarantee(
+            reason="aperiodic sampling has no guarantee with a slowly varying input gain", small_gain=None
+        )
     loops = tuple(held.loop(task, model) for model in slow_gain.models(task))
     try:
         return slow_gains(loops, slow_gain.growth)
@@ -448,11 +450,11 @@ def _bounds(
     task: UncertainPlant, held: Held, loop: PeriodicLoop, reach: InvariantPolytope | None = None
 ) -> Bounds | NoGuarantee:
     if reach is not None and not held.longest_step:
-        return NoGuarantee(reason="samples that follow a clock need no set", small_gain=None)
+        return NoGuarantee(reason="periodic sampling needs no invariant set", small_gain=None)
     if reach is not None:
         return reached_bounds(task, held, reach)
     if held.longest_step:
-        return NoGuarantee(reason="samples that follow no clock need a set that the loop never leaves", small_gain=None)
+        return NoGuarantee(reason="aperiodic sampling needs an invariant set", small_gain=None)
     try:
         return certified_bounds(task, loop, held.law.root, held.noise, held.off)
     except ParameterError:

@@ -82,7 +82,7 @@ def scaled(rows, factor):
 
 def test_both_prove_the_file_and_say_so():
     assert claim().check() is Verdict.PROVED
-    assert "held over anything from 0.001 s to 0.002 s, by no clock," in claim().sentence()
+    assert "held over sampling intervals from 0.001 s to 0.002 s in any order," in claim().sentence()
     lines = checker.verify(json.loads(text()))
     assert "every 1/1000 s to 1/500 s, each time anew," in lines[2]
     assert guarantee_text(claim()) == text()
@@ -444,7 +444,7 @@ def test_a_law_that_starts_from_what_it_measures_needs_a_clock():
 
 def test_intervals_are_said_on_their_inner_side():
     held = replace(claim().held, step=F("0.0010000001"), longest_step=F("0.0019999999"))
-    assert "anything from 0.00100001 s to 0.00199999 s, by no clock" in replace(claim(), held=held).sentence()
+    assert "intervals from 0.00100001 s to 0.00199999 s in any order" in replace(claim(), held=held).sentence()
 
 
 def test_sizes_that_others_hide_are_invalid_too():
@@ -484,26 +484,52 @@ def test_a_slow_gain_which_is_of_a_clock_proves_nothing_without_one():
 def test_with_a_clock_no_set_is_looked_at():
     known = claim()
     found = guarantee(known.task, replace(known.held, longest_step=F(0)), reach=known.reach)
-    assert "need no set" in found.reason
+    assert "needs no invariant set" in found.reason
+
+
+_ROW = (F(1),) * 7
 
 
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        (lambda s: {"facets": ()}, "facets must be 1 to"),
-        (lambda s: {"facets": (*s.facets[:-1], s.facets[-1][:-1])}, "facets must have the same number of entries"),
-        (lambda s: {"facets": ((F(10) ** 20, *s.facets[0][1:]), *s.facets[1:])}, "must be below 1e20"),
+        (lambda s: {"facets": ()}, "facets must be 1 to .* Received 0 rows of 0 entries"),
+        (lambda s: {"facets": s.facets[:1]}, r"facets must be 1 to .* Received 1 rows of \d entries"),
+        (lambda s: {"facets": (_ROW,) * 8}, "facets must have at most 6 entries each .* Received 7"),
+        (lambda s: {"at_samples": s.at_samples * 200}, r"bases must be at most 4000 in all .* Received \d{5}"),
+        (
+            lambda s: {"facets": (*s.facets[:-1], s.facets[-1][:-1])},
+            r"facets must have the same number of entries .* Received rows of \d, \d entries",
+        ),
+        (
+            lambda s: {"facets": ((F(10) ** 20, *s.facets[0][1:]), *s.facets[1:])},
+            r"must be below 1e20 .* Received the entry 1e\+20, of larger ones",
+        ),
         (lambda s: {"at_samples": s.at_samples[:-1]}, "at_samples must have one row for each facet"),
-        (lambda s: {"between": ((), *s.between[1:])}, "must have the same 1 to 32 pieces in every row"),
+        (
+            lambda s: {"between": ((), *s.between[1:])},
+            r"rows of between must have the same number of bases, 2 to 33, .* Received rows of 0, \d bases",
+        ),
+        (lambda s: {"at_samples": tuple(line[:1] for line in s.at_samples)}, "rows of at_samples .* rows of 1 bases"),
         (
             lambda s: {"between": ((s.between[0][0][:-1], *s.between[0][1:]), *s.between[1:])},
-            "a basis must have as many",
+            r"a basis must be \d numbers of facets, from 0 to below \d+ .* Received \(",
         ),
-        (lambda s: {"inputs": (F(-1), *s.inputs[1:])}, "inputs must be given, 0 or more each"),
-        (lambda s: {"inputs": ()}, "inputs must be given, 0 or more each"),
+        (
+            lambda s: {"between": (((len(s.facets), *s.between[0][0][1:]), *s.between[0][1:]), *s.between[1:])},
+            r"a basis must be \d numbers of facets, from 0 to below \d+ .* Received \(",
+        ),
+        (lambda s: {"inputs": (F(-1), *s.inputs[1:])}, "inputs must be given, 0 or more each .* Received -1"),
+        (lambda s: {"inputs": ()}, "inputs must be given, 0 or more each .* Received none"),
     ],
 )
 def test_the_condition_that_a_set_misses_is_named(wrong, said):
     found = claim().reach
-    with pytest.raises(ParameterError, match=f"{said}.* in an invariant set. Received "):
+    with pytest.raises(ParameterError, match=said):
         replace(found, **wrong(found))
+
+
+@pytest.mark.parametrize("wrong", [{"inputs": (0.5,)}, {"facets": ((None,),)}, {"between": (((1.5,),),)}])
+def test_a_set_is_made_of_rationals_and_whole_numbers(wrong):
+    with pytest.raises(ParameterError, match=f"{next(iter(wrong))} of InvariantPolytope must be a tuple of"):
+        replace(claim().reach, **wrong)

@@ -25,8 +25,15 @@ def stored(**changes):
 
 @pytest.mark.parametrize(("least", "largest"), [("1", "2"), ("-2", "-1"), ("0", "0"), ("1/1000000000", "5")])
 def test_nothing_is_between_the_limits_of_a_pump(least, largest):
-    with pytest.raises(ParameterError, match="least pressure of a pump must be 0 or less"):
+    with pytest.raises(ParameterError, match=r"least pressure of a pump must be 0 or less, .* and they must differ"):
         Pump(least=F(least), largest=F(largest))
+
+
+def test_a_pump_has_both_limits_or_none():
+    assert Pump().limits is None
+    for name in ("least", "largest"):
+        with pytest.raises(ParameterError, match=f"Received the {name} pressure alone"):
+            Pump(**{name: F(0)})
 
 
 @pytest.mark.parametrize(("name", "off"), [("least", 1), ("largest", -1)])
