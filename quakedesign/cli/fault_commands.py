@@ -192,6 +192,9 @@ def identify(
     law: str | None = None,
     stiffness: str | None = None,
     normal_stress: Pascals | None = None,
+    columns: str = "",
+    begin: Annotated[str | None, Parameter(name="--from")] = None,
+    end: Annotated[str | None, Parameter(name="--to")] = None,
     seed: Whole = 0,
     fault: FaultName = "lab-fault",
     out: Path | None = None,
@@ -207,8 +210,9 @@ def identify(
     Parameters
     ----------
     data
-        CSV file with units in its first line, such as 'time [s], load_point_displacement [um], shear_stress [MPa],
-        normal_stress [MPa]'; load_point_rate, shear_force, normal_force, friction and slip are accepted too.
+        Text with headings and units, such as 'time [s], load_point_displacement [um], shear_stress [MPa],
+        normal_stress [MPa]' (load_point_rate, shear_force, normal_force, friction and slip are accepted too); any sign
+        between columns; xlook's text and reduced binary; vectors of a MATLAB file.
     law
         Friction law. By default rate-and-state-aging and rate-and-state-slip are fitted and the better one is taken;
         others are regularised-rate-and-state, exponential-slip-weakening and linear-slip-weakening.
@@ -216,6 +220,13 @@ def identify(
         Machine stiffness, such as '5 GPa/m' ('2 kN/um' for forces, '1e-3 1/um' for friction); fitted by default.
     normal_stress
         Constant normal stress, such as '5 MPa', if the record has no such column.
+    columns
+        Which heading is which column, such as 'time=Time(s), friction=mu_corr'; a number is the place of a column,
+        and a unit may follow: 'time=1 [s]'.
+    begin
+        Where the part to fit begins: a time ('8110 s') or a load-point displacement ('1600 um') of the file.
+    end
+        Where it ends.
     seed
         Seed of the random starting points.
     fault
@@ -237,7 +248,7 @@ def identify(
         require_format(figure)
     require_different({"--out": out, "--figure": figure, "the record": data, "--fault": Path(fault)})
     around = load_fault(fault)
-    record = read_record(data, normal_stress=normal_stress)
+    record = read_record(data, normal_stress=normal_stress, columns=columns, begin=begin, end=end)
     spring = None if stiffness is None else in_unit(stiffness, record.stiffness_unit, "stiffness")
     identification = fitted(record, law, stiffness=spring, seed=seed)
     written = [path for path in (figure, out if identification.identified else None) if path is not None]

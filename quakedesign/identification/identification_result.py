@@ -225,6 +225,7 @@ class Identification:
             "outliers": [{"time": o.time, "time_unit": "s", "size": o.size, "size_unit": ""} for o in self.outliers],
             "starts": {"seed": self.seed, "searches": fit.starts, "agreeing": fit.agreeing},
             "assumptions": list(self.notes),
+            "read": list(self.record.remarks),
         }
 
 

@@ -1,23 +1,21 @@
-"""Laboratory records: CSV with units, noise estimate, straight parts, and thinning.
+"""Laboratory records: what columns mean in SI, noise estimate, straight parts, and thinning.
 
-Columns are converted to SI when read. Thinning replaces neighbouring samples by their mean where signals
-vary slowly.
+Thinning replaces neighbouring samples by their mean where signals vary slowly.
 """
 
-import csv
-import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from scipy import stats
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import RecordError
+from quakedesign.errors import RecordError, UnitError
 from quakedesign.fault.units import si_value
-from quakedesign.files import read_text
+from quakedesign.identification.record_file import Column, heading, read_columns
 from quakedesign.text import nearest_name, shown
 
 # ----------------------------------------------------------------------
@@ -36,12 +34,27 @@ COLUMNS = {
 }
 """Every known column and its SI unit."""
 
+_NAMES = {
+    "time": "t elapsedtime seconds",
+    "load_point_displacement": "displ disp displacement loadpoint loadpointdisp lpdisp lpdisplacement lpd xlp "
+    "sheardisplacement sheardisp",
+    "load_point_rate": "loadpointvelocity lpvelocity lpvel velocity vel vlp loadingrate loadingvelocity",
+    "shear_stress": "tau shear shrstress shearstr",
+    "shear_force": "shrforce",
+    "friction": "mu frictioncoefficient coefficientoffriction frictioncoeff cof",
+    "normal_stress": "sigman sigma sigmaneff norstress normalstr sn effnormalstress effectivenormalstress effnorstress",
+    "normal_force": "norforce",
+}
+_MEANT = {name.replace("_", ""): name for name in COLUMNS} | {
+    other: name for name, others in _NAMES.items() for other in others.split()
+}
+"""What names of laboratories mean, without capitals and signs."""
+_UNITS = {"mic": "um", "micron": "um", "microns": "um", "sec": "s", "secs": "s", "seconds": "s"}
+_UNITS |= {"MPA": "MPa", "Mpa": "MPa", "mpa": "MPa", "KPa": "kPa", "kpa": "kPa", "Pascal": "Pa"}
+_COUNTS = {"bit", "bits", "volt", "volts", "V", "mV", "counts"}
 _SHEAR = {"shear_stress": "normal_stress", "shear_force": "normal_force"}
-_LARGEST_FILE = 1 << 27
+_SAME = 0.01  # of friction, by which two columns of it may differ
 _PLAUSIBLE = 0.01, 3.0  # median friction [-]
-MOST_SAMPLES = 2_000_000
-_HEADING = re.compile(r"\s*(\w[\w \-]*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))?\s*")
-_BETWEEN_WORDS = re.compile(r"[ \-]+")
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -68,6 +81,12 @@ class Record:
         Of how many measurements every sample is the mean; of one unless told.
     first_rate : float or None
         Rate of the load point in its steady beginning [m/s]; that of the samples unless told.
+    load_rates : ndarray or None
+        Rates of the load point from each sample on [m/s], where these were recorded in place of its displacement.
+    remarks : tuple of str
+        What was decided when it was read.
+    origin : float
+        Time of the first sample in its file [s].
     """
 
     name: str
@@ -79,6 +98,9 @@ class Record:
     normal_unit: str
     counts: "np.ndarray | None" = None
     first_rate: float | None = None
+    load_rates: "np.ndarray | None" = None
+    remarks: tuple[str, ...] = ()
+    origin: float = 0.0
 
     def __repr__(self) -> str:
         return f"Record({self.name!r}: {self.time.size} samples in {self.time[-1] - self.time[0]:.4g} s)"
@@ -89,16 +111,30 @@ class Record:
         return f"{self.normal_unit or '1'}/m"
 
 
-def read_record(path: str | Path, *, normal_stress: float | None = None) -> Record:
-    """Record from a CSV file whose first line names columns with units, as ``time [s], shear_stress [MPa]``.
+def read_record(
+    path: str | Path,
+    *,
+    normal_stress: float | None = None,
+    columns: str = "",
+    begin: str | None = None,
+    end: str | None = None,
+) -> Record:
+    """Record from a file whose headings name columns with units, as ``time [s], shear_stress [MPa]``.
 
-    ``Time (s)`` and ``Shear stress (MPa)`` name the same columns. Lines that begin with ``#`` are remarks.
+    Text with any sign between columns, decimal points or commas, xlook's text and binary, and numeric arrays of
+    MATLAB. ``Time (s)``, ``LP_Disp [mic]`` and ``mu`` name columns as well. What was decided on the way is among the
+    remarks of the record.
 
     Parameters
     ----------
     path : str or Path
     normal_stress : float, optional
         Constant effective normal stress [Pa] where there is no such column.
+    columns : str
+        Which heading is which column, as ``time=Time(s), friction=col 7``; a number stands for the heading of that
+        place, and ``=mu_corr [1]`` gives a unit.
+    begin, end : str, optional
+        Window, as ``8110 s`` or ``1600 um`` by the file's own time or load-point displacement.
 
     Returns
     -------
@@ -111,109 +147,187 @@ def read_record(path: str | Path, *, normal_stress: float | None = None) -> Reco
     UnitError
         For a column whose unit is unknown or of another dimension.
     """
-    text = read_text(path, "record", largest=_LARGEST_FILE, refusal=RecordError)
-    lines = [(n, line) for n, line in enumerate(text.splitlines(), start=1) if line.strip() and line.strip()[0] != "#"]
-    if not lines:
-        raise RecordError(f"a record must have a line of headings. Received {path}, which is empty.")
-    if len(lines) == 1:
-        raise RecordError(f"a record must have samples. Received {path}, which has a line of headings alone.")
-    factors = _headings(next(csv.reader([lines[0][1]])))
-    if len(lines) - 1 > MOST_SAMPLES:
-        raise RecordError(
-            f"a record must have at most {MOST_SAMPLES} samples. Received {len(lines) - 1}. Cut out the part that "
-            "counts."
-        )
-    values = _values(lines[1:], list(factors))
-    given = {name: column * factor for (name, factor), column in zip(factors.items(), values.T, strict=True)}
-    return _record(Path(path).stem, given, normal_stress)
+    given, remarks = _given(read_columns(path), columns)
+    given, told = _measured(given)
+    given = _window(given, begin, end)
+    return _record(Path(path).stem, given, normal_stress, (*remarks, *told))
 
 
-def _headings(cells: Sequence[str]) -> dict[str, float]:
-    """SI value of one unit of every column, by name."""
-    if all(_number(cell) is not None for cell in cells):
-        raise RecordError(
-            f"a record must begin with a line of headings. Received {shown(','.join(cells))}, numbers alone. Write the "
-            "columns with their units above, as in time [s], load_point_displacement [um], shear_stress [MPa], "
-            "normal_stress [MPa]."
-        )
-    headings: dict[str, float] = {}
-    for cell in cells:
-        match = _HEADING.fullmatch(cell)
-        said, *units = match.groups() if match else (cell.strip(), None)
-        name, unit = _BETWEEN_WORDS.sub("_", said).lower(), next((u for u in units if u is not None), None)
-        if name not in COLUMNS:
-            raise RecordError(f"a column must be one of {', '.join(COLUMNS)}. Received {shown(said)}.{_remedy(name)}")
-        if name in headings:
-            raise RecordError(f"a column must be there once. Received {name} twice. Remove one.")
-        if unit is None and COLUMNS[name]:
+def _given(found: Sequence[Column], wanted: str) -> "tuple[dict[str, np.ndarray], list[str]]":
+    """Columns in SI by name, and what their names were taken for."""
+    given: dict[str, np.ndarray] = {}
+    headings: dict[str, str] = {}
+    named = _wanted(found, wanted)
+    unknown: list[Column] = []
+    for column in found:
+        name, column = named.get(column.heading, (_meant(column.name), column))
+        name = name if name or column.unit else _meant(column.name.rpartition("_")[0])
+        if not name:
+            unknown.append(column)
+            continue
+        if name in given:
             raise RecordError(
-                f"column {name} must have its unit in brackets. Received {shown(cell.strip())}. "
-                f"Write {name} [{COLUMNS[name]}], say."
+                f"a column must be there once. Received {name} twice: {headings[name]} and {column.heading}. Say which "
+                f"by --columns '{name}={column.heading}', or remove one."
             )
-        plain = not unit or unit.strip() in ("-", "1")
-        headings[name] = 1.0 if plain and not COLUMNS[name] else si_value(f"1 {unit}", COLUMNS[name], f"column {name}")
-    return headings
+        given[name] = column.values * _factor(name, column)
+        headings[name] = column.heading
+    numbered = all(column.heading.isdigit() for column in found)
+    if not given and numbered:
+        raise RecordError(
+            f"a record must begin with a line of headings. Received {len(found)} columns of numbers alone. Write names "
+            "and units above, or give them: --columns 'time=1 [s], load_point_displacement=2 [um], shear_stress=3 "
+            "[MPa], normal_stress=4 [MPa]'."
+        )
+    for column in unknown:
+        near = nearest_name(column.name.lower().replace(" ", "_"), COLUMNS)
+        if near and near.split()[-1].strip("?") not in given:
+            raise RecordError(f"a column must be one of {', '.join(COLUMNS)}. Received {shown(column.name)}.{near}")
+    _require_time(given, unknown)
+    remarks = [f"{headings[n]} is read as {n}" for n in given if _squeezed(heading(headings[n]).name) != _squeezed(n)]
+    return given, [*remarks, *([f"not read: {', '.join(shown(c.heading) for c in unknown)}"] if unknown else [])]
 
 
-def _remedy(name: str) -> str:
-    if any(sign in name for sign in ";\t"):
-        return " Put commas between columns."
-    return nearest_name(name, COLUMNS) or " Remove it, or rename it."
+def _squeezed(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
-def _values(lines: Sequence[tuple[int, str]], names: Sequence[str]) -> "np.ndarray":
-    """Numbers of all lines, shape (samples, columns)."""
-    try:
-        values = np.loadtxt([line for _, line in lines], delimiter=",", comments=None, ndmin=2)
-    except ValueError:
-        values = np.empty((0, 0))
-    if values.shape == (len(lines), len(names)) and np.all(np.isfinite(values)):
-        return values
-    return np.array([_row(number, line, names) for number, line in lines])
+def _meant(name: str) -> str:
+    return _MEANT.get(_squeezed(name), "")
 
 
-def _row(number: int, line: str, names: Sequence[str]) -> list[float]:
-    """Numbers of one line, or what is wrong with it."""
-    cells = line.split(",")
-    if len(cells) != len(names):
-        raise RecordError(f"line {number} must hold {len(names)} values. Received {len(cells)}.")
-    values = []
-    for name, cell in zip(names, cells, strict=True):
-        value = _number(cell)
-        if value is None or not math.isfinite(value):
+def _wanted(found: Sequence[Column], wanted: str) -> dict[str, tuple[str, Column]]:
+    """Names that a user gives to headings, with the unit that was given."""
+    by_name = {place: column for i, column in enumerate(found, start=1) for place in (str(i), column.name)}
+    by_name |= {column.heading: column for column in found}
+    named: dict[str, tuple[str, Column]] = {}
+    for part in filter(None, (each.strip() for each in re.split(r",(?![^\[(]*[\])])", wanted))):
+        name, _, said = (each.strip() for each in part.partition("="))
+        if name not in COLUMNS or not said:
             raise RecordError(
-                f"line {number} must hold a finite number in column {name}. Received {shown(cell.strip())}. Remove "
-                "lines without measurement."
+                f"--columns must name columns as time=Time(s), of {', '.join(COLUMNS)}. Received {shown(part)}."
+                f"{nearest_name(name, COLUMNS) if said else ' Write an equals sign.'}"
             )
-        values.append(value)
-    return values
+        told = heading(said)
+        column = by_name.get(said) or by_name.get(told.heading) or by_name.get(told.name)
+        if column is None:
+            near = nearest_name(told.name, by_name) or f" Write one of {', '.join(shown(c.heading) for c in found)}."
+            raise RecordError(f"--columns must name a heading of the file. Received {shown(said)}.{near}")
+        named[column.heading] = name, replace(column, unit=column.unit if told.unit is None else told.unit)
+    chosen = {name for name, _ in named.values()}
+    return {c.heading: ("", c) for c in found if _meant(c.name) in chosen} | named
 
 
-def _number(cell: str) -> float | None:
+def _factor(name: str, column: Column) -> float:
+    """SI value of one unit of a column."""
+    unit, wanted = column.unit, COLUMNS[name]
+    if unit is None and wanted and "_" in column.name:
+        unit = column.name.rpartition("_")[2]
+    plain = unit is None or unit.strip() in ("", "-", "1", ".")
+    if plain and wanted and (unit is not None or column.unit is None):
+        raise RecordError(
+            f"column {name} must have its unit in brackets. Received {shown(column.heading)}. Write {name} [{wanted}], "
+            f"say, or give it: --columns '{name}={column.heading} [{wanted}]'."
+        )
+    if plain:
+        return 1.0
+    written = re.sub(r"[^\W\d_]+", lambda word: _UNITS.get(word[0], word[0]), unit.replace("μ", "µ"))  # type: ignore[union-attr]
+    if written.strip().lower() in _COUNTS:
+        raise RecordError(
+            f"column {name} must be in units of {wanted or 'friction'}. Received {shown(column.heading)}, readings of "
+            f"an instrument. Calibrate it first, or give the size of one: --columns '{name}={column.name} "
+            f"[{ {'m': '0.0765 um', 'Pa': '0.0016 MPa', 's': '0.1 ms'}.get(wanted, '0.001') }]'."
+        )
     try:
-        return float(cell)
-    except ValueError:
-        return None
+        return si_value(
+            written if re.match(r"\s*[\d.]+(e[+-]?\d+)? ", written) else f"1 {written}", wanted, f"column {name}"
+        )
+    except UnitError as wrong:
+        if column.unit is not None:
+            raise
+        raise RecordError(
+            f"column {name} must have its unit in brackets. Received {shown(column.heading)}: {wrong}"
+        ) from None
 
 
-def _record(name: str, given: dict[str, "np.ndarray"], normal_stress: float | None) -> Record:
+def _require_time(given: "Mapping[str, np.ndarray]", unknown: Sequence[Column]) -> None:
     if "time" not in given:
-        raise RecordError(f"a record must have the column time. Received {', '.join(given)}. Add time [s].")
-    time = given["time"]
-    if late := np.flatnonzero(np.diff(time) <= 0).tolist():
+        others = f", and {', '.join(shown(c.heading) for c in unknown)}, unknown" if unknown else ""
+        example = unknown[0].name if unknown else "1"
         raise RecordError(
-            f"time must ascend. Received {time[late[0] + 1]:.9g} s after {time[late[0]]:.9g} s. Sort the record."
+            f"a record must have the column time. Received {', '.join(given) or 'none'}{others}. Add time [s], or name "
+            f"it: --columns 'time={example} [s]'."
         )
+
+
+def _measured(given: "dict[str, np.ndarray]") -> "tuple[dict[str, np.ndarray], list[str]]":
+    """Rows in which everything was measured, those at the same time as their mean, and what was done.
+
+    Raises
+    ------
+    RecordError
+        When time goes back, or nothing is left.
+    """
+    table, told = pd.DataFrame(given), []
+    whole = table.dropna()
+    if lost := len(table) - len(whole):
+        told.append(f"{lost} of {len(table)} rows without a number left out")
+    if whole.empty:
+        raise RecordError(
+            f"a record must have rows with a number in every column. Received none in {len(table)} rows. Leave out the "
+            "columns that were not measured."
+        )
+    time = whole["time"].to_numpy()
+    if back := np.flatnonzero(np.diff(time) < 0).tolist():
+        raise RecordError(
+            f"time must ascend. Received {time[back[0] + 1]:.9g} s after {time[back[0]]:.9g} s. Sort the record, or "
+            "cut it where its clock starts anew."
+        )
+    if (double := int(np.sum(np.diff(time) == 0))) and double < len(time) - 1:
+        whole = whole.groupby("time", sort=False, as_index=False).mean()
+        told.append(f"{double} samples at the time of another: their mean is taken")
+    return {str(name): whole[name].to_numpy() for name in whole}, told
+
+
+def _window(given: "dict[str, np.ndarray]", begin: str | None, end: str | None) -> "dict[str, np.ndarray]":
+    """Samples between two times or displacements of the load point, as the file counts them."""
+    inside = np.ones(len(given["time"]), dtype=bool)
+    for name, text in (("from", begin), ("to", end)):
+        if text is None:
+            continue
+        try:
+            along, at = "time", si_value(text, "s", name)
+        except UnitError:
+            along, at = "load_point_displacement", si_value(text, "m", f"{name} (a time, or a displacement)")
+        if along not in given:
+            raise RecordError(f"{name} {text} needs the column {along}. Received {', '.join(given)}. Give a time.")
+        moved = given[along] * (-1 if given[along][-1] < given[along][0] else 1)
+        inside &= moved >= at if name == "from" else moved <= at
+    if not (begin is None and end is None) and inside.sum() < 2:
+        time = given["time"]
+        raise RecordError(
+            f"a window must hold samples. Received from {begin or 'the first'} to {end or 'the last'} in a record from "
+            f"{time[0]:.6g} to {time[-1]:.6g} s. Give times or displacements of the file."
+        )
+    return {name: column[inside] for name, column in given.items()}
+
+
+def _record(name: str, given: "dict[str, np.ndarray]", normal_stress: float | None, remarks: tuple[str, ...]) -> Record:
     _require_sizes(given)
     friction, normal, unit = _friction(given, normal_stress)
+    load_point, rates, turned = _load_point(given)
+    time = given["time"]
     return Record(
         name=name,
-        time=time - time[0] if len(time) else time,
+        time=time - time[0],
         friction=friction,
-        load_point=_load_point(given),
+        load_point=load_point,
         slip=given.get("slip"),
         normal=normal,
         normal_unit=unit,
+        load_rates=rates,
+        remarks=(*remarks, *turned),
+        origin=float(time[0]),
     )
 
 
@@ -248,6 +362,7 @@ def _require_sizes(given: dict[str, "np.ndarray"]) -> None:
 
 def _friction(given: dict[str, "np.ndarray"], stress: float | None) -> "tuple[np.ndarray, np.ndarray, str]":
     """Friction coefficient, what is normal to it, and the unit of that."""
+    given = _without_repetition(given)
     measured = _one_of(given, ("friction", *_SHEAR), "friction, shear_stress or shear_force")
     across = _SHEAR.get(measured) or next((n for n in _SHEAR.values() if n in given), "normal_stress")
     if across in given and stress is not None:
@@ -270,6 +385,16 @@ def _friction(given: dict[str, "np.ndarray"], stress: float | None) -> "tuple[np
     return friction, normal, unit
 
 
+def _without_repetition(given: "dict[str, np.ndarray]") -> "dict[str, np.ndarray]":
+    """Without a column of friction that is shear over normal stress of the same file."""
+    for shear, normal in _SHEAR.items():
+        if {"friction", shear, normal} <= given.keys():
+            off = np.median(np.abs(given["friction"] * given[normal] - given[shear]))
+            if off <= _SAME * np.median(np.abs(given[shear])):
+                return {name: column for name, column in given.items() if name != "friction"}
+    return given
+
+
 def _require_plausible(friction: "np.ndarray", measured: str, across: str) -> None:
     """Refuse a friction that no rock has, which costs minutes of a fit, with its likely cause.
 
@@ -290,18 +415,24 @@ def _require_plausible(friction: "np.ndarray", measured: str, across: str) -> No
         )
 
 
-def _load_point(given: dict[str, "np.ndarray"]) -> "np.ndarray | None":
-    """Displacement [m] since the first sample, of a rate by the rule of trapezoids."""
+def _load_point(given: "dict[str, np.ndarray]") -> "tuple[np.ndarray | None, np.ndarray | None, list[str]]":
+    """Displacement [m] since the first sample, forward positive; rates [m/s] where they were recorded; what was turned.
+
+    A recorded rate is that which was commanded from its sample on, a staircase.
+    """
     names = [name for name in ("load_point_displacement", "load_point_rate") if name in given]
     if not names:
-        return None
+        return None, None, []
+    if len(names) == 2:
+        given = {name: column for name, column in given.items() if name != "load_point_rate"}
     column = given[_one_of(given, ("load_point_displacement", "load_point_rate"), "load_point_displacement or _rate")]
-    if names == ["load_point_displacement"]:
-        since_first: np.ndarray = column - column[0]
-        return since_first
-    moved = np.diff(given["time"]) * (column[1:] + column[:-1]) / 2
-    whole: np.ndarray = np.concatenate([[0.0], np.cumsum(moved)])
-    return whole
+    backward = float(column[-1] - column[0] if names[0] == "load_point_displacement" else np.sum(column)) < 0
+    column = -column if backward else column
+    turned = [f"{names[0]} falls: its sign is changed"] if backward else []
+    if names[0] == "load_point_displacement":
+        return column - column[0], None, turned
+    moved = np.concatenate([[0.0], np.cumsum(np.diff(given["time"]) * column[:-1])])
+    return moved, column, turned
 
 
 def _one_of(given: dict[str, "np.ndarray"], names: Sequence[str], what: str) -> str:

@@ -33,6 +33,7 @@ def identification_lines(identification: Identification) -> list[str]:
         *_outliers(identification),
         *_reference(identification),
         f"assumed: {'; '.join(identification.notes)}",
+        *([f"read: {'; '.join(identification.record.remarks)}"] if identification.record.remarks else []),
     ]
     return [*_wrapped(head), columns, *map(_row, shown), "", *_wrapped(tail)]
 

@@ -1,0 +1,346 @@
+"""Files as laboratories write them: text of any dialect, xlook's text and binary, MATLAB arrays.
+
+A file becomes columns with the names, units and numbers that it has. What they mean is decided in
+`quakedesign.identification.record`.
+"""
+
+import csv
+import io
+import math
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.io import loadmat, whosmat
+from scipy.io.matlab import MatReadError
+
+from quakedesign.errors import RecordError
+from quakedesign.files import read_bytes
+from quakedesign.text import shown
+
+_LARGEST_FILE = 1 << 28
+MOST_SAMPLES = 2_000_000
+_COMMENTS = ("#", "%")
+_NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?"
+_MISSING = {"", "nan", "na", "n/a", "-", "--", "null", "none", "inf", "+inf", "-inf"}
+_CELL = re.compile(rf"{_NUMBER}|\d{{1,4}}[-/.]\d{{1,2}}[-/.]\d{{1,4}}.*")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eEdD][+-]?\d+)?")
+_HEADING = re.compile(r"\s*(.*?)\s*(?:\[([^\]]*)\]|\(([^()]*)\))?\s*")
+_BLANK_HEADING = re.compile(r"[^\s\[(]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?")
+_PREAMBLE = 200  # lines before the first number
+_HEADERS = {16: 1380, 32: 2724}  # bytes of xlook's header of so many channels
+_XLOOK_TEXT = "number of records"
+_ARRAYS = {f"{sign}int{size}" for sign in ("", "u") for size in (8, 16, 32, 64)} | {"double", "single"}
+_MOST_NUMBERS = 16 * MOST_SAMPLES
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """One column as the file has it.
+
+    Attributes
+    ----------
+    heading : str
+        Name and unit as they are written.
+    name : str
+    unit : str or None
+        None where the file gives none.
+    values : ndarray
+        Numbers; not a number where the file has none.
+    """
+
+    heading: str
+    name: str
+    unit: str | None
+    values: "np.ndarray"
+
+
+def read_columns(path: str | Path) -> list[Column]:
+    """Columns of a file, of equal length.
+
+    Raises
+    ------
+    RecordError
+        When it is of no known kind, or a line does not suit its headings.
+    """
+    data = read_bytes(path, "record", largest=_LARGEST_FILE, refusal=RecordError)
+    if data.startswith(b"MATLAB 5.0"):
+        found = _matlab(data, path)
+    elif (offset := _xlook_offset(data)) is not None:
+        found = _xlook_binary(data, *offset)
+    else:
+        found = _text(_decoded(data, path), path)
+    if len(found[0].values) > MOST_SAMPLES:
+        raise RecordError(
+            f"a record must have at most {MOST_SAMPLES} samples. Received {len(found[0].values)}. Cut out the part "
+            "that counts."
+        )
+    return found
+
+
+def heading(text: str) -> Column:
+    """Name and unit of a heading, without values: ``Time (s)``, ``tau [MPa]``, ``disp_um``."""
+    text = " ".join(text.split())
+    name, square, rounded = _HEADING.fullmatch(text).groups()  # type: ignore[union-attr]
+    unit = square if square is not None else rounded
+    return Column(heading=text, name=name, unit=unit, values=np.empty(0))
+
+
+# ----------------------------------------------------------------------
+# Text: the lines of headings and of units, the sign between columns, and the sign of decimals.
+
+
+def _decoded(data: bytes, path: str | Path) -> str:
+    """Text of bytes: UTF-8, UTF-16 by its mark, or Latin-1, in which older instruments write a micro sign."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data.decode("utf-16", errors="replace")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    if "\0" in text[:1000]:
+        raise RecordError(
+            f"a record must be text, xlook's binary or a MATLAB file of version 5 to 7. Received {path}, which is "
+            "none of them. Export it as CSV."
+        )
+    return text
+
+
+def _text(text: str, path: str | Path) -> list[Column]:
+    lines = text[: 1 << 20].splitlines()
+    if not any(line.strip() and line.strip()[0] not in _COMMENTS for line in lines):
+        raise RecordError(f"a record must have a line of headings. Received {path}, which is empty.")
+    if lines[0].strip().startswith(_XLOOK_TEXT):
+        return _xlook_text(text)
+    first = next((i for i, line in enumerate(lines[:_PREAMBLE]) if _numbers(line)), None)
+    if first is None:
+        raise RecordError(f"a record must have samples. Received {path}, which has no line of numbers.")
+    sign = _sign(lines[first])
+    columns = _headings(lines[:first], len(_cells(lines[first], sign)), sign)
+    table = _table(text, first, sign, columns, lines[first])
+    return [
+        replace(column, values=_values(table[i], column, text, first)) for i, column in enumerate(columns) if i in table
+    ]
+
+
+def _numbers(line: str) -> bool:
+    """Whether a line has numbers, dates or nothing in all its cells, and two of them at least."""
+    if not line.strip() or line.strip()[0] in _COMMENTS:
+        return False
+    cells = [cell.strip() for cell in _cells(line, _sign(line))]
+    told = [cell for cell in cells if cell.lower() not in _MISSING]
+    return len(told) > 1 and _CELL.fullmatch(told[0]) is not None and sum(map(bool, map(_CELL.fullmatch, told))) > 1
+
+
+def _sign(line: str) -> str:
+    """Sign between the columns of a line of numbers, a pattern of blanks where there is no other."""
+    return next((sign for sign in (";", "\t", ",") if sign in line.strip()), r"\s+")
+
+
+def _cells(line: str, sign: str) -> list[str]:
+    cells = line.split() if sign == r"\s+" else next(csv.reader([line], delimiter=sign), [])
+    return cells[:-1] if len(cells) > 1 and not cells[-1].strip() else cells
+
+
+def _headings(before: list[str], count: int, sign: str) -> list[Column]:
+    """Names and units of the columns, from the lines before the first numbers; numbers for names where there is none.
+
+    A line of units may stand between headings and numbers, and headings may be a remark, as NumPy writes them.
+    """
+    told = [line.strip() for line in before if line.strip()]
+    plain = [line for line in told if line[0] not in _COMMENTS]
+    lines = plain or [line.lstrip("".join(_COMMENTS)) for line in told[-1:]]
+    split = [_heading_cells(line, sign) for line in lines[-2:]]
+    if split and not plain and len(split[-1]) != count:
+        split = []
+    if not split:
+        return [Column(heading=str(i), name=str(i), unit=None, values=np.empty(0)) for i in range(1, count + 1)]
+    *above, last = split
+    if above and len(above[0]) == len(last) and all(cell.strip(" []().") in _unit_words() for cell in last):
+        named = [heading(f"{name} [{unit.strip(' []()')}]") for name, unit in zip(above[0], last, strict=True)]
+    else:
+        named = [heading(cell) for cell in last]
+    if len(named) != count and {len(named), count} != {count, count - 1}:
+        _refuse_count(named, count, sign)
+    return named
+
+
+def _heading_cells(line: str, sign: str) -> list[str]:
+    """Cells of a line of headings, which may be divided by another sign than the numbers below."""
+    own = sign if sign == r"\s+" or sign in line else _sign(line)
+    found = _BLANK_HEADING.findall(line) if own == r"\s+" else _cells(line, own)
+    return [cell.strip() for cell in found]
+
+
+def _refuse_count(named: list[Column], count: int, sign: str) -> None:
+    if sign == "," and len(named) < count <= 2 * len(named):
+        raise RecordError(
+            f"a line must hold {len(named)} values, one a column. Received {count}: decimal commas between commas "
+            "cannot be told apart. Put semicolons between the columns, or write decimal points."
+        )
+    raise RecordError(
+        f"a line must hold {len(named)} values, one a column. Received {count} under the headings "
+        f"{shown(', '.join(column.heading for column in named))}. Write one heading a column, without blanks inside."
+    )
+
+
+def _table(text: str, first: int, sign: str, columns: list[Column], line: str) -> pd.DataFrame:
+    """Numbers of a text by the place of their column."""
+    cells = _cells(line, sign)
+    comma = sign != "," and any(_DECIMAL_COMMA.fullmatch(cell.strip()) for cell in cells)
+    try:
+        table = pd.read_csv(
+            io.StringIO(text),
+            sep=sign,
+            header=None,
+            skiprows=first,
+            comment="#",
+            decimal="," if comma else ".",
+            skipinitialspace=True,
+            na_values=["-", "--", "inf", "-inf"],
+            engine="c",
+            low_memory=False,
+        )
+    except (pd.errors.ParserError, ValueError) as error:
+        found = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(error))
+        what = (
+            f"line {int(found[2])} must hold {found[1]} values. Received {found[3]}." if found else "lines must agree."
+        )
+        raise RecordError(f"{what} Complete or remove it.") from None
+    if len(columns) == len(cells) - 1:  # numbers of rows without a heading, as xlook's, stand first
+        table = table.drop(columns=0)
+        table.columns = range(table.shape[1])
+    return table
+
+
+def _values(cells: pd.Series, column: Column, text: str, first: int) -> "np.ndarray":
+    """Numbers of one column; not a number where nothing was measured.
+
+    Raises
+    ------
+    RecordError
+        For a text that is no number, with its line.
+    """
+    if pd.api.types.is_numeric_dtype(cells):
+        values: np.ndarray = cells.to_numpy(dtype=float, copy=True)
+        values[~np.isfinite(values)] = np.nan
+        return values
+    told = cells.astype(str).str.strip()
+    told = told.where(~told.str.lower().isin(_MISSING), "nan")
+    if _CELL.fullmatch(told.iloc[0]) and not re.fullmatch(_NUMBER, told.iloc[0]):
+        dates = pd.to_datetime(told, format="ISO8601", errors="coerce")
+        if dates.notna().all():
+            seconds: np.ndarray = (dates - dates.iloc[0]).dt.total_seconds().to_numpy(dtype=float)
+            return seconds
+    numbers = pd.to_numeric(told.str.replace(r"(?<=[\d.])[dD](?=[+-]?\d)", "e", regex=True), errors="coerce")
+    wrong = (numbers.isna() & (told != "nan")).to_numpy().nonzero()[0]
+    if len(wrong):
+        cell = told.iloc[int(wrong[0])]
+        raise RecordError(
+            f"line {_line_number(text, first, int(wrong[0]))} must hold a number in column {column.name}. Received "
+            f"{shown(cell)}.{_remedy(cell)}"
+        )
+    found: np.ndarray = numbers.to_numpy(dtype=float)
+    return found
+
+
+def _remedy(cell: str) -> str:
+    if _CELL.fullmatch(cell) and not re.fullmatch(_NUMBER, cell):
+        return " Write seconds, or dates as 2024-03-05 10:00:00.1."
+    if re.fullmatch(r"[+-]?\d+,\d+", cell):
+        return " Write decimal points, or decimal commas in every number."
+    return " Correct it, or leave it empty where nothing was measured."
+
+
+def _line_number(text: str, first: int, row: int) -> int:
+    """Number of the line of a row: blank lines and remarks are none."""
+    told = [i for i, line in enumerate(text.splitlines()) if i >= first and line.strip() and line.strip()[0] != "#"]
+    return told[row] + 1
+
+
+def _unit_words() -> set[str]:
+    """What may stand in a line of units."""
+    words = "s sec ms min h m mm um µm μm mic micron microns nm cm Pa kPa MPa Mpa GPa N kN MN - 1 Hz"
+    rates = {f"{length}/{time}" for length in "m mm um µm mic micron microns nm".split() for time in ("s", "sec")}
+    return {"", *words.split(), *rates}
+
+
+# ----------------------------------------------------------------------
+# xlook's own files, and MATLAB's.
+
+
+def _xlook_text(text: str) -> list[Column]:
+    """What xlook's command `type` writes: a count, numbers, names, units and lengths of columns, then rows."""
+    lines = text.splitlines()
+    names, units = (lines[i].split() if len(lines) > i else [] for i in (2, 3))
+    if len(names) != len(units) or len(lines) < 6:
+        raise RecordError(
+            f"xlook's text must have as many units as columns. Received {len(units)} for {len(names)}. Write names "
+            "and units without blanks."
+        )
+    table = pd.read_csv(io.StringIO(text), sep=r"\s+", header=None, skiprows=5, engine="c")
+    columns = [heading(f"{name} [{unit}]") for name, unit in zip(names, units, strict=True)]
+    if table.shape[1] != len(columns) + 1:
+        _refuse_count(columns, table.shape[1] - 1, r"\s+")
+    return [replace(column, values=_values(table[i], column, text, 5)) for i, column in enumerate(columns, start=1)]
+
+
+def _xlook_offset(data: bytes) -> tuple[int, int, str] | None:
+    """Bytes of the header of xlook's binary, channels in it, and the kind of its numbers; None for another file."""
+    if len(data) < min(_HEADERS.values()):
+        return None
+    records, channels = (int.from_bytes(data[i : i + 4], "big") for i in (20, 24))
+    for most, size in _HEADERS.items():
+        if 0 < channels <= most and records > 0:
+            if len(data) == size + 4 * records * channels:
+                return size, channels, ">f4"
+            if len(data) == size + 8 * records * channels:
+                return size, channels, "<f8"
+    return None
+
+
+def _xlook_binary(data: bytes, size: int, channels: int, kind: str) -> list[Column]:
+    """Columns of big-endian floats, or of doubles as the machine wrote them."""
+    table = np.frombuffer(data[size:], dtype=kind)
+    if kind == "<f8" and not np.all(np.abs(table) < 1e30):
+        table = np.frombuffer(data[size:], dtype=">f8")
+    table = table.astype(float).reshape(channels, -1)
+    if b"bits" in data[36 : 36 + 84 * channels]:
+        raise RecordError(
+            "xlook's binary must hold a reduced record. Received raw readings, in bits. Run its reduction (the file "
+            "that ends in _r) in xlook and write the record as text, or as binary again."
+        )
+    words = [data[36 + 84 * i : 36 + 84 * i + 26] for i in range(channels)]
+    told = [[part.split(b"\0")[0].decode("latin-1").strip() for part in (word[:13], word[13:])] for word in words]
+    return [replace(heading(f"{name} [{unit}]"), values=row) for (name, unit), row in zip(told, table, strict=True)]
+
+
+def _matlab(data: bytes, path: str | Path) -> list[Column]:
+    """Numeric arrays of a file of MATLAB's; a matrix gives columns named after their numbers."""
+    try:
+        told = whosmat(io.BytesIO(data))
+        kinds = {name: shape for name, shape, kind in told if kind in _ARRAYS}
+        if sum(math.prod(shape) for shape in kinds.values()) > _MOST_NUMBERS:
+            raise ValueError(f"more than {_MOST_NUMBERS} numbers")
+        held = loadmat(io.BytesIO(data), squeeze_me=True, variable_names=list(kinds))
+    except (MatReadError, NotImplementedError, ValueError, TypeError, OSError) as error:
+        raise RecordError(f"a MATLAB file must be readable. Received {path}: {error}. Save it with -v7.") from None
+    arrays = {
+        name: value for name, value in held.items() if isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
+    }
+    long = max((value.shape[0] for value in arrays.values() if value.ndim), default=0)
+    if long < 2:
+        raise RecordError(
+            f"a MATLAB file must hold numeric arrays of equal length. Received {path} with "
+            f"{', '.join(name for name, *_ in told) or 'nothing'}. Save the columns as vectors."
+        )
+    found = []
+    for name, value in arrays.items():
+        if value.shape == (long,):
+            found.append(replace(heading(name), values=value.astype(float)))
+        elif value.ndim == 2 and value.shape[0] == long:
+            columns = enumerate(value.T.astype(float), start=len(found) + 1)
+            found += [replace(heading(str(i)), values=column) for i, column in columns]
+    return found
