@@ -29,6 +29,7 @@ from quakedesign.symbolic import derive
 _ONSET = 10.0
 _SHARE_OF_STRETCH = 1e-3
 _LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
+_LONGEST_RUN = 1e5 * _LONGEST  # s, three million years: a run is cut into that many spans at most
 
 
 def simulate_state(
@@ -155,6 +156,8 @@ def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
                 "loading must last a positive time at a rate that is not negative, both finite. "
                 f"Received {length!r} s at {speed!r} m/s."
             )
+    if (whole := math.fsum(length for length, _ in pieces)) > _LONGEST_RUN:
+        raise ParameterError(f"duration must be at most {_LONGEST_RUN:g} s, got {whole:g} s: give a shorter duration")
     if not pieces:
         raise ParameterError("loading must hold at least one pair of (time, rate). Received none.")
     return [(float(length), float(speed)) for length, speed in pieces]

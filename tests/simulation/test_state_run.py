@@ -352,6 +352,8 @@ def test_a_run_can_be_handed_on():
         ({"loading": [(1.0, 1e-5)], "times": [2.0]}, "times must ascend"),
         ({"loading": [(1.0, 1e-5)], "method": "euler"}, "dop853, radau.*cvodes, idas"),
         ({"loading": [(1.0, 1e-5)], "rtol": 1e-16}, "rtol must be"),
+        ({"loading": 1e-6, "duration": 4.4e18}, r"duration must be at most 1e\+14 s, got 4.4e\+18 s"),
+        ({"loading": [(9e13, 1e-6), (2e13, 0.0)]}, r"duration must be at most 1e\+14 s, got 1.1e\+14 s"),
     ],
 )
 def test_meaningless_settings_are_refused(options, said):
