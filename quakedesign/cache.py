@@ -60,7 +60,7 @@ def recall(kind: str, *question: bytes) -> bytes | None:
     """What was kept for a question, or None."""
     name = _name(kind, question)
     try:
-        with open(os.open(_own_folder() / name, os.O_RDONLY | os.O_NOFOLLOW), "rb") as file:
+        with open(os.open(_own_folder() / name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
             told = os.fstat(file.fileno())
             if not stat.S_ISREG(told.st_mode) or not _own(told):
                 return None

@@ -21,6 +21,7 @@ import inspect
 import json
 import os
 import pickle
+import random
 import re
 import resource
 import signal
@@ -383,11 +384,20 @@ class Mutation:
         with open(self.options.results, "a", encoding="utf-8") as stream:
             for path in self.paths:
                 seen: Counter[tuple[str, str, str]] = Counter()
-                for mutant in mutants_of(path):
+                mutants = list(mutants_of(path))
+                drawn = set(
+                    random.Random(self.options.seed).sample(range(len(mutants)), len(mutants))[: self.options.sample]
+                )
+                for index, mutant in enumerate(mutants):
                     key, count = mutant.key(), seen[mutant.key()]
                     seen[key] += 1
                     skipped = self.options.skip and re.search(self.options.skip, mutant.text)
-                    if skipped or known.of(key) or past.get((*key, count), "survived") != "survived":
+                    if (
+                        index not in drawn
+                        or skipped
+                        or known.of(key)
+                        or past.get((*key, count), "survived") != "survived"
+                    ):
                         continue
                     names = self.choose(mutant, reached, kills)
                     status, killer = self.try_out(mutant, by_path[mutant.path], modules, [items[n] for n in names])
@@ -532,6 +542,8 @@ def main() -> int:
     parser.add_argument("--select", default="", help="expression on the names of tests, as pytest -k")
     parser.add_argument("--slow", action="store_true", help="with the slow tests, which try all cases")
     parser.add_argument("--skip", help="regular expression for lines that are left for another run")
+    parser.add_argument("--sample", type=int, help="mutants of each module, drawn at random; all by default")
+    parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--seconds", type=float, default=10, help="of tests for one mutant")
     options = parser.parse_args()
     if options.tests:

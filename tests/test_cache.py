@@ -92,6 +92,18 @@ def test_what_belongs_to_somebody_else_is_not_used(folder, monkeypatch):
     assert len(list(folder.iterdir())) == 1
 
 
+def test_what_is_no_file_is_not_waited_for(folder):
+    """A pipe that nobody writes into would hold the command for ever."""
+    cache.keep("run", b"so long", b"how long?")
+    place = only(folder)
+    place.unlink()
+    os.mkfifo(place, 0o600)
+    asked = "from quakedesign import cache\nassert cache.recall('run', b'how long?') is None"
+    subprocess.run([sys.executable, "-c", asked], check=True, timeout=60)
+    cache.keep("run", b"so long", b"how long?")
+    assert cache.recall("run", b"how long?") == b"so long"
+
+
 def test_links_are_not_followed(folder, tmp_path, monkeypatch):
     cache.keep("run", b"so long", b"how long?")
     only(folder).rename(tmp_path / "elsewhere")

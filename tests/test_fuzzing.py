@@ -26,6 +26,7 @@ from functools import cache, partial
 from importlib.resources import files
 from inspect import Parameter, isabstract, isclass, isfunction, signature
 from pathlib import Path
+from random import Random
 from typing import is_typeddict
 
 import numpy as np
@@ -245,9 +246,9 @@ fault {short.toml;real-fault} | --box {paper;ten-percent} | --quiet | --log-leve
 derive {short.toml;lab-fault;creeping-patch} | --latex
 scale {lab-fault;real-fault} {short.toml;lab-fault} | --controller {cta;dia;elqr} \
  | --clock {natural-period;operation-time} | --json
-simulate short.toml --duration {'20 ms';0.1} | --plant {smooth;coulomb} | --method rk4 \
+simulate short.toml --duration {'20 ms';0.1} | --plant {smooth;coulomb;stick-slip} | --method rk4 \
  | --initial-slip '1 mm' | --json
-simulate lab-fault --controller {cta;dia;elqr} --duration '30 ms' | --plant coulomb | --method rk4 \
+simulate lab-fault --controller {cta;dia;elqr} --duration '30 ms' | --plant {coulomb;stick-slip} | --method rk4 \
  | --scheme explicit --substeps {2;10} | --json
 simulate lab-fault --controller {cta;dia} --duration {'20 ms';'60 ms'} --scheme {explicit;implicit;semi-implicit} \
  | --delay {'2 ms';'10 ms'} --jitter 1 | --saturation {'1 MPa';'20 MPa'} --withdrawal 0 \
@@ -279,6 +280,9 @@ identify record.csv --stiffness '1e-3 1/um' | --law rate-and-state-aging | --see
 sampling lab-fault --gains published --duration '50 ms' --out sampled --force | --controller {cta;elqr} | --json
 export lab-fault --certificate GUARANTEE --out proved --force | --fmu
 simulate lab-fault --certificate GUARANTEE --duration '0.2 s' | --plant coulomb | --saturation '1 MPa' | --json
+guarantee real-fault --plant stick-slip | --json | --out stick.json --force
+{check STICK;export real-fault --certificate STICK --out stuck --force} | --json
+simulate real-fault --certificate STICK --duration '2 s' --plant {stick-slip;smooth} | --json
 map cta --over k1 k2 --lipschitz 1/2 --points 3 --interior 1 --workers 1 --out mapped --force | --json
 """
 """Lines that are done in a moment, and in seconds: one of {a;b} each, and any of the options after | beside them."""
@@ -288,6 +292,7 @@ NAMES = {
     "SOS": "motzkin_not",
     "ELQR": "elqr_lab",
     "GUARANTEE": "guarantee_lab",
+    "STICK": "stick_slip",
 }
 NAMED = {name: str(next(p for p in PROOFS if p.name.startswith(begin))) for name, begin in NAMES.items()}
 
@@ -377,6 +382,54 @@ def test_sound_command_lines(which, workplace):
     assert len(os.listdir("/dev/fd")) < opened + 20
     assert codes[2, True] == 0
     assert codes[2, False] > 0
+
+
+PROVED, REFUTED = (str(PROOFS[0].parent / name) for name in ("super-twisting_1.5_1.1.json", "dia_1_20_1_0.json"))
+ANSWERED = """
+fault {short.toml;lab-fault;real-fault;crustal-patch}
+check PROVED
+check PROVED {REFUTED;broken.toml}
+sos {'x^2 + 1';'x^2 - 1';'x^4 + y^4 - 2*x*y + 1'}
+errata {1;2;12}
+scale lab-fault real-fault --controller {cta;dia}
+export lab-fault --controller cta --out made --force
+simulate short.toml --duration '10 ms' --plant {smooth;stick-slip}
+"""
+REFUSED = """
+fault {nowhere;no.toml;broken.toml;.}
+check PROVED none.json
+sos {'(x';'x/0';'__import__("os")'}
+errata {99;-1;x}
+{design;guarantee;limits;compare;sampling;campaign;figures} nowhere
+{design;guarantee;limits;compare} lab-fault --box wide
+guarantee real-fault --plant stick-slip {--delay;--lag;--slip-noise;--jitter} {'1 ms';'1 um';-1}
+simulate short.toml --duration {0;-1;nan;'1 MPa'}
+{simulate;export} lab-fault --controller {nobody;''}
+identify {none.csv;short.toml}
+{nothing;--nothing;map cta --over k9}
+"""
+
+
+@pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.slow)])
+def test_each_command_of_a_long_process_prints_one_document_or_one_line(count, workplace):
+    """Commands that are answered and refused, in turn: none leaves a stream or a handler to the next."""
+    (workplace / "broken.toml").write_bytes(b"[material\n\xff")
+    handlers = [signal.getsignal(number) for number in SIGNALS]
+    chance, codes = Random(count), Counter()
+    for number in range(count):
+        refused = number % 2 == 1
+        template = chance.choice((REFUSED if refused else ANSWERED).strip().splitlines())
+        line = shlex.split(re.sub(r"\{(.*?)\}", lambda found: chance.choice(found[1].split(";")), template))
+        line = [{"PROVED": PROVED, "REFUTED": REFUTED}.get(word, word) for word in line]
+        code, out, err = answer(*line, "--json")
+        codes[code] += 1
+        if refused:
+            assert (code, out) == (2, ""), line
+        else:
+            assert (code in (0, 1), err) == (True, ""), (line, err)
+            assert isinstance(json.loads(out), dict), line
+    assert [signal.getsignal(number) for number in SIGNALS] == handlers
+    assert min(codes[0], codes[1]) > 0
 
 
 # Certificates

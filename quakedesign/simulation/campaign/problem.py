@@ -141,7 +141,7 @@ class CampaignProblem(ABC):
         ParameterError
             When it is no whole number, or too large.
         """
-        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < MOST_SAMPLES:
+        if not 0 <= index < MOST_SAMPLES:
             raise ParameterError(f"index must be a whole number, 0 to {MOST_SAMPLES - 1}. Received {index!r}.")
         return point(self.seed, index, len(self.space.ranges))
 
@@ -320,9 +320,10 @@ class SlidingProblem(CampaignProblem):
                 f"Received {self.controller}. Give an elqr from design."
             )
         if self.scheme != simulation_scheme("explicit", actuator=getattr(self.scheme, "actuator", DIRECT)):
+            told = {"scheme": self.scheme.name} | {k: v for k, v in self.scheme.settings.items() if k != "actuator"}
             raise ParameterError(
-                "a campaign of slow sliding needs the scheme explicit, exact slip and its own solver. Received another "
-                "scheme, noise, a sensor or substeps. Omit these."
+                "scheme of a campaign of slow sliding must be explicit, with exact slip and one substep. Received "
+                f"{', '.join(f'{k} {v}' for k, v in told.items())}. Omit scheme, measurement and substeps."
             )
 
     @cached_property
@@ -492,7 +493,7 @@ class CompiledProgram:
         """
         move = mover(self)
         vectors = np.array(starts, dtype=np.float64, order="C", ndmin=2)
-        slice_ = max(1, SLICE // len(vectors))
+        slice_ = -(-SLICE // len(vectors))
         for taken in range(0, steps, slice_):
             move(vectors, min(slice_, steps - taken))
         return vectors
@@ -534,14 +535,13 @@ def _machine_code(content: bytes, folder: Path, size: int) -> Mover:
 
 def _virtual_machine(program: CompiledProgram) -> Mover:
     rungs = ladder(ca.Function.deserialize(program.function))
-    advancer = Advancer.of(Backend(rungs, "virtual-machine", ""), [0.0] * program.size)
+    advancer = Advancer.of(Backend(rungs, "virtual-machine", ""), [math.nan] * program.size)
     alone = Lock()  # threads share the advancer
 
     def move(vectors: "np.ndarray", steps: int) -> None:
         with alone:
             for row in vectors:
-                if not row[program.diverged] >= 0:
-                    row[:] = _moved(advancer, row, steps, program.diverged)
+                row[:] = _moved(advancer, row, steps, program.diverged)
 
     return move
 

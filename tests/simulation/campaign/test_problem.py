@@ -15,6 +15,7 @@ from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Load, Variation, simulate
 from quakedesign.simulation.campaign import campaign_problem
+from quakedesign.simulation.campaign.problem import SteppedProblem
 from quakedesign.simulation.campaign.space import Sample
 
 LAB = load_fault("lab-fault", box="ten-percent")
@@ -100,7 +101,7 @@ def test_what_a_campaign_cannot_do_is_refused():
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6])
-def test_many_starts_at_once_are_those_of_each(noise):
+def test_many_starts_at_once_are_those_of_each(noise, monkeypatch):
     scheme = simulation_scheme("explicit", measurement=Measurement(slip_noise=noise))
     problem = campaign_problem(LAB, LAW, scheme=scheme, initial_slip=1e-4, initial_slip_rate=1e-3, plant="coulomb")
     samples = [problem.sample(i) for i in range(5)]
@@ -108,3 +109,19 @@ def test_many_starts_at_once_are_those_of_each(noise):
     assert len({start.tobytes() for start in problem.starts(samples)}) == 5
     seeds = [replace(samples[0], noise_seed=seed) for seed in range(3)]
     assert len({start.tobytes() for start in problem.starts(seeds)}) == (3 if noise else 1)
+    built, start = [], SteppedProblem.start
+    monkeypatch.setattr(SteppedProblem, "start", lambda self, sample: built.append(1) or start(self, sample))
+    problem.starts([problem.sample(i) for i in range(40)])
+    assert len(built) == (40 if noise else 1)
+    assert problem.starts([]).size == 0
+
+
+def test_how_many_instants_are_kept_does_not_tell_campaigns_apart():
+    """They are resumed where what determines their digits is the same: T_s and duration are, instants are not."""
+    problem = campaign_problem(LAB, LAW, duration=0.1)
+    assert replace(problem, setting=replace(problem.setting, samples=7)).inputs == problem.inputs
+    longer = campaign_problem(LAB, LAW, duration=0.2)
+    assert longer.inputs["setting"] != problem.inputs["setting"]
+    assert {k: v for k, v in longer.inputs.items() if k != "setting"} == {
+        k: v for k, v in problem.inputs.items() if k != "setting"
+    }

@@ -28,10 +28,15 @@ def starts(count):
 
 
 @pytest.fixture(scope="module")
-def ends(tmp_path_factory):
+def built(tmp_path_factory):
     program = PROBLEM.program.compiled(tmp_path_factory.mktemp("library"))
     assert program.library
-    return program.ends(starts(16), STEPS)
+    return program
+
+
+@pytest.fixture(scope="module")
+def ends(built):
+    return built.ends(starts(16), STEPS)
 
 
 def test_some_diverge_and_some_do_not(ends):
@@ -48,11 +53,35 @@ def test_the_virtual_machine_has_the_same_digits(ends, monkeypatch, tmp_path):
     assert slow.tobytes() == ends.tobytes()
 
 
-@pytest.mark.slow
-def test_slices_and_company_change_nothing(ends, monkeypatch):
-    monkeypatch.setattr(program_module, "SLICE", 77)
+@pytest.mark.parametrize("steps", [1, 77, 10**9])
+def test_slices_and_company_change_nothing(built, ends, monkeypatch, steps):
+    """A slice of 1 of all samples together is still one step of each."""
+    monkeypatch.setattr(program_module, "SLICE", steps)
     for i in (0, 5, 15):
-        assert PROBLEM.program.ends(starts(16)[[i, 3]], STEPS)[0].tobytes() == ends[i].tobytes()
+        assert built.ends(starts(16)[[i, 3]], STEPS)[0].tobytes() == ends[i].tobytes()
+
+
+def test_a_library_that_is_there_is_loaded_and_nothing_is_built_or_interpreted(built, ends, monkeypatch):
+    def never(*_, **__):
+        raise AssertionError("not needed")
+
+    mover.cache_clear()
+    for name in ("shared_library", "_virtual_machine"):
+        monkeypatch.setattr(program_module, name, never)
+    assert built.ends(starts(2), STEPS).tobytes() == ends[:2].tobytes()
+    with pytest.raises(AssertionError):  # compiled code would write beside vectors of another length
+        mover(built)(np.zeros((1, built.size - 1)), 1)
+    mover.cache_clear()
+
+
+def test_a_sample_that_has_diverged_stays(built, monkeypatch):
+    """As soon as it has a time of divergence, zero included, in machine code and without a compiler."""
+    (row,) = starts(1)
+    row[built.diverged] = 0.0
+    assert built.ends(row, 10)[0].tobytes() == row.tobytes()
+    assert program_module._virtual_machine(built)(row[None], 10) is None
+    assert row[built.diverged] == 0.0
+    assert row.tobytes() == built.ends(row, 10)[0].tobytes()
 
 
 PLANTED = """

@@ -14,6 +14,11 @@ class Pair:
     seed: int = 0
 
 
+@dataclass(frozen=True)
+class Seedless:
+    stages: tuple
+
+
 def test_a_measurement_within_a_scheme_gets_the_seed():
     scheme = simulation_scheme("implicit", measurement=Measurement(slip_noise=1e-6), substeps=3)
     one, other = reseeded(scheme, 1), reseeded(scheme, 2)
@@ -30,5 +35,6 @@ def test_two_noises_stay_independent():
 def test_what_has_no_seed_stays():
     scheme = simulation_scheme("continuous")
     assert reseeded(scheme, 3) is scheme
-    pair = Pair(stages=(1, "two"))
+    pair, plain = Pair(stages=(1, "two")), Seedless(stages=(1, Seedless(stages=())))
     assert reseeded(pair, 3).stages is pair.stages
+    assert reseeded(plain, 3) is plain
