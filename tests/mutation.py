@@ -223,6 +223,7 @@ def apply(mutant: Mutant, functions: list[types.FunctionType], modules: list[typ
             if name == mutant.function:
                 exchange_defaults({name: old}, {name: new})
                 exchange_defaults(vars(old), vars(new))
+                exchange_numbers(old, new)
             else:
                 for module in modules:
                     if vars(module).get(name) is old:
@@ -250,6 +251,13 @@ def exchange_defaults(old: Mapping[str, object], new: Mapping[str, object]) -> N
         inner, other = (inspect.unwrap(one) if wrapped else one for one in (function, new.get(name)))
         if isinstance(inner, types.FunctionType) and isinstance(other, types.FunctionType):
             inner.__defaults__, inner.__kwdefaults__ = other.__defaults__, other.__kwdefaults__
+
+
+def exchange_numbers(old: object, new: object) -> None:
+    """Give a class the numbers of another one that are the same for all of its objects."""
+    for name, value in vars(new).items():
+        if isinstance(old, type) and type(value) in (bool, int, float) and vars(old).get(name) != value:
+            setattr(old, name, value)
 
 
 # ---------------------------------------------------------------- running tests

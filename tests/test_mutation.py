@@ -69,10 +69,12 @@ def test_code_is_changed_in_one_place_at_a_time(tmp_path):
 CLASS = """
 from dataclasses import dataclass
 from functools import cache
+from typing import ClassVar
 
 
 @dataclass
 class Size:
+    most: ClassVar[int] = 20
     value: int = 3
 
     def times(self, factor: int = 5) -> int:
@@ -101,6 +103,8 @@ def test_defaults_of_fields_and_methods_are_changed_in_place(tmp_path):
         tool.apply(found[mutation], [size.times], [module])
         assert size().times() == product
     assert size(2).times(7) == 14
+    tool.apply(found["20 → 40"], [], [module])
+    assert (size.most, size().most) == (40, 40)
     tool.apply(found["11 → 12"], [], [module])
     assert size.of().value == 12
     tool.apply(found["8 → 9"], [module.half.__wrapped__], [module])

@@ -94,19 +94,15 @@ class DesignOptions(WellOptions):
         """
         from quakedesign.fault import load_fault
 
-        controllers(self.controller)
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
         given = vars(self)["diffusion"]
         if loaded.friction.state_names and given is not None and not rational(given, "diffusion"):
             raise ParameterError("diffusion must be above 0 s. Received 0 s. Omit --diffusion for a well at the fault.")
-        laws = "elqr" if self._behind(loaded) and self.controller == "all" else self._laws
+        behind = bool(self.setup().path)  # a delay, a lag or rock, for which the e-LQR alone is designed
+        laws = "elqr" if behind and self.controller == "all" else self._laws
         names = controllers(laws, loaded)
         shown = {"published_scheme": self.published_scheme, "whole_task": self.whole_task}
         return loaded, {"names": names, **shown, **self.told()}
-
-    def _behind(self, fault: "Fault") -> bool:
-        """Whether the e-LQR alone is designed: friction without a state, behind a delay, a lag or rock."""
-        return not fault.friction.state_names and bool(self.setup().path)
 
     def told(self) -> dict[str, Any]:
         """Options of `designed_comparison`.

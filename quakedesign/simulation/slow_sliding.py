@@ -170,7 +170,7 @@ class _Loop:
         """In steady sliding, but that the stress of the tide has come at once."""
         y = np.array(self.slider.start(float(self.reference.first_rate)))
         y[1] += self.tide.at(0.0) / self.slider.stiffness
-        return y if self.tide.at(0.0) == 0 else self.slider.stepped(y, 0.0, 0.0)
+        return self.slider.stepped(y, 0.0, 0.0)
 
     def planned(self, time: Any) -> Any:
         """Pressure [Pa] that the nominal fault needs at its first rate at a time [s]."""

@@ -104,17 +104,19 @@ def along(time, rate, ramp, length):
 
 
 def oracle(
-    law, name, tide, count, off=(1.0,) * 6, *, ramp=0.0, length=5e5, late=0.0, read=float, pump=lambda asked, _: asked
-):
+    law, name, tide, count, off=(1.0,) * 6, *, ramp=0.0, length=5e5, late=0.0, lag=0.0, read=float,
+    pump=lambda asked, _: asked,
+):  # fmt: skip
     """Slip error and ln(v/V) at every sample: balance of forces by Lambert's function, LSODA between samples.
 
-    V is the first rate of the reference, whose mean is V/(1 - ramp). A pressure acts `late` [s] after its sample.
+    V is the first rate of the reference, whose mean is V/(1 - ramp). A pressure acts `late` [s] after its sample, and
+    comes with a time constant `lag` [s].
     """
     a, b, d, sigma, stiffness, damping = (
         x * y for x, y in zip((A, B, D, NORMAL, STIFFNESS, DAMPING), off, strict=True)
     )
     mean = V / (1 - ramp)
-    z, held, x, w, found = np.zeros(len(law.output)), 0.0, 0.0, 0.0, []
+    z, held, x, w, p, found = np.zeros(len(law.output)), 0.0, 0.0, 0.0, 0.0, []
     update, fed, output = (np.array(part, float) for part in (law.update, law.measured, law.output))
 
     def rate(t, x, w, held):
@@ -131,9 +133,10 @@ def oracle(
         return math.log(scale / V * lambertw(math.exp(driving / a) * V / scale).real)
 
     def field(t, state, held):
-        y = rate(t, *state, held)
+        y = rate(t, *state[:2], state[2] if lag else held)
         grown = math.exp(-state[1]) - math.exp(y) if name.endswith("aging") else -math.exp(y) * (y + state[1])
-        return [V * math.exp(y) - along(t, mean, ramp, length)[1], V / d * grown]
+        coming = (held - state[2]) / lag if lag else 0.0
+        return [V * math.exp(y) - along(t, mean, ramp, length)[1], V / d * grown, coming]
 
     for k in range(count):
         slip = along(40.0 * k, mean, ramp, length)[0]
@@ -142,8 +145,9 @@ def oracle(
         z = update @ z + fed[:, 0] * error
         change, end = 40.0 * k + late, 40.0 * (k + 1)
         for span, acting in (((40.0 * k, change), before), ((change, end), held)):
-            x, w = solve_ivp(field, span, [x, w], method="LSODA", args=(acting,), rtol=1e-10, atol=1e-15).y[:, -1]
-        found.append((x, rate(40.0 * (k + 1), x, w, held)))
+            begin = [x, w, p]
+            x, w, p = solve_ivp(field, span, begin, method="LSODA", args=(acting,), rtol=1e-10, atol=1e-15).y[:, -1]
+        found.append((x, rate(40.0 * (k + 1), x, w, p if lag else held)))
     return np.array(found).T
 
 
@@ -156,6 +160,57 @@ def test_a_held_run_agrees_with_an_independent_integrator(name):
     assert run.slip_error[4::4] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
     assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
     assert run.pressure == pytest.approx(STIFFNESS * V / MU * run.time + run.asked, abs=1e-6)
+    assert np.diff(run.time) == pytest.approx(10.0, rel=1e-12)  # four instants a period
+    assert run.slip_rate[0] == pytest.approx(V, rel=1e-10)
+    stress = tide.amplitude * np.sin(2 * np.pi * run.time / tide.period)
+    force = MU * NORMAL + DAMPING * V - STIFFNESS * run.slip + stress - DAMPING * run.slip_rate
+    assert run.shear_stress == pytest.approx(force, rel=1e-9)
+    assert run.integrals.shape == (0, len(run.time))
+
+
+def test_a_lag_between_samples_is_that_of_an_independent_integrator():
+    law, tide = sliding_law(sliding_model(fault()), STEP), Tide(amplitude=90e3, period=3000.0)
+    run = simulate_sliding(fault(), law, STEP, lag=Fraction(15), tide=tide, duration=1200.0)
+    error, log_rate = oracle(law, "rate-and-state-aging", tide, 30, lag=15.0)
+    assert run.slip_error[4::4] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
+    assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
+    at_once = oracle(law, "rate-and-state-aging", tide, 30)[1]
+    assert np.max(np.abs(log_rate - at_once)) > 1e-3
+
+
+def test_metrics_are_those_of_the_instants_from_where_errors_count():
+    """Of all instants, also where few are kept; `progress` ends at one."""
+    law, tide = sliding_law(sliding_model(fault()), STEP), Tide(amplitude=90e3, period=3000.0)
+    told = {"tide": tide, "duration": 1010.0, "settled_from": 300.0}
+    shares = []
+    run = simulate_sliding(fault(), law, STEP, **told, progress=shares.append)
+    assert shares == pytest.approx([min(1, 40 * (k + 1) / 1010) for k in range(26)])
+    assert (run.time[0], run.time[-1], len(run.time)) == (0, 1040, 105)
+    late = run.time > 300
+    error, rate = (run.slip - V * run.time)[late], (run.slip_rate - V)[late]
+    steps = np.diff(run.pressure[late])
+    expected = {
+        "max_slip_error": max(abs(error)),
+        "max_slip_rate_error": max(abs(rate)),
+        "mise_slip": np.mean(error**2),
+        "mise_slip_rate": np.mean(rate**2),
+        "rms_slip_error": np.sqrt(np.mean(error**2)),
+        "rms_slip_rate_error": np.sqrt(np.mean(rate**2)),
+        "rms_pressure": np.sqrt(np.mean(run.pressure[late] ** 2)),
+        "pressure_total_variation": sum(abs(steps)),
+        "reverse_slip_fraction": 0.0,
+        "peak_slip_rate": max(run.slip_rate),
+        "max_pressure": max(run.pressure),
+        "min_pressure": min(run.pressure),
+        "settled_from": 300.0,
+        "steps": 104,
+    }
+    found = {name: value for name, value in run.metrics.to_dict().items() if value is not None}
+    assert found.pop("seconds") > 0
+    assert found == pytest.approx(expected, rel=1e-9)
+    few = simulate_sliding(fault(), law, STEP, **told, samples=7)
+    assert (few.time[0], few.time[-1], len(few.time)) == (0, 1040, 8)
+    assert few.metrics.to_dict() | {"seconds": 0} == run.metrics.to_dict() | {"seconds": 0}
 
 
 def test_a_reference_that_swells_is_followed_as_by_an_independent_integrator():
@@ -342,9 +397,12 @@ def test_with_inertia_a_held_run_is_the_same_to_a_thousandth():
 
 def test_a_law_that_asks_for_all_of_the_normal_stress_opens_the_fault():
     greedy = dataclasses.replace(asking_for(0), feedback=(Fraction(10) ** 15, Fraction(0)))
-    run = simulate_sliding(fault(), greedy, STEP, tide=Tide(amplitude=40e3, period=1000.0), duration=4000.0)
+    tide = Tide(amplitude=40e3, period=1000.0)
+    run = simulate_sliding(fault(), greedy, STEP, tide=tide, duration=4000.0, settled_from=3999.0)
     assert run.outcome.kind == "opened"
     assert run.opened == pytest.approx(run.time[-1], rel=1e-12)
+    assert (run.metrics.max_slip_error, run.metrics.rms_pressure) == (None, None)  # it ends before errors count
+    assert run.metrics.peak_slip_rate == max(run.slip_rate)
 
 
 def test_a_run_can_be_handed_on_and_others_are_refused():
@@ -352,8 +410,10 @@ def test_a_run_can_be_handed_on_and_others_are_refused():
     run = simulate_sliding(fault(), law, STEP, duration=80.0)
     assert run.to_xarray()["slip_error"].attrs["units"] == "m"
     assert len(run.time) == 9
-    with pytest.raises(ParameterError, match="friction with one state"):
-        simulate_sliding(load_fault("real-fault"), law, STEP)
+    told_the_rate = dataclasses.replace(law, feedback=(law.feedback[0], Fraction(1)))
+    for given, of in ((load_fault("real-fault"), law), (fault(), told_the_rate)):
+        with pytest.raises(ParameterError, match="friction with one state"):
+            simulate_sliding(given, of, STEP)
     with pytest.raises(ParameterError, match="method must be one of"):
         simulate_sliding(fault(), law, STEP, method="radau")
     with pytest.raises(ParameterError, match="stress must be zero or positive"):

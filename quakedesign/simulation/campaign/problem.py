@@ -11,6 +11,7 @@ import subprocess
 from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -507,11 +508,9 @@ def mover(program: CompiledProgram) -> Mover:
     """
     with temporary_folder() as folder:
         for given in (program, replace(program, library=None)):
-            try:
+            with suppress(OSError, AttributeError):
                 if library := (given if given.library else given.compiled(folder)).library:
                     return _machine_code(library.content(), folder, program.size)
-            except (OSError, AttributeError):
-                continue
     return _virtual_machine(program)
 
 
@@ -573,7 +572,7 @@ def reseeded(value: Value, seed: int) -> Value:
 
 
 def _walk(value: Any, seed: int, count: list[int]) -> Any:
-    if isinstance(value, tuple) and type(value) is tuple:
+    if type(value) is tuple:
         walked = tuple(_walk(entry, seed, count) for entry in value)
         return walked if any(new is not old for new, old in zip(walked, value, strict=True)) else value
     if not is_dataclass(value) or isinstance(value, type):

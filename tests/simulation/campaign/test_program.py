@@ -69,6 +69,8 @@ def test_a_library_that_is_there_is_loaded_and_nothing_is_built_or_interpreted(b
     for name in ("shared_library", "_virtual_machine"):
         monkeypatch.setattr(program_module, name, never)
     assert built.ends(starts(2), STEPS).tobytes() == ends[:2].tobytes()
+    monkeypatch.setattr(program_module, "shared_library", lambda *_: built.library.path)
+    assert PROBLEM.program.ends(starts(2), STEPS).tobytes() == ends[:2].tobytes()  # built where it is not there
     with pytest.raises(AssertionError):  # compiled code would write beside vectors of another length
         mover(built)(np.zeros((1, built.size - 1)), 1)
     mover.cache_clear()
@@ -102,6 +104,19 @@ def plant(tmp_path):
         return mark
 
     return replace_library
+
+
+def test_a_library_for_another_processor_is_not_used(tmp_path):
+    seen = '__attribute__((visibility("default"))) int'
+    text = f"{seen} made_for_this_processor(void) {{ return %d; }}\n{seen} advance_samples(void) {{ return 0; }}"
+    for number, ours in enumerate((1, 0)):
+        (folder := tmp_path / str(number)).mkdir()
+        content = shared_library(text % ours, folder, compiler()).read_bytes()
+        if ours:
+            assert callable(program_module._machine_code(content, folder, 1))
+        else:
+            with pytest.raises(OSError, match="built for another processor"):
+                program_module._machine_code(content, folder, 1)
 
 
 def test_the_planted_library_of_these_tests_would_be_seen(plant, tmp_path):
