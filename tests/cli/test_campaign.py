@@ -1,12 +1,14 @@
 """The command line of campaigns."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from matplotlib.figure import Figure
 
-from quakedesign.cli import main
+from quakedesign.cli import main, simulate_commands
 from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.report import terminal
 from quakedesign.simulation.campaign import Campaign, running
 
 CALL = ["campaign", "lab-fault", "--controller", "elqr", "--duration", "0.2", "--initial-slip", "1e-4", "--box"]
@@ -97,3 +99,81 @@ def test_refusals_are_one_line(call, wrong):
     code, _, err = call(*wrong)
     assert code == 2
     assert err.count("\n") == 1
+
+
+def shown(**changes):
+    """A campaign of eight samples as it is printed."""
+    numbers = {"0.05": 1e-6, "0.5": 2e-6, "0.95": 3.14e-6, "1": None}
+    worst = [{"index": i} for i in (7, 3, 1, 0)]
+    answer = {
+        "samples": 8,
+        "resumed": 5,
+        "quantiles": {"max_slip_error": numbers, "reverse_slip_fraction": dict.fromkeys(numbers, 0.25)},
+        "worst": {"max_slip_error": worst, "reverse_slip_fraction": worst[:2]},
+        "search": {"metric": "max_slip_error", "value": 1.23456789e-5, "index": "search-9", "looked_at": 40},
+        "failures": [{"samples": ["4", "5", "6"], "reason": "MemoryError: full"}],
+    }
+    return answer | changes
+
+
+def printed(capsys, answer, *, controller=None, kinds=None, events=None):
+    problem = SimpleNamespace(fault=SimpleNamespace(name="lab-fault"), controller=controller)
+    simulate_commands._print(problem, SimpleNamespace(kinds=kinds or {}, events=events or {}), answer, "out/ (a, b)")
+    return [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+
+
+TABLE = [
+    "metric unit 5 % 50 % 95 % worst samples",
+    "max_slip_error m 1e-06 2e-06 3.1e-06 diverges 7, 3, 1",
+    "reverse_slip_fraction - 0.25 0.25 0.25 0.25 7, 3",
+]
+
+
+def test_people_are_told_outcomes_quantiles_search_and_failures(capsys):
+    counts = {"tracked": [0, 1, 2], "earthquake": [], "diverged": [7]}
+    told = {"controller": SimpleNamespace(title="e-LQR"), "kinds": counts, "events": {"peak_rate": [7], "opening": []}}
+    assert printed(capsys, shown(), **told) == [
+        "lab-fault, e-LQR: 8 samples, 5 of them from files",
+        "outcomes (samples): 3 tracked, 1 diverged",
+        "events (samples): 1 peak rate",
+        *TABLE,
+        "search: max_slip_error = 1.23457e-05 m in search-9 of 40 samples",
+        "failed: samples 4 … 6: MemoryError: full",
+        "written: out/ (a, b)",
+    ]
+
+
+def test_people_are_told_that_there_is_nothing(capsys):
+    search = {"metric": "max_slip_error", "value": None, "index": "search-9", "looked_at": 40}
+    diverged = "search: max_slip_error = diverges in search-9 of 40 samples"
+    for found, said in ((None, []), (search, [diverged])):
+        assert printed(capsys, shown(search=found, failures=[])) == [
+            "lab-fault, no control: 8 samples, 5 of them from files",
+            "outcomes (samples): none",
+            "events (samples): none",
+            *TABLE,
+            *said,
+            "written: out/ (a, b)",
+        ]
+
+
+def test_a_sample_is_run_again_by_its_number_or_its_name(tmp_path):
+    def trajectory(index):
+        outcome, metrics = (SimpleNamespace(to_dict=lambda: {"of": index}) for _ in range(2))
+        return SimpleNamespace(outcome=outcome, metrics=metrics, events={"opening": 1.0}, save=lambda path: path)
+
+    done = SimpleNamespace(trajectory=trajectory)
+    assert simulate_commands._again(done, None, tmp_path) == {}
+    for told, index in (("12", 12), ("search-3", "search-3")):
+        (again,) = simulate_commands._again(done, told, tmp_path).values()
+        assert (again["index"], again["metrics"], again["outcome"]) == (told, {"of": index}, {"of": index})
+        assert (again["file"], again["events"]) == (str(tmp_path / f"sample-{told}.nc"), {"opening": 1.0})
+
+
+@pytest.mark.parametrize("proved", ["", "proved: the slip rate never exceeds 1 m/s"])
+@pytest.mark.parametrize("energy", [None, SimpleNamespace(relative_residual=1.234e-9)])
+def test_what_is_proved_of_a_run_stands_last(capsys, monkeypatch, proved, energy):
+    monkeypatch.setattr(terminal, "print_run", lambda *_: print("the run"))
+    simulate_commands._print_run(SimpleNamespace(energy=energy), None, (), proved)
+    lost = ["  energy that the integration loses: 1.2e-09 of the largest share"] if energy else []
+    assert capsys.readouterr().out.splitlines() == ["the run", *lost, *([f"  {proved}"] if proved else [])]

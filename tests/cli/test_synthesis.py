@@ -1,7 +1,9 @@
 """`synthesise` on the command line."""
 
 import json
+from fractions import Fraction
 from functools import cache, partial
+from types import SimpleNamespace
 
 import pytest
 
@@ -116,3 +118,69 @@ def test_input_that_cannot_be_understood(capsys, arguments):
     code, _, err = run(capsys, *arguments)
     assert code == 2
     assert err.count("\n") == 1
+
+
+def test_the_sampled_objective_needs_a_fault_and_takes_degrees(capsys, monkeypatch):
+    from quakedesign.synthesis import simulated_error
+
+    asked = []
+    monkeypatch.setattr(simulated_error, "synthesise_sampled", lambda trial, **told: asked.append(told))
+    code, _, err = run(capsys, "cta", "--objective", "sampled")
+    assert (code, err.count("\n"), asked) == (2, 1, [])
+    assert "the objective sampled needs a fault. Received none. Give a preset or a file after cta" in err
+    for told, degrees in (((), None), (("--degree", "5", "--degree", "6"), (5, 6))):
+        code, out, _ = run(capsys, "cta", "real-fault", "--objective", "sampled", *told, "--json")
+        answer = json.loads(out)
+        assert (code, answer["verdict"], asked.pop()) == (1, "undecided", {"degrees": degrees})
+        assert (answer["fault"], answer["scheme"], answer["step"]) == ("real-fault", "explicit", 0.184)
+
+
+def found(unit, value, *, beta=None):
+    """A synthesis as it is shown: gains of 1 and 3/2, compared with others that are proved and that are not."""
+    gains = {"k1": Fraction(3, 2), "k2": Fraction(1)}
+    others = [({"k1": Fraction(3), "k2": Fraction(2)}, 4.0, 3.5, 2.0)]
+    others += [({"k1": Fraction(7), "k2": Fraction(5)}, None, 8.6, None)]
+    uncertain = {"d": (Fraction(-2), Fraction(2))} | ({"beta": beta} if beta else {})
+    return SimpleNamespace(
+        objective="decay",
+        gains=gains,
+        value=value,
+        unit=unit,
+        norm=1.8,
+        certificate=SimpleNamespace(loop=SimpleNamespace(uncertain=uncertain)),
+        compared=[SimpleNamespace(gains=g, value=v, norm=n, ratio=r) for g, v, n, r in others],
+    )
+
+
+@pytest.mark.parametrize(
+    ("unit", "value", "beta", "said"),
+    [
+        (
+            "-",
+            2.0,
+            None,
+            ["proved: cta with k1 = 3/2, k2 = 1 for |h'| <= 2", "gains decay norm better by", "these 2 1.8"],
+        ),
+        (
+            "1/s",
+            None,
+            (Fraction(1, 2), Fraction(3)),
+            [
+                "proved: cta with k1 = 3/2, k2 = 1 for |h'| <= 2, β in [1/2, 3]",
+                "gains decay [1/s] norm better by",
+                "these not proved 1.8",
+            ],
+        ),
+    ],
+)
+def test_the_table_says_ranges_units_and_what_is_not_proved(capsys, monkeypatch, unit, value, beta, said):
+    from quakedesign.lyapunov.gains import synthesise as gains
+
+    monkeypatch.setattr(gains, "synthesise", lambda *_, **__: found(unit, value, beta=beta))
+    code, out, _ = run(capsys, "cta")
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert (code, lines) == (0, [*said, "3 2 4 3.5 2", "7 5 not proved 8.6"])
+    code, out, _ = run(capsys, "cta", "--json")
+    answer = json.loads(out)
+    assert answer["gain_range"] == (["1/2", "3"] if beta else None)
+    assert (answer["lipschitz"], answer["certificate"], answer["value"]) == ("2", None, value)

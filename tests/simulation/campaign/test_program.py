@@ -106,14 +106,15 @@ def plant(tmp_path):
     return replace_library
 
 
-def test_a_library_for_another_processor_is_not_used(tmp_path):
+def test_a_library_that_fails_or_is_for_another_processor_is_refused(tmp_path):
     seen = '__attribute__((visibility("default"))) int'
-    text = f"{seen} made_for_this_processor(void) {{ return %d; }}\n{seen} advance_samples(void) {{ return 0; }}"
+    text = f"{seen} made_for_this_processor(void) {{ return %d; }}\n{seen} advance_samples(void) {{ return 1; }}"
     for number, ours in enumerate((1, 0)):
         (folder := tmp_path / str(number)).mkdir()
         content = shared_library(text % ours, folder, compiler()).read_bytes()
         if ours:
-            assert callable(program_module._machine_code(content, folder, 1))
+            with pytest.raises(ArithmeticError, match="the compiled step failed"):
+                program_module._machine_code(content, folder, 1)(np.zeros((1, 1)), 1)
         else:
             with pytest.raises(OSError, match="built for another processor"):
                 program_module._machine_code(content, folder, 1)
