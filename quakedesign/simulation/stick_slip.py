@@ -28,6 +28,7 @@ from quakedesign.symbolic import derive
 
 _ONSET = 10.0
 _SHARE_OF_STRETCH = 1e-3
+_FARTHEST = 1e6  # critical slips that the load point travels: some thousand cycles
 _LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
 _LONGEST_RUN = 1e5 * _LONGEST  # s, three million years: a run is cut into that many spans at most
 
@@ -98,7 +99,9 @@ def simulate_state(
     first = pieces[0][1] if start_rate is None else start_rate
     start = slider.start(first, None if start_state is None else tuple(start_state), course.before(0.0))
     level = _ONSET * max(v for _, v in pieces) if onset_rate is None else onset_rate
-    problem = SmoothProblem(slider.rates, _scales(slider, start), 2, math.log(level) if level > 0 else math.inf)
+    scales = _scales(slider, start)
+    _require_near(pieces, _FARTHEST * float(scales[0]))
+    problem = SmoothProblem(slider.rates, scales, 2, math.log(level) if level > 0 else math.inf)
     history = _History(slider, problem, pieces, course, _wanted(times, pieces), method, rtol)
     name = f"{subject.name if isinstance(subject, Fault) else slider.law.name}, loaded from afar"
     area = subject.area if isinstance(subject, Fault) else 1.0
@@ -161,6 +164,15 @@ def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
     if not pieces:
         raise ParameterError("loading must hold at least one pair of (time, rate). Received none.")
     return [(float(length), float(speed)) for length, speed in pieces]
+
+
+def _require_near(pieces: list[tuple[float, float]], farthest: float) -> None:
+    travelled = sum(length * speed for length, speed in pieces)
+    if travelled > farthest:
+        raise ParameterError(
+            f"loading must move the load point by at most {_FARTHEST:.0e} critical slips, {farthest:.6g} m. "
+            f"Received {travelled:.6g} m. Shorten the duration."
+        )
 
 
 def _require_closed(slider: SpringSlider, course: PressureCourse) -> None:

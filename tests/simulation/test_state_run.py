@@ -343,6 +343,10 @@ def test_a_run_can_be_handed_on():
         ({"loading": 1e-5}, "loading must be one rate with a duration"),
         ({"loading": [(1.0, 1e-5)], "duration": 1.0}, "loading must be one rate with a duration"),
         ({"loading": []}, "at least one pair"),
+        (
+            {"loading": 1e-5, "duration": 1e30},
+            r"at most 1e\+06 critical slips, .*Received 1e\+25 m. Shorten the duration",
+        ),
         ({"loading": [(1.0, -1e-5)]}, "not negative"),
         ({"loading": [(math.inf, 1e-5)]}, "positive time"),
         ({"loading": [(1.0, 0.0)]}, "start_rate must be positive"),
