@@ -123,7 +123,8 @@ def simulate_sliding(
     require_known(method, adaptive_integrators(), "method")
     began, length = perf_counter(), fault.reference.operation_time if duration is None else duration
     require_positive(duration=length, step=float(step))
-    setting = RunSetting.of(fault, float(step), max(length, float(step)), samples or 1, settled_from)
+    kept = 1 if samples is None else samples
+    setting = RunSetting.of(fault, float(step), max(length, float(step)), kept, settled_from)
     path = PressurePath(lag=lag, diffusion=diffusion, stages=tuple(stages))
     loop = _Loop.of(fault, path, tide or Tide(), variation or SlidingVariation(), inertia)
     around = Instruments.of(path, transducer, float(step))

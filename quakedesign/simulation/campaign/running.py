@@ -85,7 +85,7 @@ class _Dispatch:
     def run(self) -> dict[int, str]:
         while self._waiting or self._suspects or self._running:
             dead = self._fill()
-            done = wait(self._running, return_when=FIRST_COMPLETED).done if self._running and not dead else ()
+            done = () if dead else wait(self._running, return_when=FIRST_COMPLETED).done
             for future in done:
                 dead += self._collect(self._running.pop(future), future)
             if dead:
@@ -94,10 +94,9 @@ class _Dispatch:
 
     def _fill(self) -> list[int]:
         """Start as many batches as are worth it; those that a broken executor refused."""
-        while (self._suspects and not self._running) or (
-            self._waiting and not self._suspects and len(self._running) < self._crew.width
-        ):
-            key = (self._suspects or self._waiting).popleft()
+        queue, most = (self._suspects, 1) if self._suspects else (self._waiting, self._crew.width)
+        while queue and len(self._running) < most:
+            key = queue.popleft()
             try:
                 self._running[self._crew.submit(self._task, *self._batches[key])] = key
             except BrokenExecutor:

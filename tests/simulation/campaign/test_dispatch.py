@@ -1,11 +1,12 @@
 """Deaths and errors of workers: who is charged, and what is kept."""
 
-from concurrent.futures import BrokenExecutor, CancelledError, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Future, wait
 
 import pytest
 
 from quakedesign.parallel import Crew, Given, SerialExecutor
-from quakedesign.simulation.campaign.running import ATTEMPTS, dispatch
+from quakedesign.simulation.campaign import running
+from quakedesign.simulation.campaign.running import dispatch
 
 
 class Frail(Crew):
@@ -14,9 +15,11 @@ class Frail(Crew):
     width = 3
 
     def __init__(self, deadly=(), deaths=10**6):
-        self.deadly, self.deaths, self.renewals, self.under_way = set(deadly), deaths, 0, []
+        self.deadly, self.deaths, self.under_way = set(deadly), deaths, []
+        self.renewals = self.submitted = 0
 
     def submit(self, task, *arguments):
+        self.submitted += 1
         future = Future()
         self.under_way.append((future, task, arguments))
         if len(self.under_way) == self.width or arguments[0] >= 100:
@@ -90,7 +93,64 @@ def test_workers_that_never_live_are_given_up():
     found, failed = run(crew, abs, 50)
     assert not found
     assert sorted(failed) == list(range(50))
-    assert crew.renewals < 10
+    assert (crew.renewals, crew.submitted) == (6, 7)  # twice the attempts for one batch, and nothing afterwards
+
+
+def test_deaths_count_in_a_row():
+    """Four deadly batches, each tried three times: workers that answer in between live."""
+    found, failed = run(Alone(deadly={1, 3, 5, 7}), abs, 9)
+    assert sorted(found) == [0, 2, 4, 6, 8]
+    assert sorted(failed) == [1, 3, 5, 7]
+
+
+class Later(Frail):
+    """Workers that begin when their answers are waited for, so that all that is under way dies together."""
+
+    def __init__(self, monkeypatch, **deaths):
+        super().__init__(**deaths)
+
+        def answers(futures, **told):
+            self._work()
+            return wait(futures, **told)
+
+        monkeypatch.setattr(running, "wait", answers)
+
+    def submit(self, task, *arguments):
+        self.under_way.append((Future(), task, arguments))
+        return self.under_way[-1][0]
+
+
+def test_suspects_are_computed_alone(monkeypatch):
+    """One death of three together, then three of the guilty batch by itself: no innocent one dies with it."""
+    crew = Later(monkeypatch, deadly={1})
+    found, failed = run(crew, abs, 9)
+    assert sorted(found) == [0, 2, 3, 4, 5, 6, 7, 8]
+    assert (list(failed), crew.renewals) == ([1], 4)
+
+
+def test_a_batch_that_broken_workers_refuse_is_not_waited_for(monkeypatch):
+    """What was under way has no answer, now or ever: it is computed again."""
+
+    class Refusing(Alone):
+        width = 2
+
+        def submit(self, task, *arguments):
+            if self.renewals:
+                return super().submit(task, *arguments)
+            if self.under_way:
+                raise BrokenExecutor
+            self.under_way.append(None)
+            return Future()
+
+        def renew(self):
+            super().renew()
+            self.under_way, self.width = [], 1
+
+    monkeypatch.setattr(
+        running, "wait", lambda futures, timeout=60.0, **told: wait(futures, min(timeout, 5.0) / 50, **told)
+    )
+    found, failed = run(Refusing(), abs, 3)
+    assert (found, failed) == ({0: 0, 1: 1, 2: 2}, {})
 
 
 @pytest.mark.parametrize("error", [ValueError("no number"), CancelledError()])
@@ -105,5 +165,5 @@ def test_an_error_is_tried_again_and_reported(error):
 
     found, failed = run(Alone(), task, 4)
     assert sorted(found) == [0, 1, 3]
-    assert tried.count(2) == ATTEMPTS
+    assert tried.count(2) == 3
     assert type(error).__name__ in failed[2]

@@ -1,6 +1,7 @@
 """Disturbance and start of a sample are what they are called."""
 
 from dataclasses import asdict, replace
+from fractions import Fraction
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,8 @@ from scipy.linalg import expm
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.laws import published
+from quakedesign.guarantees import Held
+from quakedesign.laws import published, summed_integrals
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import Load, Variation, simulate
@@ -126,3 +128,15 @@ def test_how_many_instants_are_kept_does_not_tell_campaigns_apart(monkeypatch):
     assert {k: v for k, v in longer.inputs.items() if k != "setting"} == {
         k: v for k, v in problem.inputs.items() if k != "setting"
     }
+
+
+def test_a_scheme_that_is_given_keeps_its_own_path():
+    """By name it gets the rock that a sampled law is designed for; no seed is seed 0."""
+    fault, step = load_fault("real-fault"), Fraction("0.184")
+    law = summed_integrals((Fraction(10**9),) * 4, step)
+    controller = Held(law=law, step=step, diffusion=Fraction(2)).controller
+    given = simulation_scheme("explicit")
+    assert campaign_problem(fault, controller, scheme=given, duration=1.0).scheme is given
+    named = campaign_problem(fault, controller, duration=1.0)
+    assert [stage.name for stage in named.scheme.actuator.stages] == ["diffusion"]
+    assert (named.seed, campaign_problem(fault, controller, duration=1.0, seed=3).seed) == (0, 3)

@@ -104,6 +104,10 @@ def test_a_law_that_opens_the_fault_or_leaves_all_sizes_is_a_result(tmp_path):
     assert set(by_kind["opened"].events) == {"opening"}
     assert (set(by_kind["diverged"].events), by_kind["diverged"].figures) == ({"diverged"}, {})
     assert found.to_dict()["quantiles"]["peak_slip_rate"]["1"] is None
+    run = found.trajectory([outcome.kind for outcome in found.outcomes].index("diverged"), samples=3)
+    told = {name: value for name, value in run.metrics.to_dict().items() if value is not None}
+    assert set(told) == {"settled_from", "steps", "seconds"}
+    assert told["steps"] == round(run.time[-1] / (STEP / 4))
 
 
 def test_what_a_run_goes_through_is_the_actuators(tmp_path):
