@@ -10,6 +10,7 @@ from .fault import scaled_fault as scaled_fault
 from .guarantees import load_guarantee as load_guarantee
 from .identification import identify as identify
 from .laws import Controller as Controller
+from .laws import SampledLaw as SampledLaw
 from .laws import published as published
 from .loop.loop_setup import LoopSetup as LoopSetup
 from .lyapunov import Certificate as Certificate

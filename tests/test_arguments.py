@@ -97,7 +97,10 @@ WRONG = {
     "no task": (lambda: guarantee(3, 3), "task of guarantee must be an UncertainPlant. Received 3"),
     "no campaign": (lambda: run_campaign(None, 3, "x"), "must be a CampaignProblem. Received None"),
     "no such quantity": (lambda: qd.guarantee(LAB, wind=Fraction(1)), "quantity of the loop setup must be .*'wind'"),
-    "no law to guarantee": (lambda: qd.guarantee(LAB, controller=3), "a class derived from a Controller. Received 3"),
+    "no law to guarantee": (
+        lambda: qd.guarantee(LAB, controller=3),
+        "a class derived from a Controller or a Controller. Received 3",
+    ),
     "a number as a box": (lambda: LAB.with_box(3), "name of Fault.with_box must be a text. Received 3"),
     "a text as slip": (lambda: LAB.moment_of("x"), "slip of Fault.moment_of must be a number. Received 'x'"),
     "no premise": (lambda: DESIGN.with_premise(3), "premise of Design.with_premise must be a Premise. Received 3"),

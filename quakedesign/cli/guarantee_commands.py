@@ -49,6 +49,7 @@ def guarantee(
     controller: str = "elqr",
     objective: Literal["tracking", "peak"] = "tracking",
     gains: Gains = (),
+    law: Path | None = None,
     scheme: str | None = None,
     step: ExactSeconds | None = None,
     measured: Literal["slip-and-rate", "slip", "differentiator"] = "slip-and-rate",
@@ -80,6 +81,8 @@ def guarantee(
     gains
         k1 to k4 of an e-LQR whose integrals are summed once per sample; by default a law with a disturbance estimate is
         designed. For a sliding mode its base gains, scaled by λ.
+    law
+        File of your own sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
         Sliding modes: compensated (default); no other scheme has a guarantee. The e-LQR runs in explicit.
     step
@@ -111,6 +114,10 @@ def guarantee(
     setup = around.setup(step=step, measured=measured)
     asked: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "stress": stress}
     asked |= {"disturbance_class": disturbance_class, "spread": spread, "plant": plant}
+    if law is not None:
+        from quakedesign.laws import SampledLaw
+
+        asked["law"] = SampledLaw.load(law)
     calls = [partial(guaranteed, one, controller, setup, **asked) for one in faults]
     with progress() as tell:
         if not more and scheduler is None and workers == 1:

@@ -244,6 +244,8 @@ class LawOptions:
         Certificate file of guarantee --out instead of the options above: its law runs with its T_s, limit, noise,
         delay, lag and diffusion path. In slow sliding the shear stress is a sine of the certified amplitude unless
         --stress is given.
+    law
+        File of your own sampled linear law (.json or .npz, see SampledLaw.load) instead of the options above.
     """
 
     controller: str = "cta"
@@ -251,6 +253,7 @@ class LawOptions:
     scale: str | None = None
     feedforward: str = "none"
     certificate: Path | None = None
+    law: Path | None = None
 
     def choose(
         self, fault: "Fault", step: float | None = None, path: dict[str, float] | None = None
@@ -259,9 +262,17 @@ class LawOptions:
 
         A designed one is for a T_s [s], the fault's unless given, and a path, see `quakedesign.studies.runs.choice`.
         """
-        from quakedesign.studies.runs import certified_choice, optional_choice
+        from quakedesign.laws import SampledLaw
+        from quakedesign.studies.runs import Choice, certified_choice, optional_choice
 
         told = {"scale": self.scale, "feedforward": self.feedforward}
+        if self.law is not None:
+            if self != replace(type(self)(), law=self.law):
+                raise ParameterError(
+                    f"--law contains the law with its T_s. Received it with another option of a law, such as "
+                    f"--controller or --certificate, and {self.law}. Omit these options."
+                )
+            return Choice(controller=SampledLaw.load(self.law))
         if self.certificate is None:
             return optional_choice(fault, self.controller, self.gains, **told, step=step, path=path)
         usual, own = type(self)(), {"gains": " ".join(self.gains)}

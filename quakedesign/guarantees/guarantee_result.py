@@ -82,6 +82,8 @@ class LoopAnswer:
         has one, all else as it is; `GAINS` for a design in place of given gains.
     compensation : Compensation or None
         Gains, scale and settings of a sliding mode that runs in the scheme ``compensated``.
+    notes : tuple of str or None
+        Of a user's law: what was changed when its floats became exact numbers; None for others.
     """
 
     fault: Fault
@@ -92,6 +94,7 @@ class LoopAnswer:
     asked_step: Fraction | None = None
     nearest: tuple[str, Guarantee] | None = None
     compensation: Compensation | None = None
+    notes: tuple[str, ...] | None = None
 
     @property
     def proved(self) -> bool:
@@ -99,7 +102,10 @@ class LoopAnswer:
         return self.found.proved
 
     def lines(self) -> list[str]:
-        """Lines of text: the guarantee first, then the worst case found."""
+        """Lines of text: the guarantee first, then the worst case found, then what was changed in the law."""
+        return [*self._lines(), *(self.notes or ())]
+
+    def _lines(self) -> list[str]:
         if not self.found.proved:
             said = [self.found.sentence()]
             if self.asked_step is not None:
@@ -108,7 +114,7 @@ class LoopAnswer:
                 said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             if self.nearest is not None:
                 said.append(f"{_with_nearest(*self.nearest)}: {self.nearest[1].sentence()}")
-            if len(said) == 1:
+            if len(said) == 1 and self.notes is None:
                 said.append("no T_s was found for which a design is proved with this box, disturbance and setup")
             return said
         said = [f"proved: {self.found.sentence()}", *self._at_rest()]
@@ -226,6 +232,7 @@ class LoopAnswer:
                 "small_gain": None if gain is None else gain.exact,
                 "shorter": shorter,
                 "nearest": self.nearest and _nearest(*self.nearest),
+                **({} if self.notes is None else {"notes": list(self.notes)}),
             }
         bounds, held = self.found.bounds(), self.found.held
         small = None if isinstance(bounds, NoGuarantee) else float_above(bounds.small_gain)
@@ -244,6 +251,7 @@ class LoopAnswer:
             **{name: str(getattr(held, name)) for name in _TOLD},
             "pump": None if held.pump is None else held.pump.to_dict(),
             "law": _law(held.law),
+            **({} if self.notes is None else {"notes": list(self.notes)}),
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
 

@@ -31,3 +31,4 @@ from .sampled_law import summed_integrals as summed_integrals
 from .sliding_mode import SlidingMode as SlidingMode
 from .stick_slip_controller import StickSlipController as StickSlipController
 from .stick_slip_law import StickSlipLaw as StickSlipLaw
+from .user_law import SampledLaw as SampledLaw

@@ -10,7 +10,7 @@ from quakedesign.exact import rational
 from quakedesign.laws.base import BaseGains, Controller, Law
 from quakedesign.laws.loop_field import LoopField
 
-_OF_MATRICES = "sampled", "stick-slip"
+_OF_MATRICES = "sampled", "stick-slip", "user-law"
 """Laws that are not made of gains in order."""
 Subject = str | type[Law] | LoopField
 """What a claim can be about: the name of a law of the package, a law of the user's own, or a bare closed loop."""

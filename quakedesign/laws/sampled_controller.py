@@ -133,8 +133,17 @@ class SampledController(Controller):
 
     @property
     def of_slip(self) -> LinearLaw | None:
-        """The law, if it does without the slip rate."""
-        return self.law if self.law.of_slip_alone else None
+        """The law, if it does without the slip rate and measures the slip error."""
+        return self.law if self.law.of_slip_alone and not self.law.of_reference else None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was changed when floats of a user's law became exact numbers."""
+        return ()
+
+    def behind(self, **path: Fraction) -> Self:
+        """The law with other delay, lag, diffusion or longest interval [s] between law and fault in runs."""
+        return replace(self, **path)  # type: ignore[arg-type]
 
     @property
     def while_moving(self) -> "SampledController":
@@ -162,11 +171,13 @@ class SampledController(Controller):
         told = self.law.applied or (Fraction(0),) * len(self.law.states)
         rows = zip(self.law.update, self.law.measured, told, z, strict=False)
         rates = [(_combined((*own, *fed), seen) - state) / period + to_sympy(h) * cut for own, fed, h, state in rows]
+        rates = [rate + added / period for rate, added in zip(rates, self._of_reference(signals)[:-1], strict=True)]
         return (*rates, *((new - old) / period for new, old in zip(after, z[len(rates) :], strict=True)))
 
     def _decided(self, signals: Signals) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...]]:
         """The pressure that is applied, what that is more than is asked for, over T_s, and the limit's states after."""
         asked = _combined((*self.law.output, *self.law.feedback), self._read(signals))
+        asked += self._of_reference(signals)[-1]
         if self.rest_limit is None:
             return asked, sp.S.Zero, ()
         states = signals.integrals[len(self.law.states) :]
@@ -178,6 +189,12 @@ class SampledController(Controller):
 
     def _read(self, signals: Signals) -> tuple[Any, ...]:
         return (*signals.integrals[: len(self.law.states)], signals.slip_error, signals.slip_rate_error)
+
+    def _of_reference(self, signals: Signals) -> list[sp.Expr]:
+        """What r and r′ add to z⁺ and, last, to p."""
+        moves = signals.slip - signals.slip_error, signals.slip_rate - signals.slip_rate_error
+        rows = self.law.of_reference or ((Fraction(0),) * 2,) * (len(self.law.states) + 1)
+        return [_combined(row, moves) for row in rows]
 
     @classmethod
     def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:

@@ -50,6 +50,9 @@ class LinearLaw:
         S, two columns: z = S(e1, e2) at the first sample, as they are measured then; without rows 0.
     applied : tuple of Fraction
         What z⁺ gains per Pa that is applied beyond p, where limits cut it off; without entries the law is not told.
+    of_reference : tuple of rows
+        Two columns, for r [m] and r′ [m/s]: what they add to z⁺, row by row, and in a last row to p [Pa]. A law that
+        measures the slip x1 = e1 + r has the same entries here as in `measured` and `feedback`. Without rows 0.
 
     Raises
     ------
@@ -65,6 +68,7 @@ class LinearLaw:
     root: ImplicitRoot | None = None
     first: Matrix = ()
     applied: Row = field(default=(), compare=False)
+    of_reference: Matrix = ()
 
     def __post_init__(self) -> None:
         seen = len(MEASURED) + (self.root is not None)
@@ -78,6 +82,12 @@ class LinearLaw:
             raise ParameterError(
                 f"applied of a linear law must have {len(self.states)} entries, one a state, or be empty. "
                 f"Received {len(self.applied)}."
+            )
+        if self.of_reference and [len(row) for row in self.of_reference] != [2] * (len(self.states) + 1):
+            raise ParameterError(
+                f"of_reference of a linear law must have {len(self.states) + 1} rows of 2 entries, the last one for "
+                f"the pressure, or be empty. Received rows of {', '.join(str(len(row)) for row in self.of_reference)} "
+                "entries."
             )
 
     @property

@@ -55,6 +55,8 @@ def held_loop(
     With an implicit root the loop has w = −γe1/T_s with the middle of its slopes, and w + γe1/T_s [m/s] is the sampled
     input ``root``. If asked for, what the measured e1 and e2 are more than the true ones are the sampled inputs
     ``slip_noise`` [m] and ``rate_noise`` [m/s]: the law does with them what it does with e1 and e2, w included.
+    Of a law that is given r and r′ as well, r′ is an input twice: ``reference`` moves its states away from those that
+    ask for p* at r, and the sampled ``reference_rate`` is what it makes of r′ [m/s].
 
     Where instants may be off there is one state more, the valve's last step, which the output ``stepped`` is [m/s²].
     The input ``late`` is b times what the valve's pressure is more than on schedule, at most its last step or the next
@@ -89,6 +91,9 @@ def held_loop(
     slope = Fraction(0) if law.root is None else law.root.middle / step
     jump = tuple((row[0] - slope * row[n], *row[1:n]) for row in sample)
     sampled = {} if law.root is None else {"root": tuple(row[n] for row in sample)}
+    moving = {"reference": _reference_drift(law, path)} if law.of_reference else {}
+    if law.of_reference:
+        sampled["reference_rate"] = tuple(row[n + 1] for row in sample)
     for k, name in enumerate(NOISES):
         if name in noisy:
             sampled[name] = tuple(row[k] - (i == k) for i, row in enumerate(jump))
@@ -101,7 +106,7 @@ def held_loop(
         states=("e1", "e2", *law.states, *(f"waiting{i}" for i in range(path.waiting)), "valve", *path.behind),
         flow=_flow(path, push, model, model.gain / authority),
         segments=tuple(Segment(jump=j, duration=time, ends=ends, past_ends=past_ends) for j, time in maps),
-        inputs={"acceleration": _unit(n, 1), "drift": _drift(law, authority, path)},
+        inputs={"acceleration": _unit(n, 1), "drift": _drift(law, authority, path), **moving},
         outputs={"slip_error": _unit(n, 0), "slip_rate_error": _unit(n, 1), "push": push, **left_out, **asked},
         sampled=sampled,
         fading=fading,
@@ -224,6 +229,15 @@ def _drift(law: LinearLaw, authority: Fraction, path: _Path) -> Row:
     return (zero, zero, *(-v / authority for v in steady), *pressures, *[zero] * len(path.behind))
 
 
+def _reference_drift(law: LinearLaw, path: _Path) -> Row:
+    """What a change of r does to the states, which are counted from those that ask for p* at r."""
+    still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
+    rates = tuple(-row[0] for row in law.of_reference[:-1])
+    moved = steady_states(still, law.output, rates, -law.of_reference[-1][0])
+    zero = Fraction(0)
+    return (zero, zero, *(-v for v in moved), *[zero] * (path.size - 2 - path.own))
+
+
 def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
     """Steady states of a law with zero errors: Mz = v and Cz = p, by elimination.
 
@@ -291,18 +305,20 @@ def _left_out(path: _Path) -> tuple[dict[str, Row], dict[str, Fading]]:
 
 
 def _events(law: LinearLaw, authority: Fraction, path: _Path) -> tuple[Matrix, Matrix]:
-    """The sample, with one more column for w, and the arrival of a pressure between samples, if that is where it is."""
+    """The sample, with columns more for w and r′, and the arrival of a pressure between samples, if there is one."""
     n, valve, first, zero = path.size, path.valve, 2 + path.own, Fraction(0)
-    jump = [list(_unit(n + 1, i)) for i in range(n)]
-    asked = [zero] * (n + 1)
+    jump = [list(_unit(n + 2, i)) for i in range(n)]
+    asked = [zero] * (n + 2)
     asked[0], asked[1] = (authority * v for v in law.feedback[:2])
     asked[n] = authority * sum(law.feedback[2:], zero)
-    for i, fed, kept in zip(range(2, first), law.measured, law.update, strict=True):
-        jump[i] = [*fed[:2], *kept, *[zero] * (n - first), sum(fed[2:], zero)]
+    *moved, asked[n + 1] = [row[1] for row in law.of_reference] or [zero] * (path.own + 1)
+    asked[n + 1] *= authority
+    for i, fed, kept, r_rate in zip(range(2, first), law.measured, law.update, moved, strict=True):
+        jump[i] = [*fed[:2], *kept, *[zero] * (n - first), sum(fed[2:], zero), r_rate]
         asked[i] = authority * law.output[i - 2]
     line = [*range(first, valve), *([] if path.part else [valve])]
     for place, before in zip(reversed(line), [*reversed(line[:-1]), None], strict=True):
-        jump[place] = asked if before is None else list(_unit(n + 1, before))
+        jump[place] = asked if before is None else list(_unit(n + 2, before))
     arrival = [list(_unit(n, valve - 1 if i == valve else i)) for i in range(n)]
     if path.part:
         return tuple(map(tuple, jump)), _stepped(arrival, path)

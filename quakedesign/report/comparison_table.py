@@ -4,13 +4,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from quakedesign.fault import Fault
+from quakedesign.laws import Controller
 from quakedesign.loop import simulation_scheme
 from quakedesign.report.figures import figures
 from quakedesign.report.page import table_html
 from quakedesign.report.sentences import headline, remarks, said
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared, designs_of
 from quakedesign.studies.runs import StateRun
-from quakedesign.synthesis import Design
+from quakedesign.synthesis import Design, assess
 
 
 class Comparison(Compared):
@@ -49,7 +50,7 @@ class Comparison(Compared):
 
 def compare(
     fault: Fault,
-    designs: Sequence[Design] = (),
+    designs: Sequence[Design | Controller] = (),
     *,
     with_published: bool = True,
     scheme: str | None = None,
@@ -62,8 +63,8 @@ def compare(
     Parameters
     ----------
     fault : Fault
-    designs : sequence of Design
-        Designed controllers; one without a controller is reported and not run.
+    designs : sequence of Design, Controller or SampledLaw
+        Designed controllers; one without a controller is reported and not run. Users' laws are assessed first.
     with_published : bool
         Add the paper's gains, where the fault has any, with their verdicts and premises; not beside designs that act
         behind a delay, a lag or rock, which those do not know.
@@ -83,7 +84,8 @@ def compare(
     schemes = {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}
     tell = progress or (lambda _what, _done: None)
     how: dict[str, Any] = {"with_published": with_published, "whole_task": whole_task, "schemes": schemes}
-    return Comparison(**vars(compared(fault, designs, tell, **how)))
+    judged = [one if isinstance(one, Design) else assess(fault, one) for one in designs]
+    return Comparison(**vars(compared(fault, judged, tell, **how)))
 
 
 def designed_comparison(

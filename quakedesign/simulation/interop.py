@@ -15,14 +15,16 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.errors import ParameterError, UnsupportedError, require_known
 from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.model import require_finite
 from quakedesign.laws import Controller, Sampling
 from quakedesign.laws.sampled_controller import integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.loop import Actuator, Delay, simulation_scheme
 from quakedesign.loop.discrete_law import DiscreteLaw
+from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.loop.schemes.base import control_step
+from quakedesign.plant import uncertain_plant
 from quakedesign.simulation.closed_loop import ClosedLoop, acceleration_with_parameters, casadi_function
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_numpy
@@ -246,33 +248,92 @@ def resting_pressure(fault: Fault, slip: float) -> float:
     return fault.effective_normal_stress - load / there
 
 
-def to_statespace(fault: Fault, at: float = 0.0) -> Any:
-    """Return the fault linearised about rest at a slip, held there by pressure.
+def to_statespace(
+    fault: Fault,
+    at: float = 0.0,
+    setup: LoopSetup = IDEAL,
+    *,
+    vertex: Sequence[str] = (),
+    disturbance: bool = False,
+    **given: Quantity | None,
+) -> Any:
+    """Return the fault linearised about rest at a slip, held there by pressure; with what lies before it, if wanted.
 
     Parameters
     ----------
     fault : Fault
     at : float
         Slip [m] of the equilibrium; the pressure is that of `resting_pressure`.
+    setup : LoopSetup
+        Step, delay, lag and diffusion path. With a step the plant is one in discrete time under a pressure that is held
+        over it; a delay needs one.
+    vertex : sequence of str, optional
+        ``"low"``, ``"middle"`` or ``"high"`` for the slope in slip s, the damping w and the input gain of the ranges
+        that `guarantee` is about, in place of the linearisation at a slip: ``("high", "low", "high")``.
+    disturbance : bool
+        Whether the acceleration that disturbs it [m/s²] is an input too, constant over a step.
+    **given : str, float or Fraction
+        Fields of `LoopSetup` that replace those of `setup`, such as ``step="184 ms"``.
 
     Returns
     -------
     control.StateSpace
-        Of deviations: input ``p`` [Pa], outputs and states ``slip`` [m] and ``slip_rate`` [m/s]; on the side of
-        forward slip where friction has a kink.
+        Of deviations: input ``p`` [Pa], and ``disturbance`` [m/s²]; outputs ``slip`` [m] and ``slip_rate`` [m/s], the
+        first states; on the side of forward slip where friction has a kink.
 
     Raises
     ------
     ParameterError
-        For friction with a state, or a slip that is no number.
+        For friction with a state, a slip that is no number, or a delay without a step.
     """
     import control
 
     require_finite(at=at)
     pressure = resting_pressure(require_fault(fault), at)
-    linear = to_iosystem(fault).linearize([at, 0.0], [pressure])
-    seen = ["slip", "slip_rate"]
-    return control.ss(linear, name=fault.name, inputs=["p"], outputs=seen, states=seen)
+    setup = setup.with_given(**given)
+    if unknown := setup.given().keys() - {"step", "delay", "lag", "diffusion"}:
+        raise ParameterError(
+            f"a plant has step, delay, lag and diffusion of the loop setup. Received {', '.join(sorted(unknown))}. "
+            "Omit these."
+        )
+    if setup.delay and setup.step is None:
+        raise ParameterError("a delay needs a step, as a plant in discrete time. Received a delay alone. Give step.")
+    if vertex:
+        A, B = _vertex(fault, tuple(vertex))
+    else:
+        linear = to_iosystem(fault).linearize([at, 0.0], [pressure])
+        A, B = linear.A, linear.B
+    seen, pushed = ["slip", "slip_rate"], ["disturbance"] * disturbance
+    before = Sampling(step=setup.step or Fraction(1), lag=setup.lag, diffusion=setup.diffusion)
+    path = _linear(_flow_system(Actuator.meant_for(before)), ("p",))
+    n = path.nstates
+    A = np.block([[A, B @ path.C], [np.zeros((n, 2)), path.A]])
+    B = np.column_stack([np.vstack([B @ path.D, path.B]), np.eye(2 + n)[:, [1] * disturbance]])
+    states = [*seen, *(f"path{i + 1}" for i in range(n))]
+    plant = control.ss(
+        A, B, np.eye(2, 2 + n), np.zeros((2, B.shape[1])), name=fault.name, inputs=["p", *pushed], outputs=seen,
+        states=states,
+    )  # fmt: skip
+    return plant if setup.step is None else _held(plant, setup.step, setup.delay)
+
+
+_ENDS = ("low", "middle", "high")
+
+
+def _vertex(fault: Fault, ends: tuple[str, ...]) -> tuple[Any, Any]:
+    """A and B at ends of the ranges of s, w and input gain."""
+    if len(ends) != 3:
+        raise ParameterError(
+            "vertex must be three of low, middle and high, for slope, damping and input gain. "
+            f"Received {len(ends)}: {', '.join(map(str, ends))}."
+        )
+    known = uncertain_plant(fault)
+    found = []
+    for end, (low, high) in zip(ends, (known.slip_chord, known.rate_chord, known.beta), strict=True):
+        require_known(end, _ENDS, "end of a range")
+        found.append(float((low, (low + high) / 2, high)[_ENDS.index(end)]))
+    s, w, beta = found
+    return np.array([[0.0, 1.0], [s, -w]]), np.array([[0.0], [beta * float(known.authority)]])
 
 
 def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actuator: Actuator | None = None) -> Any:
@@ -480,7 +541,7 @@ def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:
     """A plant as it is seen every step [s] under a pressure that is held as long, from a delay [s] later on.
 
     Exact: with the delay m + f steps the held pressure of m + 1 samples ago acts for f steps, then that of m ago. Those
-    that wait are further states.
+    that wait are further states. Other inputs of the plant are constant over a step.
     """
     import control
 
@@ -496,7 +557,9 @@ def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:
     A[:n, n:], B[:n] = arriving[:, 1:], arriving[:, :1]
     A[n + 1 :, n:-1], B[n : n + 1] = np.eye(max(waiting - 1, 0)), 1.0
     C = np.column_stack([plant.C, np.zeros((plant.noutputs, waiting))])
-    return control.ss(A, B, C, plant.D, float(step), inputs=["p"], outputs=plant.output_labels)
+    whole_step = control.sample_system(plant, float(step), method="zoh")
+    B = np.column_stack([B, np.vstack([whole_step.B[:, 1:], np.zeros((waiting, plant.ninputs - 1))])])
+    return control.ss(A, B, C, plant.D, float(step), inputs=plant.input_labels, outputs=plant.output_labels)
 
 
 def _linear(system: Any, names: tuple[str, ...]) -> Any:

@@ -331,7 +331,7 @@ def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any,
     return asked
 
 
-def assess(fault: Fault, controller: Controller) -> Design:
+def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL) -> Design:
     """Verdict, certificate and premises of given gains on a fault.
 
     Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's
@@ -342,10 +342,14 @@ def assess(fault: Fault, controller: Controller) -> Design:
     ----------
     fault : Fault
     controller : Controller
+    setup : LoopSetup
+        Of a sampled linear law.
 
     Returns
     -------
     Design
     """
     fault.require_memoryless("a verdict on gains")
-    return GainProblem(fault=fault, answer=Design).assessed(controller)
+    if setup != IDEAL and controller.sampling is None:
+        raise ParameterError("a loop setup needs a law of samples. Received a law in continuous time. Omit setup.")
+    return GainProblem(fault=fault, answer=Design, setup=setup).assessed(controller)

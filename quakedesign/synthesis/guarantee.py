@@ -75,9 +75,10 @@ _OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise
 
 def guarantee(
     fault: Fault,
-    controller: str | type[Controller] = "elqr",
+    controller: str | type[Controller] | Controller = "elqr",
     setup: LoopSetup = IDEAL,
     *,
+    law: Controller | None = None,
     objective: str = "tracking",
     gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]" = (),
     scheme: str | None = None,
@@ -95,10 +96,12 @@ def guarantee(
     Parameters
     ----------
     fault : Fault
-    controller : str or type of Controller
-        ``elqr``, or a sliding mode, ``cta`` or ``dia``.
+    controller : str, type of Controller, or SampledLaw
+        ``elqr``, or a sliding mode, ``cta`` or ``dia``; or a user's law.
     setup : LoopSetup
-        Sampling, delay, lag, diffusion path, noise, jitter, pump and initial errors.
+        Sampling, delay, lag, diffusion path, noise, jitter, pump and initial errors. A user's law has its own T_s.
+    law : SampledLaw, optional
+        The same as a user's law as `controller`.
     objective : str
         Of a design: ``tracking``, or ``peak`` for the smallest proved slip-rate error.
     gains : sequence or array of str, float or Fraction, optional
@@ -137,6 +140,22 @@ def guarantee(
     """
     setup = setup.with_given(**given)
     require_known(plant, PLANTS, "plant")
+    if law is None and isinstance(controller, Controller):
+        law = controller
+    elif law is not None and controller != "elqr":
+        raise ParameterError("law and controller are the same argument. Received both. Omit controller.")
+    if law is not None:
+        usual = (plant, objective, tuple(gains), scheme) == (PLANTS[0], OBJECTIVES[0], (), None)
+        if not usual or exact_value(spread, "", "spread") or stress is not None or fault.friction.state_names:
+            raise ParameterError(
+                "a user's law is guaranteed as it is, for friction without a state and the plant continued. Received "
+                f"it with {fault.friction.name} friction, or with plant, objective, gains, scheme, stress or spread. "
+                "Omit these."
+            )
+        require_known(disturbance_class, CLASSES, "class")
+        task = uncertain_plant(fault, rate_limited=disturbance_class == "rate")
+        return method_of(type(law)).given(fault, task, law, setup)
+    assert not isinstance(controller, Controller)
     if plant == PLANTS[1]:
         if fault.friction.state_names:
             raise ParameterError(
@@ -181,9 +200,9 @@ def guarantee(
             f"stress and spread need friction with a state. Received {fault.friction.name}. Omit both."
         )
     require_known(disturbance_class, CLASSES, "class")
-    task, law = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
+    task, family = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
     wanted = Wanted(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
-    return _sampled(fault, task, law, wanted)
+    return _sampled(fault, task, family, wanted)
 
 
 def _sampled(fault: Fault, task: UncertainPlant, law: type[Controller], wanted: Wanted) -> LoopAnswer:

@@ -4,7 +4,7 @@ The base method also judges a law that belongs to no family.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache
 from typing import Any, ClassVar, Generic, TypeVar
@@ -13,7 +13,7 @@ import sympy as sp
 
 from quakedesign.discovery import discovered
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.exact import to_sympy
+from quakedesign.exact import apart, to_sympy
 from quakedesign.fault import Fault
 from quakedesign.guarantees import (
     CLASSES,
@@ -27,10 +27,13 @@ from quakedesign.guarantees import (
     SlidingGuarantee,
     best_guarantee,
 )
+from quakedesign.guarantees.search.adversary import worst_found
+from quakedesign.guarantees.search.estimate import spectral_radius
 from quakedesign.laws import Controller, SampledController, Signals, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.linear.robust_stability import sector_loop
 from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.loop.error_loop import steady_states
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup
 from quakedesign.lyapunov import Certificate, Verdict, decided_once
 from quakedesign.lyapunov.exact.domain import Domain
@@ -265,6 +268,19 @@ class DesignMethod(Generic[L]):
         reason = f"no analysis of {law.title} under a held pressure is known here"
         return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
 
+    def given(self, fault: Fault, task: UncertainPlant, controller: L, setup: LoopSetup) -> LoopAnswer:
+        """Guarantee of a controller as it is, in a loop setup.
+
+        Raises
+        ------
+        UnsupportedError
+            For one that is not a sampled linear law.
+        """
+        raise UnsupportedError(
+            "guarantee takes a sampled linear law as it is, and others by name with gains. Received "
+            f"{controller!r:.80}. Give its name and gains, or a SampledLaw."
+        )
+
 
 @cache
 def methods() -> dict[str, DesignMethod[Any]]:
@@ -303,7 +319,8 @@ class Samples(DesignMethod[SampledController]):
 
     def assess(self, problem: GainProblem[Designed], controller: SampledController) -> Designed:
         """By the guarantee."""
-        return problem.judged(controller, runs=self.guarantee(problem.fault, problem.task, controller, problem.setup))
+        found = self.guarantee(problem.fault, problem.task, controller, problem.setup)
+        return problem.judged(controller.behind(**problem.setup.path), runs=found)
 
     def premises(
         self, fault: Fault, controller: SampledController, certificate: Certificate | None
@@ -314,6 +331,42 @@ class Samples(DesignMethod[SampledController]):
     def guarantee(
         self, fault: Fault, task: UncertainPlant, controller: SampledController, setup: LoopSetup
     ) -> Guarantee | NoGuarantee:
-        """At its own T_s, with its own delay, lag and diffusion path."""
-        own, noise = controller.sampling.path, setup.noise
-        return best_guarantee(task, Held(law=controller.law, step=controller.step, **own, **noise))
+        """At its own T_s, with its own delay, lag and diffusion path where the loop setup has none."""
+        law, step = controller.law, controller.step
+        if setup.step is not None and setup.step != step:
+            own, asked = apart(step, setup.step)
+            raise ParameterError(
+                f"step of the loop setup must be that of the law, {own} s. Received {asked} s. Omit step, or give a "
+                "law for that step."
+            )
+        if setup.measured == MEASURED[2] or (setup.measured == MEASURED[1] and not law.of_slip_alone):
+            raise ParameterError(
+                "a law is given with the signals that it measures: measured must be slip-and-rate, or slip for a law "
+                f"of the slip alone. Received {setup.measured!r}. Omit measured."
+            )
+        around: Any = controller.sampling.path | setup.around()
+        still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
+        try:
+            steady_states(still, law.output, (Fraction(0),) * len(law.states), Fraction(1))
+        except ParameterError:
+            return NoGuarantee(reason=_STANDING, small_gain=None)
+        held = Held(law=law, step=step, **around)
+        found = best_guarantee(task, held)
+        if found.proved or found.small_gain is not None or held.longest_step:
+            return found
+        largest = spectral_radius(held.loop(task))
+        if largest < 1:
+            return found
+        return replace(found, reason=f"{found.reason}: of a period it has an eigenvalue of size {largest:.4g}")
+
+    def given(self, fault: Fault, task: UncertainPlant, controller: SampledController, setup: LoopSetup) -> LoopAnswer:
+        """With the worst case found beside it, of a law of the errors alone."""
+        found = self.guarantee(fault, task, controller, setup)
+        worst = worst_found(found) if found.proved and not controller.law.of_reference else None
+        return LoopAnswer(fault=fault, found=found, worst=worst, notes=controller.notes)
+
+
+_STANDING = (
+    "the law leaves an error under a constant pressure at rest, as it has no integral action: give it an integral of "
+    "the slip error or an estimate of the disturbance"
+)

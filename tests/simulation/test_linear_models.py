@@ -16,6 +16,7 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.laws import Prediction, SampledController, disturbance_estimate
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Saturation
+from quakedesign.plant import uncertain_plant
 from quakedesign.simulation.interop import resting_pressure
 
 REAL = qd.load_fault("real-fault")
@@ -247,3 +248,42 @@ def test_rock_answers_as_its_cells_do():
 def test_stages_that_are_not_linear_and_delays_without_samples_have_no_transfer_function(law, stage):
     with pytest.raises(UnsupportedError, match=rf"takes a lag, a diffusion path and.*Received {stage.name}"):
         qd.loop_transfer(REAL, law, actuator=Actuator(stages=(stage,)))
+
+
+def test_a_plant_behind_delay_and_lag_is_held_over_its_step_with_its_disturbance():
+    """By matrix exponentials of plant and lag together, in the two parts of a period."""
+    plant = qd.to_statespace(REAL, step="0.1 s", delay="0.13 s", lag="0.05 s", disturbance=True)
+    free = qd.to_statespace(REAL)
+    s, w, gain = free.A[1, 0], -free.A[1, 1], free.B[1, 0]
+    flow = np.array([[0, 1, 0, 0, 0], [s, -w, gain, 0, 1], [0, 0, -20, 20, 0], [0] * 5, [0] * 5])
+    assert plant.input_labels == ["p", "disturbance"]
+    pressures, pushes = np.random.default_rng(3).standard_normal((2, 9)) * [[1e6], [1e-3]]
+    x, expected = np.zeros(3), []
+    for k in range(9):
+        expected.append(x[:2])
+        before, after = (pressures[k - late] if k >= late else 0 for late in (2, 1))
+        x = (expm(flow * 0.03) @ [*x, before, pushes[k]])[:3]
+        x = (expm(flow * 0.07) @ [*x, after, pushes[k]])[:3]
+    got = control.forced_response(plant, np.arange(9) * 0.1, np.array([pressures, pushes])).outputs
+    assert got.T == pytest.approx(np.array(expected), rel=1e-6)
+
+
+def test_a_vertex_of_the_box_is_that_of_the_guarantee():
+    known = uncertain_plant(REAL)
+    plant = qd.to_statespace(REAL, vertex=("high", "middle", "low"))
+    assert plant.A[1] == pytest.approx([float(known.slip_chord[1]), -float(sum(known.rate_chord) / 2)])
+    assert plant.B[1, 0] == pytest.approx(float(known.authority))
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"delay": "1 s"}, "a delay needs a step"),
+        ({"step": "1 s", "slip_noise": "1 m"}, "a plant has step, delay, lag and diffusion"),
+        ({"vertex": ("high", "low")}, "vertex must be three"),
+        ({"vertex": ("high", "low", "most")}, "end of a range"),
+    ],
+)
+def test_a_plant_that_is_not_there_is_refused(more, said):
+    with pytest.raises(ParameterError, match=said):
+        qd.to_statespace(REAL, **more)

@@ -95,6 +95,9 @@ def of_class(
         wide = (high - low) / 2 / loop.step
         own.append(loop.root.remainder + wide * (loop.noise[0] + loop.off * task.reference_rate))
         shares.append([wide, *none[1:]])
+    if loop.referred:
+        own += [task.reference_rate] * 2
+        shares += [none] * 2
     for k in loop.told:
         own.append(loop.noise[k] + loop.off * (task.reference_acceleration + force if k else task.reference_rate))
         moves = [max(map(abs, ends)) for ends in (task.s, task.w, task.beta)] if k else [Fraction(0), Fraction(1)]

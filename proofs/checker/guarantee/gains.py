@@ -192,7 +192,7 @@ def input_gains(loop: Loop) -> list[list[list[Fraction]]]:
     """Gains of every input."""
     fades = len(loop.inputs) - 1 if loop.fade else None
     return [
-        gains(loop, entry, place > 1 and place != fades, *[loop.fade] * (place == fades))
+        gains(loop, entry, place > 1 + loop.referred and place != fades, *[loop.fade] * (place == fades))
         for place, entry in enumerate(loop.inputs)
     ]
 

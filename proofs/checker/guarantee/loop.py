@@ -52,8 +52,10 @@ class Loop:
     """Flow x' = Ax, then events (map, time until the next one; none in continuous time), inputs, the implicit step.
 
     The first two inputs flow; those of the implicit step and of the noise, if there are any, enter with the first
-    event. `noise` bounds what the measured e1 and e2 are off, an input each where it is not 0. Without events there may
-    be two inputs more, the second and third derivatives of the reference.
+    event. Where a law is told of the reference itself (`referred`), two more come before these: one that flows, and
+    one that enters with the first event, both bounded by the rate of the reference. `noise` bounds what the measured
+    e1 and e2 are off, an input each where it is not 0. Without events there may be two inputs more, the second and
+    third derivatives of the reference.
     With a layer of rock, L^2/D = `layer`, a fourth output bounds what its modes leave out; where `fade` is given, that
     is one more input, the last one. Where `asked`, the last output is the pressure at the valve. `start` has the
     columns of the box from which it starts, none where that is rest. `pump` has its limits as told. Where the
@@ -81,6 +83,7 @@ class Loop:
     off: Fraction = Fraction(0)
     told: list[int] = field(default_factory=list)
     longest: Fraction = Fraction(0)
+    referred: bool = False
 
 
 @dataclass
@@ -101,6 +104,7 @@ class Held:
     jitter: Row  # of measurements, of pressures besides, and over how long a measurement is a mean
     pump: dict[str, Fraction]
     longest: Fraction  # interval from sample to sample; 0 where they follow a clock
+    referred: list[Row]  # what the reference and its rate add to the law's states, and last to the pressure
 
     def __post_init__(self) -> None:
         whole, self.part = self.delay // self.step, self.delay % self.step  # arrival after a sample
@@ -136,13 +140,14 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     inputs = [unit(size)[1], drift_of(law, task.b), *([[line[size] for line in sample]] if root else [])]
     told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
     heard = [k for k in (0, 1) if law.noise[k] or (law.off and (k == 0 or root or uses_rate(*law.fed)))]
+    inputs += [reference_of(law), [line[-1] for line in sample]] if law.referred else []
     inputs += [told[k] for k in heard]
     outputs = [unit(size)[0], unit(size)[1], push]
     cuts = BENT if law.lag else EVEN
     loop = Loop(flow, events, outputs, inputs, root, step, law.noise, cuts, start=starts_of(law, errors), pump=law.pump)
     loop = with_left_out(loop, law) if law.diffusion else loop
     loop = replace(loop, outputs=[*loop.outputs, unit(size)[law.valve]], asked=True) if law.path else loop
-    loop = replace(loop, off=law.off, told=heard, longest=law.longest)
+    loop = replace(loop, off=law.off, told=heard, longest=law.longest, referred=bool(law.referred))
     plain = not (law.delay or law.path or law.watched or root or any(errors) or any(map(any, law.first)))
     need(
         plain or not law.longest, "samples that follow no clock must be of a linear law from rest, its pressure at once"
@@ -154,10 +159,10 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
 
 def read_held(value: Any) -> Held:
     """Read step, delay, lag and diffusion, the law's matrices, the implicit step, the noise and the pump."""
-    optional = ("root", "noise", "diffusion", "first", "jitter", "pump", "applied", "longest")
+    optional = ("root", "noise", "diffusion", "first", "jitter", "pump", "applied", "longest", "of_reference")
     more = [k for k in optional if type(value) is dict and k in value]
-    parts = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
-    given = keys(value, "loop", *parts, *more)
+    named = ("step", "delay", "lag", "states", "update", "measured", "output", "feedback")
+    given = keys(value, "loop", *named, *more)
     implicit = "root" in more
     root = read_root(given["root"]) if implicit else None
     step, delay, lag = (number(given[k], k) for k in ("step", "delay", "lag"))
@@ -176,7 +181,11 @@ def read_held(value: Any) -> Held:
     pump = read_pump(given["pump"]) if "pump" in more else {}
     longest = number(given["longest"], "longest") if "longest" in more else Fraction(0)
     need("longest" not in more or longest > step, "the longest interval must be longer than step")
-    law = Held(step, delay, lag, time, update, seen, output, feedback, root, noise, first, jitter, pump, longest)
+    referred = matrix(given["of_reference"], "of_reference", n + 1, 2) if "of_reference" in more else []
+    need("of_reference" not in more or any(map(any, referred)), "of_reference must not be zero where it is given")
+    need(not (referred and (time or longest or root)), "of_reference must stand without rock, root and longest")
+    parts = (step, delay, lag, time, update, seen, output, feedback, root, noise, first, jitter, pump, longest)
+    law = Held(*parts, referred)
     need(not (law.watched and time), "jitter and the rate of a pump must not be told of a loop through rock")
     need(law.size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
     return law
@@ -229,16 +238,17 @@ def flow_of(law: Held, task: Task) -> tuple[list[Row], Row]:
 
 
 def maps_of(law: Held, b: Fraction) -> tuple[list[Row], list[Row]]:
-    """The sample, with one more column for w, and the arrival of a pressure, which counts if it is between samples."""
+    """The sample, with columns for w and the reference's rate, and the arrival of a pressure, if between samples."""
     n, size, valve = law.own, law.size, law.valve
-    rest = [Fraction(0)] * (size - 2 - n)  # behind it the column of w
-    asked = [*(b * v for v in (*law.feedback[:2], *law.output)), *rest, b * sum(law.feedback[2:])]
-    sample = [[*line, Fraction(0)] for line in unit(size)]
+    rest = [Fraction(0)] * (size - 2 - n)  # behind it the columns of w and of the reference's rate
+    *moved, pressed = [line[1] for line in law.referred] or [Fraction(0)] * (n + 1)
+    asked = [*(b * v for v in (*law.feedback[:2], *law.output)), *rest, b * sum(law.feedback[2:]), b * pressed]
+    sample = [[*line, Fraction(0), Fraction(0)] for line in unit(size)]
     for i, (seen, kept) in enumerate(zip(law.measured, law.update, strict=True)):
-        sample[2 + i] = [*seen[:2], *kept, *rest, Fraction(sum(seen[2:]))]
+        sample[2 + i] = [*seen[:2], *kept, *rest, Fraction(sum(seen[2:])), moved[i]]
     queue = [*range(2 + n, valve), *([] if law.part else [valve])]
     for i, place in enumerate(queue):
-        sample[place] = [*unit(size)[queue[i - 1]], Fraction(0)] if i else asked
+        sample[place] = [*unit(size)[queue[i - 1]], Fraction(0), Fraction(0)] if i else asked
     arrival = unit(size)
     arrival[valve] = unit(size)[valve - 1]
     last = arrival if law.part else sample
@@ -256,6 +266,14 @@ def drift_of(law: Held, b: Fraction) -> Row:
     steady = steady_states(still, law.output, [Fraction(0)] * law.own, Fraction(1))
     behind = [Fraction(0)] * (law.size - law.well)
     return [Fraction(0), Fraction(0), *(-v / b for v in steady), *[Fraction(-1)] * (law.waiting + 1), *behind]
+
+
+def reference_of(law: Held) -> Row:
+    """What a change of the reference does to the states, which are counted from those that ask for p* there."""
+    still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(law.update)]
+    *rates, pressed = [-line[0] for line in law.referred]
+    moved = steady_states(still, law.output, rates, pressed)
+    return [Fraction(0), Fraction(0), *(-v for v in moved), *[Fraction(0)] * (law.size - 2 - law.own)]
 
 
 def starts_of(law: Held, errors: Sequence[Fraction]) -> list[Row]:

@@ -59,7 +59,7 @@ _SLIDING_REFERENCE = ("rate", "distance", "ramp")
 _NOISE = ("slip", "rate")
 _LIMITS, _JITTER = ("least", "largest"), ("measured", "delay")
 _LAW = ("states", "measured", "output", "feedback")
-_MORE = {"root", "noise", "diffusion", "first", "jitter", "pump", "applied", "longest"}
+_MORE = {"root", "noise", "diffusion", "first", "jitter", "pump", "applied", "longest", "of_reference"}
 _FAULT = re.compile(r"\w[\w .-]{0,59}")
 _MOST_COEFFICIENTS = 13
 _MOST_STATES = 20
@@ -219,6 +219,8 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         own = {"update": [texts(row) for row in claim.held.law.update]}
         own |= {"first": [texts(row) for row in claim.held.law.first]} if claim.held.law.first else {}
         own |= {"applied": texts(claim.held.law.applied)} if claim.held.law.applied else {}
+        moved = claim.held.law.of_reference
+        own |= {"of_reference": [texts(row) for row in moved]} if moved else {}
         root = claim.held.law.root
         own |= {} if root is None else {"root": _root_document(root)}
         noise = claim.held.noise
@@ -361,7 +363,13 @@ def _held(raw: Any, start: dict[str, Fraction]) -> Held:
     root = _read_root(raw["root"]) if "root" in given else None
     first = _first(raw) if "first" in given else ()
     applied = read_row(raw["applied"], "applied", length=_count(raw)) if "applied" in given else ()
-    law = LinearLaw(update=_square(raw, "update"), root=root, first=first, applied=applied, **_rest(raw))
+    moved = raw["of_reference"] if "of_reference" in given else None
+    rows = () if moved is None else listed(moved, "of_reference", length=_count(raw) + 1)
+    of_reference = tuple(read_ends(row, "of_reference") for row in rows)
+    need(moved is None or any(map(any, of_reference)), "of_reference must not be zero where it is given")
+    law = LinearLaw(
+        update=_square(raw, "update"), root=root, first=first, applied=applied, of_reference=of_reference, **_rest(raw)
+    )
     noise = read_exactly(raw["noise"], _NOISE) if "noise" in given else {}
     diffusion = read_rational(raw["diffusion"]) if "diffusion" in given else _ZERO
     need(diffusion > 0 or "diffusion" not in given, "diffusion must be positive where it is given")

@@ -116,6 +116,12 @@ class Held:
                 "rate noise needs a law that measures the slip rate. Received the rate noise "
                 f"{shortly(self.rate_noise)} m/s for a law of the slip alone. Omit the rate noise."
             )
+        if self.law.of_reference and (self.diffusion or self.longest_step or self.law.root is not None):
+            raise ParameterError(
+                "a law that uses the slip, the slip rate or the reference itself has no guarantee with a diffusion "
+                "path, aperiodic sampling or an implicit step. Received one of these. Use slip_error and "
+                "slip_rate_error, or omit it."
+            )
         if self.longest_step:
             self._require_no_clock()
 
@@ -325,7 +331,10 @@ def _told(task: UncertainPlant, noise: Mapping[str, Fraction], jitter: Fraction)
 
 
 def beside(task: UncertainPlant, names: Collection[str]) -> Iterator[Channel]:
-    """Inputs of a law in continuous time that uses the reference itself (`continuous_loop`), a start, what is late."""
+    """Inputs of a law that uses the reference itself (`continuous_loop`, `held_loop`), a start, what is late."""
+    for name in ("reference", "reference_rate"):
+        if name in names:
+            yield Channel(name=name, own=task.reference_rates[0], shares={})
     if "reference_acceleration" in names:
         yield Channel(name="reference_acceleration", own=task.reference_rates[1], shares={})
     if "reference_jerk" in names:

@@ -1,0 +1,295 @@
+"""Guarantees of users' laws: certificates of both checkers, an independent run, and what is refused."""
+
+import importlib.util
+import json
+import re
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+from time import process_time
+
+import control
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import quakedesign as qd
+from quakedesign.checking import check_files
+from quakedesign.cli import main
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.guarantees.exact.guarantee_files import guarantee_document, save_guarantee
+from quakedesign.laws import NominalModel
+from quakedesign.loop import held_loop
+
+CHECK = Path(__file__).parents[2] / "proofs" / "check.py"
+REAL = qd.load_fault("real-fault")
+STEP = 0.184
+ERRORS = ["slip_error", "slip_rate_error"]
+
+
+def lqg(inputs, label="LQG"):
+    """LQG of python-control with a disturbance and an unused fourth state, in coordinates that mix all of them."""
+    plant = qd.to_statespace(REAL, step=STEP, vertex=("middle", "middle", "middle"))
+    A = np.block([[plant.A, plant.B, np.zeros((2, 1))], [np.zeros((2, 2)), np.diag([1, 0.5])]])
+    B, C = np.vstack([plant.B, [[0], [0]]]), np.eye(2, 4)
+    gain = float(plant.B[1, 0])
+    K, _, _ = control.dlqr(plant.A, plant.B, np.diag([1, 0.1]), np.array([[0.04 * gain**2]]))
+    K = np.hstack([K, [[1, 0]]])
+    L, _, _ = control.dlqe(A, np.eye(4), C, np.diag([1e-16, 1e-12, 1e7, 1e-3]), np.diag([1e-13, 1e-12]))
+    M = np.linalg.solve(A, L)
+    known = np.eye(4) - M @ C
+    mixed = np.array([[1, 0.3, 0.1, 0], [0, 2, 0.1, 0], [0.5, 0.1, 1, 0], [0, 1, 0, 1]])
+    mixed = np.diag([1e-5, 1e-4, 1e5, 1]) @ mixed
+    F, G = np.linalg.solve(mixed, (A - B @ K) @ known @ mixed), np.linalg.solve(mixed, (A - B @ K) @ M)
+    return qd.SampledLaw.from_statespace(control.ss(F, G, -K @ known @ mixed, -K @ M, STEP), inputs=inputs, label=label)
+
+
+LAW, ABSOLUTE = lqg(ERRORS), lqg(["slip_error", "slip_rate"], "LQG of the slip rate")
+
+
+@pytest.fixture(scope="module")
+def proof_check():
+    """The standalone checker."""
+    specification = importlib.util.spec_from_file_location("check_user_laws", CHECK)
+    module = importlib.util.module_from_spec(specification)
+    sys.modules["check_user_laws"] = module
+    specification.loader.exec_module(module)
+    yield module
+    del sys.modules["check_user_laws"]
+
+
+def run(*arguments):
+    """Exit code of a command."""
+    with pytest.raises(SystemExit) as stop:
+        main([*map(str, arguments)])
+    return stop.value.code
+
+
+@pytest.fixture(scope="module")
+def found():
+    return qd.guarantee(REAL, law=LAW)
+
+
+@pytest.fixture(scope="module")
+def referred():
+    return qd.guarantee(REAL, ABSOLUTE, delay="20 ms", slip_noise="1 um", rate_noise="1 um/s")
+
+
+def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
+    began = process_time()
+    again = qd.guarantee(REAL, law=LAW, slip_noise="0.1 um")  # nothing of which is remembered
+    assert process_time() - began < 2
+    assert again.proved
+    assert found.proved
+    assert found.found.claims.slip_rate_error < Fraction("2.5e-4")
+    assert "an integrator that rounding has moved" in found.lines()[-1]
+    assert found.to_dict()["notes"] == list(LAW.notes)
+
+
+@pytest.mark.parametrize("name", ["found", "referred"])
+def test_both_checkers_decide_the_file_and_refuse_a_tighter_claim(name, request, tmp_path):
+    claim = request.getfixturevalue(name).found
+    path = tmp_path / "law.json"
+    save_guarantee(claim, path)
+    assert check_files([path], "real-fault")[str(path)][0] == "proved"
+    assert subprocess.run([sys.executable, CHECK, path], capture_output=True, check=False).returncode == 0
+    document = json.loads(path.read_text())
+    document["claims"]["slip_rate_error"] = str(Fraction(document["claims"]["slip_rate_error"]) * Fraction(99, 100))
+    path.write_text(json.dumps(document))
+    assert check_files([path], "real-fault")[str(path)][0] != "proved"
+    assert subprocess.run([sys.executable, CHECK, path], capture_output=True, check=False).returncode == 1
+
+
+def leaves(value, way=()):
+    """Ways to every rational of a document."""
+    if isinstance(value, dict):
+        for key, entry in value.items():
+            if key not in ("name", "states"):
+                yield from leaves(entry, (*way, key))
+    elif isinstance(value, list):
+        for place, entry in enumerate(value):
+            yield from leaves(entry, (*way, place))
+    elif isinstance(value, str) and way[0] != "kind":
+        yield way
+
+
+def test_every_number_of_the_law_is_bound_by_what_is_printed(referred, proof_check):
+    """A law of another digit is refused or stated otherwise: the entries that are printed tell them apart."""
+    document = guarantee_document(referred.found)
+    stated = proof_check.check(json.dumps(document)).statement
+    ways = list(leaves(document["loop"], ("loop",)))
+    assert len(ways) >= 4 * 4 + 2 * 4 + 4 + 2 + 10 + 5
+    for way in ways[::5]:
+        changed = json.loads(json.dumps(document))
+        inner = changed
+        for key in way[:-1]:
+            inner = inner[key]
+        inner[way[-1]] = str(Fraction(inner[way[-1]]) * Fraction(1000001, 1000000) + Fraction(1, 10**12))
+        try:
+            assert proof_check.check(json.dumps(changed)).statement != stated, way
+        except proof_check.Refused:
+            pass
+
+
+def test_zero_rows_of_the_reference_are_refused(referred, proof_check):
+    document = guarantee_document(referred.found)
+    document["loop"]["of_reference"] = [["0", "0"]] * 5
+    with pytest.raises(proof_check.Refused, match="of_reference"):
+        proof_check.check(json.dumps(document))
+
+
+def test_a_law_of_slip_and_slip_rate_moves_its_errors_as_the_inputs_of_the_loop_say():
+    """A plant without uncertainty in slip and slip rate, by matrix exponentials, beside the loop of its errors."""
+    s, w, gain, pace = 0.9, 1.6, 2.5e-8, 3.0e-4
+    one = Fraction
+    law = qd.SampledLaw.from_gains([7e8, 4e8, 1e8], step="0.1", inputs=("slip", "slip_rate")).law
+    model = NominalModel(slip=one("0.9"), rate=one("1.6"), gain=one("2.5e-8"))
+    loop = held_loop(law, model, one("2.5e-8"), one("0.1"), delay=one("0.03"))
+    n = len(loop.states)
+    rows = lambda matrix: np.array([[float(v) for v in row] for row in matrix])  # noqa: E731
+    drift = -s * pace  # b·dp*/dt, as b(p* ) = −s·r
+    pushed = sum(
+        np.array([float(v) for v in loop.inputs[name]]) * size
+        for name, size in (("acceleration", -w * pace), ("drift", drift), ("reference", pace))
+    )
+    told = np.array([float(v) for v in loop.sampled["reference_rate"]]) * pace
+    flow = np.block([[rows(loop.flow), pushed[:, None]], [np.zeros((1, n + 1))]])
+    state, errors = np.zeros(n), []
+    state[1] = -pace  # r' jumps to its rate
+    x, z, held = np.zeros(2), np.zeros(1), 0.0
+    exact = np.block([[np.array([[0, 1], [s, -w]]), np.array([[0], [gain]])], [np.zeros((1, 3))]])
+    for k in range(60):
+        state = rows(loop.segments[0].jump) @ state + told
+        state = (expm(flow * 0.03) @ [*state, 1])[:-1]
+        state = rows(loop.segments[1].jump) @ state
+        state = (expm(flow * 0.07) @ [*state, 1])[:-1]
+        r = pace * k * 0.1
+        asked = -(7e8 * x[0] + 4e8 * x[1] + 1e8 * z[0])
+        z = z + 0.1 * (x[0] - r)
+        x = (expm(exact * 0.03) @ [*x, held])[:2]
+        held = asked
+        x = (expm(exact * 0.07) @ [*x, held])[:2]
+        errors.append((state[:2], x - [r + 0.1 * pace, pace]))
+    got, expected = np.array(errors).transpose(1, 0, 2)
+    assert np.abs(expected).max() > 1e-4
+    assert got == pytest.approx(expected, rel=1e-7, abs=1e-12)
+
+
+def worst_course(claim, law, seed):
+    """Largest |e1|, |e2| of random and resonant courses at the ends of all ranges, by SciPy alone."""
+    random, task = np.random.default_rng(seed), claim.task
+    b, H = float(task.authority), float(task.amplitude)
+    slope, damping = ([float(v) for v in ends] for ends in (task.slip_chord, task.rate_chord))
+    F, G, C, D = (
+        np.array(part, dtype=float) for part in (law.law.update, law.law.measured, [law.law.output], [law.law.feedback])
+    )
+    part = STEP / 4
+    steps = {}
+    for s in slope:
+        for w in damping:
+            for beta in (1.0, float(task.beta[1])):
+                A = np.zeros((4, 4))
+                A[0, 1], A[1, 0], A[1, 1], A[1, 2], A[1, 3] = 1, s, -w, beta * b, 1
+                steps[s, w, beta] = expm(A * part)[:2]
+    largest = np.zeros(2)
+    for beta in (1.0, float(task.beta[1])):
+        x, z, sign = np.zeros(2), np.zeros(len(F)), 1.0
+        period = random.uniform(1, 12)
+        for k in range(1500):
+            p = float((C @ z + D @ x)[0])
+            z = F @ z + G @ x
+            for j in range(4):
+                sign = np.sign(np.sin(2 * np.pi * (4 * k + j) / (4 * period))) or 1.0
+                s = slope[int(x[0] * sign > 0)]  # the slope pushes with the disturbance
+                x = steps[s, random.choice(damping), beta] @ [*x, p, sign * H]
+                largest = np.maximum(largest, np.abs(x))
+    return largest
+
+
+def test_an_independent_run_with_adverse_disturbances_stays_inside(found):
+    reached = np.max([worst_course(found.found, LAW, seed) for seed in range(6)], axis=0)
+    claims = found.found.claims
+    assert reached[0] < claims.slip_error
+    assert reached[1] < claims.slip_rate_error
+    assert reached[1] > 0.5 * float(claims.slip_rate_error)  # the runs are no idle ones
+
+
+def test_none_names_what_fails():
+    weak = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([1e8, 1e8, 1e7], step="0.184"))
+    assert not weak.proved
+    assert "range" in weak.lines()[0]
+    assert weak.found.small_gain > 1
+    standing = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2e8], step="0.05"))
+    assert "no integral action" in standing.lines()[0]
+    wild = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([9e9, 9e9, 1e9], step="0.184"))
+    assert "an eigenvalue of size" in wild.lines()[0]
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"step": "0.1"}, "step of the loop setup must be that of the law"),
+        ({"measured": "differentiator"}, "signals that it measures"),
+        ({"measured": "slip"}, "signals that it measures"),
+        ({"gains": [1]}, "guaranteed as it is"),
+        ({"plant": "stick-slip"}, "guaranteed as it is"),
+        ({"objective": "peak"}, "guaranteed as it is"),
+        ({"controller": "cta"}, "same argument"),
+        ({"disturbance_class": "no"}, "class"),
+        ({"law": ABSOLUTE, "diffusion": "0.02 s"}, "no guarantee with a diffusion"),
+        ({"law": ABSOLUTE, "longest_step": "0.2 s"}, "no guarantee with a diffusion"),
+    ],
+)
+def test_what_does_not_apply_is_refused(more, said):
+    with pytest.raises(ParameterError, match=said):
+        qd.guarantee(REAL, **({"law": LAW} | more))
+
+
+def test_a_law_in_continuous_time_is_refused():
+    with pytest.raises(UnsupportedError, match="sampled linear law"):
+        qd.guarantee(REAL, law=qd.published("real-fault")["elqr"])
+    with pytest.raises(ParameterError, match="needs a law of samples"):
+        qd.assess(REAL, qd.published("real-fault")["elqr"], qd.LoopSetup(delay="10 ms"))
+
+
+def test_friction_with_a_state_has_no_guarantee_of_a_user_s_law():
+    with pytest.raises(ParameterError, match="without a state"):
+        qd.guarantee(qd.load_fault("crustal-patch"), law=LAW)
+
+
+def test_a_law_is_compared_and_assessed_in_its_setup():
+    designed = qd.assess(REAL, LAW, qd.LoopSetup(delay="20 ms"))
+    assert str(designed.verdict) == "proved"
+    assert designed.controller.delay == Fraction("0.02")
+    assert designed.guarantee.held.delay == Fraction("0.02")
+    seen = qd.compare(qd.load_fault("lab-fault"), [qd.SampledLaw.from_pid(1, 0.1, step=0.01)], with_published=False)
+    (entry,) = seen.of("designed")
+    assert entry.label == "PID (designed)"
+    assert entry.guaranteed is None
+
+
+def test_the_command_line_takes_the_file_of_a_law(tmp_path, capsys):
+    path = tmp_path / "own.json"
+    LAW.save(path)
+    assert run("guarantee", "real-fault", "--law", path, "--out", tmp_path / "c.json", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["verdict"] == "proved"
+    assert run("check", tmp_path / "c.json") == 0
+    assert run("simulate", "real-fault", "--law", path, "--duration", "60 s", "--json") == 0
+    assert run("export", "real-fault", "--law", path, "--out", tmp_path / "c") == 0
+    assert (tmp_path / "c" / "controller.c").exists()
+    capsys.readouterr()
+    assert run("simulate", "real-fault", "--law", path, "--controller", "cta") == 2
+    assert "Omit these options" in capsys.readouterr().err
+    assert run("guarantee", "real-fault", "--law", tmp_path / "none.json") == 2
+
+
+def test_every_snippet_of_the_page_runs(tmp_path, monkeypatch, capsys):
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "own_controller.md").read_text(encoding="utf-8")
+    assert len(page.split()) < 600
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for cell in re.findall(r"```\{code-cell\} python\n(.*?)```", page, flags=re.DOTALL):
+        exec(cell, names)
+    assert capsys.readouterr().out.count("proved") == 4
+    assert names["hinf"].step == Fraction("0.184")
