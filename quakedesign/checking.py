@@ -32,7 +32,7 @@ from quakedesign.symbolic.terms import written
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
     from quakedesign.guarantees.exact.guarantee_files import Claim
-    from quakedesign.plant import SlidingPlant, UncertainPlant
+    from quakedesign.plant import FaultPlant, SlidingPlant
 
 
 __all__ = ["check_files"]
@@ -106,7 +106,7 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     return str(Verdict.PROVED), lines
 
 
-def _task(claim: "Claim", fault: "Fault") -> "UncertainPlant | SlidingPlant":
+def _task(claim: "Claim", fault: "Fault") -> "FaultPlant | SlidingPlant":
     """What a claim of the kind would be about on a fault."""
     if not isinstance(claim, guarantees.SlidingGuarantee):
         return plants.uncertain_plant(fault, rate_limited=claim.task.change is not None)

@@ -8,7 +8,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import fraction_of, rational
 from quakedesign.fault import Fault, SlidingReference
 from quakedesign.loop import StateLaw
-from quakedesign.plant.ranges import Friction, UncertainPlant
+from quakedesign.plant.ranges import FaultPlant, Friction
 from quakedesign.plant.sliding_plant import AXES, SlidingPlant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 
@@ -92,7 +92,7 @@ def _near(expression: sp.Expr) -> Fraction:
 # Friction of slip and slip rate: the plant on a moving reference.
 
 
-def uncertain_plant(fault: Fault, *, rate_limited: bool = False) -> UncertainPlant:
+def uncertain_plant(fault: Fault, *, rate_limited: bool = False) -> FaultPlant:
     """Plant of a fault with its reference and disturbance, exact.
 
     Parameters
@@ -116,7 +116,7 @@ def uncertain_plant(fault: Fault, *, rate_limited: bool = False) -> UncertainPla
         )
     stage = sp.Symbol("s")
     shape = sp.Poly(fault.reference.shape(stage), stage).all_coeffs()[::-1]
-    return UncertainPlant(
+    return FaultPlant(
         name=fault.name,
         density=rational(fault.density),
         shear_modulus=rational(fault.shear_modulus),

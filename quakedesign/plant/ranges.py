@@ -47,7 +47,7 @@ class Friction:
 
 
 @checked_dataclass(frozen=True, kw_only=True)
-class UncertainPlant:
+class FaultPlant:
     """A fault, its reference and its disturbance, as a certificate states them. SI units.
 
     Attributes

@@ -33,7 +33,7 @@ from quakedesign.guarantees.exact.impossibility import (
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
 from quakedesign.guarantees.search.lqg import near_path, sliding_model
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Quantity
-from quakedesign.plant import UncertainPlant, uncertain_plant
+from quakedesign.plant import FaultPlant, uncertain_plant
 from quakedesign.simulation.natural import natural_peak
 
 # ----------------------------------------------------------------------
@@ -391,7 +391,7 @@ def limits(
 
 
 def _impossible(
-    push: UncertainPlant | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
+    push: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
 ) -> dict[str, Bound | None]:
     """What no controller can do, by name; nothing where no limit is known."""
     reaction, path = longest_reaction(push, withdrawal), longest_diffusion(push, withdrawal, step)
@@ -502,7 +502,7 @@ def _why(answer: SlidingAnswer | None) -> str:
     return f": {answer.found.reason}" if answer is not None and isinstance(answer.found, NoGuarantee) else ""
 
 
-def _proved_steps(task: UncertainPlant, step: Fraction, told: Told) -> tuple[tuple[Guarantee, ...], Guarantee | None]:
+def _proved_steps(task: FaultPlant, step: Fraction, told: Told) -> tuple[tuple[Guarantee, ...], Guarantee | None]:
     """Guarantees at growing T_s up to nearly the longest, and that at the fault's own, if there is one."""
     own: Guarantee | NoGuarantee | None = design_held(task, step, objective="peak", **told.around)
     longest = longest_step(task, **told.around)
@@ -523,12 +523,12 @@ def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
     return min(found, key=lambda g: g.claims.slip_rate_error)
 
 
-def _proved_delay(task: UncertainPlant, step: Fraction, told: Told) -> LowerBound | None:
+def _proved_delay(task: FaultPlant, step: Fraction, told: Told) -> LowerBound | None:
     longest = longest_delay(task, step, **told.around)
     return LowerBound(longest.held.delay) if longest else None
 
 
-def _proved_rock(task: UncertainPlant, step: Fraction, told: Told) -> LowerBound | None:
+def _proved_rock(task: FaultPlant, step: Fraction, told: Told) -> LowerBound | None:
     """L²/D [s] behind which a law that is told of a clock is proved."""
     farthest = farthest_rock(task, step, **told.around)
     return LowerBound(farthest.held.diffusion) if farthest else None

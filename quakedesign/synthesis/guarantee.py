@@ -18,7 +18,7 @@ from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer, answer_sti
 from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
-from quakedesign.plant import UncertainPlant, uncertain_plant
+from quakedesign.plant import FaultPlant, uncertain_plant
 from quakedesign.synthesis.method import Wanted, method_of
 
 Found = TypeVar("Found")
@@ -205,7 +205,7 @@ def guarantee(
     return _sampled(fault, task, family, wanted)
 
 
-def _sampled(fault: Fault, task: UncertainPlant, law: type[Controller], wanted: Wanted) -> LoopAnswer:
+def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> LoopAnswer:
     """Guarantee on a moving reference; none without given gains where no controller within σ′ can hold the fault."""
     setup, most = wanted.setup, rational(fault.effective_normal_stress)
     step = rational(fault.sampling_time) if setup.step is None else setup.step

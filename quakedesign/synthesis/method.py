@@ -40,7 +40,7 @@ from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.exact.premises import Premise, Variant, linear_premises
 from quakedesign.lyapunov.search.search import find_certificate
-from quakedesign.plant import UncertainPlant, uncertain_plant
+from quakedesign.plant import FaultPlant, uncertain_plant
 
 # ----------------------------------------------------------------------
 # What is asked of every family of laws, and what is answered of a law that belongs to none.
@@ -101,7 +101,7 @@ class GainProblem(Generic[Designed]):
     tell: Callable[[str, float], None] = lambda what, done: None
 
     @property
-    def task(self) -> UncertainPlant:
+    def task(self) -> FaultPlant:
         """Uncertain plant of the fault, as a guarantee uses it."""
         return uncertain_plant(self.fault, rate_limited=self.disturbance_class == "rate")
 
@@ -241,7 +241,7 @@ class DesignMethod(Generic[L]):
         known = linear_about_a_reference(controller)
         return tuple(linear_premises(fault, controller, certificate)) if known else (), None
 
-    def guarantee(self, fault: Fault, task: UncertainPlant, controller: L, setup: LoopSetup) -> Guarantee | NoGuarantee:
+    def guarantee(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> Guarantee | NoGuarantee:
         """Guarantee of the sampled law on a task of the fault, with the noise of a loop setup."""
         return NoGuarantee(
             reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
@@ -263,12 +263,12 @@ class DesignMethod(Generic[L]):
         """Premises and domain of the same gains with every named feed-forward; none for laws without."""
         return ()
 
-    def sampled(self, fault: Fault, task: UncertainPlant, law: type[L], step: Fraction, wanted: Wanted) -> LoopAnswer:
+    def sampled(self, fault: Fault, task: FaultPlant, law: type[L], step: Fraction, wanted: Wanted) -> LoopAnswer:
         """Guarantee of given gains, or of a design, as they run once every T_s [s]."""
         reason = f"no analysis of {law.title} under a held pressure is known here"
         return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
 
-    def given(self, fault: Fault, task: UncertainPlant, controller: L, setup: LoopSetup) -> LoopAnswer:
+    def given(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> LoopAnswer:
         """Guarantee of a controller as it is, in a loop setup.
 
         Raises
@@ -329,7 +329,7 @@ class Samples(DesignMethod[SampledController]):
         return (), None
 
     def guarantee(
-        self, fault: Fault, task: UncertainPlant, controller: SampledController, setup: LoopSetup
+        self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> Guarantee | NoGuarantee:
         """At its own T_s, with its own delay, lag and diffusion path where the loop setup has none."""
         law, step = controller.law, controller.step
@@ -359,7 +359,7 @@ class Samples(DesignMethod[SampledController]):
             return found
         return replace(found, reason=f"{found.reason}: of a period it has an eigenvalue of size {largest:.4g}")
 
-    def given(self, fault: Fault, task: UncertainPlant, controller: SampledController, setup: LoopSetup) -> LoopAnswer:
+    def given(self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup) -> LoopAnswer:
         """With the worst case found beside it, of a law of the errors alone."""
         found = self.guarantee(fault, task, controller, setup)
         worst = worst_found(found) if found.proved and not controller.law.of_reference else None

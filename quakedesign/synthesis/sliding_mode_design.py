@@ -28,7 +28,7 @@ from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.fault_bounds import Errors, coefficient_range, largest_matched_rate, least_authority
 from quakedesign.lyapunov.exact.premises import Premise, Variant, feedforward_variants, sliding_mode_premises
 from quakedesign.lyapunov.search.search import find_certificate
-from quakedesign.plant import UncertainPlant
+from quakedesign.plant import FaultPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
 
 _HEADROOM = Fraction(11, 10)
@@ -94,7 +94,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         return tuple(premises), domain
 
     def guarantee(
-        self, fault: Fault, task: UncertainPlant, controller: SlidingMode, setup: LoopSetup
+        self, fault: Fault, task: FaultPlant, controller: SlidingMode, setup: LoopSetup
     ) -> Guarantee | NoGuarantee:
         """In the scheme ``compensated``, and in no other."""
         return guarantee_of(task, controller, **setup.noise)
@@ -108,7 +108,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         return feedforward_variants(fault, controller, certificate)
 
     def sampled(
-        self, fault: Fault, task: UncertainPlant, law: type[SlidingMode], step: Fraction, wanted: Wanted
+        self, fault: Fault, task: FaultPlant, law: type[SlidingMode], step: Fraction, wanted: Wanted
     ) -> LoopAnswer:
         """In a scheme, with given base gains or the first ones known."""
         wanted.require_all_measured()

@@ -37,7 +37,7 @@ from quakedesign.loop.sensing.differentiator import told_by_differences
 from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.search.search import claims_of, find_certificate, finish, quadratic_margin
-from quakedesign.plant import UncertainPlant
+from quakedesign.plant import FaultPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
 
 
@@ -67,7 +67,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         return _judged(problem, controller, quadratic_certificate(loop), {})
 
     def guarantee(
-        self, fault: Fault, task: UncertainPlant, controller: ExtendedLQR, setup: LoopSetup
+        self, fault: Fault, task: FaultPlant, controller: ExtendedLQR, setup: LoopSetup
     ) -> Guarantee | NoGuarantee:
         """With integrals summed over the T_s of the fault."""
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
@@ -86,7 +86,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         return held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
 
     def sampled(
-        self, fault: Fault, task: UncertainPlant, law: type[ExtendedLQR], step: Fraction, wanted: Wanted
+        self, fault: Fault, task: FaultPlant, law: type[ExtendedLQR], step: Fraction, wanted: Wanted
     ) -> LoopAnswer:
         """Integrals of given gains are summed; without gains, a law with an estimate of the disturbance."""
         setup, differs = wanted.setup, wanted.setup.measured == MEASURED[2]

@@ -10,12 +10,12 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import Held, SlowGain
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import summed_integrals
-from quakedesign.plant import UncertainPlant, uncertain_plant
+from quakedesign.plant import FaultPlant, uncertain_plant
 
 REAL = uncertain_plant(load_fault("real-fault"))
 
 
-def random_task(number: int) -> tuple[UncertainPlant, F]:
+def random_task(number: int) -> tuple[FaultPlant, F]:
     """A fault near the preset real-fault, and T_s."""
     random = np.random.default_rng(number)
 
@@ -36,7 +36,7 @@ def random_task(number: int) -> tuple[UncertainPlant, F]:
     ), F(f"{random.uniform(0.05, 0.3):.3f}")
 
 
-def random_loop(number: int) -> tuple[UncertainPlant, Held, SlowGain | None] | None:
+def random_loop(number: int) -> tuple[FaultPlant, Held, SlowGain | None] | None:
     """A loop of any kind, with a delay, a lag, rock, noise and a start or without; None where there is no law."""
     random = np.random.default_rng(10**6 + number)
     task, step = random_task(number)

@@ -21,7 +21,7 @@ from quakedesign.guarantees.exact.small_gain import bounds_from, certified_bound
 from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, Power
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, Segment, exact_integrals
 from quakedesign.loop.loop_setup import Pump
-from quakedesign.plant import UncertainPlant
+from quakedesign.plant import FaultPlant
 from quakedesign.plant import ranges as package_task
 from quakedesign.plant.ranges import Friction
 
@@ -37,7 +37,7 @@ def some_task(random):
     least = some(random, 1, 4, 10)
     static = least + some(random, 0, 3, 10)
     tenths = lambda high: some(random, 0, high, 10)  # noqa: E731
-    return UncertainPlant(
+    return FaultPlant(
         name="fault",
         density=some(random, 1, 9),
         shear_modulus=some(random, 1, 50),
@@ -376,7 +376,7 @@ def test_the_stress_at_rest_turns_where_friction_reaches_a_bound(growth, change,
     """(2/5·9 ∓ 3/2·r)/μ at r = 0, 2/5 and 2, by hand."""
     zero = F(0)
     friction = Friction(static=F(2, 5), least=F(1, 5), largest=F(3, 5), rate_slope=zero, **change)
-    task = UncertainPlant(
+    task = FaultPlant(
         name="fault", density=F(2), shear_modulus=F(3), length=F(2), damping=zero, normal_stress=F(9),
         spreads=(zero, zero, zero), friction=friction, shape=tuple(map(F, SHAPES[0])), target_slip=F(2),
         operation_time=F(1), amplitude=zero, change=None, growths=(growth, zero),

@@ -29,7 +29,7 @@ from quakedesign.lyapunov.exact.certificate_files import (
     kind_of,
     read_json,
 )
-from quakedesign.plant.ranges import Friction, UncertainPlant
+from quakedesign.plant.ranges import FaultPlant, Friction
 from quakedesign.plant.sliding_plant import AXES, MOST_CELLS, Cuts, SlidingPlant, cells
 from quakedesign.sos.exact.strict import (
     headed,
@@ -154,7 +154,7 @@ def _of_tracking(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
     }
 
 
-def task_document(task: UncertainPlant) -> dict[str, Any]:
+def task_document(task: FaultPlant) -> dict[str, Any]:
     """Fault, reference and disturbance."""
     change = {} if task.change is None else {"change": str(task.change)}
     return {
@@ -305,7 +305,7 @@ def _name(fault: dict[str, Any]) -> str:
     return str(name)
 
 
-def read_task(raw: dict[str, Any]) -> UncertainPlant:
+def read_task(raw: dict[str, Any]) -> FaultPlant:
     """Fault, reference and disturbance of a parsed file."""
     rock = (*_ROCK, "normal_stress")
     fault = with_keys(raw["fault"], {"name", *rock, "spreads", "friction"})
@@ -315,7 +315,7 @@ def read_task(raw: dict[str, Any]) -> UncertainPlant:
     with_keys(given, {"amplitude", "growths"} | ({"change"} if limited else set()))
     stiffness, damping, authority = read_exactly(fault["spreads"], _SPREADS).values()
     slip, rate = read_exactly(given["growths"], _NOISE).values()
-    return UncertainPlant(
+    return FaultPlant(
         name=_name(fault),
         **{name: read_rational(fault[name]) for name in rock},
         spreads=(stiffness, damping, authority),
@@ -343,7 +343,7 @@ def _sliding_task(raw: dict[str, Any]) -> SlidingPlant:
     return SlidingPlant(name=_name(fault), ranges=ranges, stress=read_rational(raw["stress"]), **more)
 
 
-def _slow_gain(raw: Any, task: UncertainPlant) -> SlowGain:
+def _slow_gain(raw: Any, task: FaultPlant) -> SlowGain:
     with_keys(raw, {"parts", "growth"})
     need(type(raw["parts"]) is int, "parts must be an integer")
     slow_gain = SlowGain(parts=raw["parts"], growth=read_rational(raw["growth"]))

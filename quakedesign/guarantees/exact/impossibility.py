@@ -19,7 +19,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, end_of
 from quakedesign.guarantees.exact.norms import ball, upper
 from quakedesign.loop import SlidingModel
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
 # What no controller can do with a fault in slow sliding, of its linearisation: two theorems, in ball arithmetic.
@@ -268,7 +268,7 @@ class _Pushed:
 
 
 def smallest_peak(
-    task: UncertainPlant,
+    task: FaultPlant,
     step: Fraction,
     delay: Fraction = _IMPOSSIBILITY_ZERO,
     *,
@@ -279,7 +279,7 @@ def smallest_peak(
 
     Parameters
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     step, delay : Fraction
         T, positive, and θ [s].
     slip_noise, rate_noise : Fraction
@@ -306,7 +306,7 @@ def smallest_peak(
     return best if best.slip_rate_error > 0 else None
 
 
-def longest_reaction(task: UncertainPlant | SlidingPush, withdrawal: Fraction) -> UpperBound | None:
+def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> UpperBound | None:
     """T + θ [s] beyond which no controller holds the fault, without a diffusive path; None where none is proved."""
     _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
 
@@ -317,7 +317,7 @@ def longest_reaction(task: UncertainPlant | SlidingPush, withdrawal: Fraction) -
     return _least(task, longest)
 
 
-def longest_diffusion(task: UncertainPlant | SlidingPush, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
+def longest_diffusion(task: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
     """L²/D [s] beyond which no controller holds the fault with samples T apart; None where none is proved."""
     _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
 
@@ -343,7 +343,7 @@ def nearest_proved_well(diffusion_time: LowerBound, diffusivity: Fraction) -> Lo
         return LowerBound(end_of(ball(diffusion_time * diffusivity).sqrt().lower()))
 
 
-def smallest_withdrawal(task: UncertainPlant | SlidingPush, step: Fraction) -> LowerBound | None:
+def smallest_withdrawal(task: FaultPlant | SlidingPush, step: Fraction) -> LowerBound | None:
     """P [Pa] below which no controller holds the fault with samples T apart; None where none is proved."""
     _require(step >= 0, "a step of at least 0", step)
     with ctx.workprec(_BITS):
@@ -352,7 +352,7 @@ def smallest_withdrawal(task: UncertainPlant | SlidingPush, step: Fraction) -> L
     return LowerBound(max(withdrawals)) if withdrawals else None
 
 
-def too_slow(task: UncertainPlant, withdrawal: Fraction, step: Fraction, delay: Fraction) -> str:
+def too_slow(task: FaultPlant, withdrawal: Fraction, step: Fraction, delay: Fraction) -> str:
     """Why no controller with such a withdrawal [Pa] holds the fault with T_s and a delay [s]; empty where none is."""
     late = longest_reaction(task, withdrawal) if task.change is None else None
     if late is None or step + delay <= late:
@@ -362,12 +362,12 @@ def too_slow(task: UncertainPlant, withdrawal: Fraction, step: Fraction, delay: 
     return f"no controller whatever that withdraws at most {most} holds it {how}"
 
 
-def hopeless(task: UncertainPlant, withdrawal: Fraction, delay: Fraction, diffusion: Fraction) -> str:
+def hopeless(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffusion: Fraction) -> str:
     """Why no controller with such a withdrawal [Pa] holds the fault, whatever its T_s; empty where that is not proved.
 
     Parameters
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     withdrawal : Fraction
         [Pa].
     delay, diffusion : Fraction
@@ -384,20 +384,20 @@ def hopeless(task: UncertainPlant, withdrawal: Fraction, delay: Fraction, diffus
     return f"no controller whatever that withdraws at most {most} holds it {way}, whatever T_s"
 
 
-def _least(task: UncertainPlant | SlidingPush, value: Callable[[_Pushed | SlidingPush], Any]) -> UpperBound | None:
+def _least(task: FaultPlant | SlidingPush, value: Callable[[_Pushed | SlidingPush], Any]) -> UpperBound | None:
     with ctx.workprec(_BITS):
         bounds = [upper(value(plant)) for plant in _pushed(task)]
     return UpperBound(min(bounds)) if bounds else None
 
 
-def _corners(task: UncertainPlant) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
+def _corners(task: FaultPlant) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
     """κ, w and N̂ at the ends of their ranges."""
     ranges = (dict.fromkeys(ends) for ends in (task.stiffness, task.specific_damping, task.area_per_mass))
     for k, eta, area in product(*ranges):
         yield k - task.growths[0], eta - task.growths[1], area
 
 
-def _pushed(task: UncertainPlant | SlidingPush) -> Sequence[_Pushed | SlidingPush]:
+def _pushed(task: FaultPlant | SlidingPush) -> Sequence[_Pushed | SlidingPush]:
     """Plants of theorem 2, which is that of `SlidingPush` too."""
     if isinstance(task, SlidingPush):
         return [task] if task.grows else []
@@ -409,7 +409,7 @@ def _pushed(task: UncertainPlant | SlidingPush) -> Sequence[_Pushed | SlidingPus
     return [plant for plant in plants if plant.slip > 0 and law.static > law.least and task.amplitude]
 
 
-def _surprised(task: UncertainPlant) -> Iterator[_Surprised]:
+def _surprised(task: FaultPlant) -> Iterator[_Surprised]:
     """Friction that does not change near the target, and friction that falls as fast as it may."""
     law, target = task.friction, task.target_slip
     for kappa, w, area in _corners(task):

@@ -37,7 +37,7 @@ from quakedesign.guarantees.exact.loop import Channel, Held, channels_of
 from quakedesign.guarantees.exact.norms import absolute, ball, column, majorant, matrix, upper
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, unshifted
 from quakedesign.loop import PeriodicLoop
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 _BITS, _ZERO = 128, Fraction(0)
 SOONEST = 4  # pieces of the shortest interval, for integrals
@@ -133,7 +133,7 @@ def _even(lines: tuple[tuple[Basis, ...], ...]) -> bool:
     return len({len(line) for line in lines}) == 1 and 2 <= len(lines[0]) <= MOST_PIECES + 1
 
 
-def reached_bounds(task: UncertainPlant, held: Held, reach: InvariantPolytope) -> Bounds | NoGuarantee:
+def reached_bounds(task: FaultPlant, held: Held, reach: InvariantPolytope) -> Bounds | NoGuarantee:
     """Bounds of the theorem, or the condition that fails."""
     loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
     with ctx.workprec(_BITS):

@@ -18,7 +18,7 @@ from quakedesign.guarantees.exact.norms import START
 from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, NominalModel
 from quakedesign.loop import Instants, Layer, PeriodicLoop, held_loop, starts, with_known_area
 from quakedesign.loop.loop_setup import Pump
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 if TYPE_CHECKING:
     from quakedesign.laws import SampledController
@@ -190,7 +190,7 @@ class Held:
         off, part = self.jitter + self.delay_jitter, self.delay % self.step
         return min(self.step - part - off, self.step - 2 * off)
 
-    def told(self, task: UncertainPlant, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
+    def told(self, task: FaultPlant, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
         """Bounds of the measured errors from those of the true errors at any time [m], [m/s].
 
         A measurement that is early or late may be compared with the reference at its instant.
@@ -216,7 +216,7 @@ class Held:
             )
         return laws.SampledController(law=self.law, step=self.step, **self.path, longest=self.longest_step)
 
-    def loop(self, task: UncertainPlant, model: NominalModel | None = None) -> PeriodicLoop:
+    def loop(self, task: FaultPlant, model: NominalModel | None = None) -> PeriodicLoop:
         """Nominal error loop on a task, of its model or another one."""
         loop = held_loop(
             self.law,
@@ -286,7 +286,7 @@ class GainSpread:
 
 
 def channels_of(
-    task: UncertainPlant,
+    task: FaultPlant,
     root: ImplicitRoot | None,
     step: Fraction,
     noise: Mapping[str, Fraction] = NOISELESS,
@@ -315,7 +315,7 @@ def channels_of(
     )
 
 
-def _told(task: UncertainPlant, noise: Mapping[str, Fraction], jitter: Fraction) -> Iterator[Channel]:
+def _told(task: FaultPlant, noise: Mapping[str, Fraction], jitter: Fraction) -> Iterator[Channel]:
     """What the measured errors are more than the true ones at their instants: noise, and what moves until then."""
     forces = _task_inputs(task)[0]
     slopes = [max(map(abs, ends)) for ends in (task.slip_chord, task.rate_chord, task.beta)]
@@ -330,7 +330,7 @@ def _told(task: UncertainPlant, noise: Mapping[str, Fraction], jitter: Fraction)
             yield Channel(name=name, own=noise[name] + jitter * (rate + force), shares=off)
 
 
-def beside(task: UncertainPlant, names: Collection[str]) -> Iterator[Channel]:
+def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
     """Inputs of a law that uses the reference itself (`continuous_loop`, `held_loop`), a start, what is late."""
     for name in ("reference", "reference_rate"):
         if name in names:
@@ -358,7 +358,7 @@ def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel
         yield Channel(name=name, own=_ZERO, shares={"left_out": Fraction(1)})
 
 
-def _task_inputs(task: UncertainPlant) -> tuple[Fraction, Fraction, Fraction]:
+def _task_inputs(task: FaultPlant) -> tuple[Fraction, Fraction, Fraction]:
     """F of a [m/s²] and of d [m/s³], and κ [1/s²]."""
     if task.change is None:
         return task.reference_force + task.amplitude, task.drift, _ZERO

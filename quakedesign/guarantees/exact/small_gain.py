@@ -20,7 +20,7 @@ from quakedesign.guarantees.exact.norms import ball, flow_norms, norms
 from quakedesign.laws import ImplicitRoot, NominalModel, Power
 from quakedesign.loop import PeriodicLoop
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
 # The robust small-gain theorem for a loop that runs: bounds for ever, in exact arithmetic.
@@ -218,7 +218,7 @@ class NoGuarantee:
 
 
 def certified_bounds(
-    task: UncertainPlant,
+    task: FaultPlant,
     loop: PeriodicLoop,
     root: ImplicitRoot | None = None,
     noise: Mapping[str, Fraction] = NOISELESS,
@@ -238,7 +238,7 @@ def certified_bounds(
 
 
 def best_bounds(
-    task: UncertainPlant,
+    task: FaultPlant,
     gains: Gains,
     root: ImplicitRoot | None,
     step: Fraction,
@@ -258,7 +258,7 @@ def best_bounds(
 
 
 def bounds_from(
-    task: UncertainPlant,
+    task: FaultPlant,
     gains: Gains,
     root: ImplicitRoot | None,
     step: Fraction,
@@ -346,7 +346,7 @@ def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
     return [row[size] for row in rows]
 
 
-def unshifted(task: UncertainPlant) -> Fraction:
+def unshifted(task: FaultPlant) -> Fraction:
     """Difference of b·(p − p*) and the loop's matched disturbance, p* shifted in class ``rate`` [m/s²]."""
     if task.change is None:
         return _ZERO
@@ -396,7 +396,7 @@ class SlowGain:
                 f"{self.parts} parts and the growth {shortly(self.growth)} 1/s."
             )
 
-    def models(self, task: UncertainPlant) -> tuple[NominalModel, ...]:
+    def models(self, task: FaultPlant) -> tuple[NominalModel, ...]:
         """Nominal model of every part.
 
         Raises
@@ -413,7 +413,7 @@ class SlowGain:
         middles = (task.beta[0] + (2 * number + 1) * half for number in range(self.parts))
         return tuple(replace(task.model, gain=middle * task.authority) for middle in middles)
 
-    def spread(self, task: UncertainPlant, slip_error: Fraction) -> GainSpread:
+    def spread(self, task: FaultPlant, slip_error: Fraction) -> GainSpread:
         """Deviation of the input gain while the slip error stays below a bound [m]."""
         law = task.friction
         slope = max(law.weakening, law.strengthening) * task.area_per_mass[1] / task.authority
@@ -422,7 +422,7 @@ class SlowGain:
             aged=slope * task.reference_rates[0] * _ONE_OVER_E / self.growth,
         )
 
-    def _half(self, task: UncertainPlant) -> Fraction:
+    def _half(self, task: FaultPlant) -> Fraction:
         return (task.beta[1] - task.beta[0]) / (2 * self.parts)
 
 

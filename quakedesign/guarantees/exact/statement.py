@@ -28,7 +28,7 @@ from quakedesign.guarantees.exact.small_gain import (
 from quakedesign.laws import RestLimit
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant.ranges import Friction, UncertainPlant
+from quakedesign.plant.ranges import FaultPlant, Friction
 from quakedesign.plant.sliding_plant import Cuts, SlidingPlant, cells
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class Claims:
     largest_step: UpperBound | None = None
 
     @classmethod
-    def of(cls, task: UncertainPlant, bounds: Bounds) -> "Claims":
+    def of(cls, task: FaultPlant, bounds: Bounds) -> "Claims":
         """Tightest claims that bounds support."""
         low, high = task.rest_pressure
         push = bounds.push / task.authority
@@ -124,12 +124,12 @@ class Claims:
             **dict(zip(_ENDS, ends, strict=False)),
         )
 
-    def verdict(self, task: UncertainPlant, bounds: Bounds) -> Verdict:
+    def verdict(self, task: FaultPlant, bounds: Bounds) -> Verdict:
         """PROVED if the claims follow from bounds under which the fault stays closed, else UNDECIDED."""
         tightest = Claims.of(task, bounds)
         return Verdict.PROVED if self.covers(tightest) and not tightest.opens(task) else Verdict.UNDECIDED
 
-    def opens(self, task: UncertainPlant) -> str:
+    def opens(self, task: FaultPlant) -> str:
         """Why the fault may open, where the plant is another one; empty where the pressure stays below σ′."""
         if self.largest_pressure < task.normal_stress:
             return ""
@@ -191,7 +191,7 @@ class Guarantee:
 
     Attributes
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     held : Held
     claims : Claims
     slow_gain : SlowGain, optional
@@ -203,7 +203,7 @@ class Guarantee:
     """
 
     proved: ClassVar[Literal[True]] = True
-    task: UncertainPlant
+    task: FaultPlant
     held: Held
     claims: Claims
     slow_gain: SlowGain | None = None
@@ -310,7 +310,7 @@ class Guarantee:
         return sentence_of(self.task, self.claims, when, _start(*held.start))
 
 
-def sentence_of(task: UncertainPlant, claims: Claims, when: str, start: str = "from rest") -> str:
+def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from rest") -> str:
     """What is claimed of a task, for people; `when` says how the pressure follows the law.
 
     Bounds of what is claimed are rounded up, those of the disturbances and starts for which it is claimed down.
@@ -333,7 +333,7 @@ def sentence_of(task: UncertainPlant, claims: Claims, when: str, start: str = "f
 
 
 def guarantee(
-    task: UncertainPlant, held: Held, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
+    task: FaultPlant, held: Held, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
 ) -> Guarantee | NoGuarantee:
     """Tightest rounded claims about a loop, or why there are none; of a pump of some rate, with a ramp that will do.
 
@@ -363,13 +363,13 @@ def guarantee(
     return found
 
 
-def _proved(task: UncertainPlant, held: Held, slow_gain: SlowGain | None) -> Guarantee | NoGuarantee:
+def _proved(task: FaultPlant, held: Held, slow_gain: SlowGain | None) -> Guarantee | NoGuarantee:
     claims = _claims(task, held) if slow_gain is None else _slow_claims(task, held, slow_gain)
     return claims if isinstance(claims, NoGuarantee) else _of_claims(task, held, claims, slow_gain)
 
 
 def _of_claims(
-    task: UncertainPlant,
+    task: FaultPlant,
     held: Held,
     claims: Claims,
     slow_gain: SlowGain | None = None,
@@ -387,16 +387,16 @@ def _of_claims(
     return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
 
 
-def _claims(task: UncertainPlant, held: Held) -> Claims | NoGuarantee:
+def _claims(task: FaultPlant, held: Held) -> Claims | NoGuarantee:
     bounds = _bounds(task, held, held.loop(task))
     return bounds if isinstance(bounds, NoGuarantee) else _rounded(task, bounds)
 
 
-def _rounded(task: UncertainPlant, bounds: Bounds) -> Claims:
+def _rounded(task: FaultPlant, bounds: Bounds) -> Claims:
     return Claims.of(task, bounds).rounded()
 
 
-def _slow_claims(task: UncertainPlant, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
+def _slow_claims(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
     """Claims on whose slip error the gain's spread rests that they follow from."""
     gains, slip_error = _slow_gains(task, held, slow_gain), Fraction(0)
     if isinstance(gains, NoGuarantee):
@@ -413,7 +413,7 @@ def _slow_claims(task: UncertainPlant, held: Held, slow_gain: SlowGain) -> Claim
     return NoGuarantee(reason=reason, small_gain=None)
 
 
-def _slow_gains(task: UncertainPlant, held: Held, slow_gain: SlowGain) -> Gains | NoGuarantee:
+def _slow_gains(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Gains | NoGuarantee:
     if held.longest_step:
         return NoGuarantee(
             reason="aperiodic sampling has no guarantee with a slowly varying input gain", small_gain=None
@@ -426,13 +426,13 @@ def _slow_gains(task: UncertainPlant, held: Held, slow_gain: SlowGain) -> Gains 
 
 
 def _slow_bounds(
-    task: UncertainPlant, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
+    task: FaultPlant, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
 ) -> Bounds | NoGuarantee:
     spread = slow_gain.spread(task, slip_error)
     return best_bounds(task, gains, held.law.root, held.step, held.noise, spread, held.off)
 
 
-def _root_within(task: UncertainPlant, held: Held, claims: Claims) -> bool:
+def _root_within(task: FaultPlant, held: Held, claims: Claims) -> bool:
     """Whether an implicit root, if there is one, is as said wherever the claims hold."""
     root = held.law.root
     errors = held.told(task, (claims.slip_error, claims.slip_rate_error))
@@ -447,7 +447,7 @@ def _beyond_the_pump(held: Held, claims: Claims) -> str:
 
 
 def _bounds(
-    task: UncertainPlant, held: Held, loop: PeriodicLoop, reach: InvariantPolytope | None = None
+    task: FaultPlant, held: Held, loop: PeriodicLoop, reach: InvariantPolytope | None = None
 ) -> Bounds | NoGuarantee:
     if reach is not None and not held.longest_step:
         return NoGuarantee(reason="periodic sampling needs no invariant set", small_gain=None)
@@ -501,13 +501,13 @@ class ContinuousPeaks:
 
     Attributes
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     law : ContinuousLaw
     claims : Claims
     """
 
     proved: ClassVar[Literal[True]] = True
-    task: UncertainPlant
+    task: FaultPlant
     law: ContinuousLaw
     claims: Claims
 
@@ -535,7 +535,7 @@ class ContinuousPeaks:
         return sentence_of(self.task, self.claims, WHEN)
 
 
-def continuous_peaks(task: UncertainPlant, law: ContinuousLaw) -> ContinuousPeaks | NoGuarantee:
+def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousPeaks | NoGuarantee:
     """Tightest rounded claims about a law in continuous time, or why there are none.
 
     Raises
@@ -552,7 +552,7 @@ def continuous_peaks(task: UncertainPlant, law: ContinuousLaw) -> ContinuousPeak
     return ContinuousPeaks(task=task, law=law, claims=claims)
 
 
-def _loop(task: UncertainPlant, law: ContinuousLaw) -> PeriodicLoop:
+def _loop(task: FaultPlant, law: ContinuousLaw) -> PeriodicLoop:
     """Nominal error loop, of a law that fits the reference."""
     loop = continuous_loop(law, task.model, task.authority)
     if any(law.of_reference):
@@ -560,7 +560,7 @@ def _loop(task: UncertainPlant, law: ContinuousLaw) -> PeriodicLoop:
     return loop
 
 
-def _continuous_bounds(task: UncertainPlant, law: ContinuousLaw) -> Bounds | NoGuarantee:
+def _continuous_bounds(task: FaultPlant, law: ContinuousLaw) -> Bounds | NoGuarantee:
     loop = _loop(task, law)
     try:
         return certified_bounds(task, loop)
@@ -584,7 +584,7 @@ _SAME = {
 _SPREADS = ("stiffness", "damping", "authority")
 
 
-def differences(proved: UncertainPlant, asked: UncertainPlant) -> list[str]:
+def differences(proved: FaultPlant, asked: FaultPlant) -> list[str]:
     """Differences of a task that a proof does not cover, with both values, SI; empty if none.
 
     Constants of the fault and its reference must be the same; friction, ranges and disturbance lie within those of the
@@ -593,7 +593,7 @@ def differences(proved: UncertainPlant, asked: UncertainPlant) -> list[str]:
     return [*_other(proved, asked), *_wider_than_needed(proved, asked), *_rougher(proved.friction, asked.friction)]
 
 
-def _other(proved: UncertainPlant, asked: UncertainPlant) -> list[str]:
+def _other(proved: FaultPlant, asked: FaultPlant) -> list[str]:
     """Constants that are not the same."""
     pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(asked, name)) for name, unit in _SAME.items()}
     pairs["static friction [-]"] = proved.friction.static, asked.friction.static
@@ -607,7 +607,7 @@ def _other(proved: UncertainPlant, asked: UncertainPlant) -> list[str]:
     return found + ([] if proved.shape == asked.shape else ["the shape of the reference"])
 
 
-def _wider_than_needed(proved: UncertainPlant, asked: UncertainPlant) -> list[str]:
+def _wider_than_needed(proved: FaultPlant, asked: FaultPlant) -> list[str]:
     """Ranges and disturbances beyond those of the proof."""
     pairs = {f"spread of {name} [-]": both for name, *both in zip(_SPREADS, proved.spreads, asked.spreads, strict=True)}
     pairs["disturbance [m/s^2]"] = [proved.amplitude, asked.amplitude]

@@ -15,7 +15,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
     StickSlipPolytope,
 )
 from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 from quakedesign.sos.exact.strict import listed, need, read_exactly, read_row, texts, with_keys
 
 
@@ -36,7 +36,7 @@ def stick_slip_document(claim: StickSlipGuarantee) -> dict[str, Any]:
     }
 
 
-def read_stick_slip(raw: Any, task: UncertainPlant, claims: Callable[[type], Any]) -> StickSlipGuarantee:
+def read_stick_slip(raw: Any, task: FaultPlant, claims: Callable[[type], Any]) -> StickSlipGuarantee:
     """Claim from a parsed file, its task, and a reader of claims of a kind.
 
     Raises

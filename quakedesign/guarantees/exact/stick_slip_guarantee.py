@@ -14,7 +14,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
     stick_slip_bounds,
 )
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 if TYPE_CHECKING:
     from quakedesign.laws.stick_slip_controller import StickSlipController
@@ -26,7 +26,7 @@ class StickSlipGuarantee:
 
     Attributes
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     held : SampledStickSlip
     reach : StickSlipPolytope
     claims : StickSlipClaims
@@ -35,7 +35,7 @@ class StickSlipGuarantee:
     """
 
     proved: ClassVar[Literal[True]] = True
-    task: UncertainPlant
+    task: FaultPlant
     held: SampledStickSlip
     reach: StickSlipPolytope
     claims: StickSlipClaims
@@ -86,7 +86,7 @@ class StickSlipGuarantee:
 
 
 def stick_slip_guarantee(
-    task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope
+    task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope
 ) -> StickSlipGuarantee | NoGuarantee:
     """Claims that the theorem gives for a polytope, or what of it does not hold."""
     try:

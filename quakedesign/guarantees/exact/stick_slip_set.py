@@ -60,7 +60,7 @@ from quakedesign.exact import LowerBound, UpperBound, end_of, shortly
 from quakedesign.guarantees.exact.norms import absolute, ball, majorant, matrix
 from quakedesign.guarantees.exact.statement import above
 from quakedesign.laws.stick_slip_law import StickSlipLaw
-from quakedesign.plant.ranges import Range, UncertainPlant
+from quakedesign.plant.ranges import FaultPlant, Range
 
 BITS = 128
 NODES = 16  # pieces of a period, for integrals of impulse responses
@@ -300,7 +300,7 @@ class Ranges:
     rest_pressure: Range
 
 
-def ranges(task: UncertainPlant, ahead: Fraction, push: Range, moved: Fraction) -> Ranges:
+def ranges(task: FaultPlant, ahead: Fraction, push: Range, moved: Fraction) -> Ranges:
     """For a slip of at most `ahead` [m] beyond the target and `moved` [m] in a period, and U = p* − p in a range [Pa].
 
     β changes within a period by at most N̂|μ′|/b·`moved`, so that σ is that share larger than s/(bβ) at most.
@@ -329,7 +329,7 @@ def ranges(task: UncertainPlant, ahead: Fraction, push: Range, moved: Fraction) 
     return Ranges(slope=slope, damping=damping, chord=chord, rest_pressure=rest)
 
 
-def stop_bounds(task: UncertainPlant, held: SampledStickSlip, found: Ranges) -> tuple[tuple[Fraction, Fraction], ...]:
+def stop_bounds(task: FaultPlant, held: SampledStickSlip, found: Ranges) -> tuple[tuple[Fraction, Fraction], ...]:
     """Pairs (g, h) with D ≤ g·y + h for the slip D [m] until a last stop within a period.
 
     Upper bounds of the exponentials: (1 − e^{−wm})/w ≤ m − wm²/2 + w²m³/6, (e^{wx} − 1 − wx)/w² ≤ x²/2/(1 − wx/3) and
@@ -360,7 +360,7 @@ class Period:
     """One period in numbers of a back end; SI units."""
 
     back: Numbers
-    task: UncertainPlant
+    task: FaultPlant
     held: SampledStickSlip
     found: Ranges
     of_rate: tuple[Any, Any]  # ξ and y at the end, of y
@@ -369,7 +369,7 @@ class Period:
     bent: tuple[Any, Any]
 
     @classmethod
-    def of(cls, back: Numbers, task: UncertainPlant, held: SampledStickSlip, found: Ranges) -> "Period":
+    def of(cls, back: Numbers, task: FaultPlant, held: SampledStickSlip, found: Ranges) -> "Period":
         """From exact ranges."""
         zero, one = _ZERO, Fraction(1)
         slope, damping = (sum(pair, _ZERO) / 2 for pair in (found.slope, found.damping))
@@ -490,7 +490,7 @@ _Combination = tuple[int, bool, int, int]
 
 def _carried(
     back: Numbers,
-    task: UncertainPlant,
+    task: FaultPlant,
     held: SampledStickSlip,
     facets: np.ndarray,
     ends: Sequence[tuple[int, _Combination]],
@@ -565,7 +565,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
 
 def resting_rows(
     back: Numbers,
-    task: UncertainPlant,
+    task: FaultPlant,
     held: SampledStickSlip,
     found: Ranges,
     facets: np.ndarray,
@@ -595,7 +595,7 @@ def resting_rows(
 Constraint = tuple[tuple[Fraction, ...], Fraction]
 
 
-def slices(task: UncertainPlant, held: SampledStickSlip) -> tuple[tuple[Constraint, ...], ...]:
+def slices(task: FaultPlant, held: SampledStickSlip) -> tuple[tuple[Constraint, ...], ...]:
     """Ends of the three slices: e1 up to 0, from there to max r′/c, and above."""
     threshold, one = task.reference_rates[0] / held.law.return_rate, Fraction(1)
     up, down = (one, _ZERO, _ZERO), (-one, _ZERO, _ZERO)
@@ -603,7 +603,7 @@ def slices(task: UncertainPlant, held: SampledStickSlip) -> tuple[tuple[Constrai
 
 
 def polytopes(
-    task: UncertainPlant, held: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], found: Ranges | None
+    task: FaultPlant, held: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], found: Ranges | None
 ) -> list[list[Constraint]]:
     """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, D) where ranges are known.
 
@@ -709,7 +709,7 @@ def _middles(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return middles, radii
 
 
-def stick_slip_bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
+def stick_slip_bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
     """Bounds of the theorem.
 
     Raises
@@ -726,7 +726,7 @@ def stick_slip_bounds(task: UncertainPlant, held: SampledStickSlip, reach: Stick
         raise ParameterError("numbers of the loop and its polytope must be of a size that floats hold") from None
 
 
-def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
+def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
     ahead, rate, up, lag, down = reach.box
     fastest = task.reference_rates[0]
     sizes = [max(ahead, lag), rate, max(up, down)]
@@ -765,7 +765,7 @@ def _bounds(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolyto
     )
 
 
-def _bracket(task: UncertainPlant, held: SampledStickSlip, found: Ranges, push: Fraction) -> Fraction:
+def _bracket(task: FaultPlant, held: SampledStickSlip, found: Ranges, push: Fraction) -> Fraction:
     """What |a| ≤ H + δS·ξ + δw·y loses at most where ξ and y of one β stand beside the U of another [m/s²].
 
     As long as it is below H, |a| has a bound of 0 or more at both ends of β, also where the response of a facet changes
@@ -777,7 +777,7 @@ def _bracket(task: UncertainPlant, held: SampledStickSlip, found: Ranges, push: 
     return share * task.authority * (task.beta[1] - task.beta[0]) * max(push, _ZERO)
 
 
-def _push(task: UncertainPlant, held: SampledStickSlip, reach: StickSlipPolytope, sizes: Sequence[Fraction]) -> Range:
+def _push(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, sizes: Sequence[Fraction]) -> Range:
     """Least and largest U = p* − p at a sample [Pa]."""
     law, fastest = held.law, task.reference_rates[0]
     row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)

@@ -23,7 +23,7 @@ from quakedesign.laws import NOISES
 from quakedesign.laws.implicit_root import root_of
 from quakedesign.loop import PeriodicLoop
 from quakedesign.loop.periodic import Matrix, Row
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 from quakedesign.plant.sliding_plant import SlidingPlant
 
 # ----------------------------------------------------------------------
@@ -246,7 +246,7 @@ class _Limit:
         self.rest = np.clip(self.rest - drifted, *self.ends)
 
 
-def _of_asked(task: UncertainPlant, held: Held) -> list[float]:
+def _of_asked(task: FaultPlant, held: Held) -> list[float]:
     """What the first jump of a period makes of what is asked for, [m/s²] and all states: of a law that asks for e1."""
     zero = Fraction(0)
     still = tuple((zero, zero) for _ in held.law.states)
@@ -515,7 +515,7 @@ def _pushes(added: np.ndarray, costates: np.ndarray) -> np.ndarray:
     return np.reshape(found, (len(costates), vertices, inputs))
 
 
-def _with_disturbance(task: UncertainPlant, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
+def _with_disturbance(task: FaultPlant, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
     """Flow and columns of all inputs at full size; a disturbance of bounded rate is one more state."""
     flow = np.array(loop.flow, dtype=float)
     push, drift = (np.array(loop.inputs[name], dtype=float) for name in ("acceleration", "drift"))
@@ -530,7 +530,7 @@ def _with_disturbance(task: UncertainPlant, loop: PeriodicLoop) -> tuple[np.ndar
     return wide, columns
 
 
-def _at(task: UncertainPlant, flow: np.ndarray, push: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
+def _at(task: FaultPlant, flow: np.ndarray, push: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
     """Flow at a vertex, from the nominal one: slopes act on the errors, the input gain on the push."""
     found, model = flow.copy(), task.model
     found[1] += (beta - float(model.gain / task.authority)) * push

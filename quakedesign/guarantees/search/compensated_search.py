@@ -43,7 +43,7 @@ from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.implicit import end_rate, end_slip
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 from quakedesign.symbolic import SignedPower
 
 # ----------------------------------------------------------------------
@@ -197,7 +197,7 @@ class Compensation:
 
 
 def compensated(
-    task: UncertainPlant,
+    task: FaultPlant,
     controller: SlidingMode,
     weight: Fraction,
     authority: Fraction,
@@ -238,7 +238,7 @@ def compensated(
 
 
 def design_compensated(
-    task: UncertainPlant,
+    task: FaultPlant,
     controller: SlidingMode,
     step: Fraction,
     *,
@@ -263,7 +263,7 @@ def design_compensated(
 
 
 def _made(
-    task: UncertainPlant,
+    task: FaultPlant,
     controller: SlidingMode,
     step: Fraction,
     chosen: tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None],
@@ -290,7 +290,7 @@ class Deadbeat(Kind):
     controller: SlidingMode
 
     def closest(
-        self, task: UncertainPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]
+        self, task: FaultPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]
     ) -> Closest | NoGuarantee:
         """The weight and B0 with which a deadbeat step comes nearest to a guarantee, for any gains."""
         if (none := unpredictable(task, step)) is not None:
@@ -314,15 +314,15 @@ class Deadbeat(Kind):
                 break
         return Closest(least, x, self.held(task, x, step, **around))
 
-    def held(self, task: UncertainPlant, numbers: np.ndarray, step: Fraction, **around: Unpack[Around]) -> Held:
+    def held(self, task: FaultPlant, numbers: np.ndarray, step: Fraction, **around: Unpack[Around]) -> Held:
         """The loop with a deadbeat step, of any gains."""
         return _held(_DEADBEAT, *_settled(task, numbers), step, around)
 
-    def proved(self, task: UncertainPlant, found: Closest) -> Guarantee | NoGuarantee:
+    def proved(self, task: FaultPlant, found: Closest) -> Guarantee | NoGuarantee:
         """Of the smallest λ for which the step is deadbeat."""
         return self.made(task, found.held.step, found.numbers, **found.held.around).found
 
-    def made(self, task: UncertainPlant, step: Fraction, numbers: np.ndarray, **around: Unpack[Around]) -> Compensation:
+    def made(self, task: FaultPlant, step: Fraction, numbers: np.ndarray, **around: Unpack[Around]) -> Compensation:
         """The controller with these numbers, and what is guaranteed of it."""
         (weight, authority), held = _settled(task, numbers), self.held(task, numbers, step, **around)
         bounds = closeness(task, held)[1]
@@ -330,7 +330,7 @@ class Deadbeat(Kind):
         errors = None if bounds is None else (bounds.slip_error + noise[0], bounds.slip_rate_error + noise[1])
         return _made(task, self.controller, step, (weight, authority, errors), around)
 
-    def leanest(self, task: UncertainPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
+    def leanest(self, task: FaultPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
         """That with the smallest peak."""
         weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, **around)
         law = _made(task, self.controller, step, (weight, authority, errors), around).controller
@@ -338,7 +338,7 @@ class Deadbeat(Kind):
         return None if errors is None else _held(root, weight, authority, step, around)
 
     def continued(
-        self, task: UncertainPlant, step: Fraction, longest: Longest | None, **around: Unpack[Around]
+        self, task: FaultPlant, step: Fraction, longest: Longest | None, **around: Unpack[Around]
     ) -> Compensation | None:
         """Design for a T_s [s] up to the longest, of numbers near those; None where none is proved."""
         if longest is None or longest.guarantee.held.step < step:
@@ -347,7 +347,7 @@ class Deadbeat(Kind):
         made = None if isinstance(near, NoGuarantee) else self.made(task, step, near.numbers, **around)
         return made if made is not None and made.found.proved else None
 
-    def at(self, task: UncertainPlant, longest: Longest, objective: str = "peak") -> Compensation:
+    def at(self, task: FaultPlant, longest: Longest, objective: str = "peak") -> Compensation:
         """Design for the longest T_s and all else of a guarantee: as others are made, else that of the search."""
         held = longest.guarantee.held
         made = design_compensated(task, self.controller, held.step, objective=objective, **held.around)
@@ -356,7 +356,7 @@ class Deadbeat(Kind):
         return self.made(task, held.step, longest.numbers, **held.around)
 
 
-def _settled(task: UncertainPlant, numbers: np.ndarray) -> tuple[Fraction, Fraction]:
+def _settled(task: FaultPlant, numbers: np.ndarray) -> tuple[Fraction, Fraction]:
     """Weight and B0 in few digits."""
     return Fraction(f"{numbers[0]:.3g}"), _short(Fraction(float(numbers[1])) * task.model.gain)
 
@@ -421,7 +421,7 @@ def _settings(law: SlidingMode) -> dict[str, Fraction]:
 
 @lru_cache(maxsize=64)
 def _deadbeat(
-    task: UncertainPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], **around: Unpack[Around]
+    task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], **around: Unpack[Around]
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
     """Weight and authority for a deadbeat step, of any law, and the errors that it leaves, if it has a guarantee."""
     require_known(objective, OBJECTIVES, "objective")
@@ -432,7 +432,7 @@ def _deadbeat(
 
 
 def _deadbeat_search(
-    task: UncertainPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], around: Around
+    task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], around: Around
 ) -> list[str]:
     """The same, as texts."""
     seen = dict[tuple[Fraction, Fraction], BoundsEstimate]()

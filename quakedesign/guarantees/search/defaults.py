@@ -32,7 +32,7 @@ from quakedesign.laws import SlidingMode
 from quakedesign.loop import schemes
 from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.lyapunov.exact.premises import Premise
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
 # The default designs of a fault: for its own T_s, else for the longest T_s that has a guarantee.
@@ -87,7 +87,7 @@ class SampledDesign:
 
 
 def sampled_design(
-    task: UncertainPlant,
+    task: FaultPlant,
     step: Fraction,
     objective: str = "tracking",
     *,
@@ -122,7 +122,7 @@ def sampled_design(
 
 
 def sampled_sliding_mode(
-    task: UncertainPlant, law: SlidingMode, step: Fraction, objective: str = "tracking", **noise: Unpack[Around]
+    task: FaultPlant, law: SlidingMode, step: Fraction, objective: str = "tracking", **noise: Unpack[Around]
 ) -> tuple[Compensation, SampledDesign]:
     """Sliding mode with the base gains of a law for a T_s [s], or for the longest shorter one that has a guarantee.
 
@@ -159,7 +159,7 @@ def sampled_sliding_mode(
 # What is guaranteed of a sliding mode as a scheme runs it, and why most schemes have nothing.
 
 
-def guarantee_of(task: UncertainPlant, law: SlidingMode, **noise: Unpack[Around]) -> Guarantee | NoGuarantee:
+def guarantee_of(task: FaultPlant, law: SlidingMode, **noise: Unpack[Around]) -> Guarantee | NoGuarantee:
     """What is guaranteed of a sliding mode as it runs: something only of one for the scheme ``compensated``."""
     own = law.sampling
     if own is None or own.scheme != GUARANTEED:
@@ -174,7 +174,7 @@ def guarantee_of(task: UncertainPlant, law: SlidingMode, **noise: Unpack[Around]
 
 
 def sliding_mode(
-    task: UncertainPlant,
+    task: FaultPlant,
     law: type[SlidingMode],
     step: Fraction,
     *,
@@ -187,7 +187,7 @@ def sliding_mode(
 
     Parameters
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     law : type
     step : Fraction
         T_s [s].
@@ -212,13 +212,13 @@ def sliding_mode(
     return replace(made, found=tightened(made.found))
 
 
-def deadbeat(task: UncertainPlant, law: type[SlidingMode], gains: tuple[str, ...] = ()) -> Deadbeat:
+def deadbeat(task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...] = ()) -> Deadbeat:
     """Sliding modes of a law with given base gains, or the first ones known for it."""
     base = law.from_values(gains) if gains else law.base_gains()[0].law
     return Deadbeat(replace(base, gains=dict(base.gains), divisor=task.authority))
 
 
-def _why_none(task: UncertainPlant, law: type[SlidingMode], scheme: str, step: Fraction) -> str:
+def _why_none(task: FaultPlant, law: type[SlidingMode], scheme: str, step: Fraction) -> str:
     if scheme == "continuous":
         return f"a pressure that follows {law.title} at every instant is run by no sampled controller{_REMEDY}"
     if scheme == "implicit":

@@ -18,7 +18,7 @@ from quakedesign.guarantees.exact.norms import START
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, SlowGain, bounds_from
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
 # The bounds of a guarantee in floats, for searches: proposes, decides nothing.
@@ -43,7 +43,7 @@ class BoundsEstimate:
     drift_gain: float
 
 
-def estimated(task: UncertainPlant, held: Held) -> BoundsEstimate | None:
+def estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
     """Bounds of the theorem with sums in place of upper sums; None where the nominal loop is unstable or very slow."""
     gains = gains_of(held.loop(task))
     if gains is None:
@@ -52,7 +52,7 @@ def estimated(task: UncertainPlant, held: Held) -> BoundsEstimate | None:
     return BoundsEstimate(bounds, max(gains["slip_error", "drift"]))
 
 
-def slowly_estimated(task: UncertainPlant, held: Held) -> BoundsEstimate | None:
+def slowly_estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
     """The same where the input gain is slow: of nominal loops at the ends and in the middle of its range."""
     low, high = task.beta
     found = []
@@ -67,7 +67,7 @@ def slowly_estimated(task: UncertainPlant, held: Held) -> BoundsEstimate | None:
     return BoundsEstimate(bounds, max(whole["slip_error", "drift"]))
 
 
-def closeness(task: UncertainPlant, held: Held) -> tuple[float, Bounds | None]:
+def closeness(task: FaultPlant, held: Held) -> tuple[float, Bounds | None]:
     """Below 1 where a proof is to be expected: the small gain [-], and the bounds; elsewhere 1 more, of errors of 0.
 
     Where friction depends on the slip alone the input gain is slow, and the slip error that moves it has to follow from

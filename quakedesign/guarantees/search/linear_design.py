@@ -47,7 +47,7 @@ from quakedesign.loop import PeriodicLoop, exact_integrals
 from quakedesign.loop.loop_setup import MEASURED, Pump, require_step
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.of_fault import uncertain_plant
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
 # Guarantees that use how slowly the input gain changes, where friction depends on the slip alone.
@@ -56,7 +56,7 @@ _PARTS = 8
 _SHARE = 0.5  # of the slowest decay, for what is past to grow by
 
 
-def best_guarantee(task: UncertainPlant, held: Held) -> Guarantee | NoGuarantee:
+def best_guarantee(task: FaultPlant, held: Held) -> Guarantee | NoGuarantee:
     """Guarantee with an input gain that is slow, where the friction's is and it helps, else with any.
 
     Where samples follow no clock that is one with a set that the loop never leaves.
@@ -83,7 +83,7 @@ def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee:
     return better if better.proved else found
 
 
-def slow_gain(task: UncertainPlant, held: Held) -> SlowGain | None:
+def slow_gain(task: FaultPlant, held: Held) -> SlowGain | None:
     """Parts and growth for a proof; None where friction depends on the slip rate or a nominal loop is not stable."""
     if task.friction.rate_slope:
         return None
@@ -140,7 +140,7 @@ class Closest:
 
 
 def closest(
-    task: UncertainPlant,
+    task: FaultPlant,
     step: Fraction,
     *,
     near: np.ndarray | None = None,
@@ -166,7 +166,7 @@ def closest(
 
 
 def nearby(
-    task: UncertainPlant, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: FaultPlant, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], **around: Unpack[Around]
 ) -> Guarantee | NoGuarantee:
     """Design for the smallest certified slip-rate error, sought near the numbers of a law for another T_s or delay.
 
@@ -180,7 +180,7 @@ def nearby(
 
 
 def design_held(
-    task: UncertainPlant,
+    task: FaultPlant,
     step: Fraction,
     *,
     objective: str = "tracking",
@@ -199,7 +199,7 @@ def design_held(
 
     Parameters
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     step : Fraction
         T_s [s].
     objective : str
@@ -267,13 +267,13 @@ def _with_noise(without: Guarantee, noise: Mapping[str, Fraction]) -> Guarantee 
 class _Laws:
     """Laws among which a search chooses for one loop, and what is seen of each."""
 
-    task: UncertainPlant
+    task: FaultPlant
     family: LawFamily
     template: Held
     question: tuple[Any, ...]
 
     @classmethod
-    def of(cls, task: UncertainPlant, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
+    def of(cls, task: FaultPlant, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
         """Laws for a T_s [s] and what is around them, or why there are none."""
         require_surroundings(around)
         require_step(step)
@@ -392,7 +392,7 @@ def _hopeless(cost: float) -> bool:
     return _HOPELESS * _FAILED < cost < 9 * _FAILED
 
 
-def unpredictable(task: UncertainPlant, step: Fraction) -> NoGuarantee | None:
+def unpredictable(task: FaultPlant, step: Fraction) -> NoGuarantee | None:
     """No law of samples, where the errors of the model outgrow within a period what a prediction can hold."""
     require_ordinary(step=step)
     rate, slip = float(task.model.rate), max(float(task.model.slip), 0.0)
@@ -498,7 +498,7 @@ class Longest:
     numbers: np.ndarray
 
 
-Asked = tuple[UncertainPlant, Fraction, Around]
+Asked = tuple[FaultPlant, Fraction, Around]
 """Task, T_s [s] and what is around a law, of a design."""
 
 
@@ -506,15 +506,15 @@ class Kind(ABC):
     """A kind of laws, as far as a search for the most that one of them stands knows it."""
 
     @abstractmethod
-    def closest(self, task: UncertainPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
+    def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
         """`Closest` to a guarantee, or `NoGuarantee`; near the numbers of another law if they are given."""
 
     @abstractmethod
-    def proved(self, task: UncertainPlant, found: Closest) -> Guarantee | NoGuarantee:
+    def proved(self, task: FaultPlant, found: Closest) -> Guarantee | NoGuarantee:
         """Proof about a law that is near enough."""
 
     @abstractmethod
-    def leanest(self, task: UncertainPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
+    def leanest(self, task: FaultPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
         """The loop of a law whose pressure changes little; None where no law is known."""
 
 
@@ -524,15 +524,15 @@ class Linear(Kind):
 
     measured: str = MEASURED[0]
 
-    def closest(self, task: UncertainPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
+    def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
         """By a search over the numbers of the family."""
         return closest(task, step, near=near, measured=self.measured, **around)
 
-    def proved(self, task: UncertainPlant, found: Closest) -> Guarantee | NoGuarantee:
+    def proved(self, task: FaultPlant, found: Closest) -> Guarantee | NoGuarantee:
         """With a slow input gain where that helps."""
         return best_guarantee(task, found.held)
 
-    def leanest(self, task: UncertainPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
+    def leanest(self, task: FaultPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
         """That with the smallest change of pressure near the smallest peak."""
         laws = _Laws.of(task, step, self.measured, around)
         if isinstance(laws, NoGuarantee):
@@ -542,7 +542,7 @@ class Linear(Kind):
 
 
 def longest_step(
-    task: UncertainPlant, *, measured: str = MEASURED[0], kind: Kind | None = None, **around: Unpack[Around]
+    task: FaultPlant, *, measured: str = MEASURED[0], kind: Kind | None = None, **around: Unpack[Around]
 ) -> Longest | None:
     """A guarantee at nearly the longest T_s that has one, whatever the T_s of the fault; None where none is found.
 
@@ -550,7 +550,7 @@ def longest_step(
 
     Parameters
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     measured, **around
         As in `design_held`.
     kind : Kind, optional
@@ -561,7 +561,7 @@ def longest_step(
     return _farthest(kind or Linear(measured), lambda step: (task, step, around), _first_step(task, late), None)
 
 
-def _first_step(task: UncertainPlant, late: float = 0.0) -> Fraction:
+def _first_step(task: FaultPlant, late: float = 0.0) -> Fraction:
     """T_s to begin with [s], where a pressure acts late [s]: of the fastest pole, of a stable fault of its spring."""
     slip, rate = float(task.slip_chord[1]), float(task.rate_chord[0])
     pole = (sqrt(max(rate**2 + 4 * slip, 0.0)) - rate) / 2 if slip > 0 or rate < 0 else 0.0
@@ -570,7 +570,7 @@ def _first_step(task: UncertainPlant, late: float = 0.0) -> Fraction:
 
 
 def continued(
-    task: UncertainPlant,
+    task: FaultPlant,
     step: Fraction,
     longest: Longest | None,
     *,
@@ -584,7 +584,7 @@ def continued(
     return found if found.proved else None
 
 
-def design_at(task: UncertainPlant, longest: Longest) -> Guarantee:
+def design_at(task: FaultPlant, longest: Longest) -> Guarantee:
     """Design for a small slip-rate error at T_s and all else of a guarantee, which stays where there is none."""
     held = longest.guarantee.held
     found = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), **held.around)
@@ -592,7 +592,7 @@ def design_at(task: UncertainPlant, longest: Longest) -> Guarantee:
 
 
 def longest_delay(
-    task: UncertainPlant,
+    task: FaultPlant,
     step: Fraction,
     *,
     measured: str = MEASURED[0],
@@ -609,7 +609,7 @@ def longest_delay(
 
 
 def farthest_rock(
-    task: UncertainPlant, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: FaultPlant, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
 ) -> Guarantee | None:
     """A guarantee through nearly the largest L²/D of rock that has one; None where none is found."""
 
@@ -621,7 +621,7 @@ def farthest_rock(
 
 
 def nearest_setup(
-    task: UncertainPlant,
+    task: FaultPlant,
     step: Fraction,
     *,
     measured: str = MEASURED[0],
@@ -678,13 +678,13 @@ def _slack(step: Fraction, around: Around) -> Fraction:
     return max(around.get("longest_step", step) - step, Fraction(0))
 
 
-def _narrowed(task: UncertainPlant, share: Fraction) -> tuple[Fraction, Fraction, Fraction]:
+def _narrowed(task: FaultPlant, share: Fraction) -> tuple[Fraction, Fraction, Fraction]:
     """Half-widths of a box that is smaller."""
     first, second, third = (share * width for width in task.spreads)
     return first, second, third
 
 
-def _less_pressed(laws: Kind, task: UncertainPlant, step: Fraction, around: Around) -> tuple[str, Guarantee] | None:
+def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, around: Around) -> tuple[str, Guarantee] | None:
     """The smallest pump, or the largest disturbance, for which a law of little pressure is proved."""
     pump, held = around.get("pump"), laws.leanest(task, step, **around)
     if held is None:

@@ -37,7 +37,7 @@ from quakedesign.loop import SHORTEST, Layer, SlidingModel
 from quakedesign.loop.layer import MODES
 from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.loop.sensing.differentiator import ORDER, names_before, told_by_differences
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_rate
 
 # ----------------------------------------------------------------------
@@ -200,14 +200,14 @@ def why_no_law(step: Fraction, measured: str, around: Around) -> str:
     return "" if known else "a law with models of the delay and of the diffusion path has too many states"
 
 
-def family_of(task: UncertainPlant, step: Fraction, measured: str, around: Around) -> LawFamily:
+def family_of(task: FaultPlant, step: Fraction, measured: str, around: Around) -> LawFamily:
     """Feedback with an estimate of the disturbance, from slip and slip rate, from the slip alone or a differentiator.
 
     Through a lag or a layer it is a feedback of the pressures on their way as well, which the law simulates.
 
     Parameters
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     step : Fraction
         T_s [s].
     measured : str
@@ -239,7 +239,7 @@ def family_of(task: UncertainPlant, step: Fraction, measured: str, around: Aroun
     return LawFamily(law, _STARTS, lambda x: bool(0 < x[2] < 1), room=1.6, period=step)
 
 
-def _through_path(task: UncertainPlant, step: Fraction, around: Around) -> LawFamily:
+def _through_path(task: FaultPlant, step: Fraction, around: Around) -> LawFamily:
     feedback = PathFeedback.of(task.model, step, around)
 
     def law(x: np.ndarray) -> LinearLaw:
@@ -252,7 +252,7 @@ def _through_path(task: UncertainPlant, step: Fraction, around: Around) -> LawFa
     return LawFamily(law, _path_starts(around), admits, room=1.6, period=step + around.get("diffusion", 0))
 
 
-def _observers_through_path(task: UncertainPlant, step: Fraction, around: Around) -> LawFamily:
+def _observers_through_path(task: FaultPlant, step: Fraction, around: Around) -> LawFamily:
     feedback, kalman = PathFeedback.of(task.model, step, around, observed=True), _Kalman.of(task, step)
     decades = kalman.decades(task, around.get("slip_noise", Fraction(0)))
 
@@ -273,7 +273,7 @@ def _solvable(x: np.ndarray) -> bool:
     return bool(np.abs(x).max() < _WIDEST)
 
 
-def _observers(task: UncertainPlant, step: Fraction, delay: Fraction, noise: Fraction) -> LawFamily:
+def _observers(task: FaultPlant, step: Fraction, delay: Fraction, noise: Fraction) -> LawFamily:
     """Steady-state Kalman observers: two gains, decades of the variances of accelerations and of the level's steps."""
     scale, prediction, kalman = _Scale.of(task, step), _ahead(task, step, delay), _Kalman.of(task, step)
 
@@ -294,12 +294,12 @@ class _Kalman:
     step: float
 
     @classmethod
-    def of(cls, task: UncertainPlant, step: Fraction) -> "_Kalman":
+    def of(cls, task: FaultPlant, step: Fraction) -> "_Kalman":
         period = float(step)
         units = np.diag([1, 1 / period, 1 / period**2])
         return cls(np.linalg.inv(units) @ expm(_flow(task) * period) @ units, units, period)
 
-    def decades(self, task: UncertainPlant, noise: Fraction) -> float:
+    def decades(self, task: FaultPlant, noise: Fraction) -> float:
         """Where a search begins: of what the disturbance moves within T_s, over the noise [m]."""
         moved = float(task.amplitude) * self.step**2
         return _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
@@ -322,7 +322,7 @@ class _Scale:
     step: float
 
     @classmethod
-    def of(cls, task: UncertainPlant, step: Fraction) -> "_Scale":
+    def of(cls, task: FaultPlant, step: Fraction) -> "_Scale":
         gain = float(task.model.gain)
         return cls(short(gain), gain, float(step))
 
@@ -331,12 +331,12 @@ class _Scale:
         return short(float(x[0]) / self.model_gain / self.step**2), short(float(x[1]) / self.model_gain / self.step)
 
 
-def _flow(task: UncertainPlant) -> np.ndarray:
+def _flow(task: FaultPlant) -> np.ndarray:
     """Of e1, e2 and a constant push."""
     return np.array([[0, 1, 0], [float(task.model.slip), -float(task.model.rate), 1], [0, 0, 0]])
 
 
-def _ahead(task: UncertainPlant, step: Fraction, delay: Fraction) -> ErrorPrediction:
+def _ahead(task: FaultPlant, step: Fraction, delay: Fraction) -> ErrorPrediction:
     """What the model says of the next sample, and of the time at which a pressure arrives; numbers of four digits."""
     flow, period, late = _flow(task), float(step), float(delay)
 

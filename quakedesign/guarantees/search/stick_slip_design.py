@@ -34,7 +34,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
 )
 from quakedesign.guarantees.search.estimate import short
 from quakedesign.laws.stick_slip_law import StickSlipLaw
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 Tell = Callable[[str, float], None]
 TUNINGS = tuple((level, slip, back, 1.3) for level, slip in ((0.5, 0.5), (0.7, 0.5), (0.3, 0.3)) for back in (0.3, 0.1))
@@ -76,12 +76,12 @@ FLOATS = Numbers(
 )
 
 
-def tuned(task: UncertainPlant, step: Fraction, tuning: Sequence[float]) -> StickSlipLaw:
+def tuned(task: FaultPlant, step: Fraction, tuning: Sequence[float]) -> StickSlipLaw:
     """Deadbeat feedback for the middle of the damping, with the shares of a tuning.
 
     Parameters
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     step : Fraction
         T_s [s].
     tuning : sequence of float
@@ -109,7 +109,7 @@ def tuned(task: UncertainPlant, step: Fraction, tuning: Sequence[float]) -> Stic
 class _Start:
     """States at a sample, one a row, and choices of reference, input gain and slope of friction, one a column."""
 
-    task: UncertainPlant
+    task: FaultPlant
     held: SampledStickSlip
     slip: np.ndarray
     rate: np.ndarray
@@ -122,7 +122,7 @@ class _Start:
     force: np.ndarray
 
     @classmethod
-    def of(cls, task: UncertainPlant, held: SampledStickSlip, found: Ranges, states: np.ndarray) -> "_Start":
+    def of(cls, task: FaultPlant, held: SampledStickSlip, found: Ranges, states: np.ndarray) -> "_Start":
         """With the ends of all ranges; the input gain changes slowest."""
         law = held.law
         slip, rate, level = (column[:, None] for column in states.T)
@@ -147,13 +147,13 @@ class _Start:
 class _Reach:
     """The two maps of the theorem, and the plant itself, on many states at once."""
 
-    task: UncertainPlant
+    task: FaultPlant
     held: SampledStickSlip
     found: Ranges
     period: Period
 
     @classmethod
-    def of(cls, task: UncertainPlant, held: SampledStickSlip) -> "_Reach":
+    def of(cls, task: FaultPlant, held: SampledStickSlip) -> "_Reach":
         found = ranges(task, task.target_slip / 100, (Fraction(0), Fraction(0)), task.amplitude * held.step**2)
         return cls(task, held, found, Period.of(FLOATS, task, held, found))
 
@@ -341,7 +341,7 @@ class _Images:
 class _Growing:
     """A polytope {n·z ≤ h} that grows until it holds its images."""
 
-    task: UncertainPlant
+    task: FaultPlant
     held: SampledStickSlip
     normals: np.ndarray
     heights: np.ndarray
@@ -585,7 +585,7 @@ class _Growing:
 
 
 def proved(
-    task: UncertainPlant, held: SampledStickSlip, tell: Tell = lambda said, done: None
+    task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda said, done: None
 ) -> StickSlipGuarantee | NoGuarantee:
     """Guarantee of a law with a polytope that is searched for it, or what speaks against one."""
     none = NoGuarantee(reason="no polytope was found that the loop never leaves", small_gain=None)
@@ -609,7 +609,7 @@ def proved(
 
 
 def design_stick_slip(
-    task: UncertainPlant,
+    task: FaultPlant,
     step: Fraction,
     *,
     objective: str = "tracking",
@@ -621,7 +621,7 @@ def design_stick_slip(
 
     Parameters
     ----------
-    task : UncertainPlant
+    task : FaultPlant
     step : Fraction
         T_s [s].
     objective : str

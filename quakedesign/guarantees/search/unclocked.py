@@ -13,7 +13,7 @@ from quakedesign.guarantees.exact.loop import Held, channels_of
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee
 from quakedesign.guarantees.exact.statement import Guarantee, guarantee
 from quakedesign.guarantees.search.estimate import BoundsEstimate, gains_of, short
-from quakedesign.plant.ranges import UncertainPlant
+from quakedesign.plant.ranges import FaultPlant
 
 MOST_SIZE = 3  # entries of the state at a sample: hulls of more take too long
 _SAMPLE_PIECES, _BETWEEN_PIECES = 6, 8
@@ -29,7 +29,7 @@ _SEED = 5
 _DIGITS = 7
 
 
-def unclocked_guarantee(task: UncertainPlant, held: Held) -> Guarantee | NoGuarantee:
+def unclocked_guarantee(task: FaultPlant, held: Held) -> Guarantee | NoGuarantee:
     """Guarantee with a set that is found for it, or what speaks against one."""
     found: Guarantee | NoGuarantee = NoGuarantee(reason="no set was found that the loop never leaves", small_gain=None)
     for raised in _RAISED:
@@ -42,7 +42,7 @@ def unclocked_guarantee(task: UncertainPlant, held: Held) -> Guarantee | NoGuara
     return found
 
 
-def unclocked_estimate(task: UncertainPlant, held: Held) -> BoundsEstimate | None:
+def unclocked_estimate(task: FaultPlant, held: Held) -> BoundsEstimate | None:
     """Bounds of a set with few facets, its small gain that of the inputs without it; None where there is no set."""
     middle = replace(held, step=(held.step + held.longest_step) / 2, longest_step=Fraction(0))
     gains, loop = gains_of(middle.loop(task)), _Floats.of(task, held)
@@ -78,7 +78,7 @@ class _Floats:
     force: float
 
     @classmethod
-    def of(cls, task: UncertainPlant, held: Held) -> "_Floats":
+    def of(cls, task: FaultPlant, held: Held) -> "_Floats":
         """Of a law that follows no clock."""
         loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
         seen, kept = (
@@ -222,7 +222,7 @@ def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pus
     return np.asarray(np.array([after for _, after in found])[choice, row])
 
 
-def _reach(task: UncertainPlant, held: Held, raised: float) -> InvariantPolytope | NoGuarantee | None:
+def _reach(task: FaultPlant, held: Held, raised: float) -> InvariantPolytope | NoGuarantee | None:
     """A set in numbers of few digits, for inputs that it makes no larger than it is for."""
     loop = _Floats.of(task, held)
     if not loop.fits:

@@ -20,11 +20,11 @@ from quakedesign.laws import summed_integrals
 from quakedesign.loop import PeriodicLoop
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
-from quakedesign.plant.ranges import Friction, UncertainPlant
+from quakedesign.plant.ranges import FaultPlant, Friction
 
 SLOW = SlowGain(parts=2, growth=F(1, 9))
 FRICTION = Friction(static=F(4), least=F(4), largest=F(4), weakening=F(5), strengthening=F(2), rate_slope=F(0))
-BY_HAND = UncertainPlant(  # N̂ from 1/2 to 3/2, b = 2, β from 1 to 3, r′ up to 2
+BY_HAND = FaultPlant(  # N̂ from 1/2 to 3/2, b = 2, β from 1 to 3, r′ up to 2
     name="by hand", density=F(1), shear_modulus=F(1), length=F(1), damping=F(0), normal_stress=F(1),
     spreads=(F(0), F(0), F(1, 2)), friction=FRICTION, shape=(F(0), F(0), F(3), F(-2)), target_slip=F(4),
     operation_time=F(3), amplitude=F(0), change=None, growths=(F(0), F(0)),
