@@ -11,6 +11,7 @@ from quakedesign.fault import Disturbance, friction_law, load_fault
 from quakedesign.laws import published
 from quakedesign.loop import Actuator, Diffusion, Lag, Saturation
 from quakedesign.simulation import natural_earthquake, simulate, velocity_step
+from quakedesign.simulation import trajectory as trajectory_module
 from quakedesign.simulation.trajectory import Recording
 
 LAB = load_fault("lab-fault")
@@ -250,3 +251,76 @@ def test_a_run_with_state_is_saved_by_the_same_calls(tmp_path):
         assert data.attrs["Conventions"].startswith("CF-1.")
         assert np.array_equal(data.theta, run.states[0])
         assert data.time.attrs["units"] == "s"
+
+
+DAY, HOUR, MINUTE = 86400.0, 3600.0, 60.0
+
+
+@pytest.mark.parametrize(
+    ("end", "unit", "seconds"),
+    [
+        (2 * DAY, "d", DAY),
+        (2 * DAY - 1, "h", HOUR),
+        (2 * HOUR, "h", HOUR),
+        (2 * HOUR - 1, "min", MINUTE),
+        (2 * MINUTE, "min", MINUTE),
+        (2 * MINUTE - 1, "s", 1.0),
+        (1e-3, "s", 1.0),
+    ],
+)
+def test_time_is_drawn_in_the_largest_unit_of_which_there_are_two(end, unit, seconds):
+    time, values = np.array([0.0, end]), np.array([1.0, 2.0])
+    (axis,) = trajectory_module.figure("title", time, [("slip", "m", values, ("", None))] * 2).axes[1:]
+    _, below = trajectory_module.stress_figure("title", time, values, values, 3 * values).axes
+    for drawn in (axis, below):
+        assert drawn.get_xlabel() == f"time [{unit}]"
+        assert list(drawn.lines[0].get_xdata()) == [0, end / seconds]
+    assert list(below.lines[0].get_ydata()) == [3, 6]
+
+
+@pytest.mark.parametrize(
+    ("largest", "prefix", "size"),
+    [
+        (1e6, "M", 1e6),
+        (-2e6, "M", 1e6),
+        (999999.0, "k", 1e3),
+        (1e3, "k", 1e3),
+        (999.0, "", 1.0),
+        (1.0, "", 1.0),
+        (0.5, "m", 1e-3),
+        (1e-3, "m", 1e-3),
+        (9e-4, "µ", 1e-6),
+        (1e-6, "µ", 1e-6),
+        (9e-7, "n", 1e-9),
+        (1e-12, "n", 1e-9),
+        (0.0, "", 1.0),
+    ],
+)
+def test_values_are_drawn_with_the_prefix_of_the_largest(largest, prefix, size):
+    time, values = np.array([0.0, 1.0]), np.array([largest / 4, largest])
+    panels = [("pressure", "Pa", values, ("", None)), ("flow", "m^3/s", values, ("", None))]
+    drawing = trajectory_module.figure("title", time, panels)
+    axis, power = drawing.axes
+    assert (axis.get_ylabel(), power.get_ylabel()) == (f"pressure [{prefix}Pa]", "flow [m³/s]")  # no prefix of a power
+    assert list(axis.lines[0].get_ydata()) == pytest.approx([largest / 4 / size, largest / size], abs=0)
+    assert list(power.lines[0].get_ydata()) == [largest / 4, largest]
+    assert axis.get_legend() is None
+    assert (drawing.get_suptitle(), axis.get_xlabel()) == ("title", "")
+    above, _ = trajectory_module.stress_figure("title", time, values, values, values).axes
+    assert (above.get_xlabel(), above.get_ylabel()) == (f"slip [{prefix}m]", f"shear stress [{prefix}Pa]")
+    assert list(above.lines[0].get_xdata()) == pytest.approx([largest / 4 / size, largest / size], abs=0)
+
+
+@pytest.mark.parametrize("name", ["reference", "at the well"])
+def test_a_second_curve_shares_the_prefix_and_is_named(name):
+    """The reference lies below the fault's own curve, a pressure at the well above it."""
+    time, own, other = np.array([0.0, 1.0]), np.array([1.0, -2.0]), np.array([500.0, -5000.0])
+    (axis, _) = trajectory_module.figure("title", time, [("pressure", "Pa", own, (name, other))] * 2).axes
+    beside, fault = axis.lines
+    assert (beside.get_label(), beside.get_linestyle(), beside.get_color()) == (name, "--", "black")
+    assert (fault.get_label(), fault.get_linestyle()) == ("fault", "-")
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == [name, "fault"]
+    assert axis.get_ylabel() == "pressure [kPa]"
+    assert list(beside.get_ydata()) == [0.5, -5.0]
+    assert list(fault.get_ydata()) == pytest.approx([1e-3, -2e-3])
+    assert (fault.get_zorder() > beside.get_zorder()) is (name == "reference")
