@@ -143,6 +143,19 @@ def test_people_are_told_outcomes_quantiles_search_and_failures(capsys):
     ]
 
 
+def test_a_narrow_terminal_wraps_samples_alone(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "68")
+    worst = [{"index": f"search-{i}"} for i in range(3)]
+    answer = shown(search=None, failures=[], worst={"max_slip_error": worst, "reverse_slip_fraction": worst})
+    lines = printed(capsys, answer)
+    assert max(len(line) for line in lines if "samples," not in line) <= 68
+    assert [line.split()[0] for line in lines[4:] if line.startswith(("max_slip_error", "reverse_slip_fraction"))] == [
+        "max_slip_error",
+        "reverse_slip_fraction",
+    ]
+    assert sum("search-2" in line for line in lines) == 2
+
+
 def test_people_are_told_that_there_is_nothing(capsys):
     search = {"metric": "max_slip_error", "value": None, "index": "search-9", "looked_at": 40}
     diverged = "search: max_slip_error = diverges in search-9 of 40 samples"

@@ -6,7 +6,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.cli import main
-from quakedesign.cli.design_commands import positive
+from quakedesign.cli.design_commands import DesignOptions, positive
 from quakedesign.errors import QuakedesignError
 from quakedesign.guarantees import NoGuarantee
 from quakedesign.report import comparison_table
@@ -53,6 +53,7 @@ def test_all_laws_of_a_fault_are_designed_in_samples_unless_told(asked, command)
     assert (fault, names) == ("lab-fault", ["cta", "dia", "elqr"])
     assert more == {"published_scheme": "continuous", "whole_task": False, "scheme": None, "options": DEFAULTS}
     assert setup == qd.LoopSetup()
+    assert DesignOptions().asked("lab-fault")[1] == {"names": names, **more, "options": {**DEFAULTS, "setup": setup}}
 
 
 @pytest.mark.parametrize(

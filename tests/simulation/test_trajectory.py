@@ -1,12 +1,13 @@
 import json
 import os
+from dataclasses import fields, replace
 
 import numpy as np
 import pint
 import pytest
 import xarray as xr
 
-from quakedesign.errors import OutputError
+from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import Disturbance, friction_law, load_fault
 from quakedesign.laws import published
 from quakedesign.loop import Actuator, Diffusion, Lag, Saturation
@@ -51,6 +52,38 @@ def test_a_table_names_its_units(run):
     assert table.index.name == "time [s]"
     assert "slip_rate [m/s]" in table
     assert np.array_equal(table["pressure [Pa]"], run.pressure)
+    assert np.array_equal(table["friction [-]"], run.friction)
+
+
+def test_two_instants_are_resampled_no_finer_than_they_are_known(uncontrolled):
+    ends = {f.name: getattr(uncontrolled, f.name) for f in fields(uncontrolled)}
+    ends = {name: v[..., [0, -1]] for name, v in ends.items() if isinstance(v, np.ndarray)}
+    run = replace(uncontrolled, **ends)
+    length = run.time[1] - run.time[0]
+    assert run.resample(length).slip.values == pytest.approx(run.slip)
+    with pytest.raises(ParameterError, match="dt must be between"):
+        run.resample(0.9 * length)
+
+
+@pytest.fixture(scope="module")
+def twice():
+    """Two events of friction with a state and the beginning of a third: slip rates in straight lines, level 1 m/s."""
+    law = friction_law("rate-and-state-aging")(
+        reference_coefficient=0.6, direct_effect=0.01, evolution_effect=0.015, critical_slip=1e-5, reference_rate=1e-6,
+        slowest_rate=1e-12, fastest_rate=10.0,
+    )  # fmt: skip
+    run = velocity_step(law, 1e9, [(1.0, 1e-6)], times=np.linspace(0, 1, 11))
+    rate = np.array([0.0, 2.0, 0.5, 0.5, 3.0, 3.0, 0.0, 0.0, 0.0, 4.0, 4.0])
+    slip = np.array([0.0, 1.0, 2.0, 2.5, 4.0, 7.0, 8.0, 8.0, 8.0, 10.0, 14.0])
+    told = {"slip_rate": rate, "slip": slip, "time": np.arange(11.0), "onset_rate": 1.0}
+    return replace(run, **told, onsets=np.array([0.5, 3.2, 8.25]))
+
+
+def test_an_event_lasts_until_its_slip_rate_is_back(twice):
+    """From 2 to 0.5 m/s within a second: back at 1 m/s after 2/3 of it; from 3 to 0: after 2/3 as well."""
+    assert twice.arrests == pytest.approx([1 + 2 / 3, 5 + 2 / 3])
+    assert twice.event_slips == pytest.approx([1 + 2 / 3 - 0.5, 7 + 2 / 3 - (2.5 + 0.2 * 1.5)])
+    assert twice.recurrence_intervals == pytest.approx([2.7, 5.05])
 
 
 def test_the_response_is_python_controls(run):

@@ -128,6 +128,19 @@ def test_suspects_are_computed_alone(monkeypatch):
     assert (list(failed), crew.renewals) == ([1], 4)
 
 
+def test_answers_that_come_one_by_one_are_all_waited_for(monkeypatch):
+    """The last three come when nothing is left to be started."""
+
+    class OneByOne(Later):
+        def _work(self):
+            later, self.under_way = self.under_way[1:], self.under_way[:1]
+            super()._work()
+            self.under_way = later
+
+    found, failed = run(OneByOne(monkeypatch), abs, 5)
+    assert (found, failed) == ({i: i for i in range(5)}, {})
+
+
 def test_a_batch_that_broken_workers_refuse_is_not_waited_for(monkeypatch):
     """What was under way has no answer, now or ever: it is computed again."""
 

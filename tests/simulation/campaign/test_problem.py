@@ -45,7 +45,7 @@ def test_a_start_away_from_rest_keeps_the_energy_budget():
     problem = campaign_problem(LAB, LAW, step=1e-4, duration=0.05, load=Load(drift=1e-3))
     sample = Sample(numbers=asdict(Variation()) | {"initial_slip": 2e-4, "initial_slip_rate": 0.03}, noise_seed=0)
     run = problem.trajectory(sample, 50)
-    assert (run.slip[0], run.slip_rate[0]) == (2e-4, 0.03)
+    assert (run.slip[0], run.slip_rate[0], run.provenance["drift"]) == (2e-4, 0.03, 1e-3)
     kinetic = LAB.mass * (run.slip_rate[-1] ** 2 - 0.03**2) / 2
     assert run.energy.kinetic == pytest.approx(kinetic)
     assert run.energy.relative_residual < 1e-7

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,8 +19,9 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
-from quakedesign.parallel import SerialExecutor
-from quakedesign.simulation.campaign import campaign_problem, run_campaign
+from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.simulation.campaign import campaign_problem, run_campaign, running
+from quakedesign.simulation.campaign.ledger import Ledger
 
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]
@@ -34,10 +36,22 @@ def answer(found):
     return {name: value for name, value in found.to_dict().items() if name != "resumed"}
 
 
+TOLD = []  # of the first campaign, while it was computed
+
+
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("serial")
-    return run_campaign(PROBLEM, COUNT, folder, executor=SerialExecutor(), batch=7, **SEARCH), folder
+    folder, tell = tmp_path_factory.mktemp("serial") / "campaign", lambda *told: TOLD.append(told)
+    return run_campaign(PROBLEM, COUNT, folder, executor=SerialExecutor(), batch=7, tell=tell, **SEARCH), folder
+
+
+def test_what_is_done_is_told_batch_by_batch(serial):
+    assert serial[0].resumed == 0
+    told = np.array([done for what, done in TOLD if what == "samples"])
+    assert (told[0], told[-1]) == (0, 1)
+    assert sorted(np.diff(told) * COUNT) == pytest.approx([5, 7, 7, 7, 7, 7])  # in any order
+    for what in {what for what, _ in TOLD} - {"samples"}:
+        assert [done for whose, done in TOLD if whose == what][-1] == 1
 
 
 def test_divergence_is_a_result(serial):
@@ -142,8 +156,9 @@ import json, os, random, signal, sys, time
 from dataclasses import replace
 from quakedesign.laws import published
 from quakedesign.fault import load_fault
-from quakedesign.parallel import SerialExecutor
-from quakedesign.simulation.campaign import campaign_problem, run_campaign
+from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.simulation.campaign import campaign_problem, run_campaign, running
+from quakedesign.simulation.campaign.ledger import Ledger
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.loop.schemes import simulation_scheme
 
@@ -245,6 +260,71 @@ def test_another_campaign_does_not_go_on_here(serial, change):
     with pytest.raises(SimulationError, match=rf"differs in .*{next(iter(change))}"):
         run_campaign(replace(PROBLEM, **change), COUNT, serial[1], executor=SerialExecutor())
     assert {path: path.stat().st_mtime_ns for path in serial[1].rglob("*")} == before
+
+
+class Failing(SerialExecutor):
+    """Has no answer for the batches that hold one of some rows."""
+
+    def __init__(self, *rows):
+        super().__init__()
+        self.rows = [row.tobytes() for row in rows]
+
+    def submit(self, task, /, *arguments, **named):
+        def fail():
+            raise MemoryError("full")
+
+        bad = any(row.tobytes() in self.rows for row in arguments[1])
+        return super().submit(fail) if bad else super().submit(task, *arguments, **named)
+
+
+def test_a_batch_that_fails_leaves_the_others(tmp_path):
+    failing = Failing(PROBLEM.start(PROBLEM.sample(4)))
+    found = run_campaign(PROBLEM, 8, tmp_path, executor=failing, batch=3)
+    assert [(failure.samples, failure.reason) for failure in found.failures] == [(("3", "4", "5"), "MemoryError: full")]
+    assert [result is None for result in found.results] == [index in (3, 4, 5) for index in range(8)]
+
+
+@pytest.mark.parametrize("wanted", ["max_slip_error", "peak_slip_rate"])
+def test_a_search_begins_at_the_worst_sample_and_passes_over_failures(tmp_path, monkeypatch, wanted):
+    calm = replace(PROBLEM, setting=replace(PROBLEM.setting, steps=20, settled_from=0.0))
+    asked, lost = [], calm.sample(30)
+
+    def search(space, metric, evaluate, starts, *, noise_seed, rounds):
+        values = evaluate([calm.sample(20), lost]) + evaluate([calm.sample(21)])
+        asked.append((metric, [point.tolist() for point in starts], noise_seed, rounds, values))
+
+    monkeypatch.setattr(running, "search", search)
+    settings = {"executor": Failing(calm.start(lost)), "batch": 1, "metric": wanted, "rounds": 3}
+    found = run_campaign(calm, 12, tmp_path, **settings)
+    values = found.values(wanted)
+    worst = int(np.argmax(values))
+    ((metric, starts, noise_seed, rounds, evaluated),) = asked
+    assert len(set(values)) == 12
+    assert (metric, starts, rounds) == (wanted, [calm.point(worst).tolist()], 3)
+    assert noise_seed == calm.sample(worst).noise_seed
+    others = run_campaign(calm, 22, tmp_path, executor=SerialExecutor()).values(wanted)
+    assert evaluated == [others[20], -np.inf, others[21]]
+    assert [failure.samples for failure in found.failures] == [("search-1",)]
+
+
+@pytest.mark.parametrize(
+    ("count", "width", "steps", "size"),
+    [
+        (1, 4, 100, 1),
+        (5, 4, 100, 2),  # every worker has some, whatever the lanes
+        (100, 4, 100, 8),  # 100/32, but all lanes
+        (10_000, 4, 100, 312),  # eight batches a worker, in whole lanes
+        (1_000_000, 4, 100, 1024),
+        (1_000_000, 4, 1_000_000, 80),  # of 80 million steps
+        (1_000_000, 4, 10**9, 8),
+    ],
+)
+def test_a_batch_fills_lanes_and_workers_and_is_lost_in_half_a_minute(tmp_path, count, width, steps, size):
+    program = SimpleNamespace(lanes=8, batch_steps=80_000_000)
+    problem = SimpleNamespace(setting=SimpleNamespace(steps=steps))
+    with Given(SerialExecutor(), width=width) as crew:
+        runner = running._Runner(problem, Ledger(tmp_path, ""), program, crew, None, lambda *_: None)
+        assert runner._batch_size(count) == size
 
 
 def test_what_makes_no_sense_is_refused(tmp_path):

@@ -127,6 +127,7 @@ def test_what_a_run_goes_through_is_the_actuators(tmp_path):
         ({"controller": published("real-fault")["elqr"]}, "needs a sampled law"),
         ({"load": Load(drift=1e-9)}, "Received a load"),
         ({"initial_slip": 1e-3}, "Received a load, an initial slip"),
+        ({"initial_slip_rate": 1e-9}, "Received a load, an initial slip"),
         (
             {"scheme": simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-6))},
             r"must be explicit, .*Received scheme explicit, substeps 1, measurement .*slip_noise=1e-06.*Omit scheme",
@@ -140,8 +141,9 @@ def test_what_a_run_goes_through_is_the_actuators(tmp_path):
 def test_what_does_not_apply_is_refused(wrong, said):
     with pytest.raises((ParameterError, UnknownNameError), match=said):
         campaign_problem(**({"fault": PATCH, "controller": CONTROLLER, "duration": 3000.0} | wrong))
-    with pytest.raises(ParameterError, match="need friction with a state"):
-        campaign_problem(load_fault("real-fault"), None, stress=1.0)
+    for given in ({"stress": 1.0}, {"spread": 0.1}):
+        with pytest.raises(ParameterError, match="need friction with a state"):
+            campaign_problem(load_fault("real-fault"), None, **given)
 
 
 def test_a_law_that_is_told_more_than_the_slip_or_has_no_samples_is_refused(monkeypatch):
