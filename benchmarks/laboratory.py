@@ -188,7 +188,7 @@ class Apparatus:
             scheme=simulation_scheme(str(name), **around, **numbers),
             duration=duration,
             settled_from=0.0,
-            plant="coulomb" if self.stick else "smooth",
+            plant="stick-slip" if self.stick else "printed",
             load=self.load(seed),
             seed=seed,
         )

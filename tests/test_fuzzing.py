@@ -179,7 +179,20 @@ def test_fault_files(which, tmp_path):
 # Arguments of commands
 
 NUMBERS = ["1", "0.5", "7/5", "1 ms", "10 ms", "1 kPa", "2", "3", "1e-3", "0.01 s"]
-WORDS = ["none", "cta", "dia", "elqr", "explicit", "implicit", "compensated", "continuous", "rk4", "coulomb", "paper"]
+WORDS = [
+    "none",
+    "cta",
+    "dia",
+    "elqr",
+    "explicit",
+    "implicit",
+    "compensated",
+    "continuous",
+    "rk4",
+    "stick-slip",
+    "printed",
+    "paper",
+]
 QUICK = {"simulate", "export", "scale", "fault", "derive", "check", "sos"}  # all others search
 POLYNOMIALS = [
     "x^2 + 1",
@@ -246,9 +259,9 @@ fault {short.toml;real-fault} | --box {paper;ten-percent} | --quiet | --log-leve
 derive {short.toml;lab-fault;creeping-patch} | --latex
 scale {lab-fault;real-fault} {short.toml;lab-fault} | --controller {cta;dia;elqr} \
  | --clock {natural-period;operation-time} | --json
-simulate short.toml --duration {'20 ms';0.1} | --plant {smooth;coulomb;stick-slip} | --method rk4 \
+simulate short.toml --duration {'20 ms';0.1} | --plant {printed;stick-slip} | --method rk4 \
  | --initial-slip '1 mm' | --json
-simulate lab-fault --controller {cta;dia;elqr} --duration '30 ms' | --plant {coulomb;stick-slip} | --method rk4 \
+simulate lab-fault --controller {cta;dia;elqr} --duration '30 ms' | --plant {printed;stick-slip} | --method rk4 \
  | --scheme explicit --substeps {2;10} | --json
 simulate lab-fault --controller {cta;dia} --duration {'20 ms';'60 ms'} --scheme {explicit;implicit;semi-implicit} \
  | --delay {'2 ms';'10 ms'} --jitter 1 | --saturation {'1 MPa';'20 MPa'} --withdrawal 0 \
@@ -256,7 +269,7 @@ simulate lab-fault --controller {cta;dia} --duration {'20 ms';'60 ms'} --scheme 
  | --quantum '1 kPa' | --lag '5 ms' | --slip-noise-deviation '1 um' | --out run.nc --force \
  | --substeps 10 | --scale 3/2
 simulate lab-fault --controller cta --duration '30 ms' --scheme compensated | --weight {0.5;1} \
- | --plant coulomb | --drift '1 mm/s'
+ | --plant stick-slip | --drift '1 mm/s'
 simulate {lab-fault;short.toml} --controller elqr --gains 1e8 1e6 1e7 1e5 --duration '30 ms' --scheme explicit \
  | --quiet | --delay '10 ms' | --differentiator-bound 2 --slip-quantum '0.1 um' --averaging {1;2} \
  | --perturbation '1e-3*sin(time)' | --json
@@ -279,10 +292,10 @@ identify record.csv --stiffness '1e-3 1/um' | --law rate-and-state-aging | --see
  | --out identified.toml --force | --json
 sampling lab-fault --gains published --duration '50 ms' --out sampled --force | --controller {cta;elqr} | --json
 export lab-fault --certificate GUARANTEE --out proved --force | --fmu
-simulate lab-fault --certificate GUARANTEE --duration '0.2 s' | --plant coulomb | --saturation '1 MPa' | --json
+simulate lab-fault --certificate GUARANTEE --duration '0.2 s' | --plant stick-slip | --saturation '1 MPa' | --json
 guarantee real-fault --plant stick-slip | --json | --out stick.json --force
 {check STICK;export real-fault --certificate STICK --out stuck --force} | --json
-simulate real-fault --certificate STICK --duration '2 s' --plant {stick-slip;smooth} | --json
+simulate real-fault --certificate STICK --duration '2 s' --plant {stick-slip;printed} | --json
 map cta --over k1 k2 --lipschitz 1/2 --points 3 --interior 1 --workers 1 --out mapped --force | --json
 """
 """Lines that are done in a moment, and in seconds: one of {a;b} each, and any of the options after | beside them."""

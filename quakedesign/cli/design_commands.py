@@ -67,6 +67,9 @@ class DesignOptions(WellOptions):
         Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     published_scheme
         Scheme of the runs of published gains, see --scheme.
+    plant
+        Plant of the runs: stick-slip (by default; friction holds the fault at rest), or printed (the paper's,
+        continued to negative slip rates). Not for rate-and-state faults, which never rest.
     whole_task
         Rate-and-state faults: simulate the whole task instead of 500 D_c/V of it. The proof covers the whole task in
         either case.
@@ -83,6 +86,7 @@ class DesignOptions(WellOptions):
     stress: ExactPascals | None = None
     spread: str = "0"
     published_scheme: str = "continuous"
+    plant: Literal["stick-slip", "printed"] | None = None
     whole_task: Annotated[bool, Parameter(negative="")] = False
 
     def asked(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
@@ -101,7 +105,11 @@ class DesignOptions(WellOptions):
         behind = bool(self.setup().path)  # a delay, a lag or rock, for which the e-LQR alone is designed
         laws = "elqr" if behind and self.controller == "all" else self._laws
         names = controllers(laws, loaded)
-        shown = {"published_scheme": self.published_scheme, "whole_task": self.whole_task}
+        if self.plant is not None:
+            from quakedesign.studies.comparison import require_plant
+
+            require_plant(loaded, self.plant)
+        shown = {"published_scheme": self.published_scheme, "plant": self.plant, "whole_task": self.whole_task}
         return loaded, {"names": names, **shown, **self.told()}
 
     def told(self) -> dict[str, Any]:

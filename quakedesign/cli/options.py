@@ -310,11 +310,11 @@ class RunOptions:
         every stage of the integrator. By default continuous in simulate and explicit in campaign. Designed laws have
         their own scheme.
     method
-        Integrator: dormand-prince or rk4; for single smooth runs also cvodes or idas. Rate-and-state faults: cvodes or
+        Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: cvodes or
         idas, for single runs without control also radau or dop853.
     plant
-        smooth (as in the paper, for forward slip) or coulomb, also stick-slip (set-valued friction).
-        Rate-and-state faults: smooth or quasi-dynamic (without inertia).
+        stick-slip (by default; friction holds the fault at rest) or printed (the paper's, continued to negative slip
+        rates). Rate-and-state faults never rest: smooth (by default) or quasi-dynamic (without inertia).
     step
         Length of one step; the fault's sampling time by default.
     duration
@@ -329,7 +329,7 @@ class RunOptions:
 
     scheme: str | None = None
     method: str = "dormand-prince"
-    plant: str = "smooth"
+    plant: str | None = None
     step: Seconds | None = None
     duration: Seconds | None = None
     substeps: Whole = 1

@@ -403,7 +403,7 @@ def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
 def _print(problem: "CampaignProblem", done: "Campaign", answer: dict[str, Any], written: str) -> None:
     from rich.table import Table
 
-    from quakedesign.simulation.recorder import StickMetrics
+    from quakedesign.simulation.recorder import Metrics
 
     out = console()
     happened = ", ".join(f"{len(indices)} {name.replace('_', ' ')}" for name, indices in done.events.items() if indices)
@@ -419,10 +419,10 @@ def _print(problem: "CampaignProblem", done: "Campaign", answer: dict[str, Any],
     for name, quantiles in answer["quantiles"].items():
         values = ("diverges" if quantiles[level] is None else f"{quantiles[level]:.2g}" for level in levels)
         worst = ", ".join(str(entry["index"]) for entry in answer["worst"][name][:3])
-        table.add_row(name, StickMetrics.unit(name) or "-", *values, worst)
+        table.add_row(name, Metrics.unit(name) or "-", *values, worst)
     out.print(table, soft_wrap=False)
     for told in (answer["search"],) if answer["search"] else ():
-        value = "diverges" if told["value"] is None else f"{told['value']:.6g} {StickMetrics.unit(told['metric'])}"
+        value = "diverges" if told["value"] is None else f"{told['value']:.6g} {Metrics.unit(told['metric'])}"
         out.print(f"search: {told['metric']} = {value} in {told['index']} of {told['looked_at']} samples")
     for failure in answer["failures"]:
         span = f"{failure['samples'][0]} … {failure['samples'][-1]}"

@@ -56,6 +56,7 @@ def compare(
     scheme: str | None = None,
     published_scheme: str | None = None,
     whole_task: bool = False,
+    plant: str | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Comparison:
     """Run all controllers of a fault over the whole task, step T_s; of a slow one with a state over 500 D_c/V.
@@ -74,6 +75,8 @@ def compare(
         designs do that are not continuous.
     whole_task : bool
         Run all of a task of friction with a state, however slow.
+    plant : str, optional
+        Of the runs of friction without a state: ``stick-slip`` unless given, or ``printed``, as of `simulate`.
     progress : callable, optional
         Called with what is being done and the fraction done [-].
 
@@ -83,7 +86,12 @@ def compare(
     """
     schemes = {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}
     tell = progress or (lambda _what, _done: None)
-    how: dict[str, Any] = {"with_published": with_published, "whole_task": whole_task, "schemes": schemes}
+    how: dict[str, Any] = {
+        "with_published": with_published,
+        "whole_task": whole_task,
+        "schemes": schemes,
+        "plant": plant,
+    }
     judged = [one if isinstance(one, Design) else assess(fault, one) for one in designs]
     return Comparison(**vars(compared(fault, judged, tell, **how)))
 
@@ -95,6 +103,7 @@ def designed_comparison(
     *,
     options: Mapping[str, Any] | None = None,
     whole_task: bool = False,
+    plant: str | None = None,
     **schemes: Any,
 ) -> Comparison:
     """Comparison of a fault's designs of the named laws and the published gains.
@@ -107,11 +116,12 @@ def designed_comparison(
         Progress.
     options : mapping, optional
         Of `quakedesign.design`, such as ``objective`` and ``continuous``.
-    whole_task : bool
+    whole_task, plant : bool, str
         As of `compare`.
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """
     for name in filter(None, schemes.values()):
         simulation_scheme(name)
-    return compare(fault, designs_of(fault, names, tell, options), whole_task=whole_task, progress=tell, **schemes)
+    shown: dict[str, Any] = {"whole_task": whole_task, "plant": plant, **schemes}
+    return compare(fault, designs_of(fault, names, tell, options), progress=tell, **shown)

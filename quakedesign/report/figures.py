@@ -4,12 +4,13 @@ Cycles and slow sliding are for faults with friction state. Published and design
 figure.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from quakedesign.fault import Fault
+from quakedesign.guarantees import Guarantee
 from quakedesign.report.drawing import (
     NATURAL,
     ORIGINS,
@@ -327,6 +328,7 @@ def error_figure(comparison: "Compared") -> Any:
         for axis, values in ((slip, run.slip_error), (rate, run.slip_rate_error)):
             middle, _, largest = band(run.time / divisor, np.abs(known(values)))
             axis.plot(middle, np.maximum(largest, 1e-300), **style(entry))
+    _proved_bounds(slip, rate, [entry for entry, _ in runs])
     for axis, label in ((slip, "|slip error| [m]"), (rate, "|slip-rate error| [m/s]")):
         axis.set_yscale("log")
         axis.set_ylabel(label)
@@ -334,6 +336,20 @@ def error_figure(comparison: "Compared") -> Any:
     made = [run for _, run in runs]
     title = f"{comparison.fault.name}: tracking errors"
     return finish(drawing, title, made, with_diverged(comparison.entries, "largest of 40 kept samples"), legend=slip)
+
+
+def _proved_bounds(slip: Any, rate: Any, entries: "Sequence[Entry]") -> None:
+    """Lines at the proved bounds of both errors; laws with the same bounds share a line."""
+    bounds: dict[tuple[float, float], str] = {}
+    for entry in entries:
+        if isinstance(entry.guaranteed, Guarantee):
+            claims = entry.guaranteed.claims
+            bounds.setdefault((float(claims.slip_error), float(claims.slip_rate_error)), colour(entry.design.name))
+    label = "proved for the plant without stick"
+    for (of_slip, of_rate), shade in bounds.items():
+        slip.axhline(of_slip, color=shade, linestyle=":", linewidth=1.4, label=label)
+        rate.axhline(of_rate, color=shade, linestyle=":", linewidth=1.4)
+        label = ""
 
 
 _SHOWN = {

@@ -455,7 +455,9 @@ def _limits(comparison: "Compared", told: list[Account]) -> list[str]:
         if e.run and e.run.metrics.reverse_slip_fraction
     ]
     reverse = (
-        [f"the slip rate is negative, outside the model, in part of the steps: {', '.join(shares)}"] if shares else []
+        [f"on the plant without stick, the slip rate is negative in part of the steps: {', '.join(shares)}"]
+        if shares
+        else []
     )
     about_runs = SLIDING_LIMITS if comparison.fault.friction.state_names else (*REST_LIMITS, _way(comparison))
     return [*own, *reverse, *MODEL_LIMITS, *about_runs]

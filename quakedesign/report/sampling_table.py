@@ -23,7 +23,7 @@ _CELLS = {
     "max_slip_rate_error": (1, ".2e"),
     "rms_pressure": (1e6, ".3g"),
     "pressure_total_variation": (1e9, ".3g"),
-    "reverse_slip_fraction": (1, ".2f"),
+    "time_at_rest_fraction": (1, ".2f"),
 }
 OUTCOMES = ("law", "scheme", *OUTCOME_COLUMNS, "least p [MPa]", "largest p [MPa]")
 COLUMNS = (
@@ -33,7 +33,7 @@ COLUMNS = (
     "rate error [m/s]",
     "RMS p [MPa]",
     "path p [GPa]",
-    "back slip",
+    "at rest",
     "on tra- jectory",
 )
 FOOTNOTE = (

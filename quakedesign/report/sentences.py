@@ -431,7 +431,9 @@ def _held_headline(run: Trajectory | None) -> list[str]:
 def _reversed(run: Trajectory | None) -> list[str]:
     """Slip against the direction of the model."""
     share = run.metrics.reverse_slip_fraction if run else None
-    return [f"the slip rate is negative, outside the model, in {100 * share:.3g} % of the steps"] if share else []
+    return (
+        [f"on the plant without stick, the slip rate is negative in {100 * share:.3g} % of the steps"] if share else []
+    )
 
 
 def _holds(premises: Iterable[Any], name: str) -> bool:

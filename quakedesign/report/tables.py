@@ -23,7 +23,7 @@ COLUMNS = (
     "largest p [Pa]",
     "RMS of p [Pa]",
     "path of p [Pa]",
-    "back slip",
+    "at rest",
 )
 _METRICS = (
     "max_slip_error",
@@ -32,7 +32,7 @@ _METRICS = (
     "max_pressure",
     "rms_pressure",
     "pressure_total_variation",
-    "reverse_slip_fraction",
+    "time_at_rest_fraction",
 )
 
 
@@ -45,7 +45,7 @@ def outcome_rows(comparison: "Compared") -> list[tuple[str, ...]]:
 def rows(comparison: "Compared") -> list[tuple[str, ...]]:
     """One row a controller under `COLUMNS`, narrow enough for 80 columns; a dash means not applicable.
 
-    Largest errors, RMS and total variation (path) of the pressure and the share of reverse slip count after a quarter
+    Largest errors, RMS and total variation (path) of the pressure and the share at rest count after a quarter
     of the task, the least and the largest pressure over all of it.
     """
     return [(e.label, *_cells(e.run)) for e in comparison.entries]
@@ -54,7 +54,7 @@ def rows(comparison: "Compared") -> list[tuple[str, ...]]:
 def _cells(run: "Trajectory | None") -> tuple[str, ...]:
     values = {name: getattr(run.metrics, name) if run else None for name in _METRICS}
     return tuple(
-        "–" if v is None else f"{v:.2f}" if name == "reverse_slip_fraction" else f"{v + 0.0:.2e}"
+        "–" if v is None else f"{v:.2f}" if name == "time_at_rest_fraction" else f"{v + 0.0:.2e}"
         for name, v in values.items()
     )
 

@@ -19,7 +19,6 @@ from .interop import to_statespace as to_statespace
 from .natural import natural_earthquake as natural_earthquake
 from .recorder import ActuatorMetrics as ActuatorMetrics
 from .recorder import Metrics as Metrics
-from .recorder import StickMetrics as StickMetrics
 from .sensitivity import Study as Study
 from .sensitivity import accuracy as accuracy
 from .sensitivity import gain_sensitivity as gain_sensitivity

@@ -32,7 +32,10 @@ def require_smooth(recorder: Recorder, method: str) -> None:
     loop, remedy = recorder.loop, "Use a fixed step: method dormand-prince or rk4."
     said = f"method {method} follows smooth loops only. Received"
     if loop.sticks:
-        raise ParameterError(f"{said} the plant {loop.plant_name}, whose friction is set-valued. {remedy}")
+        raise ParameterError(
+            f"{said} the plant {loop.plant_name}, whose friction is set-valued. Use the plant printed, or method "
+            "dormand-prince or rk4."
+        )
     if type(recorder.scheme).rates is Scheme.rates:
         raise ParameterError(f"{said} the scheme {recorder.scheme.name}, which holds the pressure in steps. {remedy}")
     if loop.controller is not None and not _lipschitz(loop):

@@ -280,12 +280,12 @@ class Meter:
             seen: list[Any] = []
 
             def watched(time: Any, x: Any, pressure: Any) -> Any:
-                seen[:] = [self.loop.powers(time, x, pressure, getattr(plant, "direction", 1))]
+                seen[:] = [self.loop.powers(time, x, pressure)]
                 return plant(time, x, pressure)
 
             return ca.vertcat(motion(watched, passed, now[:size]), seen[0])
 
-        end = self.loop.advance(method, with_powers, ca.vertcat(state, ca.SX.zeros(len(WORKS))), step)
+        end = self.loop.advance(method, with_powers, ca.vertcat(state, ca.SX.zeros(len(WORKS))), step, works=len(WORKS))
         self.works = self.works + end[size:]
         return end[:size]
 
@@ -323,18 +323,17 @@ class Metered(Stepped):
     def shaken(self) -> Any:
         """Function (t [s], x [m, m/s]) → φ̂_e [m/s²]."""
 
-    def powers(self, time: Any, x: Any, pressure: Any, direction: Any = 1) -> Any:
+    def powers(self, time: Any, x: Any, pressure: Any) -> Any:
         """Integrands per unit mass in the order of `WORKS` (SX): [W/kg], and x1 [m] for the last.
 
-        Friction counts relative to its static value under the whole normal stress, whose work is exact in the slip; it
-        acts against `direction`.
+        Friction counts relative to its static value under the whole normal stress, whose work is exact in the slip.
         """
         _, normal, damping, stress = self.hats()
-        rate, relief = (ca.fabs(x[1]), ca.fmin(pressure, stress)) if self.sticks else (x[1], pressure)
-        friction, way = self.friction(ca.vertcat(x[0], rate)), direction * x[1]
+        relief = ca.fmin(pressure, stress) if self.sticks else pressure
+        friction = self.friction(ca.vertcat(x[0], x[1]))
         return ca.vertcat(
-            normal * stress * (friction * way - self.static_friction * x[1]),
-            normal * friction * relief * way,
+            normal * stress * (friction * x[1] - self.static_friction * x[1]),
+            normal * friction * relief * x[1],
             damping * x[1] * x[1],
             self.shaken(time, x) * x[1],
             x[0],
@@ -448,8 +447,8 @@ class ClosedLoop(Metered):
         True over nominal parameters as in `Variation.values`; empty for the nominal fault.
     """
 
-    plant_name: ClassVar[str] = "smooth"
-    plant_title: ClassVar[str] = ""
+    plant_name: ClassVar[str] = "printed"
+    plant_title: ClassVar[str] = ", plant without stick"
 
     fault: Fault
     controller: Controller | None = None
@@ -461,7 +460,7 @@ class ClosedLoop(Metered):
         """Return the same loop with other true parameters, which may be symbols of CasADi (SX)."""
         return replace(self, factors=factors) if factors else self
 
-    def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float) -> Any:
+    def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float, works: int = 0) -> Any:
         """State [x1, x2, ξ] (SX) after one step.
 
         Parameters
@@ -473,6 +472,8 @@ class ClosedLoop(Metered):
         state : SX
         step : float
             [s].
+        works : int
+            Number of entries at the end of the state that are works of forces, which nothing depends on.
         """
         return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)
 
@@ -529,9 +530,14 @@ class ClosedLoop(Metered):
         least = rational(self.fault.friction.bounds[0]) * (1 - self.fault.box.authority)
         return sp.Rational(str(least)) * plant.plant_values(self.fault)[plant.N_hat]
 
-    @cached_property
+    @property
     def plant(self) -> Any:
         """CasADi Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²]."""
+        return self.printed
+
+    @cached_property
+    def printed(self) -> Any:
+        """The same of the plant as the paper prints it, eq. shift, which holds for slip rates that are not negative."""
         rates = [plant.x2, acceleration_expression(self.fault, bool(self.factors))]
         inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p]}
         return self.function("plant", inputs, {"dx": rates})
@@ -590,6 +596,10 @@ class ClosedLoop(Metered):
     def shaken(self) -> Any:
         """CasADi Function (t [s], x [m, m/s]) → φ̂_e [m/s²], without the push of the far end."""
         return self.function("shaken", {"t": [plant.t], "x": [plant.x1, plant.x2]}, {"phi": [self.disturbance]})
+
+    def reversing(self, time: Any, state: Any, pressure: Any) -> Any:
+        """Whether the load on a fault at rest exceeds friction backward (SX): never where nothing rests."""
+        return ca.SX(0)
 
     def shear_stress(self, time: Any, state: Any, pressure: Any, friction: Any) -> Any:
         """Shear stress τ = μ(σ' − p) [Pa] that friction sets against slip (SX)."""

@@ -37,7 +37,7 @@ def natural_earthquake(
     *,
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
-    plant: str = "smooth",
+    plant: str | None = None,
 ) -> Trajectory:
     """Let an uncontrolled fault go, under a constant pressure and, if it is unstable, a tiny constant acceleration.
 
@@ -84,7 +84,7 @@ def natural_earthquake(
     if pressure:
         return earthquake
     natural = earthquake if growth <= 0 else _with_peak(earthquake, fault, growth)
-    if plant == "smooth":
+    if plant is None:
         _PEAKS[_alone(fault)] = natural.criterion.natural_peak
         if len(_PEAKS) > _MOST_PEAKS:
             del _PEAKS[next(iter(_PEAKS))]

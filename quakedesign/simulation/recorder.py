@@ -41,6 +41,7 @@ START = {
     "opening": NEVER,
     "reverse_slip": NEVER,
     "stick": NEVER,
+    "load_reversed": NEVER,
 } | dict.fromkeys(WORKS, 0.0)
 
 
@@ -210,6 +211,7 @@ class Recorder:
             "opening": now["pressure"] >= self.loop.fault.effective_normal_stress,
             "reverse_slip": now["slip_rate"] < 0,
             "stick": ca.logic_and(parts.counter > 0, self._rests(now)),
+            "load_reversed": self.loop_of(vector).reversing(now["time"], parts.state, now["pressure"]),
         }
         return {
             name: ca.if_else(ca.logic_and(before[name] < 0, what), now["time"], before[name])
@@ -217,7 +219,7 @@ class Recorder:
         }
 
     def _rests(self, now: dict[str, Any]) -> Any:
-        """Whether friction holds the fault; a smooth plant is at rest only in passing."""
+        """Whether friction holds the fault; the plant without stick is at rest only in passing."""
         return now["slip_rate"] == 0 if self.loop.sticks else 0
 
 
@@ -269,7 +271,7 @@ def _ranges(before: dict[str, Any], now: dict[str, Any], signals: Iterable[str])
 # The figures by which controllers are compared, computed from every step of a run.
 
 _FASTEST = 1e6  # m/s: far above an earthquake, and below what a plant reaches whose motion overflows
-EVENTS = ("diverged", "opening", "reverse_slip", "stick")
+EVENTS = ("diverged", "opening", "reverse_slip", "stick", "load_reversed")
 
 
 def _figure(unit: str) -> Any:
@@ -297,6 +299,8 @@ class Metrics:
         Sum of |Δp| between successive steps [Pa].
     reverse_slip_fraction : float or None
         Share of the steps with x2 < 0 [-].
+    time_at_rest_fraction : float or None
+        Share of the steps with x2 = 0 on the stick–slip plant [-], given without a controller too.
     peak_slip_rate : float or None
         Largest |x2| of the whole run [m/s].
     max_h_rate : float or None
@@ -320,6 +324,7 @@ class Metrics:
     rms_pressure: float | None = _figure("Pa")
     pressure_total_variation: float | None = _figure("Pa")
     reverse_slip_fraction: float | None = _figure("")
+    time_at_rest_fraction: float | None = _figure("")
     peak_slip_rate: float | None = _figure("m/s")
     max_h_rate: float | None = _figure("m/s^3")
     max_pressure: float | None = _figure("Pa")
@@ -339,20 +344,7 @@ class Metrics:
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class StickMetrics(Metrics):
-    """Figures of one run of a plant whose friction holds it at rest, given without a controller too.
-
-    Attributes
-    ----------
-    stick_fraction : float or None
-        Share of the steps with x2 = 0 over t > settled_from [-].
-    """
-
-    stick_fraction: float | None = _figure("")
-
-
-@checked_dataclass(frozen=True, slots=True, kw_only=True)
-class ActuatorMetrics(StickMetrics):
+class ActuatorMetrics(Metrics):
     """Figures of one run whose pressure reaches the fault through an actuator; extremes of the whole run.
 
     Attributes
@@ -395,7 +387,7 @@ def metrics(
 ) -> Metrics:
     """Figures from what the loop accumulated; `step` [s] is the length of one step, `further` are signals beyond p."""
     signals = list(further)
-    kind = ActuatorMetrics if signals else StickMetrics if sticks else Metrics
+    kind = ActuatorMetrics if signals else Metrics
     if watched["diverged"] >= 0:
         peak = watched["peak_slip_rate"]  # of a plant that stays finite where the numbers of its law overflow
         known = {"peak_slip_rate": peak} if peak <= _FASTEST else {}
@@ -422,8 +414,7 @@ def _metric_ranges(watched: dict[str, float], signals: list[str]) -> dict[str, f
 
 def _shares(watched: dict[str, float]) -> dict[str, float]:
     count = watched["settled_count"]
-    counted = {"stick_fraction": "rest_count", "reverse_slip_fraction": "reverse_count"}
-    return {name: watched[what] / count for name, what in counted.items()} if count else {}
+    return {"time_at_rest_fraction": watched["rest_count"] / count} if count else {}
 
 
 def _settled(watched: dict[str, float]) -> dict[str, float]:

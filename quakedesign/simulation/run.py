@@ -23,10 +23,10 @@ from quakedesign.simulation import stepping
 from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
 from quakedesign.simulation.closed_loop import ClosedLoop, names
 from quakedesign.simulation.compiled import STEP, prepare
-from quakedesign.simulation.coulomb import CoulombLoop
 from quakedesign.simulation.integrators import FLOOR, AdaptiveIntegrator, Integrator
 from quakedesign.simulation.recorder import Recorder, events, metrics
 from quakedesign.simulation.stepping import Advancer, Checkpoint, instants, march
+from quakedesign.simulation.stick_slip_plant import StickSlipLoop
 from quakedesign.simulation.trajectory import OutcomeCriterion, SampledTrajectory, Trajectory
 
 # ----------------------------------------------------------------------
@@ -229,22 +229,22 @@ def by_no_clock(
     return (step / clock.shortest if clock else step), numbers
 
 
-STICK_SLIP = "stick-slip"
-"""Another name of the plant ``coulomb``, which sticks."""
+STICK_SLIP, PRINTED = StickSlipLoop.plant_name, ClosedLoop.plant_name
+_LOOPS: dict[str, type[ClosedLoop]] = {STICK_SLIP: StickSlipLoop, PRINTED: ClosedLoop}
+_EARLIER = {"coulomb": STICK_SLIP, "smooth": PRINTED}  # names of version 0.3
 
 
-def loop_class(plant: str) -> type[ClosedLoop]:
-    """Closed loop with a named plant.
+def loop_class(plant: str | None) -> type[ClosedLoop]:
+    """Closed loop with a named plant; the stick–slip plant for None.
 
     Raises
     ------
     ParameterError
         When there is none of that name.
     """
-    classes = {kind.plant_name: kind for kind in (ClosedLoop, CoulombLoop)}
-    classes[STICK_SLIP] = CoulombLoop
-    require_known(plant, classes, "plant")
-    return classes[plant]
+    name = STICK_SLIP if plant is None else _EARLIER.get(plant, plant)
+    require_known(name, _LOOPS, "plant")
+    return _LOOPS[name]
 
 
 def run(

@@ -13,6 +13,7 @@ from quakedesign.fault import Fault
 from quakedesign.laws import Controller
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.closed_loop import Variation
+from quakedesign.simulation.run import PRINTED
 from quakedesign.simulation.simulate import simulate
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ def accuracy(
     duration: float,
     settled_from: float,
 ) -> Study:
-    """Errors of a sliding mode against the sampling period.
+    """Errors of a sliding mode against the sampling period, on the plant without stick, for which orders are known.
 
     Parameters
     ----------
@@ -151,6 +152,7 @@ def accuracy(
             duration=duration,
             settled_from=settled_from,
             samples=_KEPT,
+            plant=PRINTED,
         )
 
     title = f"{fault.name}, {controller.title}: accuracy of sampling"
@@ -166,6 +168,7 @@ def noise_sensitivity(
     schemes: Sequence[str] = SCHEMES,
     seed: int = 0,
     duration: float | None = None,
+    plant: str | None = None,
 ) -> Study:
     """Errors against the noise of the measurement.
 
@@ -181,6 +184,8 @@ def noise_sensitivity(
     seed : int
     duration : float, optional
         [s]; the operation time unless given.
+    plant : str, optional
+        As of `simulate`.
     """
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     exact = Measurement(seed=seed)
@@ -189,7 +194,7 @@ def noise_sensitivity(
     def run(scheme: str, level: float) -> "Trajectory":
         slip, rate = (level, 0.0) if of == "slip_noise" else (0.0, level)
         measurement = replace(exact, slip_noise=slip, rate_noise=rate)
-        return simulate(fault, controller, scheme=scheme, measurement=measurement, duration=duration)
+        return simulate(fault, controller, scheme=scheme, measurement=measurement, duration=duration, plant=plant)
 
     title = f"{fault.name}, {controller.title}: sensitivity to noise"
     return _study(title, (of.replace("_", " "), units[of]), tuple(levels), schemes, run)
@@ -202,6 +207,7 @@ def gain_sensitivity(
     points: int = 5,
     schemes: Sequence[str] = SCHEMES,
     duration: float | None = None,
+    plant: str | None = None,
 ) -> Study:
     """Errors against the true input gain, over the whole range of β = μN̂/(μ0N̂0) that the fault's box allows.
 
@@ -218,6 +224,8 @@ def gain_sensitivity(
     schemes : sequence of str
     duration : float, optional
         [s]; the operation time unless given.
+    plant : str, optional
+        As of `simulate`.
     """
     width = float(fault.box.authority)
     if not width or points < 2:
@@ -231,7 +239,7 @@ def gain_sensitivity(
 
     def run(scheme: str, level: float) -> "Trajectory":
         variation = Variation(authority=levels[level])
-        return simulate(fault, controller, scheme=scheme, variation=variation, duration=duration)
+        return simulate(fault, controller, scheme=scheme, variation=variation, duration=duration, plant=plant)
 
     title = f"{fault.name}, {controller.title}: sensitivity to the input gain"
     return _study(title, ("beta at rest over its middle", ""), tuple(levels), schemes, run)

@@ -35,7 +35,7 @@ def simulate(
     settled_from: float | None = None,
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
-    plant: str = "smooth",
+    plant: str | None = None,
     load: Load | None = None,
     variation: Variation | SlidingVariation | None = None,
     rtol: float = _RTOL,
@@ -65,7 +65,7 @@ def simulate(
         ``"continuous"`` measure and decide once per step and hold the pressure in between. Unless given, that of a law
         of samples, which has no other, and ``"continuous"`` for others.
     method : str
-        Integrator with a fixed step, or, for smooth loops, ``"cvodes"`` or ``"idas"`` with a step of its own choice;
+        Integrator with a fixed step, or, for the printed plant, ``"cvodes"`` or ``"idas"`` with an adaptive step;
         see `quakedesign.simulation.integrators`. The latter answer at every multiple of `step`, where the run is
         watched. Friction with a state is stiff between samples: ``"cvodes"`` unless ``"idas"``.
     duration : float, optional
@@ -79,10 +79,10 @@ def simulate(
     compiled : bool, optional
         True: machine code or an error. False: CasADi's virtual machine. None: machine code if the run
         is long enough to be worth it and a C compiler works. The digits are the same.
-    plant : str
-        ``"smooth"``: eq. shift, which holds for slip rates that are not negative. ``"coulomb"``: friction opposes slip
-        in both directions and holds the fault at rest (ERRATA 14). Of friction with a state ``"smooth"`` or
-        ``"quasi-dynamic"``, without inertia.
+    plant : str, optional
+        ``"stick-slip"``: friction holds the fault at rest, and it never slips backward (ERRATA 14). ``"printed"``: eq.
+        shift, continued to negative slip rates as in the paper. Of friction with a state, which never rests,
+        ``"smooth"`` or ``"quasi-dynamic"``, without inertia. The first of each unless given.
     load : Load, optional
         Drift of the far end and a perturbation, beside the fault's own disturbance.
     variation : Variation or SlidingVariation, optional
@@ -139,6 +139,7 @@ def simulate(
         }
         law, path = _sampled_law(fault, controller, actuator, [name for name, given in refused.items() if given])
         own_way(controller, scheme, step)
+        plant = plant or next(iter(PLANTS))
         require_known(plant, PLANTS, "plant of a fault with a state", UnknownNameError)
         return simulate_sliding(
             fault,

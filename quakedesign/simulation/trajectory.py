@@ -425,7 +425,8 @@ class Trajectory(Recording):
         From all of its steps; None for a run that diverged.
     events : mapping of str to float
         Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'_n), ``reverse_slip`` (x2 < 0), ``stick``
-        (friction holds the fault at rest after the start; not watched on the smooth plant).
+        (friction holds the fault at rest after the start), ``load_reversed`` (the load at rest exceeds friction
+        backward, which the stick–slip plant leaves out).
     criterion : OutcomeCriterion
         What `outcome` is decided by.
     provenance : mapping

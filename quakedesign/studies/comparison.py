@@ -32,6 +32,7 @@ from quakedesign.lyapunov.exact.fault_bounds import equilibrium_pressure, sector
 from quakedesign.lyapunov.exact.premises import Variant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.integrators import amplification
+from quakedesign.simulation.run import loop_class
 from quakedesign.studies.certified import certified_bound, largest_sampling_time, on_trajectory
 from quakedesign.studies.runs import StateRun, designed_run, natural_run
 from quakedesign.synthesis import Design, assess, designable, left_out
@@ -163,25 +164,42 @@ def compared(
     with_published: bool = True,
     whole_task: bool = False,
     schemes: Mapping[str, str],
+    plant: str | None = None,
 ) -> Compared:
     """Runs of all controllers of a fault, as `quakedesign.report.compare` shows them; schemes by origin."""
     require_fault(fault)
+    require_plant(fault, plant)
     for name in schemes.values():
         simulation_scheme(name)
     tell("uncontrolled", 0.0)
     if fault.friction.state_names:
         return _slowly_compared(fault, designs, tell, whole=whole_task)
-    uncontrolled = natural_earthquake(fault)
+    uncontrolled = natural_earthquake(fault, plant=plant)
     entries: list[Entry] = []
     at_once = not any(designed.setup.path for designed in designs)
     for controller in published(fault.name).values() if with_published and at_once else ():
         tell(f"{controller.title} (published): verdict", 0.0)
-        entries.append(_entry("published", assess(fault, controller), schemes, tell))
+        entries.append(_entry("published", assess(fault, controller), schemes, tell, plant))
     for designed in designs:
-        entry = _entry("designed", designed, schemes, tell)
+        entry = _entry("designed", designed, schemes, tell, plant)
         tell(f"{entry.label}: worst cases", 0.0)
         entries.append(replace(entry, answer=_answer(fault, designed)))
     return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
+
+
+def require_plant(fault: Fault, plant: str | None) -> None:
+    """Refuse an unknown plant of the runs, and any of friction with a state, which never rests.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if plant is not None and fault.friction.state_names:
+        raise ParameterError(
+            f"plant is for friction without a state, got {plant!r} with {fault.friction.name}, which never rests: omit "
+            "it."
+        )
+    loop_class(plant)
 
 
 def behind_path(fault: Fault) -> dict[str, str]:
@@ -227,7 +245,7 @@ def designs_of(
     return designs
 
 
-def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell) -> Entry:
+def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell, plant: str | None) -> Entry:
     sampling = design.controller.sampling if design.controller else None
     scheme = sampling.scheme if sampling else schemes[origin]
     differ = len(set(schemes.values())) > 1
@@ -236,7 +254,12 @@ def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell) 
         return Entry(label=label, origin=origin, design=design, run=None)
     told = design.measurement
     run = simulate(
-        design.fault, design.controller, scheme=scheme, measurement=told, progress=lambda done: tell(label, done)
+        design.fault,
+        design.controller,
+        scheme=scheme,
+        measurement=told,
+        plant=plant,
+        progress=lambda done: tell(label, done),
     )
     entry = Entry(label=label, origin=origin, design=design, run=run)
     if design.controller.lipschitz_limit is not None:

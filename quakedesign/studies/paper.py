@@ -196,7 +196,8 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     if fault.friction.state_names:
         return PaperRuns(comparison=comparison, induced=None, close_ups={})
     tell("induced earthquake", 0.0)
-    induced = natural_earthquake(fault, INDUCING_SHARE * fault.effective_normal_stress)
+    plant = comparison.uncontrolled.provenance["plant"]
+    induced = natural_earthquake(fault, INDUCING_SHARE * fault.effective_normal_stress, plant=plant)
     length = min(PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
     close_ups = {}
     for entry in comparison.entries:
@@ -210,6 +211,7 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
                 duration=max(length, step),
                 step=step,
                 samples=int(length / step) + 1,
+                plant=plant,
             )
     laws = [entry.design.controller for entry in comparison.of("designed")]
     tell("peak against tracking", 0.0)

@@ -232,7 +232,7 @@ def test_limits_are_written_where_a_folder_is_given(call, monkeypatch, tmp_path)
         ({"delay": 0.03, "lag": 2.0, "diffusion": 1.0}, ["delay", "diffusion"]),
         ({"initial_slip": 1e-3, "initial_slip_rate": -1e-2}, []),
         ({"initial_slip": 1.1e-3, "initial_slip_rate": -1.1e-2}, ["initial_slip", "initial_slip_rate"]),
-        ({"slip_noise": 1e-6, "saturation": 1e6, "plant": "coulomb"}, ["plant", "saturation", "slip_noise"]),
+        ({"slip_noise": 1e-6, "saturation": 1e6, "plant": "stick-slip"}, ["plant", "saturation", "slip_noise"]),
         ({"averaging": 2, "drift": 1e-9, "scheme": "implicit"}, ["scheme", "drift", "averaging"]),
         ({"perturbation": "time", "weight": 0.5, "authority": 1.0}, ["perturbation", "weight", "authority"]),
     ],

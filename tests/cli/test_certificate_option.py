@@ -76,7 +76,7 @@ def test_it_runs_behind_its_lag_with_its_noise(file, capsys):
         ((), ""),
         (("--lag", "20 ms", "--substeps", "20", "--seed", "3"), ""),
         (("--saturation", "1 kPa"), "saturation"),
-        (("--plant", "coulomb", "--initial-slip", "1 mm"), "plant, initial_slip"),
+        (("--plant", "stick-slip", "--initial-slip", "1 mm"), "plant, initial_slip"),
         (("--perturbation", "0.01"), "perturbation"),
     ],
 )

@@ -181,38 +181,45 @@ def test_a_campaign_takes_the_same_options(run, monkeypatch, tmp_path):
 # What happens is named with its time, whatever causes it, and no JSON has a number that is none.
 EVENTS = {
     "divergence of gains that sampling makes unstable (ERRATA 22)": (
-        ("real-fault", "--controller", "elqr", "--scheme", "explicit", "--duration", "400"),
+        ("real-fault", "--controller", "elqr", "--scheme", "explicit", "--duration", "400", "--plant", "printed"),
         ("opening", "reverse_slip", "diverged"),
     ),
     "divergence behind an actuator": (
-        ("real-fault", "--controller", "elqr", "--scheme", "explicit", "--duration", "400", "--rate-limit", "1e99"),
+        (
+            *("real-fault", "--controller", "elqr", "--scheme", "explicit", "--duration", "400"),
+            *("--rate-limit", "1e99", "--plant", "printed"),
+        ),
         ("opening", "reverse_slip", "diverged"),
     ),
     "opening with estimates, and divergence in the run without that their premise needs": (
         (
             *("lab-fault", "--controller", "elqr", "--scheme", "explicit", "--step", "2 ms", "--duration", "1"),
-            *("--differentiator-bound", "1e6"),
+            *("--differentiator-bound", "1e6", "--plant", "printed"),
         ),
         ("opening", "reverse_slip"),
     ),
     "opening by a push that only injection can balance": (
-        ("real-fault", "--controller", "elqr", "--duration", "60", "--perturbation", "-0.1*time"),
+        ("real-fault", "--controller", "elqr", "--duration", "60", "--perturbation", "-0.1*time", "--plant", "printed"),
         ("opening", "reverse_slip"),
     ),
     "opening by gains alone": (
         (
             *("lab-fault", "--controller", "elqr", "--gains", "1e12", "1e9", "1e9", "1e7", "--duration", "2"),
-            *("--scheme", "explicit", "--saturation", "1 MPa"),
+            *("--scheme", "explicit", "--saturation", "1 MPa", "--plant", "printed"),
         ),
         ("opening", "reverse_slip"),
     ),
     "reverse slip by a push": (
-        ("real-fault", "--duration", "5 s", "--perturbation", "-1e-3"),
+        ("real-fault", "--duration", "5 s", "--perturbation", "-1e-3", "--plant", "printed"),
         ("reverse_slip",),
     ),
     "rest": (
-        ("real-fault", "--duration", "5 s", "--perturbation", "-1e-3", "--plant", "coulomb"),
+        ("real-fault", "--duration", "5 s", "--perturbation", "-1e-3"),
         ("stick",),
+    ),
+    "a load beyond what friction carries backward": (
+        ("real-fault", "--duration", "5 s", "--perturbation=-9*time"),
+        ("stick", "load_reversed"),
     ),
 }
 

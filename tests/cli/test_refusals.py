@@ -62,7 +62,7 @@ def test_one_line_says_what_is_wrong(capsys, tmp_path, monkeypatch, arguments, s
         ("guarantee real-fault --step '3 mss'", "ms"),
         ("simulate real-fault --controller cta --gains publishd", "published"),
         ("simulate real-fault --controller cta --feedforward nominl", "nominal"),
-        ("simulate real-fault --controller cta --plant colomb", "coulomb"),
+        ("simulate real-fault --controller cta --plant stick-slop", "stick-slip"),
         ("simulate real-fault --controller cta --method dormand-prnce", "dormand-prince"),
         ("simulate crustal-patch --start lokced", "locked"),
         ("synthesise cta real-fault --objective decy", "decay"),

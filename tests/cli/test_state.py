@@ -98,7 +98,7 @@ def test_a_locked_fault_starts_with_an_aged_state(capsys, patch):
         (("--diffusion", "10 s"), "diffusion cannot be used for friction with a state without control"),
         (("--stress", "1 kPa"), "needs a controller"),
         (("--saturation", "1 MPa"), "saturation cannot be used for friction with a state"),
-        (("--plant", "coulomb"), "one of smooth, quasi-dynamic"),
+        (("--plant", "stick-slip"), "one of smooth, quasi-dynamic"),
         (("--start", "early"), "one of steady, locked, late"),
         (("--start", "locked"), "Give --hold"),
         (("--hold", "1 year"), "hold cannot be used with the start steady"),

@@ -139,7 +139,9 @@ def test_it_is_not_reached_where_the_pressure_follows_one_that_moves_with_the_re
 def test_on_a_fault_that_sticks_the_pressure_stays_where_it_is_proved_to_stay(proved):
     """Ahead of a reference that comes to rest the fault rests for ever: the pressure without limits goes on to fall."""
     claims = proved.claims
-    free, limited = (simulate(REAL, one.controller, plant="coulomb", samples=20_000) for one in (proved.held, proved))
+    free, limited = (
+        simulate(REAL, one.controller, plant="stick-slip", samples=20_000) for one in (proved.held, proved)
+    )
     assert free.pressure.min() < 1.2 * float(claims.least_pressure)
     assert limited.pressure.min() > claims.least_pressure
     for run in (free, limited):
@@ -376,13 +378,13 @@ def test_behind_a_lag_and_rock_a_fault_that_sticks_does_not_wind_up(name):
     free = replace(found.controller, rest_limit=None)
     runs = {
         (plant, one.rest_limit is None): simulate(REAL, one, plant=plant, **told)
-        for plant in ("smooth", "coulomb")
+        for plant in ("printed", "stick-slip")
         for one in (found.controller, free)
     }
-    assert np.array_equal(runs["smooth", True].pressure, runs["smooth", False].pressure)
-    assert runs["coulomb", True].pressure.min() < 1.5 * runs["coulomb", False].pressure.min()
-    assert runs["coulomb", False].pressure.min() > -1.02 * float(found.rest_limit.width)
-    for run in (runs["coulomb", False], runs["smooth", False]):
+    assert np.array_equal(runs["printed", True].pressure, runs["printed", False].pressure)
+    assert runs["stick-slip", True].pressure.min() < 1.5 * runs["stick-slip", False].pressure.min()
+    assert runs["stick-slip", False].pressure.min() > -1.02 * float(found.rest_limit.width)
+    for run in (runs["stick-slip", False], runs["printed", False]):
         assert run.metrics.max_slip_error < found.claims.slip_error
         assert run.metrics.max_slip_rate_error < found.claims.slip_rate_error
 

@@ -222,7 +222,7 @@ def test_a_pressure_arrives_between_samples(delay, lag):
     """The law by its recursion, the plant by SciPy between changes of the pressure; friction has a kink at slip 0."""
     law, periods = Held(law=LAW, step=STEP, delay=delay, lag=lag).controller, 10
     told = {"duration": periods * float(STEP), "samples": periods + 1, "initial_slip_rate": 1e-5}
-    run = simulate(REAL, law, substeps=16, **told)
+    run = simulate(REAL, law, substeps=16, **told, plant="printed")
     plant, reference = ClosedLoop(REAL, law).plant, ClosedLoop(REAL, law).reference
     update, measured, output, feedback = (
         np.array(part, dtype=float) for part in (LAW.update, LAW.measured, LAW.output, LAW.feedback)
@@ -245,7 +245,7 @@ def test_a_pressure_arrives_between_samples(delay, lag):
     slips, speeds, _ = np.transpose(found)
     assert np.abs(run.slip[:-1] - slips).max() < 1e-6 * np.abs(slips).max()
     assert np.abs(run.slip_rate[:-1] - speeds).max() < 1e-6 * np.abs(speeds).max()
-    sooner = simulate(REAL, law, actuator=Actuator(), **told)
+    sooner = simulate(REAL, law, actuator=Actuator(), **told, plant="printed")
     assert np.abs(run.slip - sooner.slip).max() > 0.1 * np.abs(slips).max()
 
 

@@ -42,7 +42,7 @@ def compared(kept):
             "quakedesign.studies.comparison.published", lambda _: {name: laws[name] for name in ("cta", "elqr")}
         )
         designs = [undecided(SHORT, laws[name]) for name in ("cta", "elqr")]
-        yield compare(SHORT, designs, scheme="compensated", published_scheme="explicit")
+        yield compare(SHORT, designs, scheme="compensated", published_scheme="explicit", plant="printed")
 
 
 def test_every_row_says_its_scheme_and_is_the_run_of_it(compared):
@@ -56,7 +56,7 @@ def test_every_row_says_its_scheme_and_is_the_run_of_it(compared):
     assert [row[0] for row in rows(compared)] == labels
     assert [row[0] for row in outcome_rows(compared)] == ["uncontrolled", *labels]
     assert [e.to_dict()["run"]["scheme"] for e in compared.entries] == ["explicit"] * 2 + ["compensated"] * 2
-    alone = simulate(SHORT, compared.entries[2].design.controller, scheme="compensated")
+    alone = simulate(SHORT, compared.entries[2].design.controller, scheme="compensated", plant="printed")
     assert replace(alone.metrics, seconds=0) == replace(compared.entries[2].run.metrics, seconds=0)
 
 

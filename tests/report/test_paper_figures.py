@@ -90,7 +90,7 @@ def test_every_axis_has_a_unit_and_every_figure_says_how_it_was_made(study):
             labels = axis.get_xlabel() + axis.get_ylabel()
             assert "[" in labels or not axis.axison, name
         if name != "friction-law":
-            made_with = r"scheme continuous, step \d\S* s, method dormand-prince, smooth plant"
+            made_with = r"scheme continuous, step \d\S* s, method dormand-prince, stick-slip plant"
             assert re.search(made_with, caption(drawing)), name
 
 
@@ -242,8 +242,8 @@ def test_every_way_in_which_runs_were_made_is_named_once(study):
     run = study.comparison.entries[0].run
     other = replace(run, provenance={**run.provenance, "scheme": "implicit"})
     assert made([run, run, other]).split("; ") == [
-        "scheme continuous, step 0.001 s, method dormand-prince, smooth plant",
-        "scheme implicit, step 0.001 s, method dormand-prince, smooth plant",
+        "scheme continuous, step 0.001 s, method dormand-prince, stick-slip plant",
+        "scheme implicit, step 0.001 s, method dormand-prince, stick-slip plant",
     ]
 
 

@@ -27,7 +27,7 @@ def same(one, other):
     assert one.energy == other.energy
 
 
-@few("plant", ["smooth", "coulomb"], every=2)
+@few("plant", ["printed", "stick-slip"], every=2)
 def test_a_run_interrupted_thrice_ends_with_the_same_digits(tmp_path, plant):
     law = published("real-fault")["cta"]
     whole = simulate(REAL, law, plant=plant, **SETTING)

@@ -24,7 +24,7 @@ gain = st.floats(-1e250, 1e250, allow_nan=False)
 @settings(max_examples=5, deadline=None)
 @given(st.sampled_from(["cta", "elqr", "dia"]), st.lists(gain, min_size=4, max_size=4), st.booleans())
 def test_no_figure_of_any_run_is_not_a_number(law, gains, sticks):
-    plant = "coulomb" if sticks else "smooth"
+    plant = "stick-slip" if sticks else "printed"
     try:
         controller = control_law(law).from_values(tuple(gains), **({} if law == "elqr" else DIVISOR))
         run = simulate(REAL, controller, duration=4.0, plant=plant, compiled=False)
@@ -47,7 +47,14 @@ def test_no_figure_of_any_run_is_not_a_number(law, gains, sticks):
 def test_opening_is_named_at_the_first_step_at_which_the_pressure_is_the_stress():
     """A push that grows makes the linear law inject until p ≥ σ'."""
     controller = published("real-fault")["elqr"]
-    run = simulate(REAL, controller, duration=60.0, samples=10**5, load=Load(perturbation=-0.1 * sp.Symbol("time")))
+    run = simulate(
+        REAL,
+        controller,
+        duration=60.0,
+        samples=10**5,
+        load=Load(perturbation=-0.1 * sp.Symbol("time")),
+        plant="printed",
+    )
     opened = run.pressure >= REAL.effective_normal_stress
     assert np.any(opened)
     assert run.events["opening"] == run.time[np.argmax(opened)]
@@ -55,7 +62,8 @@ def test_opening_is_named_at_the_first_step_at_which_the_pressure_is_the_stress(
 
 
 def test_reverse_slip_of_the_uncontrolled_fault_is_named():
-    run = simulate(REAL.with_disturbance(Disturbance(constant=-1e-3)), duration=5.0, samples=10**5)
+    backward = REAL.with_disturbance(Disturbance(constant=-1e-3))
+    run = simulate(backward, duration=5.0, samples=10**5, plant="printed")
     assert run.events["reverse_slip"] == run.time[1]
 
 
@@ -63,7 +71,7 @@ def test_a_pressure_beyond_all_numbers_is_a_divergence():
     """x1 and x2 are still small when a gain of 1e160 asks for a pressure whose square is none."""
     gains = {name: 1e160 for name in published("real-fault")["elqr"].gain_units}
     law = control_law("elqr")(gains=gains)
-    run = simulate(REAL, law, duration=10.0, compiled=False)
+    run = simulate(REAL, law, duration=10.0, compiled=False, plant="printed")
     assert run.events["diverged"] <= 2 * REAL.sampling_time
     assert run.metrics.rms_pressure is None
     assert np.all(np.isfinite(run.pressure))

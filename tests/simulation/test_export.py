@@ -171,10 +171,10 @@ def test_a_step_that_is_told_what_a_pump_applied_winds_up_no_more_than_in_simula
     controller, scheme, _ = CASES[case]
     found = controller_step(LAB, controller, step=1e-3, scheme=simulation_scheme(scheme))
     around = {"step": 1e-3, "method": "rk4", "duration": 0.2, "samples": 200, "compiled": False}
-    free = simulate(LAB, controller, scheme=simulation_scheme(scheme), **around)
+    free = simulate(LAB, controller, scheme=simulation_scheme(scheme), **around, plant="printed")
     most = float(np.abs(free.pressure).max()) / 4
     pump = Actuator(stages=(Saturation(lowest=-most, highest=most),))
-    run = simulate(LAB, controller, scheme=simulation_scheme(scheme, actuator=pump), **around)
+    run = simulate(LAB, controller, scheme=simulation_scheme(scheme, actuator=pump), **around, plant="printed")
     pressures = asked_along(found, run, -most, most)
     assert run.pressure == pytest.approx(pressures, rel=1e-9, abs=1e-9 * most)
     assert np.sum(np.abs(pressures) == most) > 3

@@ -128,9 +128,9 @@ def test_behind_a_pump_that_tells_what_it_applied_it_asks_for_what_simulate_does
     """Of slip and slip rate as simulated; without being told, the law winds up and asks for something else."""
     law = published("lab-fault")[name]
     around = {"step": STEP, "method": "rk4", "duration": 0.2, "samples": 200, "compiled": False}
-    most = float(np.abs(simulate(LAB, law, scheme="explicit", **around).pressure).max()) / 4
+    most = float(np.abs(simulate(LAB, law, scheme="explicit", **around, plant="printed").pressure).max()) / 4
     pump = simulation_scheme("explicit", actuator=Actuator(stages=(Saturation(lowest=-most, highest=most),)))
-    seen = simulate(LAB, law, scheme=pump, **around)
+    seen = simulate(LAB, law, scheme=pump, **around, plant="printed")
     found = export_controller(LAB, law, tmp_path / "c", step=STEP, fmu=True)
     measured = {"slip": seen.slip, "slip_rate": seen.slip_rate}
     rows = np.array([measured[signal] for signal in found.measurement]).T

@@ -120,7 +120,7 @@ def test_the_measure_of_events_is_found_with_the_event(monkeypatch):
     monkeypatch.setattr(memoryless_earthquake, "_PEAKS", {})
     runs, run = [], memoryless_earthquake.run
     monkeypatch.setattr(memoryless_earthquake, "run", lambda *given, **more: runs.append(1) or run(*given, **more))
-    natural_earthquake(LAB, plant="coulomb")
+    natural_earthquake(LAB, plant="stick-slip")
     peak = memoryless_earthquake.natural_peak(LAB)
     assert len(runs) == 2
     event = natural_earthquake(LAB, compiled=False)

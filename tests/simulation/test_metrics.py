@@ -21,7 +21,7 @@ def law(request):
 
 @few("settled_from", [None, 0.0, 300.0], every=2)
 def test_they_agree_with_numpy(law, settled_from):
-    run = simulate(REAL, law, duration=800.0, samples=10**6, settled_from=settled_from)
+    run = simulate(REAL, law, duration=800.0, samples=10**6, settled_from=settled_from, plant="printed")
     start = 200.0 if settled_from is None else settled_from
     kept = run.time > start
     slip_error, rate_error = run.slip_error[kept], run.slip_rate_error[kept]
@@ -42,7 +42,8 @@ def test_they_agree_with_numpy(law, settled_from):
         "min_pressure": np.min(run.pressure),
     }
     found = run.metrics.to_dict()
-    assert set(found) - set(expected) == {"settled_from", "steps", "seconds"}
+    assert set(found) - set(expected) == {"time_at_rest_fraction", "settled_from", "steps", "seconds"}
+    assert found["time_at_rest_fraction"] is None
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, rel=1e-11), name
     assert found["steps"] == len(run.time) - 1
@@ -53,10 +54,11 @@ def test_they_do_not_depend_on_what_is_kept(law):
     assert few | {"seconds": 0} == many | {"seconds": 0}
 
 
-def test_without_control_only_the_peak_is_given():
+def test_without_control_only_peak_and_rest_are_given():
     found = simulate(REAL, duration=30.0).metrics.to_dict()
     assert {name for name, value in found.items() if value is not None} == {
         "peak_slip_rate",
+        "time_at_rest_fraction",
         "settled_from",
         "steps",
         "seconds",

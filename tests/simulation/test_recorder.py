@@ -10,8 +10,8 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import control_law, published
 from quakedesign.loop import Actuator, Lag, simulation_scheme
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.simulation.coulomb import CoulombLoop
 from quakedesign.simulation.recorder import Recorder
+from quakedesign.simulation.stick_slip_plant import StickSlipLoop
 
 LAB = load_fault("lab-fault")
 STRESS = LAB.effective_normal_stress
@@ -62,9 +62,9 @@ def test_an_event_keeps_the_time_at_which_it_was_first():
 
 def test_rest_is_what_set_valued_friction_holds_but_for_the_start():
     moving, resting = (0.0, 1e-300), (0.0, 0.0)
-    found = watched([resting, moving, resting, resting], kind=CoulombLoop)
+    found = watched([resting, moving, resting, resting], kind=StickSlipLoop)
     assert (found["stick"], found["rest_count"]) == (2 * STEP, 3)
-    assert watched([resting, resting], kind=CoulombLoop)["stick"] == STEP
+    assert watched([resting, resting], kind=StickSlipLoop)["stick"] == STEP
     passing = watched([resting, moving, resting, resting])
     assert (passing["stick"], passing["rest_count"]) == (-1.0, 0)
 
@@ -88,7 +88,7 @@ def test_errors_count_after_the_time_from_which_they_do_and_the_peak_always():
 
 def test_at_rest_at_the_start_there_is_nothing_but_an_instant_that_counts():
     found = watched([(0.0, 0.0)], law=linear(0.0))
-    events = dict.fromkeys(("diverged", "opening", "reverse_slip", "stick"), -1.0)
+    events = dict.fromkeys(("diverged", "opening", "reverse_slip", "stick", "load_reversed"), -1.0)
     h = float(ClosedLoop(LAB, linear(0.0)).perturbation(0, [0, 0], [0, 0, 0])[0])
     assert found == dict.fromkeys(found, 0.0) | events | {"settled_count": 1, "previous_h": h}
 

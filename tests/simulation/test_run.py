@@ -55,7 +55,7 @@ def test_the_linear_law_agrees_with_scipy(fault, step, duration):
     """The early slip swings through zero, where friction has a kink and a fixed step its second order only."""
     controller = published(fault.name)["elqr"]
     gains = [float(gain) for gain in controller.gains.values()]
-    run = simulate(fault, controller, step=step, duration=duration, samples=50)
+    run = simulate(fault, controller, step=step, duration=duration, samples=50, plant="printed")
     scale = np.max(np.abs([run.slip, run.slip_rate]), axis=1)
     oracle = solve_ivp(
         elqr_field(fault, gains),
@@ -72,7 +72,7 @@ def test_the_linear_law_agrees_with_scipy(fault, step, duration):
 
 
 def test_the_uncontrolled_fault_agrees_with_scipy():
-    run = simulate(REAL, step=0.02, duration=60.0, samples=60)
+    run = simulate(REAL, step=0.02, duration=60.0, samples=60, plant="printed")
     oracle = solve_ivp(
         lambda t, y: [y[1], acceleration(REAL, t, *y, 0.0)],
         (0, run.time[-1]),
@@ -166,7 +166,7 @@ def test_the_reference_rests_after_the_operation(law):
 def test_a_destabilising_law_is_named_and_has_no_metrics():
     good = published("real-fault")["elqr"]
     bad = dataclasses.replace(good, gains={name: -value for name, value in good.gains.items()})
-    run = simulate(REAL, bad, duration=20000.0)
+    run = simulate(REAL, bad, duration=20000.0, plant="printed")
     assert 0 < run.events["diverged"] < 20000.0
     assert run.events["opening"] < run.events["diverged"]
     assert run.metrics.max_slip_error is None
@@ -177,7 +177,7 @@ def test_a_destabilising_law_is_named_and_has_no_metrics():
 
 
 def test_reverse_slip_is_named_at_its_first_step():
-    run = simulate(REAL, published("real-fault")["cta"], duration=200.0, samples=5000)
+    run = simulate(REAL, published("real-fault")["cta"], duration=200.0, samples=5000, plant="printed")
     assert run.events["reverse_slip"] == run.time[np.argmax(run.slip_rate < 0)]
     assert "diverged" not in run.events
 

@@ -52,7 +52,13 @@ def test_the_orders_hold_over_three_decades():
 @pytest.mark.slow
 def test_noise_raises_the_errors_and_leaves_the_order_of_the_schemes():
     study = noise_sensitivity(
-        REAL, LAW, levels=(1e-8, 1e-5), of="rate_noise", schemes=("explicit", "compensated"), duration=2000.0
+        REAL,
+        LAW,
+        levels=(1e-8, 1e-5),
+        of="rate_noise",
+        schemes=("explicit", "compensated"),
+        duration=2000.0,
+        plant="printed",
     )
     for found in study.errors.values():
         assert found["slip_rate_error"][1] > found["slip_rate_error"][0]
@@ -61,7 +67,9 @@ def test_noise_raises_the_errors_and_leaves_the_order_of_the_schemes():
 
 @pytest.mark.slow
 def test_the_compensated_scheme_keeps_both_limits_over_the_whole_box():
-    study = gain_sensitivity(REAL.with_box("ten-percent"), LAW, points=2, schemes=("compensated",), duration=30000.0)
+    study = gain_sensitivity(
+        REAL.with_box("ten-percent"), LAW, points=2, schemes=("compensated",), duration=30000.0, plant="printed"
+    )
     assert study.levels[0] < 1.1 < 1.3 < study.levels[1]
     assert max(study.errors["compensated"]["slip_error"]) < 1e-5
     assert max(study.errors["compensated"]["slip_rate_error"]) < 6e-6
@@ -69,7 +77,7 @@ def test_the_compensated_scheme_keeps_both_limits_over_the_whole_box():
 
 def test_a_diverging_run_counts_as_infinite():
     law = control_law("elqr").from_values(("1.9e9", "5.8e8", "1e6", "18"))
-    study = noise_sensitivity(REAL, law, levels=(1e-9,), schemes=("explicit",), duration=400.0)
+    study = noise_sensitivity(REAL, law, levels=(1e-9,), schemes=("explicit",), duration=400.0, plant="printed")
     assert study.errors["explicit"]["slip_error"] == (math.inf,)
 
 

@@ -349,7 +349,7 @@ def test_simulate_runs_what_a_design_found_in_its_own_way():
         ({"measurement": Measurement()}, "Received measurement"),
         ({"variation": Variation()}, "Received variation"),
         ({"step": 20.0}, "runs with the scheme explicit"),
-        ({"plant": "coulomb"}, "one of smooth, quasi-dynamic"),
+        ({"plant": "stick-slip"}, "one of smooth, quasi-dynamic"),
         (
             {"actuator": Actuator(stages=(Diffusion.of_time(100.0), Lag(time_constant=30.0)))},
             "a lag, rock, or both. Received diffusion, lag",

@@ -49,7 +49,9 @@ def test_already_a_band_of_forty_instants_meets_most_phases(period):
 
 def test_a_decimated_run_shows_the_chatter_that_its_metrics_tell():
     """Explicit 2-CTA: at every even step alone one would see half of it."""
-    run = simulate(REAL, published("real-fault")["cta"], scheme="explicit", duration=4000.0, samples=500)
+    run = simulate(
+        REAL, published("real-fault")["cta"], scheme="explicit", duration=4000.0, samples=500, plant="printed"
+    )
     settled = run.time > run.metrics.settled_from
     assert run.metrics.steps / 500 > 40
     for errors, largest in (

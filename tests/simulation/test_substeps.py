@@ -21,7 +21,7 @@ METHOD = integrator("dormand-prince")
 def step_of(substeps, cells=3):
     rock = Actuator(stages=(Diffusion(length=0.1, diffusivity=1.0, cells=cells),))
     scheme = simulation_scheme("explicit", substeps=substeps, actuator=rock)
-    return _step(Recorder(loop_class("smooth")(LAB, LAW), scheme, LAB.sampling_time), METHOD)
+    return _step(Recorder(loop_class("printed")(LAB, LAW), scheme, LAB.sampling_time), METHOD)
 
 
 def written_out(loop, motion, given, state, step, times):
@@ -35,7 +35,7 @@ def written_out(loop, motion, given, state, step, times):
     return state
 
 
-@few("plant", ["smooth", "coulomb"], every=2)
+@few("plant", ["printed", "stick-slip"], every=2)
 @pytest.mark.parametrize("factors", [(), Variation(stiffness=1.07).values], ids=["nominal", "varied"])
 def test_the_digits_are_those_of_steps_written_out(plant, factors):
     def motion(plant, passed, now, given):

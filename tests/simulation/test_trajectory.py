@@ -180,7 +180,9 @@ def actuated():
     stages = Saturation(lowest=-2e4, highest=2e4), Lag(time_constant=5e-3), rock
     law = published("lab-fault")["cta"]
     actuator = Actuator(stages=stages)
-    return simulate(LAB, law, scheme="explicit", actuator=actuator, substeps=2, duration=2.0, samples=2000)
+    return simulate(
+        LAB, law, scheme="explicit", actuator=actuator, substeps=2, duration=2.0, samples=2000, plant="printed"
+    )
 
 
 @pytest.mark.slow
@@ -255,7 +257,7 @@ def test_the_area_under_stress_against_slip_is_the_work_of_friction(uncontrolled
 def test_friction_at_rest_sets_no_more_against_the_load_than_it_must():
     """Coulomb: τA = load on the block where it rests."""
     push = -0.3 * LAB.friction.residual * LAB.authority * LAB.effective_normal_stress
-    run = simulate(LAB.with_disturbance(Disturbance(constant=push)), duration=0.1, plant="coulomb")
+    run = simulate(LAB.with_disturbance(Disturbance(constant=push)), duration=0.1, plant="stick-slip")
     static = (LAB.friction.residual + LAB.friction.drop) * LAB.effective_normal_stress
     assert np.all(run.slip == 0)
     assert run.shear_stress == pytest.approx(np.full(run.time.size, static + push * LAB.mass / LAB.area), rel=1e-12)

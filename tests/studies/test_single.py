@@ -20,7 +20,7 @@ from quakedesign.studies import runs as single
 from quakedesign.studies.runs import Choice, choice, chosen_controller, run_single, sensor
 
 LAB = load_fault("lab-fault")
-USUAL = {"step": None, "scheme": "continuous", "method": "dormand-prince", "plant": "smooth", "substeps": 1}
+USUAL = {"step": None, "scheme": "continuous", "method": "dormand-prince", "plant": None, "substeps": 1}
 BASE = ("7", "5", "2.3", "1.1")
 
 

@@ -16,7 +16,7 @@ from quakedesign.errors import ParameterError, require_known
 from quakedesign.files import write_whole
 from quakedesign.simulation.campaign.problem import CampaignProblem, SampleResult
 from quakedesign.simulation.campaign.space import UNITS, Worst
-from quakedesign.simulation.recorder import EVENTS, StickMetrics
+from quakedesign.simulation.recorder import EVENTS, Metrics
 from quakedesign.simulation.trajectory import KINDS, Outcome, Trajectory
 
 # ----------------------------------------------------------------------
@@ -250,7 +250,7 @@ class Campaign:
             f"{name} [{UNITS.get(name, '-')}]": [n[name] for n in numbers] for name in numbers[0]
         }
         columns["outcome [-]"] = [outcome.kind if outcome else None for outcome in self.outcomes]
-        columns |= {f"{m} [{StickMetrics.unit(m) or '-'}]": self.values(m) for m in self.metrics}
+        columns |= {f"{m} [{Metrics.unit(m) or '-'}]": self.values(m) for m in self.metrics}
         return pd.DataFrame(columns, index=pd.Index(range(len(numbers)), name="sample"))
 
     def save(self, folder: str | Path, figures: Mapping[str, bytes] | None = None) -> None:
@@ -290,7 +290,7 @@ class Campaign:
             f"{problem.fault.name}, {law}: {count} samples, {diverged} diverge",
             f"scheme {problem.scheme.name}, step {problem.setting.step:g} s",
             {
-                f"{name.replace('_', ' ')} [{StickMetrics.unit(name)}]": (
+                f"{name.replace('_', ' ')} [{Metrics.unit(name)}]": (
                     self.values(name),
                     {level: levels[name][f"{level:g}"] for level in _MARKED},
                 )

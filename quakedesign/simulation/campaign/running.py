@@ -33,7 +33,8 @@ from quakedesign.simulation.campaign.problem import (
 from quakedesign.simulation.campaign.space import Sample, Space, Worst, require_count, search
 from quakedesign.simulation.closed_loop import Load
 from quakedesign.simulation.integrators import DormandPrince, integrator
-from quakedesign.simulation.run import RunSetting, own_path, sampled_scheme
+from quakedesign.simulation.run import STICK_SLIP, RunSetting, own_path, sampled_scheme
+from quakedesign.simulation.slow_sliding import PLANTS
 from quakedesign.simulation.state_plant import TIDE
 
 # ----------------------------------------------------------------------
@@ -164,7 +165,7 @@ def campaign_problem(
     method: str = "dormand-prince",
     duration: float | None = None,
     settled_from: float | None = None,
-    plant: str = "smooth",
+    plant: str | None = None,
     load: Load | None = None,
     initial_slip: float = 0.0,
     initial_slip_rate: float = 0.0,
@@ -209,7 +210,7 @@ def campaign_problem(
         "controller": controller,
         "scheme": way,
         "setting": RunSetting.of(fault, step, duration, 1, settled_from),
-        "plant": plant,
+        "plant": plant or (next(iter(PLANTS)) if fault.friction.state_names else STICK_SLIP),
         "seed": seed,
     }
     if fault.friction.state_names:

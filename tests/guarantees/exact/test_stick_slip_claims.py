@@ -322,7 +322,7 @@ def test_a_run_on_the_plant_that_sticks_stays_within_the_claims(proof):
     assert metrics.max_slip_error <= max(claims.slip_behind, claims.slip_ahead)
     assert claims.least_pressure <= metrics.min_pressure <= metrics.max_pressure <= claims.largest_pressure
     assert metrics.reverse_slip_fraction == 0
-    assert metrics.stick_fraction > 0.5
+    assert metrics.time_at_rest_fraction > 0.5
 
 
 def test_claims_are_rounded_outward(bounds):

@@ -105,7 +105,7 @@ def test_an_empty_chain_changes_nothing():
 def test_the_fault_gets_what_the_stages_leave():
     """Rounded to 10 kPa, cut at ±0.2 MPa, two samples late: what NumPy makes of the law's own pressure."""
     stages_used = (Delay(samples=2), Quantisation(quantum=1e4), Saturation(lowest=-2e5, highest=2e5))
-    found = run(Actuator(stages=stages_used))
+    found = run(Actuator(stages=stages_used), plant="printed")
     nu = -(1e-3 ** (2 / 3)) * 7 * np.cbrt(found.slip_error)
     nu -= np.sqrt(1e-3 * np.abs(found.slip_rate_error)) * 5 * np.sign(found.slip_rate_error)
     asked = np.concatenate([[0, 0], (nu + found.integrals[0])[:-2]]) / float(LAW.divisor)
@@ -152,7 +152,7 @@ def test_signals_of_the_actuator_carry_units():
 
 @pytest.mark.parametrize("scheme", ["implicit", "compensated"])
 def test_a_coulomb_plant_takes_the_actuator_too(scheme):
-    found = run(Actuator(stages=(Lag(time_constant=0.2),)), scheme=scheme, plant="coulomb", count=60)
+    found = run(Actuator(stages=(Lag(time_constant=0.2),)), scheme=scheme, plant="stick-slip", count=60)
     assert np.all(np.isfinite(found.pressure))
 
 

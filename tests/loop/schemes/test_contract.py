@@ -92,7 +92,7 @@ def test_between_samples_the_fault_moves_under_the_pressure_that_is_held(name):
     friction = dataclasses.replace(REAL.friction, drop=0.0)
     linear = dataclasses.replace(REAL, friction=friction).with_disturbance(Disturbance())
     quick = dataclasses.replace(linear, reference=dataclasses.replace(linear.reference, operation_time=200.0))
-    found = run(name, fault=quick, substeps=4)
+    found = run(name, fault=quick, substeps=4, plant="printed")
     gain = friction.residual * REAL.authority
     rates = np.array([[0, 1, 0], [-REAL.specific_stiffness, -REAL.specific_damping, gain], [0, 0, 0]])
     advance = expm(rates * REAL.sampling_time)[:2]

@@ -32,7 +32,7 @@ def claim():
 @cache
 def seen(seed=None):
     own = {} if seed is None else {"scheme": Explicit(clock=NoClock(shortest=8, longest=16, seed=seed))}
-    return simulate(FAULT, claim().controller, **own, **SHORT)
+    return simulate(FAULT, claim().controller, plant="printed", **own, **SHORT)
 
 
 def sampled(run):

@@ -60,7 +60,7 @@ def stepped(scheme, law, state, step, *, counter=0, plant=None, method=ClassicRu
     """Pressure at the start of a step [Pa], and slip, rate and states of the law at its end."""
     loop = ClosedLoop(LAB, law)
     if plant is not None:
-        vars(loop)["plant"] = plant
+        vars(loop)["printed"] = plant
     memory = scheme.memory(loop, step)
     given = ca.SX.sym("given", 2 + len(loop.integrals) + len(memory))
     asked = scheme.pressure(loop, counter, given, step)
@@ -169,7 +169,7 @@ def test_a_sum_that_moves_no_pressure_goes_on_while_a_limit_holds():
 def test_between_samples_by_no_clock_nothing_of_the_law_moves(law):
     """A sample at every second step, while slip grows: pressure and sum change there alone."""
     loop = ClosedLoop(LAB, linear(**{SLIP: 8.0, SLIP_INTEGRAL: 1.0}) if law else None, 5.0)
-    vars(loop)["plant"] = lambda *_: ca.DM([1, 0])
+    vars(loop)["printed"] = lambda *_: ca.DM([1, 0])
     scheme = Explicit(clock=NoClock(shortest=2, longest=2))
     memory, count = scheme.memory(loop, 0.25), len(loop.integrals)
     given, number = ca.SX.sym("given", 2 + count + len(memory)), ca.SX.sym("number")
@@ -227,7 +227,7 @@ def test_the_well_has_what_the_pump_holds_and_the_fault_what_the_rock_lets_throu
 def test_behind_a_lag_slip_feels_what_has_come_through():
     """Rates of p and 1: under a pressure held p = held·(1 - exp(-t/τ)), up to what RK4 leaves out, (t/τ)⁵/120 of it."""
     scheme, loop = Explicit(actuator=Actuator(stages=(Lag(time_constant=2.0),))), ClosedLoop(LAB, linear(**{SLIP: 8.0}))
-    vars(loop)["plant"] = lambda _, x, p: ca.vertcat(p, x.shape[0] - 1)
+    vars(loop)["printed"] = lambda _, x, p: ca.vertcat(p, x.shape[0] - 1)
     held, _ = stepped(Explicit(), loop.controller, (-1.0, 0.0), 0.25)
     memory = scheme.memory(loop, 0.25)
     before = [-1.0, 0.0, *[0.0] * len(loop.integrals), *memory.values()]

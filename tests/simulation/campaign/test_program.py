@@ -19,7 +19,7 @@ from quakedesign.simulation.compiled import compiler, shared_library
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]  # sampled at 1 ms it is on the verge of instability (ERRATA 22)
 SCHEME = simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-7))
-PROBLEM = campaign_problem(LAB, LAW, scheme=SCHEME, duration=0.3, initial_slip=1e-4)
+PROBLEM = campaign_problem(LAB, LAW, scheme=SCHEME, duration=0.3, initial_slip=1e-4, plant="printed")
 STEPS = PROBLEM.setting.steps
 
 

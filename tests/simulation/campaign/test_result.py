@@ -170,9 +170,9 @@ def test_a_sample_is_run_again_by_its_index(monkeypatch):
 
 
 def test_the_table_of_one_sample_has_outcomes_and_dimensionless_metrics():
-    found = Campaign(problem=PROBLEM, results=(SampleResult(figures={"stick_fraction": 0.5}, events={}),))
+    found = Campaign(problem=PROBLEM, results=(SampleResult(figures={"time_at_rest_fraction": 0.5}, events={}),))
     table = found.to_pandas()
-    assert table["stick_fraction [-]"].tolist() == [0.5]
+    assert table["time_at_rest_fraction [-]"].tolist() == [0.5]
     outcomes = campaign([None, math.nan]).to_pandas()["outcome [-]"]
     assert outcomes[0] == "diverged"
     assert outcomes.isna().tolist() == [False, True]

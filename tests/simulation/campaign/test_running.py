@@ -26,7 +26,7 @@ from quakedesign.simulation.campaign.ledger import Ledger
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]
 SCHEME = simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-7))
-PROBLEM = campaign_problem(LAB, LAW, scheme=SCHEME, duration=0.3, initial_slip=1e-4)
+PROBLEM = campaign_problem(LAB, LAW, scheme=SCHEME, duration=0.3, initial_slip=1e-4, plant="printed")
 COUNT = 40
 SEARCH = {"metric": "max_slip_rate_error", "rounds": 2}
 
@@ -165,7 +165,7 @@ from quakedesign.loop.schemes import simulation_scheme
 folder = sys.argv[1]
 scheme = simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-7))
 lab, law = load_fault("lab-fault", box="ten-percent"), published("lab-fault")["elqr"]
-problem = campaign_problem(lab, law, scheme=scheme, duration=0.3, initial_slip=1e-4)
+problem = campaign_problem(lab, law, scheme=scheme, duration=0.3, initial_slip=1e-4, plant="printed")
 problem.inputs
 chance, files = random.Random(1), []
 for _ in range(5):

@@ -1,0 +1,180 @@
+"""The stick–slip plant: friction holds the fault at rest, and it never slips backward (ERRATA 14)."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+
+from quakedesign.simulation.closed_loop import ClosedLoop, Motion
+from quakedesign.simulation.integrators import Integrator
+
+_BISECTIONS = 4  # of the step, which leave a sixteenth of it, from where Newton's method converges quadratically
+_NEWTON_STEPS = 3
+
+
+@dataclass(frozen=True)
+class StickSlipLoop(ClosedLoop):
+    """A closed loop with x2 ≥ 0: x2' = load − F + λ, with the reaction λ ≥ 0, λ·x2 = 0 and F = μ N̂ max(σ' − p, 0).
+
+    While the fault slips it obeys eq. shift, and digits are those of `ClosedLoop` as long as p < σ'. Where the slip
+    rate falls to zero it stops; it rests as long as friction can carry the load, and the slip rate is exactly zero.
+    A step locates one stop or one release, to the order of the integrator. Friction in the backward direction is not
+    modelled: `reversing` says where it would be exceeded.
+
+    Attributes
+    ----------
+    fault, controller, constant_pressure
+        As in `ClosedLoop`.
+    """
+
+    plant_name: ClassVar[str] = "stick-slip"
+    plant_title: ClassVar[str] = ""
+    sticks: ClassVar[bool] = True
+
+    @property
+    def plant(self) -> Any:
+        """Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²] while it slips; without friction where it is opened."""
+        _, normal, _, stress = self.hats()
+
+        def rates(time: Any, x: Any, pressure: Any) -> Any:
+            pulling = normal * self.friction(x) * ca.fmin(stress - pressure, 0)  # of the printed plant beyond p = σ'
+            return self.printed(time, x, pressure) + ca.vertcat(0, pulling)
+
+        return rates
+
+    def resting_load(self, time: Any, slip: Any, pressure: Any) -> tuple[Any, Any]:
+        """Load less friction, and load plus friction [m/s²], of a fault at rest (SX): it rests from ≤ 0 to ≥ 0."""
+        forward = self.plant(time, ca.vertcat(slip, 0), pressure)[1]
+        _, normal, _, stress = self.hats()
+        strength = normal * self.friction(ca.vertcat(slip, 0)) * ca.fmax(stress - pressure, 0)
+        return forward, forward + 2 * strength
+
+    def reversing(self, time: Any, state: Any, pressure: Any) -> Any:
+        """Whether the load on a fault at rest exceeds friction backward (SX)."""
+        return ca.logic_and(state[1] == 0, self.resting_load(time, state[0], pressure)[1] < 0)
+
+    def shear_stress(self, time: Any, state: Any, pressure: Any, friction: Any) -> Any:
+        """Shear stress [Pa]: μ max(σ' − p, 0) against slip, or what carries the load at rest (SX)."""
+        strength = friction * ca.fmax(self.fault.effective_normal_stress - pressure, 0)
+        carried = self.resting_load(time, state[0], pressure)[0] / self.hats()[1] + strength
+        return ca.if_else(state[1] == 0, ca.fmin(carried, strength), strength)
+
+    def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float, works: int = 0) -> Any:
+        """State after one step, with at most one release and one stop; the last entries of the state are works."""
+        moved = _SplitStep(self.plant, method, motion, step, works)
+        rests, push = state[1] == 0, moved.push(0.0, state)
+        release = _crossing(push, moved.push(1.0, moved.rested(0.0, 1.0, state)))
+        begin = ca.if_else(rests, ca.if_else(push > 0, 0.0, release), 0.0)
+        start = moved.rested(0.0, begin, state)
+        ahead = moved.slid(begin, 1 - begin, start)
+        stop, stopped = moved.stop(begin, start, ahead)
+        return ca.if_else(ahead[1] < 0, moved.rested(stop, 1 - stop, stopped), ahead)
+
+
+@dataclass(frozen=True)
+class _SplitStep:
+    """The motion within one step, cut at shares [-] of its length."""
+
+    plant: Any
+    method: type[Integrator]
+    motion: Motion
+    step: float
+    works: int
+
+    def rates(self, passed: Any, state: Any) -> Any:
+        """Time derivative of the state while the fault slips."""
+        return self.motion(self.plant, passed, state)
+
+    def push(self, passed: Any, state: Any) -> Any:
+        """Acceleration [m/s²] out of rest; positive where friction cannot hold the fault."""
+        return self.rates(passed, _at_rest(state))[1]
+
+    def slid(self, passed: Any, share: Any, state: Any) -> Any:
+        """State after a share of the step of the sliding fault."""
+        return self.method.advance(lambda part, now: self.rates(passed + share * part, now), state, share * self.step)
+
+    def rested(self, passed: Any, share: Any, state: Any) -> Any:
+        """State after a share of the step at rest: slip and slip rate stay, the rest of the state goes on."""
+
+        def field(part: Any, now: Any) -> Any:
+            return self.motion(lambda *_: ca.SX.zeros(2), passed + share * part, ca.vertcat(state[0], 0, now[2:]))
+
+        if self._further(state):
+            return self.method.advance(field, state, share * self.step)
+        return state + share * self.step * field(0.0, state)
+
+    def _further(self, state: Any) -> bool:
+        """Whether there is more than slip, slip rate and works: states of the law, or pressures on their way."""
+        return bool(state.shape[0] - 2 - self.works)
+
+    def stop(self, begin: Any, start: Any, ahead: Any) -> tuple[Any, Any]:
+        """Share of the step at which the slip rate has fallen to zero, and the state there.
+
+        The slip rate is the quartic in time with the values and slopes of both ends and the slip between them. States
+        of the law and pressures on their way are integrated up to there; works are cubics.
+        """
+        length = (1 - begin) * self.step
+        first, last = self.rates(begin, start), self.rates(1.0, ahead)
+        rate = _Quartic.of(start[1], ahead[1], length * first[1], length * last[1], (ahead[0] - start[0]) / length)
+        share = rate.root()
+        stop = begin + share * (1 - begin)
+        if self._further(start):
+            stopped = self.slid(begin, share * (1 - begin), start)
+        else:
+            up = share * share * (3 - 2 * share)
+            slopes = share * (1 - share) * ((1 - share) * first - share * last)
+            stopped = start + up * (ahead - start) + length * slopes
+        return stop, ca.vertcat(start[0] + length * rate.integral(share), 0, stopped[2:])
+
+
+def _at_rest(state: Any) -> Any:
+    return ca.vertcat(state[0], 0, state[2:])
+
+
+def _crossing(before: Any, after: Any) -> Any:
+    """Share of a step at which a quantity that ends positive has left zero, by its secant; 1 where it stays below."""
+    crosses = ca.logic_and(before <= 0, after > 0)
+    return ca.if_else(crosses, before / ca.if_else(crosses, before - after, 1), 1)
+
+
+@dataclass(frozen=True)
+class _Quartic:
+    """Polynomial of degree four on [0, 1], by its coefficients."""
+
+    coefficients: tuple[Any, Any, Any, Any, Any]
+
+    @classmethod
+    def of(cls, start: Any, end: Any, start_slope: Any, end_slope: Any, mean: Any) -> "_Quartic":
+        """Quartic with these values and slopes at 0 and 1, and this mean."""
+        cubic = 2 * (start - end) + start_slope + end_slope
+        square = 3 * (end - start) - 2 * start_slope - end_slope
+        bulge = 30 * (mean - (start + start_slope / 2 + square / 3 + cubic / 4))  # of s²(1 − s)²
+        return cls((start, start_slope, square + bulge, cubic - 2 * bulge, bulge))
+
+    def at(self, share: Any) -> Any:
+        """Value at a share."""
+        a, b, c, d, e = self.coefficients
+        return a + share * (b + share * (c + share * (d + share * e)))
+
+    def integral(self, share: Any) -> Any:
+        """Integral from 0 to a share."""
+        a, b, c, d, e = self.coefficients
+        return share * (a + share * (b / 2 + share * (c / 3 + share * (d / 4 + share * e / 5))))
+
+    def slope(self, share: Any) -> Any:
+        """Derivative at a share."""
+        _, b, c, d, e = self.coefficients
+        return b + share * (2 * c + share * (3 * d + share * 4 * e))
+
+    def root(self) -> Any:
+        """A share at which it falls through zero, where it is ≥ 0 at 0 and < 0 at 1."""
+        low, high = 0.0, 1.0
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            positive = self.at(middle) > 0
+            low, high = ca.if_else(positive, middle, low), ca.if_else(positive, high, middle)
+        share = (low + high) / 2
+        for _ in range(_NEWTON_STEPS):
+            slope = self.slope(share)
+            share = ca.fmin(ca.fmax(share - self.at(share) / ca.if_else(slope == 0, 1, slope), low), high)
+        return share
