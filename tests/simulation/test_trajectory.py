@@ -1,5 +1,6 @@
 import json
 import os
+import re
 from dataclasses import fields, replace
 
 import numpy as np
@@ -53,6 +54,13 @@ def test_a_table_names_its_units(run):
     assert "slip_rate [m/s]" in table
     assert np.array_equal(table["pressure [Pa]"], run.pressure)
     assert np.array_equal(table["friction [-]"], run.friction)
+
+
+def test_what_a_run_does_not_have_is_none(run, uncontrolled):
+    assert (uncontrolled.slip_error, uncontrolled.slip_rate_error) == (None, None)
+    assert np.array_equal(run.slip_rate_error, run.slip_rate - run.reference_rate)
+    assert json.loads(replace(run, energy=None).attributes()["energy"]) is None
+    assert json.loads(run.attributes()["energy"]) == run.energy.to_dict()
 
 
 def test_two_instants_are_resampled_no_finer_than_they_are_known(uncontrolled):
@@ -148,9 +156,18 @@ def test_a_run_says_where_it_comes_from(run):
     assert {"method", "step", "scheme", "backend", "version_casadi", "version_numpy"} <= set(run.provenance)
 
 
-def test_its_text_shows_figures_not_arrays(run):
+def test_its_text_shows_figures_not_arrays(run, twice, actuated):
     assert "Metrics" in repr(run)
-    assert "array" not in repr(run)
+    for each in (run, twice, actuated):
+        assert "array" not in repr(each)
+    of_a_law = {"name", "integral_units", "metrics", "events"}
+    assert [shown_fields(each) for each in (run, actuated)] == [of_a_law, of_a_law]
+    assert shown_fields(twice) == {"name", "state_names", "state_units", "onset_rate"}
+
+
+def shown_fields(run):
+    text = repr(run).replace("Metrics(", "")
+    return {field.name for field in fields(run) if re.search(rf"[(\s]{field.name}=", text)}
 
 
 def test_a_file_follows_the_climate_and_forecast_conventions(run, uncontrolled, tmp_path):

@@ -76,14 +76,14 @@ def test_a_library_that_is_there_is_loaded_and_nothing_is_built_or_interpreted(b
     mover.cache_clear()
 
 
-def test_a_sample_that_has_diverged_stays(built, monkeypatch):
+def test_a_sample_that_has_diverged_stays(built):
     """As soon as it has a time of divergence, zero included, in machine code and without a compiler."""
-    (row,) = starts(1)
-    row[built.diverged] = 0.0
-    assert built.ends(row, 10)[0].tobytes() == row.tobytes()
-    assert program_module._virtual_machine(built)(row[None], 10) is None
-    assert row[built.diverged] == 0.0
-    assert row.tobytes() == built.ends(row, 10)[0].tobytes()
+    rows = starts(1)
+    rows[0, built.diverged] = 0.0
+    before = rows.tobytes()
+    assert built.ends(rows, 10).tobytes() == before
+    program_module._virtual_machine(built)(rows, 10)
+    assert rows.tobytes() == before
 
 
 PLANTED = """
@@ -118,6 +118,15 @@ def test_a_library_that_fails_or_is_for_another_processor_is_refused(tmp_path):
         else:
             with pytest.raises(OSError, match="built for another processor"):
                 program_module._machine_code(content, folder, 1)
+
+
+def test_a_library_whose_content_is_another_one_is_no_library(tmp_path):
+    (tmp_path / "steps.so").write_bytes(b"built")
+    library = program_module.Library.of(tmp_path / "steps.so")
+    assert library.content() == b"built"
+    library.path.write_bytes(b"other")
+    with pytest.raises(OSError, match=r"steps\.so is not what was built"):
+        library.content()
 
 
 def test_the_planted_library_of_these_tests_would_be_seen(plant, tmp_path):

@@ -282,6 +282,9 @@ def test_a_batch_that_fails_leaves_the_others(tmp_path):
     found = run_campaign(PROBLEM, 8, tmp_path, executor=failing, batch=3)
     assert [(failure.samples, failure.reason) for failure in found.failures] == [(("3", "4", "5"), "MemoryError: full")]
     assert [result is None for result in found.results] == [index in (3, 4, 5) for index in range(8)]
+    failing = Failing(PROBLEM.start(PROBLEM.sample(0)))
+    nothing = run_campaign(PROBLEM, 1, tmp_path / "other", executor=failing, metric="peak_slip_rate")
+    assert (nothing.results, nothing.search) == ((None,), None)
 
 
 @pytest.mark.parametrize("wanted", ["max_slip_error", "peak_slip_rate"])

@@ -134,6 +134,7 @@ def test_what_a_run_goes_through_is_the_actuators(tmp_path):
         ),
         ({"spread": 1}, "a spread must be from 0 to below 1"),
         ({"stress": -1.0}, "stress must be zero or positive"),
+        ({"stress_period": 0.0}, "stress_period must be positive"),
         ({"method": "rk4"}, "method must be one of"),
         ({"plant": "stick-slip"}, "one of smooth, quasi-dynamic"),
     ],
