@@ -282,7 +282,10 @@ def test_true_constants_other_than_the_nominal_ones_are_those_of_the_plant_alone
     assert np.max(np.abs(log_rate)) > 0.1
     assert run.slip_error[4::4] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
     assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
-    assert run.provenance["variation_critical_slip"] == 1.2
+    told = {name: value for name, value in run.provenance.items() if name.startswith("variation_")}
+    assert told == {f"variation_{name}": value for name, value in off.items()}
+    doubled = simulate_sliding(fault(), law, STEP, duration=40.0, variation=SlidingVariation(damping=2.0))
+    assert [name for name in doubled.provenance if name.startswith("variation_")] == ["variation_damping"]
     with pytest.raises(ParameterError, match="direct_effect must be positive"):
         SlidingVariation(direct_effect=0.0)
 

@@ -63,14 +63,19 @@ def test_what_a_run_does_not_have_is_none(run, uncontrolled):
     assert json.loads(run.attributes()["energy"]) == run.energy.to_dict()
 
 
-def test_two_instants_are_resampled_no_finer_than_they_are_known(uncontrolled):
-    ends = {f.name: getattr(uncontrolled, f.name) for f in fields(uncontrolled)}
-    ends = {name: v[..., [0, -1]] for name, v in ends.items() if isinstance(v, np.ndarray)}
-    run = replace(uncontrolled, **ends)
-    length = run.time[1] - run.time[0]
-    assert run.resample(length).slip.values == pytest.approx(run.slip)
-    with pytest.raises(ParameterError, match="dt must be between"):
-        run.resample(0.9 * length)
+@pytest.mark.parametrize("count", [2, 3])
+def test_few_instants_are_resampled_no_finer_than_they_are_known(uncontrolled, count):
+    """Also of a run that begins later."""
+    kept = np.linspace(0, len(uncontrolled.time) - 1, count).astype(int)
+    arrays = {f.name: getattr(uncontrolled, f.name) for f in fields(uncontrolled)}
+    run = replace(uncontrolled, **{name: v[..., kept] for name, v in arrays.items() if isinstance(v, np.ndarray)})
+    run = replace(run, time=np.linspace(5.0, 9.0, count))
+    mean = 4.0 / (count - 1)
+    assert run.resample(mean).time.values == pytest.approx(run.time)
+    assert run.resample(mean).slip.values == pytest.approx(run.slip)
+    for wrong in (0.9 * mean, 4.1):
+        with pytest.raises(ParameterError, match="dt must be between"):
+            run.resample(wrong)
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +97,7 @@ def test_an_event_lasts_until_its_slip_rate_is_back(twice):
     assert twice.arrests == pytest.approx([1 + 2 / 3, 5 + 2 / 3])
     assert twice.event_slips == pytest.approx([1 + 2 / 3 - 0.5, 7 + 2 / 3 - (2.5 + 0.2 * 1.5)])
     assert twice.recurrence_intervals == pytest.approx([2.7, 5.05])
+    assert replace(twice, onsets=np.array([1.0])).arrests == pytest.approx([1 + 2 / 3])  # one instant alone is above
 
 
 def test_the_response_is_python_controls(run):
@@ -321,13 +327,13 @@ DAY, HOUR, MINUTE = 86400.0, 3600.0, 60.0
     ],
 )
 def test_time_is_drawn_in_the_largest_unit_of_which_there_are_two(end, unit, seconds):
-    time, values = np.array([0.0, end]), np.array([1.0, 2.0])
+    time, values = np.array([0.0, end / 4, end]), np.array([1.0, 1.0, 2.0])
     (axis,) = trajectory_module.figure("title", time, [("slip", "m", values, ("", None))] * 2).axes[1:]
     _, below = trajectory_module.stress_figure("title", time, values, values, 3 * values).axes
     for drawn in (axis, below):
         assert drawn.get_xlabel() == f"time [{unit}]"
-        assert list(drawn.lines[0].get_xdata()) == [0, end / seconds]
-    assert list(below.lines[0].get_ydata()) == [3, 6]
+        assert list(drawn.lines[0].get_xdata()) == [0, end / 4 / seconds, end / seconds]
+    assert list(below.lines[0].get_ydata()) == [3, 3, 6]
 
 
 @pytest.mark.parametrize(

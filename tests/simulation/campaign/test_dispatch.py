@@ -116,6 +116,7 @@ class Later(Frail):
         monkeypatch.setattr(running, "wait", answers)
 
     def submit(self, task, *arguments):
+        self.submitted += 1
         self.under_way.append((Future(), task, arguments))
         return self.under_way[-1][0]
 
@@ -126,6 +127,14 @@ def test_suspects_are_computed_alone(monkeypatch):
     found, failed = run(crew, abs, 9)
     assert sorted(found) == [0, 2, 3, 4, 5, 6, 7, 8]
     assert (list(failed), crew.renewals) == ([1], 4)
+
+
+def test_workers_that_never_live_are_given_up_among_suspects_too(monkeypatch):
+    """Three batches together, then six by themselves: no suspect is tried after that."""
+    crew = Later(monkeypatch, deadly=set(range(9)))
+    found, failed = run(crew, abs, 9)
+    assert (found, sorted(failed)) == ({}, list(range(9)))
+    assert (crew.renewals, crew.submitted) == (6, 9)
 
 
 def test_answers_that_come_one_by_one_are_all_waited_for(monkeypatch):

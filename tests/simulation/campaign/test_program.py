@@ -61,6 +61,13 @@ def test_slices_and_company_change_nothing(built, ends, monkeypatch, steps):
         assert built.ends(starts(16)[[i, 3]], STEPS)[0].tobytes() == ends[i].tobytes()
 
 
+def test_results_are_those_of_each_end(ends, monkeypatch):
+    whole = PROBLEM.results(ends)
+    monkeypatch.setattr(program_module, "_SLICE", 5)
+    assert PROBLEM.results(ends) == whole
+    assert len(whole) == 16
+
+
 def test_a_library_that_is_there_is_loaded_and_nothing_is_built_or_interpreted(built, ends, monkeypatch):
     def never(*_, **__):
         raise AssertionError("not needed")
