@@ -21,6 +21,7 @@ from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.premises import Premise, Variant
 from quakedesign.simulation import Trajectory
 from quakedesign.simulation.natural import waiting
+from quakedesign.simulation.run import STICK_SLIP
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, Entry, pressure_extremes, shortfall
 from quakedesign.synthesis import Design
 from quakedesign.text import lasting
@@ -37,9 +38,9 @@ if TYPE_CHECKING:
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
 """Premises of a linear law's stability that its certified peaks do without."""
 GRADES = (
-    "guaranteed: the slip rate that the loop as it ran never exceeds, and how far its slip stays from the reference; "
-    "proved for this loop and task: every premise holds in the run that is shown; proved, but …: what the proof does "
-    "not cover, and how many times over"
+    "guaranteed: proved bounds of slip rate and slip error of the sampled loop, for friction without a state on the "
+    "plant without stick; proved for this loop and task: every premise holds in the run that is shown; proved, but …: "
+    "what the proof does not cover, and how many times over"
 )
 
 
@@ -317,7 +318,15 @@ def sentences(entry: "Entry") -> list[str]:
         return _because(Verdict.UNDECIDED, design.details.get("reason", "no gains with a proof were found"))
     outcome, *of_run = run_sentences(entry.run, design.fault) if entry.run else ("",)
     assumed = [f"assumed: {what}" for what in filter(None, [design.details.get("assumed")])]
-    told = [outcome, *_verdict(design), *_step_verdict(entry), *_premises(entry), *of_run, *_bounds(entry), *assumed]
+    told = [
+        outcome,
+        *_verdict(design, entry.run),
+        *_step_verdict(entry),
+        *_premises(entry),
+        *of_run,
+        *_bounds(entry),
+        *assumed,
+    ]
     told += [part_of_task(entry.run, design.fault)] if entry.run else []
     return [sentence for sentence in (*told, *_reversed(entry.run)) if sentence]
 
@@ -330,11 +339,14 @@ def part_of_task(run: Trajectory, fault: Fault) -> str:
     return f"shown: the first {lasting(last)} of {lasting(task)}; --whole-task runs all of it"
 
 
-def _verdict(design: Design) -> list[str]:
-    """Of the loop that ran or in continuous time, with the reason where it is not positive."""
+def _verdict(design: Design, run: Trajectory | None) -> list[str]:
+    """Of the sampled loop or in continuous time, with the reason where it is not positive."""
     if design.verdict is Verdict.PROVED:
         lasts = "for all t >= 0" if design.runs is None or not design.runs.proved else design.runs.lasts
-        return [f"proved for the loop that ran, {lasts}" if _sampled(design) else "proved in continuous time"]
+        plant = "for the loop that ran"
+        if run is not None and run.provenance["plant"] == STICK_SLIP:
+            plant = "for this sampled loop on the plant without stick"
+        return [f"proved {plant}, {lasts}" if _sampled(design) else "proved in continuous time"]
     unsaid = {Verdict.REFUTED: "a counterexample checks in exact arithmetic", Verdict.UNDECIDED: "no certificate"}
     return _because(design.verdict, design.details.get("reason", unsaid[design.verdict]))
 

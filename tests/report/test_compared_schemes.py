@@ -101,7 +101,7 @@ def test_the_terminal_says_it_and_no_table_is_wider_than_eighty_columns_or_break
     said = out.getvalue()
     assert SCHEMES in " ".join(said.split())
     assert max(map(len, said.splitlines())) <= 200
-    first = said.split("\n\noutcome, ")[1].split("\nguaranteed: the")[0].splitlines()[1:]
+    first = said.split("\n\noutcome, ")[1].split("\nguaranteed: proved")[0].splitlines()[1:]
     second = said.split("\n\nclosed loop, ")[1].split("\nSchemes: ")[0].splitlines()[1:]
     shown = [*first, *second]
     assert max(map(len, shown)) <= 80

@@ -212,7 +212,7 @@ class Guarantee:
         "every friction law of the box and every disturbance up to the stated size, for a plant continued to negative "
         "slip rates"
     )
-    lasts: ClassVar[str] = "for ever"
+    lasts: ClassVar[str] = "for all t >= 0"
 
     def __repr__(self) -> str:
         held, claims = self.held, self.claims
