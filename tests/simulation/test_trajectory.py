@@ -242,6 +242,11 @@ def test_the_flow_rate_is_what_the_volume_grows_by(actuated):
     assert np.max(np.abs(gained - volume)) < 0.02 * np.max(np.abs(volume))
 
 
+def test_a_run_through_an_actuator_has_its_signals_beside_those_of_every_run(run, actuated):
+    assert set(actuated.signals()) == {*run.signals(), *actuated.actuation}
+    assert actuated.signals()["well_pressure"][1:] == ("pressure at the well", "Pa")
+
+
 def test_the_figure_shows_the_well_and_what_flows(actuated):
     axes = actuated.plot().axes
     assert [axis.get_ylabel() for axis in axes[5:]] == ["injected volume [m³]", "injected flow rate [m³/s]"]

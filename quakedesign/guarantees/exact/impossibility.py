@@ -262,9 +262,10 @@ class _Pushed:
 
     @property
     def pole(self) -> Any:
-        """λ [1/s]."""
-        w = ball(self.rate)
-        return ((w * w + 4 * ball(self.slip)).sqrt() - w) / 2
+        """λ [1/s], without the difference of two numbers that are nearly the same where damping is large."""
+        w, twice = ball(self.rate), 2 * ball(self.slip)
+        root = (w * w + 2 * twice).sqrt()
+        return twice / (root + w) if self.rate > 0 else (root - w) / 2
 
 
 def smallest_peak(

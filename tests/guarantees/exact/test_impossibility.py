@@ -86,6 +86,20 @@ def test_every_bound_is_on_the_side_where_the_claim_is_true():
             assert -(mpmath.mpf(10) ** -50) <= excess < mpmath.mpf(10) ** -30
 
 
+@pytest.mark.parametrize("damping", [F(10) ** 24, F(-2), F(0)])
+def test_a_slow_pole_beside_large_damping_is_a_number(damping):
+    """By a tool with 200 digits; a damping below the growth of the disturbance, and none, too."""
+    task = replace(REAL, specific_damping=(damping, damping))
+    with mpmath.workdps(200):
+        w = exact(damping - task.growths[1])
+        s = mpmath.mpf(8) / 10**8 * exact(REAL.friction.weakening) * 5 * 10**7
+        s -= exact(REAL.stiffness[0] - REAL.growths[0])
+        pole = (mpmath.sqrt(w * w + 4 * s) - w) / 2
+        ratio = mpmath.mpf(8) / 10**8 * exact(REAL.friction.static) * 2 * 10**7 / (mpmath.mpf(32) / 10**5)
+        excess = exact(longest_reaction(task, F(2 * 10**7))) * pole / mpmath.log(ratio) - 1
+        assert 0 <= excess < mpmath.mpf(10) ** -30
+
+
 def exact(value):
     return mpmath.mpf(value.numerator) / value.denominator
 
