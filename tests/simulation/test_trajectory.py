@@ -243,7 +243,7 @@ def test_the_flow_rate_is_what_the_volume_grows_by(actuated):
 
 
 def test_a_run_through_an_actuator_has_its_signals_beside_those_of_every_run(run, actuated):
-    assert set(actuated.signals()) == {*run.signals(), *actuated.actuation}
+    assert set(actuated.signals()) == {*run.signals(), *actuated.actuation} - {"xi_2"}  # its law has one state
     assert actuated.signals()["well_pressure"][1:] == ("pressure at the well", "Pa")
 
 
