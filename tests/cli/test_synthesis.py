@@ -175,12 +175,27 @@ def found(unit, value, *, beta=None):
 )
 def test_the_table_says_ranges_units_and_what_is_not_proved(capsys, monkeypatch, unit, value, beta, said):
     from quakedesign.lyapunov.gains import synthesise as gains
+    from quakedesign.synthesis import simulated_error
 
     monkeypatch.setattr(gains, "synthesise", lambda *_, **__: found(unit, value, beta=beta))
     code, out, _ = run(capsys, "cta")
     lines = [" ".join(line.split()) for line in out.splitlines()]
     assert (code, lines) == (0, [*said, "3 2 4 3.5 2", "7 5 not proved 8.6"])
+    monkeypatch.setattr(simulated_error, "synthesise_sampled", lambda *_, **__: found(unit, value, beta=beta))
+    code, out, _ = run(capsys, "cta", "real-fault", "--objective", "sampled", "--step", "50 ms")
+    first, measured, *_ = out.splitlines()
+    assert first.startswith("proved: cta with k1 = 3/2")
+    assert "measured, not proved: decay of one explicit run on real-fault with scale" in measured
+    assert "T_s = 0.05 s" in measured
     code, out, _ = run(capsys, "cta", "--json")
     answer = json.loads(out)
     assert answer["gain_range"] == (["1/2", "3"] if beta else None)
     assert (answer["lipschitz"], answer["certificate"], answer["value"]) == ("2", None, value)
+
+
+def test_a_map_takes_several_numbers_after_one_option(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stop:
+        main(["map", "cta", "--over", "k1", "k2", "--range", "1", "2", "3"])
+    assert stop.value.code == 2
+    assert "range needs four numbers, two for each gain. Received 3." in capsys.readouterr().err

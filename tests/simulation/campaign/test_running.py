@@ -310,6 +310,13 @@ def test_a_search_begins_at_the_worst_sample_and_passes_over_failures(tmp_path, 
     assert [failure.samples for failure in found.failures] == [("search-1",)]
 
 
+def test_a_search_needs_a_metric_that_some_sample_has(tmp_path):
+    """Errors count after these runs have ended."""
+    short = replace(PROBLEM, setting=replace(PROBLEM.setting, steps=20))
+    with pytest.raises(ParameterError, match=r"metric must be one of peak_slip_rate, .*Received 'max_slip_error'"):
+        run_campaign(short, 2, tmp_path, executor=SerialExecutor(), metric="max_slip_error")
+
+
 @pytest.mark.parametrize(
     ("count", "width", "steps", "size"),
     [
