@@ -406,7 +406,7 @@ sos {'x^2 + 1';'x^2 - 1';'x^4 + y^4 - 2*x*y + 1'}
 errata {1;2;12}
 scale lab-fault real-fault --controller {cta;dia}
 export lab-fault --controller cta --out made --force
-simulate short.toml --duration '10 ms' --plant {smooth;stick-slip}
+simulate short.toml --duration '10 ms' --plant {printed;stick-slip}
 """
 REFUSED = """
 fault {nowhere;no.toml;broken.toml;.}

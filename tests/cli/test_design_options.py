@@ -51,7 +51,8 @@ def test_all_laws_of_a_fault_are_designed_in_samples_unless_told(asked, command)
     fault, names, more = asked(command, "lab-fault")
     setup = more["options"].pop("setup")
     assert (fault, names) == ("lab-fault", ["cta", "dia", "elqr"])
-    assert more == {"published_scheme": "continuous", "whole_task": False, "scheme": None, "options": DEFAULTS}
+    shown = {"published_scheme": "continuous", "plant": None, "whole_task": False}
+    assert more == {**shown, "scheme": None, "options": DEFAULTS}
     assert setup == qd.LoopSetup()
     assert DesignOptions().asked("lab-fault")[1] == {"names": names, **more, "options": {**DEFAULTS, "setup": setup}}
 
@@ -75,10 +76,12 @@ def test_which_laws_are_designed(asked, told, names):
 def test_every_option_reaches_the_design(asked):
     told = ("--objective", "peak", "--continuous", "--scheme", "explicit", "--published-scheme", "implicit")
     told += ("--class", "rate", "--spread", "0.1", "--stress", "2 kPa", "--whole-task", "--controller", "elqr")
-    _, names, more = asked("design", "lab-fault", *told, "--measured", "slip", "--slip-noise", "1 um")
+    _, names, more = asked(
+        "design", "lab-fault", *told, "--measured", "slip", "--slip-noise", "1 um", "--plant", "printed"
+    )
     setup, stress = more["options"].pop("setup"), more["options"].pop("stress")
     assert (names, float(stress), more["whole_task"]) == (["elqr"], 2000, True)
-    assert (more["scheme"], more["published_scheme"]) == ("explicit", "implicit")
+    assert (more["scheme"], more["published_scheme"], more["plant"]) == ("explicit", "implicit", "printed")
     changed = {"objective": "peak", "continuous": True, "disturbance_class": "rate", "spread": "0.1"}
     assert more["options"] == changed
     assert setup == qd.LoopSetup(measured="slip", slip_noise="1 um")
