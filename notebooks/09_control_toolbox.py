@@ -111,7 +111,7 @@ run = qd.simulate(fault, law, scheme="explicit", duration=duration)
 
 fig, (upper, below) = plt.subplots(2, sharex=True, figsize=(7, 5))
 upper.plot(time, 1e6 * (at_once.outputs[0] - r), label="python-control, pressure at once")
-upper.plot(run.time, 1e6 * run.slip_error, label=f"simulate, held over {1e3 * period:g} ms")
+upper.plot(run.time, 1e6 * run.slip_error, label=f"simulate, with zero-order hold over {1e3 * period:g} ms")
 upper.set_ylabel("slip error [µm]"), upper.set_xlim(0, 60), upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
 below.plot(time, 1e-3 * at_once.outputs[1])
 below.plot(run.time, 1e-3 * run.pressure)

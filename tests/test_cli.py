@@ -167,7 +167,11 @@ def test_every_guarantee_is_said_first_and_holds_in_what_was_seen(main_job):
         assert entry["headline"].startswith("tracked: peak slip rate")
         title = {"cta": "2-CTA", "dia": "2-DIA", "elqr": "e-LQR"}[law]
         own = page[page.index(f"<h3>{title} (designed)") :]
-        assert own.index("guarantee: from rest, held over") < own.index("worst found") < own.index("tracked: peak")
+        assert (
+            own.index("guarantee: on the plant without stick, from rest")
+            < own.index("worst found")
+            < own.index("tracked: peak")
+        )
 
 
 def test_the_premises_are_reported_as_they_are(main_job):

@@ -72,7 +72,7 @@ def test_a_guarantee_covers_the_fault_whose_data_it_has(monkeypatch, tmp_path):
     monkeypatch.setattr(Guarantee, "check", lambda self: Verdict.PROVED)
     verdict, said = checked(path)
     assert (verdict, said[0]) == ("proved", 'fault "real-fault", by the data in the file')
-    assert said[1].startswith("from rest, held over 0.184 s")
+    assert said[1].startswith("on the plant without stick, from rest, with zero-order hold over 0.184 s")
     assert checked(path, "real-fault") == ("proved", [*said, 'the data are those of "real-fault", box paper'])
     slower = replace(load_fault("real-fault"), sampling_time=0.5)
     monkeypatch.setattr(

@@ -180,7 +180,7 @@ class LoopAnswer:
         step += " with that noise" if held.noise else ""
         both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
         rate = f"{limit.slip_rate_error:.3g} m/s"
-        return [f"no controller held over T_s = {step} keeps the slip-rate error below {rate}{both}"]
+        return [f"no controller with zero-order hold over T_s = {step} keeps the slip-rate error below {rate}{both}"]
 
     def task_lines(self) -> list[str]:
         """What is said of the task, whatever law it is for."""

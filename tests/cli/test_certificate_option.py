@@ -83,7 +83,7 @@ def test_it_runs_behind_its_lag_with_its_noise(file, capsys):
 def test_a_run_that_is_not_what_is_proved_says_so(file, capsys, more, outside):
     out = " ".join(told(capsys, "simulate", "real-fault", "--certificate", file, *SHORT, *more)[1].split())
     if outside:
-        assert f"NOT proved of this run, by {outside}; without: from rest" in out
+        assert f"NOT proved of this run, by {outside}; without: on the plant without stick, from rest" in out
         assert " proved: " not in out
     else:
         assert f"proved: {CLAIM.sentence()}" in out

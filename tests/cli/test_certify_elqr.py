@@ -127,7 +127,7 @@ def test_a_design_is_reported_with_the_guarantee_of_the_loop_that_ran(capsys, tm
     found = json.loads(said)["controllers"]["elqr"]
     assert code == 0
     assert next(iter(found)) == "guarantee"
-    assert found["guarantee"]["sentence"].startswith("from rest, held over 0.001 s")
+    assert found["guarantee"]["sentence"].startswith("from rest, with zero-order hold over 0.001 s")
     told, metrics = found["guarantee"], found["metrics"]
     assert metrics["peak_slip_rate"] <= Fraction(told["peak_slip_rate"])
     assert Fraction(told["pressure"][0]) <= metrics["min_pressure"] < metrics["max_pressure"]
@@ -136,7 +136,7 @@ def test_a_design_is_reported_with_the_guarantee_of_the_loop_that_ran(capsys, tm
     assert (found["run"]["scheme"], found["run"]["step"], found["peaks"]) == ("explicit", 0.001, None)
     assert found["certificate"] == told["certificate"] == "certificates/elqr-guarantee.json"
     page = (out / "report.html").read_text()
-    assert page.index("guarantee: from rest") < page.index("tracked: peak slip rate")
+    assert page.index("guarantee: on the plant without stick, from rest") < page.index("tracked: peak slip rate")
     checker = Path(__file__).parents[2] / "proofs" / "check.py"
     command = [sys.executable, str(checker), str(out / found["certificate"])]
     assert "proved" in subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout

@@ -76,7 +76,10 @@ GUARANTEE = import_module("quakedesign.synthesis.guarantee")  # the module: the 
 def test_given_gains_for_people(call):
     code, out, _ = call("real-fault", "--gains", *GAINS)
     assert code == 0
-    assert out.startswith("proved: from rest, held over 0.184 s, for every disturbance of at most 0.00032 m/s^2 (4 kPa")
+    assert out.startswith(
+        "proved: on the plant without stick, from rest, with zero-order hold over 0.184 s, for every disturbance of at "
+        "most 0.00032 m/s^2 (4 kPa"
+    )
     assert "worst found with stick" in out
     assert "of the box: the slip rate never exceeds" in " ".join(out.split())
     assert max(map(len, out.splitlines())) <= 200
@@ -128,7 +131,7 @@ def test_gains_that_do_not_hold_the_nominal_fault_either(call, tmp_path):
     path = tmp_path / "law.json"
     code, out, _ = call("real-fault", "--gains", "1", "1", "1", "1", "--out", str(path))
     assert (code, path.exists()) == (1, False)
-    assert out.startswith("none: held over 0.184 s even the nominal loop is not stable")
+    assert out.startswith("none: with zero-order hold over 0.184 s even the nominal loop is not stable")
     assert f"{path} is not written" in out
 
 
@@ -139,7 +142,7 @@ def test_where_no_controller_whatever_can_hold_the_fault_the_nearest_rock_that_i
     code, out, _ = call("real-fault", "--diffusion", "180 s")
     assert code == 1
     assert out.startswith("none: no controller whatever that withdraws at most 50 MPa holds it through rock of L^2/D")
-    assert "with a diffusion time L^2/D of at most 7 s: from rest, held over" in out
+    assert "with a diffusion time L^2/D of at most 7 s: on the plant without stick, from rest, " in out
     assert "command limits" not in out
 
 
@@ -190,7 +193,7 @@ def test_a_sliding_mode_with_its_file(call, tmp_path):
 def test_a_sliding_mode_with_given_gains_for_people(call):
     code, out, _ = call("real-fault", "--controller", "dia", "--gains", "1", "20", "1", "0", "--objective", "peak")
     assert code == 0
-    assert out.startswith("proved: from rest, held over 0.184 s")
+    assert out.startswith("proved: on the plant without stick, from rest, with zero-order hold over 0.184 s")
     assert "2-DIA with kI1 = 1, kI2 = 20, kI3 = 1, kI4 = 0" in out
     assert (
         "its implicit step is deadbeat, e1 + T_s·w = 0, for all errors that are claimed, so it answers as any other"
@@ -412,8 +415,11 @@ def test_samples_by_no_clock_are_in_the_answer_and_in_the_file(call, tmp_path, m
     path, asked = tmp_path / "loop.json", ("lab-fault", "--step", "1 ms", "--longest-step", "3/2000")
     code, out, _ = call(*asked, "--objective", "peak", "--out", str(path))
     said = " ".join(out.split())
-    assert (code, "held over sampling intervals from 0.001 s to 0.0015 s in any order" in said) == (0, True)
-    assert "no controller held over T_s = 0.0015 s keeps the slip-rate error below" in said
+    assert (code, "with zero-order hold over sampling intervals from 0.001 s to 0.0015 s in any order" in said) == (
+        0,
+        True,
+    )
+    assert "no controller with zero-order hold over T_s = 0.0015 s keeps the slip-rate error below" in said
     loop = json.loads(path.read_text())["loop"]
     assert (loop["step"], loop["longest"]) == ("1/1000", "3/2000")
     assert check_files([path], "lab-fault")[str(path)][0] == "proved"

@@ -52,7 +52,7 @@ def test_a_creeping_patch_is_held_below_1_65_times_its_rate(capsys, tmp_path):
 def test_a_step_that_is_too_short_is_said_to_be(capsys):
     code, out, _ = run(capsys, "guarantee", "creeping-patch", "--lag", "200 s", "--step", "10 s", "--stress", "10 kPa")
     assert code == 1
-    assert out.startswith("none: no law held over 10 s")
+    assert out.startswith("none: no law with zero-order hold over 10 s")
     assert "4e+03 s, suits" in out
 
 

@@ -69,7 +69,9 @@ def test_a_course_beyond_both_is_said_and_the_narrow_claims_stay(monkeypatch):
     found = stuck(monkeypatch, between("slip_error", F(2)), 0.0)
     assert found.found == SLOW
     assert "leaves the bounds" in found.lines()[-1]
-    assert found.limit_lines()[0].startswith("no controller held over T_s = 0.184 s keeps the slip-rate error below ")
+    assert found.limit_lines()[0].startswith(
+        "no controller with zero-order hold over T_s = 0.184 s keeps the slip-rate error below "
+    )
 
 
 def test_what_is_widened_is_proved_or_not_said(monkeypatch):

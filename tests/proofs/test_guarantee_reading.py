@@ -407,7 +407,10 @@ def test_the_statement_says_what_rock_there_is(lag):
     said = f"law with 1 states, every 1 s, 0 s late, lag {lag} s, rock of distance^2/diffusivity = 2 s"
     assert checker.statement(raw, checker.read_task(raw), dict.fromkeys(CLAIMS, F(1)), F(1, 3))[2] == said
     claim, lagging = read_guarantee(raw), "" if lag == "0" else ", through a lag of 0.333334 s"
-    assert f"held over 1 s{lagging}, through rock of L^2/D = 2 s from well to fault, for every" in claim.sentence()
+    assert (
+        f"with zero-order hold over 1 s{lagging}, through rock of L^2/D = 2 s from well to fault, for every"
+        in claim.sentence()
+    )
     assert json.loads(guarantee_text(claim)) == raw
     assert "rock" not in read_guarantee(HELD).sentence()
 

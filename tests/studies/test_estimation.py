@@ -39,7 +39,7 @@ def test_what_belongs_to_a_differentiator_is_refused_without(more):
 
 
 def test_where_the_loop_with_exact_states_diverges_nothing_is_certified():
-    """The published e-LQR of the laboratory held over 2 ms (ERRATA 22)."""
+    """The published e-LQR of the laboratory with zero-order hold over 2 ms (ERRATA 22)."""
     law = published("lab-fault")["elqr"]
     found = differentiator_premise(LAB, law, sensor(2e-3, EXACT, 1e6))
     assert (found.certified, found.ratio, found.holds) == (0, None, False)

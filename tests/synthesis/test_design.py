@@ -180,7 +180,9 @@ def test_a_sliding_mode_has_no_bound_of_peaks_in_continuous_time(judged):
 def test_a_simulation_that_holds_the_pressure_agrees_with_both_guarantees(real, sampled):
     free = qd.design(real, "elqr", continuous=True)
     assert sampled.guarantee.check() is Verdict.PROVED
-    assert free.guarantee.sentence().startswith("none: held over 0.184 s even the nominal loop is not stable")
+    assert free.guarantee.sentence().startswith(
+        "none: with zero-order hold over 0.184 s even the nominal loop is not stable"
+    )
     assert free.held_loop().to_dict()["verdict"] == "refuted"
     assert sampled.held_loop() is None
     assert "no bound of peaks" in sampled.certified_peaks().reason

@@ -293,10 +293,10 @@ class Guarantee:
     def sentence(self) -> str:
         """What is guaranteed, for people."""
         held = self.held
-        when = f"held over {_seconds(held.step)}"
+        when = f"with zero-order hold over {_seconds(held.step)}"
         if held.longest_step:
             shortest, longest = UpperBound(held.step), LowerBound(held.longest_step)
-            when = f"held over sampling intervals from {shortest:.6g} s to {longest:.6g} s in any order"
+            when = f"with zero-order hold over sampling intervals from {shortest:.6g} s to {longest:.6g} s in any order"
         when += f", {_seconds(held.delay)} late" if held.delay else ""
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
         when += f", through rock of L^2/D = {_seconds(held.diffusion)} from well to fault" if held.diffusion else ""
@@ -325,10 +325,9 @@ def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from 
     largest = claims.largest_step
     step = "" if largest is None else f", that asked for changes by at most {largest.quantity('Pa')} a sample"
     return (
-        f"{start}, {when}, {kind}, for all friction and constant parameters of the box: "
+        f"on the plant without stick, {start}, {when}, {kind}, for all friction and constant parameters of the box: "
         f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
-        f"{claims.slip_error:.3g} m of the reference, the pressure {', at the valve '.join(pressures)}{step} "
-        "(for a plant continued to negative slip rates)"
+        f"{claims.slip_error:.3g} m of the reference, the pressure {', at the valve '.join(pressures)}{step}"
     )
 
 
@@ -462,8 +461,8 @@ def _bounds(
 
 
 def _unstable(held: Held) -> NoGuarantee:
-    reason = f"held over {_seconds(held.step)} even the nominal loop is not stable, or too slow to be seen so"
-    return NoGuarantee(reason=reason, small_gain=None)
+    over = f"with zero-order hold over {_seconds(held.step)}"
+    return NoGuarantee(reason=f"{over} even the nominal loop is not stable, or too slow to be seen so", small_gain=None)
 
 
 def _off_schedule(measured: Fraction, arrived: Fraction) -> str:
@@ -740,7 +739,7 @@ class SlidingGuarantee:
 
 
 def _path(held: Held) -> str:
-    said = f"held over {float(held.step):.6g} s"
+    said = f"with zero-order hold over {float(held.step):.6g} s"
     said += f", {float(held.delay):.6g} s late" if held.delay else ""
     said += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
     said += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""

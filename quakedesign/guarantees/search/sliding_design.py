@@ -155,8 +155,8 @@ def designed_sliding(
     ageing = float(task.ranges["critical_slip"][0] / task.rate)
     path = "".join(f", {title} = {float(v):.4g} s" for title, v in _path(around).items() if v)
     reason = (
-        f"no law held over {float(step):g} s was found whose loop is stable and forgets within some hundred periods, "
-        f"D_c/V = {ageing:.3g} s{path}"
+        f"no law with zero-order hold over {float(step):g} s was found whose loop is stable and forgets within some "
+        f"hundred periods, D_c/V = {ageing:.3g} s{path}"
     )
     return NoGuarantee(reason=reason, small_gain=None)
 

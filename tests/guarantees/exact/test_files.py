@@ -169,10 +169,10 @@ def test_the_statement_says_what_is_measured_and_how_well():
     assert f"{said} the true one" in checker.check(guarantee_text(claim("observer"))).statement
     third = replace(LOOPS["noisy"], slip_noise=F(1, 3 * 10**6))
     found = guarantee(uncertain_plant(load_fault("real-fault")), third).sentence()
-    said = "held over 0.184 s, with any noise of at most 3.33333e-07 m in the measured slip, with any noise of at most"
-    assert f"{said} 1e-05 m/s in the measured slip rate, for every disturbance" in found
+    said = "over 0.184 s, with any noise of at most 3.33333e-07 m in the measured slip, with any noise of at most"
+    assert f"with zero-order hold {said} 1e-05 m/s in the measured slip rate, for every disturbance" in found
     said = (
-        "held over 0.184 s, with the slip alone measured, with any noise of at most 1e-06 m in the measured slip, for"
+        "hold over 0.184 s, with the slip alone measured, with any noise of at most 1e-06 m in the measured slip, for"
     )
     assert said in claim("observer").sentence()
 

@@ -182,8 +182,10 @@ def test_a_larger_start_is_guaranteed_less_and_none_is_rest():
         assert getattr(rest.claims, name) < getattr(near.claims, name) < getattr(far.claims, name)
     assert near.claims.least_pressure < rest.claims.least_pressure
     assert near.bounds().small_gain == pytest.approx(float(rest.bounds().small_gain), rel=1e-3)
-    assert rest.sentence().startswith("from rest, held over")
-    assert near.sentence().startswith("from every start within 1e-05 m and 4e-05 m/s of rest, held over 0.184 s, for")
+    assert rest.sentence().startswith("on the plant without stick, from rest, with zero-order hold over")
+    assert near.sentence().startswith(
+        "on the plant without stick, from every start within 1e-05 m and 4e-05 m/s of rest, with zero"
+    )
 
 
 @pytest.mark.parametrize(("name", "slow"), [("real-fault", True), ("late_real-fault", False)])

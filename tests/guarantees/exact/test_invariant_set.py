@@ -82,7 +82,7 @@ def scaled(rows, factor):
 
 def test_both_prove_the_file_and_say_so():
     assert claim().check() is Verdict.PROVED
-    assert "held over sampling intervals from 0.001 s to 0.002 s in any order," in claim().sentence()
+    assert "with zero-order hold over sampling intervals from 0.001 s to 0.002 s in any order," in claim().sentence()
     lines = checker.verify(json.loads(text()))
     assert "every 1/1000 s to 1/500 s, each time anew," in lines[2]
     assert guarantee_text(claim()) == text()

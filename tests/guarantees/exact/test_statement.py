@@ -95,17 +95,21 @@ def test_four_digits_are_not_below(value, rounded):
             F(2, 3),
             "at most 0.333 m/s^2 (4.16 MPa of shear) that starts at 0 and changes by at most 0.666 m/s^3 (class rate)",
         ),
-        (F(0), None, "held over 1 s, without disturbance, for all friction"),
-        (F(0), F(0), "held over 1 s, without disturbance, for all friction"),
+        (F(0), None, "with zero-order hold over 1 s, without disturbance, for all friction"),
+        (F(0), F(0), "with zero-order hold over 1 s, without disturbance, for all friction"),
     ],
 )
 def test_a_sentence_says_which_disturbances_and_none_that_are_larger(amplitude, change, said):
-    assert said in sentence_of(replace(TASK, amplitude=amplitude, change=change), CLAIMS, "held over 1 s")
+    assert said in sentence_of(
+        replace(TASK, amplitude=amplitude, change=change), CLAIMS, "with zero-order hold over 1 s"
+    )
 
 
 def test_parameters_are_said_to_be_constant_for_a_spring_that_stiffens_at_once_pulls_more_than_any_disturbance():
     """At the end of the task, by a tenth: 0.1·k̂·785 mm, k̂ = 0.48/s², which no sampled law can know of for a period."""
-    assert "for all friction and constant parameters of the box" in sentence_of(TASK, CLAIMS, "held over 1 s")
+    assert "for all friction and constant parameters of the box" in sentence_of(
+        TASK, CLAIMS, "with zero-order hold over 1 s"
+    )
     assert TASK.stiffness[0] * TASK.target_slip / 10 == F("0.03768") > 100 * TASK.amplitude
 
 
@@ -115,7 +119,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     )
     both = Held(law=replace(alone, feedback=(F(1), F(1))), step=F(1), slip_noise=F(1, 3), rate_noise=F(2, 3))
     said = Guarantee(task=TASK, held=both, claims=CLAIMS).sentence()
-    told = "held over 1 s, with any noise of at most 0.333333 m in the measured slip, "
+    told = "with zero-order hold over 1 s, with any noise of at most 0.333333 m in the measured slip, "
     assert told + "with any noise of at most 0.666666 m/s in the measured slip rate, for every" in said
     assert (both.noise, replace(both, slip_noise=F(0)).noise) == (
         {"slip_noise": F(1, 3), "rate_noise": F(2, 3)},
@@ -126,7 +130,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     around += ("jitter", "delay_jitter", "averaging", "longest_step")
     assert (quiet.noise, quiet.around) == ({}, dict.fromkeys(around, 0) | {"pump": None})
     said = Guarantee(task=TASK, held=quiet, claims=CLAIMS).sentence()
-    assert "held over 1 s, with the slip alone measured, for every" in said
+    assert "with zero-order hold over 1 s, with the slip alone measured, for every" in said
     assert Held(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
     with pytest.raises(ParameterError, match="needs a law that measures the slip rate"):
         replace(quiet, rate_noise=F(1))
@@ -145,8 +149,9 @@ def test_claims_are_shown_as_the_exact_numbers():
 def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     held = Held(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
     said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
-    assert said.startswith("from rest, held over 0.1 s, 0.02 s late, through a lag of 0.03 s, for every disturbance")
-    assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith("from rest, held over 0.1 s, for every")
+    where = "on the plant without stick, from rest, with zero-order hold over 0.1 s"
+    assert said.startswith(f"{where}, 0.02 s late, through a lag of 0.03 s, for every disturbance")
+    assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith(f"{where}, for every")
     assert "never exceeds 0.286 m/s, the slip stays within 0.334 m of the reference" in said
     assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa, that asked" in said
 
@@ -216,7 +221,9 @@ def test_a_loop_that_is_not_seen_to_be_stable_has_no_guarantee(monkeypatch):
 
     monkeypatch.setattr(statement, "certified_bounds", refuse)
     found = guarantee(TASK, HELD)
-    assert found.reason == "held over 0.1 s even the nominal loop is not stable, or too slow to be seen so"
+    assert (
+        found.reason == "with zero-order hold over 0.1 s even the nominal loop is not stable, or too slow to be seen so"
+    )
 
 
 def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monkeypatch):
@@ -251,11 +258,11 @@ def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
 def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     held = replace(HELD, jitter=F(1, 300), delay_jitter=F(1, 150))
     said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
-    told = "held over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s of when"
+    told = "hold over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s of when"
     assert told in said
-    assert "5.67 Pa, that asked for changes by at most 1.67 Pa a sample (for" in said
+    assert "5.67 Pa, that asked for changes by at most 1.67 Pa a sample" in said
     late = Guarantee(task=TASK, held=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
-    assert "held over 0.1 s, each pressure within 0.00666666 s of when it is due, for every" in late
+    assert "with zero-order hold over 0.1 s, each pressure within 0.00666666 s of when it is due, for every" in late
     assert (held.noise, HELD.noise) == ({"slip_noise": 0, "rate_noise": 0}, {})
     assert tuple(held.loop(TASK).sampled) == ("slip_noise", "rate_noise")
     alone = replace(HELD.law, feedback=(F(1), F(0)), measured=tuple((row[0], F(0)) for row in HELD.law.measured))
@@ -268,7 +275,7 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     assert (mean.off, mean.instants) == (F(1, 50), Instants(measured=F(1, 50), arrived=F(1, 300)))
     assert tuple(mean.noise) == ("slip_noise", "rate_noise")
     said = Guarantee(task=TASK, held=mean, claims=CLAIMS).sentence()
-    assert "held over 0.1 s, each measurement a mean over 0.0333333 s around its time, each measurement within" in said
+    assert "hold over 0.1 s, each measurement a mean over 0.0333333 s around its time, each measurement within" in said
     for name in ("jitter", "delay_jitter", "averaging", "ramp"):
         with pytest.raises(ParameterError, match="jitter, delay jitter, averaging and ramp must be 0 or more"):
             replace(HELD, **{name: F(-1, 10**9)})

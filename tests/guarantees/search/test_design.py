@@ -215,7 +215,7 @@ def test_another_objective_is_refused():
 
 
 def test_designs_say_what_is_guaranteed_of_them_as_they_run():
-    """The published e-LQR is unstable when held over 184 ms; gains for the sampled loop are guaranteed."""
+    """The published e-LQR is unstable with a hold over 184 ms; gains for the sampled loop are guaranteed."""
     fault = load_fault("real-fault")
     gains = dict(zip(("k1", "k2", "k3", "k4"), map(F, ("6.96e8", "2.53e8", "6.02e8", "2.16e8")), strict=True))
     made = [
@@ -230,7 +230,7 @@ def test_designs_say_what_is_guaranteed_of_them_as_they_run():
     assert isinstance(held, Guarantee)
     assert held.check() is Verdict.PROVED
     assert unstable.check() is sliding.check() is Verdict.UNDECIDED
-    assert unstable.sentence().startswith("none: held over 0.184 s even the nominal loop is not stable")
+    assert unstable.sentence().startswith("none: with zero-order hold over 0.184 s even the nominal loop is not stable")
     assert sliding.sentence().startswith("none: a pressure that follows 2-CTA at every instant is run by no sampled")
 
 

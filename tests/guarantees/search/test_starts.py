@@ -138,7 +138,9 @@ def test_the_command_says_from_where(capsys, monkeypatch):
     found = json.loads(said.out)
     assert (code, found["verdict"]) == (0, "proved")
     assert (found["initial_slip"], found["initial_slip_rate"]) == ("1/100000", "1/25000")
-    assert found["sentence"].startswith("from every start within 1e-05 m and 4e-05 m/s of rest, held over 0.184 s, for")
+    assert found["sentence"].startswith(
+        "from every start within 1e-05 m and 4e-05 m/s of rest, with zero-order hold over 0.184 s, for"
+    )
 
 
 @pytest.mark.parametrize(
