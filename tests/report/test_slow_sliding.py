@@ -96,7 +96,9 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
 
 
 def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(comparison, monkeypatch):
-    why = "no law with zero-order hold over 300 s was found whose loop is stable; a proof was found for a stress of at most 7 kPa"
+    why = (
+        "no law with a hold over 300 s was found whose loop is stable; a proof was found for a stress of at most 7 kPa"
+    )
     guarantee = comparison.entries[0].guarantee
     none = SlidingAnswer(found=NoGuarantee(reason=why, small_gain=None), task=guarantee.task, held=None)
     monkeypatch.setattr(state_feedback, "answer_sliding", lambda fault, **asked: none)

@@ -77,8 +77,8 @@ class StickSlipGuarantee:
         size = f"{LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
         pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
         return (
-            f"from rest, with zero-order hold over {UpperBound(held.step):.6g} s and exact measurements of slip and slip "
-            "rate, "
+            f"from rest, with zero-order hold over {UpperBound(held.step):.6g} s and exact measurements of slip and "
+            "slip rate, "
             f"for every disturbance of at most {size}, for all friction and constant parameters of the box: "
             f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, whether the fault slides or sticks, "
             f"the slip stays between {claims.slip_behind:.3g} m behind and {claims.slip_ahead:.3g} m ahead of the "
