@@ -88,7 +88,7 @@ class Recording(ABC):
             For a shorter one, or one longer than the run.
         """
         duration, kept = float(self.time[-1] - self.time[0]), max(len(self.time) - 1, 1)
-        if not duration / kept * (1 - 1e-9) <= dt <= duration:
+        if not 0 < duration / kept * (1 - 1e-9) <= dt <= duration:
             raise ParameterError(
                 f"dt must be between {duration / kept:.4g} s, the mean distance of the instants that are kept, and "
                 f"{duration:.4g} s, the run. Received {dt!r}. Ask simulate for more samples."

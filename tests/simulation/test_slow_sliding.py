@@ -434,6 +434,9 @@ def test_a_run_can_be_handed_on_and_others_are_refused():
             simulate_sliding(given, of, STEP)
     with pytest.raises(ParameterError, match="method must be one of"):
         simulate_sliding(fault(), law, STEP, method="radau")
+    assert np.array_equal(run.signals()["slip_error"][0], run.slip - run.reference)
+    with pytest.raises(ParameterError, match="duration must be positive"):
+        simulate_sliding(fault(), law, STEP, duration=0.0)
     for samples in (0, -1):
         with pytest.raises(ParameterError, match="samples must be a whole number of at least 1"):
             simulate_sliding(fault(), law, STEP, samples=samples)

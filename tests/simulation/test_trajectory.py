@@ -78,6 +78,13 @@ def test_few_instants_are_resampled_no_finer_than_they_are_known(uncontrolled, c
             run.resample(wrong)
 
 
+def test_one_instant_cannot_be_resampled(uncontrolled):
+    """A fault that opens at once has no other."""
+    for wrong in (0.0, 1.0):
+        with pytest.raises(ParameterError, match="dt must be between 0 s"):
+            replace(uncontrolled, time=np.array([0.0])).resample(wrong)
+
+
 @pytest.fixture(scope="module")
 def twice():
     """Two events of friction with a state and the beginning of a third: slip rates in straight lines, level 1 m/s."""
@@ -97,6 +104,9 @@ def test_an_event_lasts_until_its_slip_rate_is_back(twice):
     assert twice.arrests == pytest.approx([1 + 2 / 3, 5 + 2 / 3])
     assert twice.event_slips == pytest.approx([1 + 2 / 3 - 0.5, 7 + 2 / 3 - (2.5 + 0.2 * 1.5)])
     assert twice.recurrence_intervals == pytest.approx([2.7, 5.05])
+    rate = np.array([0.0, 2.0, 1.0, 2.0, 0.0, 2.0, 1.0])  # at the level itself it is back
+    again = replace(twice, slip_rate=rate, time=np.arange(7.0), onsets=np.array([0.5, 2.0, 4.5]))
+    assert again.arrests == pytest.approx([2.0, 3.5, 6.0])
     assert replace(twice, onsets=np.array([1.0])).arrests == pytest.approx([1 + 2 / 3])  # one instant alone is above
 
 

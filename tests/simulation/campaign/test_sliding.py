@@ -132,6 +132,10 @@ def test_what_a_run_goes_through_is_the_actuators(tmp_path):
             {"scheme": simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-6))},
             r"must be explicit, .*Received scheme explicit, substeps 1, measurement .*slip_noise=1e-06.*Omit scheme",
         ),
+        (
+            {"scheme": simulation_scheme("explicit", substeps=3, actuator=Actuator(stages=(Lag(time_constant=9.0),)))},
+            r"Received scheme explicit, substeps 3\. Omit scheme",
+        ),
         ({"spread": 1}, "a spread must be from 0 to below 1"),
         ({"stress": -1.0}, "stress must be zero or positive"),
         ({"stress_period": 0.0}, "stress_period must be positive"),
