@@ -61,6 +61,8 @@ def test_what_a_run_does_not_have_is_none(run, uncontrolled):
     assert np.array_equal(run.slip_rate_error, run.slip_rate - run.reference_rate)
     assert json.loads(replace(run, energy=None).attributes()["energy"]) is None
     assert json.loads(run.attributes()["energy"]) == run.energy.to_dict()
+    with pytest.raises(ValueError, match="JSON"):  # as files hold what every reader of JSON reads
+        replace(run, events={"opening": float("nan")}).attributes()
 
 
 @pytest.mark.parametrize("count", [2, 3])
@@ -114,6 +116,7 @@ def test_the_response_is_python_controls(run):
     response = run.response
     assert response.output_labels == ["slip", "slip_rate"]
     assert response.input_labels == ["p"]
+    assert response.state_labels == ["slip", "slip_rate", "xi_1", "xi_2"]
     assert np.array_equal(response.outputs[0], run.slip)
     assert np.array_equal(response.inputs.ravel(), run.pressure)
     assert response.states.shape == (4, run.time.size)
@@ -343,7 +346,8 @@ DAY, HOUR, MINUTE = 86400.0, 3600.0, 60.0
 )
 def test_time_is_drawn_in_the_largest_unit_of_which_there_are_two(end, unit, seconds):
     time, values = np.array([0.0, end / 4, end]), np.array([1.0, 1.0, 2.0])
-    (axis,) = trajectory_module.figure("title", time, [("slip", "m", values, ("", None))] * 2).axes[1:]
+    (above, axis) = trajectory_module.figure("title", time, [("slip", "m", values, ("", None))] * 2).axes
+    assert above.get_shared_x_axes().joined(above, axis)
     _, below = trajectory_module.stress_figure("title", time, values, values, 3 * values).axes
     for drawn in (axis, below):
         assert drawn.get_xlabel() == f"time [{unit}]"
