@@ -457,7 +457,7 @@ BUDGETS = {
     "synthesis": 1700,
     "rocq": 800,
     "simulation": 10000,
-    "identification": 4000,
+    "identification": 4200,
     "studies": 3600,
     "report": 3700,
     "cli": 3200,

@@ -73,6 +73,8 @@ class DesignOptions(WellOptions):
     whole_task
         Rate-and-state faults: simulate the whole task instead of 500 D_c/V of it. The proof covers the whole task in
         either case.
+    accept_poor_fit
+        Go on for a fault whose friction its record does not explain, or does not tell; the result is named so.
     """
 
     controller: str = "all"
@@ -88,6 +90,7 @@ class DesignOptions(WellOptions):
     published_scheme: str = "continuous"
     plant: Literal["stick-slip", "printed"] | None = None
     whole_task: Annotated[bool, Parameter(negative="")] = False
+    accept_poor_fit: Annotated[bool, Parameter(negative="")] = False
 
     def asked(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
         """Fault of a name, and what `designed_comparison` is asked about it; refused before anything heavy is loaded.
@@ -96,9 +99,10 @@ class DesignOptions(WellOptions):
         ------
         UnknownNameError, ParameterError
         """
-        from quakedesign.fault import load_fault
+        from quakedesign.fault import load_fault, with_accepted_fit
 
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
+        loaded = with_accepted_fit(loaded, self.accept_poor_fit)
         given = vars(self)["diffusion"]
         if loaded.friction.state_names and given is not None and not rational(given, "diffusion"):
             raise ParameterError("diffusion must be above 0 s. Received 0 s. Omit --diffusion for a well at the fault.")

@@ -195,6 +195,8 @@ def identify(
     columns: str = "",
     begin: Annotated[str | None, Parameter(name="--from")] = None,
     end: Annotated[str | None, Parameter(name="--to")] = None,
+    rates: str = "",
+    states: Whole = 1,
     seed: Whole = 0,
     fault: FaultName = "lab-fault",
     out: Path | None = None,
@@ -205,7 +207,8 @@ def identify(
     """Identify friction parameters, with confidence regions, from a laboratory record.
 
     Velocity steps and slide-hold-slide tests give rate-and-state parameters; slip or a test with a stiff machine gives
-    slip-weakening parameters. Exit code 1 if the record does not determine every parameter.
+    slip-weakening parameters. The first line is the verdict: the fit explains the record, does not, or cannot tell.
+    Exit code 0 only if it explains it and every parameter is determined.
 
     Parameters
     ----------
@@ -227,6 +230,11 @@ def identify(
         Where the part to fit begins: a time ('8110 s') or a load-point displacement ('1600 um') of the file.
     end
         Where it ends.
+    rates
+        Rates of the load point one after the other, such as '1 um/s, 10 um/s', where they are known; from its
+        displacement by default.
+    states
+        2 for friction with a second state, which may explain what one does not; no fault file holds it.
     seed
         Seed of the random starting points.
     fault
@@ -236,6 +244,7 @@ def identify(
     figure
         Figure of data, fit and residuals to write: .svg, .png or .pdf.
     """
+    from quakedesign.errors import RecordError
     from quakedesign.fault import load_fault
     from quakedesign.identification.fault_file import law_remarks, next_command, other_parts, save_fault, task_remarks
     from quakedesign.identification.identify import identify as fitted
@@ -250,24 +259,27 @@ def identify(
     around = load_fault(fault)
     record = read_record(data, normal_stress=normal_stress, columns=columns, begin=begin, end=end)
     spring = None if stiffness is None else in_unit(stiffness, record.stiffness_unit, "stiffness")
-    identification = fitted(record, law, stiffness=spring, seed=seed)
-    written = [path for path in (figure, out if identification.identified else None) if path is not None]
+    speeds = [in_unit(part.strip(), "m/s", "rates") for part in rates.split(",") if part.strip()]
+    identification = fitted(record, law, stiffness=spring, rates=speeds, states=states, seed=seed)
+    file, unwritten = (out, "") if out is not None else (None, "")
+    if out is not None:
+        try:
+            save_fault(identification, around, out)
+        except RecordError as refused:
+            file, unwritten = None, f"not written: {out}: {refused}"
+    written = [path for path in (figure, file) if path is not None]
     if figure is not None:
         save_figure(identification, figure)
-    if out is not None and identification.identified:
-        save_fault(identification, around, out)
     told = law_remarks(identification, around)
     told += [f"written: {', '.join(map(str, written))}"] if written else []
-    if out in written:
+    if file is not None:
         told.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
-        ahead = "next:" if identification.explained else "next, if nothing above explains the record better:"
-        told += [*task_remarks(identification, around), f"{ahead} {next_command(identification, out)}"]
-    if out is not None and not identification.identified:
-        told.append(f"not written: {out}, which needs every parameter")
-    places = {"figure": figure, "file": out if identification.identified else None}
+        told += [*task_remarks(identification, around), f"next: {next_command(identification, file)}"]
+    told += [unwritten] if unwritten else []
+    places = {"figure": figure, "file": file}
     facts = identification.to_dict() | {name: None if path is None else str(path) for name, path in places.items()}
     output.show(facts, [*identification_lines(identification), *told])
-    return 0 if identification.identified else 1
+    return 0 if identification.explained else 1
 
 
 # ----------------------------------------------------------------------

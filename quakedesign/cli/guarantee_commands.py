@@ -60,6 +60,7 @@ def guarantee(
     spread: str = "0",
     box: Box = None,
     disturbance: Shaking = None,
+    accept_poor_fit: Annotated[bool, Parameter(negative="")] = False,
     workers: Whole = 1,
     scheduler: Scheduler = None,
     out: Path | None = None,
@@ -100,16 +101,19 @@ def guarantee(
         disturbance, such as '25 kPa'; by default the largest that the design withstands.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
+    accept_poor_fit
+        Go on for a fault whose friction its record does not explain, or does not tell; the result is named so.
     workers
         Number of processes for several faults.
     out
         Certificate file to write; for several faults a folder.
     """
-    from quakedesign.fault import load_fault
+    from quakedesign.fault import load_fault, with_accepted_fit
     from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
 
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
+    faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)
     setup = around.setup(step=step, measured=measured)
     asked: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "stress": stress}

@@ -13,5 +13,6 @@ from .model import SlidingReference as SlidingReference
 from .model import UncertaintyBox as UncertaintyBox
 from .model import require_fault as require_fault
 from .model import uncertainty_box as uncertainty_box
+from .model import with_accepted_fit as with_accepted_fit
 from .similarity import Scales as Scales
 from .similarity import scaled_fault as scaled_fault

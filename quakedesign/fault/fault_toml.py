@@ -430,6 +430,8 @@ def _fault(table: Table, problems: Problems, allow_code: bool) -> Any:
     parts: dict[str, Any] = {"name": table.text("name"), "source": _NO_SOURCE}
     if "source" in table.entries:
         parts["source"] = table.text("source")
+    if "poor_fit" in table.entries:
+        parts["poor_fit"] = table.text("poor_fit")
     for key, unit in PLANT.items():
         parts |= table.quantities({key: unit}, optional=key in OPTIONAL)
     parts["friction"] = _friction(table.table("friction"), problems, allow_code)
@@ -588,6 +590,8 @@ def fault_toml(fault: Fault) -> str:
         "uncertainty": {key: float(getattr(fault.box, key)) for key in WIDTHS},
     }
     top: dict[str, Any] = {"name": fault.name, "source": fault.source} | _values(fault, PLANT)
+    if fault.poor_fit:
+        top["poor_fit"] = fault.poor_fit
     if fault.box == BOXES.get(fault.box.name):
         top["uncertainty"] = fault.box.name
         del named["uncertainty"]
@@ -729,6 +733,7 @@ def fault_schema() -> dict[str, Any]:
     properties = {
         "name": {"type": "string", "description": "letters, digits, spaces and _ . -"},
         "source": {"type": "string", "description": said["source"]},
+        "poor_fit": {"type": "string", "description": said["poor_fit"]},
         **_quantities(PLANT, said),
         "uncertainty": {
             "oneOf": [{"enum": sorted(BOXES)}, _table(widths, ())],

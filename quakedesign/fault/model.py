@@ -552,6 +552,8 @@ class Fault:
     box : UncertaintyBox
     assumed : tuple of str
         What a file left to physics or to the paper's example, each in a sentence.
+    poor_fit : str
+        Why the friction, identified from a record, must not be relied on; nothing where there is no reason.
 
     Notes
     -----
@@ -579,6 +581,7 @@ class Fault:
     disturbance: Disturbance = field(default_factory=Disturbance)
     box: UncertaintyBox = field(default_factory=lambda: uncertainty_box("paper"))
     assumed: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    poor_fit: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         problems = Problems()
@@ -761,6 +764,27 @@ def require_plant(**numbers: float) -> None:
 def magnitude(seismic_moment: float) -> float:
     """M_w = ⅔log10(M0) − 6.07 [-] of a seismic moment [N·m], eq. magnitude; minus infinity of none."""
     return -math.inf if seismic_moment <= 0 else 2 / 3 * math.log10(seismic_moment) - 6.07
+
+
+_ACCEPTED = "poor-fit"
+
+
+def with_accepted_fit(fault: Fault, accept_poor_fit: bool) -> Fault:
+    """A fault to design for: one whose friction a record does not support only if that is accepted, and named so.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not fault.poor_fit:
+        return fault
+    if not accept_poor_fit:
+        raise ParameterError(
+            f"the friction of {fault.name} must be one that its record supports. Received: {fault.poor_fit}. Identify "
+            "it from a better record, or accept it with --accept-poor-fit (accept_poor_fit=True)."
+        )
+    source = f"poor fit accepted ({fault.poor_fit}); {fault.source}"
+    return replace(fault, name=f"{fault.name[:40].rstrip()}-{_ACCEPTED}", source=source, poor_fit="")
 
 
 def require_fault(fault: Fault) -> Fault:

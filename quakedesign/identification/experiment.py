@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -73,7 +73,7 @@ class Experiment(ABC):
     def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
         """The law with the values of given coordinates."""
         values = {name: v for name, v in self.outward(fitted).items() if name in self.law.quantities()}
-        return replace(self.law, **values)  # type: ignore[type-var]
+        return holding(self.law, values)
 
     def resolved(self, fitted: "np.ndarray", accuracy: float) -> "Experiment":
         """The same experiment, simulated to an accuracy of friction [-] at given coordinates."""
@@ -90,35 +90,114 @@ class Experiment(ABC):
         """What is fitted, of values in their units."""
         return np.array([c.inward(v) for c, v in zip(self.coordinates, values, strict=True)])
 
+    def near(self, values: Mapping[str, float]) -> "np.ndarray":
+        """What is fitted, at values of another experiment; where it has none, the middle of where searches start."""
+        return np.array(
+            [
+                c.inward(values[c.name]) if c.name in values else sum(map(c.inward, c.start)) / 2
+                for c in self.coordinates
+            ]
+        )
+
     def outward(self, fitted: "np.ndarray") -> dict[str, float]:
         """Values in their units by name."""
         return {c.name: c.outward(float(q)) for c, q in zip(self.coordinates, fitted, strict=True)}
 
 
-def fitted_quantities(law: FrictionLaw, names: Sequence[str], fitted: Any) -> dict[Any, Any]:
-    """What the symbols of a law stand for: exponentials of what is fitted by name, else its own numbers."""
+def fitted_quantities(
+    law: FrictionLaw, names: Sequence[str], fitted: Any, linear: Collection[str] = ()
+) -> dict[Any, Any]:
+    """What the symbols of a law stand for: exponentials of what is fitted by name, else its own numbers.
+
+    Quantities that may be negative, `linear` ones, are fitted as they are.
+    """
     places = {name: i for i, name in enumerate(names)}
-    return {
-        symbol: ca.exp(fitted[places[name]]) if name in places else getattr(law, name)
-        for name, symbol in law.symbols().items()
-    }
+    values = {n: fitted[place] if n in linear else ca.exp(fitted[place]) for n, place in places.items()}
+    return {symbol: values.get(name, getattr(law, name)) for name, symbol in law.symbols().items()}
+
+
+def holding(law: FrictionLaw, values: Mapping[str, float]) -> FrictionLaw:
+    """A law with other values, those that no fault can have among them: an evolution effect that is not positive."""
+    if values.get("evolution_effect", 1.0) > 0:
+        return replace(law, **values)  # type: ignore[type-var]
+    told = {name: getattr(law, name) for name in law.quantities()} | law._options()
+    return law._holding({**told, **values})
+
+
+TREND = "trend"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Difference(Experiment):
-    """An experiment in which the difference of two coordinates stands for the first of them.
+class Trended(Experiment):
+    """An experiment whose friction rises, or falls, with the displacement of the load point as well.
 
     Attributes
     ----------
     whole : Experiment
-        In which both are logarithmic.
-    first, second : int
-        Places of the two.
+        Without the trend.
+    path : ndarray
+        Displacement since the first sample [m].
+    coordinates : tuple of Coordinate
+        Those of `whole`, then the trend [1/m].
+    """
+
+    whole: Experiment
+    path: "np.ndarray"
+    coordinates: tuple[Coordinate, ...]
+
+    @property
+    def law(self) -> FrictionLaw:  # type: ignore[override]
+        """That of the experiment."""
+        return self.whole.law
+
+    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Friction of the experiment and the trend."""
+        friction: np.ndarray = self.whole.friction(fitted[:-1]) + fitted[-1] * self.path
+        return friction
+
+    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Derivatives; that by the trend is the path."""
+        return np.column_stack([self.whole.slopes(fitted[:-1]), self.path])
+
+    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+        """Those of the experiment."""
+        return self.whole.remarks(fitted[:-1], noise)
+
+    def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
+        """That of the experiment."""
+        return self.whole.best_law(fitted[:-1])
+
+    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "Trended":
+        """With the experiment resolved."""
+        finer = self.whole.resolved(fitted[:-1], accuracy)
+        return self if finer is self.whole else replace(self, whole=finer)
+
+
+def trended(whole: Experiment, path: "np.ndarray", size: float) -> Trended:
+    """An experiment with a trend, of at most ten times a friction over the whole path."""
+    most = 10 * size / float(np.ptp(path))
+    trend = Coordinate(
+        name=TREND, unit="1/m", low=-most, high=most, start=(-1e-3 * most, 1e-3 * most), logarithmic=False
+    )
+    return Trended(whole=whole, path=path, coordinates=(*whole.coordinates, trend))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference(Experiment):
+    """An experiment in which the difference of coordinates stands for the first of them.
+
+    Attributes
+    ----------
+    whole : Experiment
+    first : int
+        Place of the one from which others are taken.
+    seconds : tuple of int
+        Places of the others.
     """
 
     whole: Experiment
     first: int
-    second: int
+    seconds: tuple[int, ...]
 
     @property
     def law(self) -> FrictionLaw:  # type: ignore[override]
@@ -129,13 +208,13 @@ class Difference(Experiment):
     def coordinates(self) -> tuple[Coordinate, ...]:  # type: ignore[override]
         """Those of the experiment, with the difference in place of the first."""
         changed = list(self.whole.coordinates)
-        a, b = changed[self.first], changed[self.second]
+        a, others = changed[self.first], [changed[place] for place in self.seconds]
         changed[self.first] = Coordinate(
-            name=f"{a.name} - {b.name}",
+            name=" - ".join(each.name for each in (a, *others)),
             unit=a.unit,
-            low=a.low - b.high,
-            high=a.high - b.low,
-            start=(a.start[0] - b.start[1], a.start[1] - b.start[0]),
+            low=a.low - sum(b.high for b in others),
+            high=a.high - sum(b.low for b in others),
+            start=(a.start[0] - sum(b.start[1] for b in others), a.start[1] - sum(b.start[0] for b in others)),
             logarithmic=False,
         )
         return tuple(changed)
@@ -148,8 +227,12 @@ class Difference(Experiment):
         """Derivatives by the chain rule."""
         at = self.whole_of(fitted)
         slopes = self.whole.slopes(at).copy()
-        per_first = slopes[:, self.first] / np.exp(at[self.first])
-        slopes[:, self.second] += per_first * np.exp(at[self.second])
+        per_first = slopes[:, self.first].copy()
+        if self.whole.coordinates[self.first].logarithmic:
+            per_first /= np.exp(at[self.first])
+        for second in self.seconds:
+            grown = np.exp(at[second]) if self.whole.coordinates[second].logarithmic else 1.0
+            slopes[:, second] += per_first * grown
         slopes[:, self.first] = per_first
         return slopes
 
@@ -160,12 +243,19 @@ class Difference(Experiment):
     def difference(self, fitted: "np.ndarray") -> "np.ndarray":
         """Coordinates here, of those of the whole."""
         changed = np.array(fitted, dtype=float)
-        changed[self.first] = np.exp(fitted[self.first]) - np.exp(fitted[self.second])
+        changed[self.first] = self.whole.coordinates[self.first].outward(float(fitted[self.first])) - self._others(
+            fitted
+        )
         return changed
 
     def whole_of(self, fitted: "np.ndarray") -> "np.ndarray":
         """Coordinates of the whole, of those here; not a number where the first would not be positive."""
         changed = np.array(fitted, dtype=float)
-        first = fitted[self.first] + np.exp(fitted[self.second])
-        changed[self.first] = np.log(first) if first > 0 else np.nan
+        first = fitted[self.first] + self._others(fitted)
+        if self.whole.coordinates[self.first].logarithmic:
+            first = np.log(first) if first > 0 else np.nan
+        changed[self.first] = first
         return changed
+
+    def _others(self, fitted: "np.ndarray") -> float:
+        return sum(self.whole.coordinates[place].outward(float(fitted[place])) for place in self.seconds)

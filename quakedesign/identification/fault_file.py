@@ -21,6 +21,7 @@ from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox, f
 from quakedesign.fault.fault_toml import beyond_rates, fault_toml, mean_rate, sliding_step, step_assumed
 from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.files import write_whole
+from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
 
 _DIGITS = 6
@@ -105,9 +106,19 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     Raises
     ------
     RecordError
-        When the record does not tell every parameter.
+        When the record does not tell every parameter, or tells a friction that no fault file holds.
     """
-    if not identification.identified:
+    if len(identification.law.state_names) > 1 or getattr(identification.law, "evolution_effect", 1.0) <= 0:
+        told = "two states" if len(identification.law.state_names) > 1 else "an evolution effect that is not positive"
+        raise RecordError(
+            f"a fault file holds friction with one state whose effect is positive. Received {told}. "
+            + (
+                "Omit --states for a file."
+                if "two" in told
+                else "It strengthens with rate: there is nothing to control."
+            )
+        )
+    if not identification.determined:
         raise RecordError(
             f"a fault file needs every parameter. Received {identification.record.name}: {identification.untold()[0]}."
         )
@@ -127,6 +138,19 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         friction=held.law,
         box=held.box,
         assumed=(),
+        poor_fit=poor_fit(identification),
+    )
+
+
+def poor_fit(identification: Identification) -> str:
+    """Why a controller must not be built on a record unless this is accepted; nothing where it is explained."""
+    assessment = identification.assessment
+    if assessment.verdict == EXPLAINS:
+        return ""
+    return (
+        f"the fit {assessment}"
+        if assessment.verdict == EXPLAINS_NOT
+        else f"the record cannot tell: {assessment.open[0]}"
     )
 
 
@@ -189,6 +213,8 @@ def next_command(identification: Identification, path: str | Path) -> str:
         )
     spread = "" if covers(identification.law) else f" --spread {_spread(identification)}"
     code = "" if type(identification.law) in friction_laws().values() else " --allow-code"
+    if why := poor_fit(identification):
+        return f"none: {why}. Design refuses the file without --accept-poor-fit"
     return f"quakedesign design {quote(str(path))}{spread}{code}"
 
 
@@ -258,7 +284,7 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
         f"from {fault.name}: {other_parts(identification, fault)}.",
         f"Best fit (95 % alone; box of all together); {said}.",
         *(_remark(estimate) for estimate in identification.estimates.values()),
-        *(f"{said}." for said in task_remarks(identification, fault)),
+        *(f"{said}." for said in [*task_remarks(identification, fault), *filter(None, [poor_fit(identification)])]),
     ]
 
 

@@ -12,6 +12,7 @@ from scipy import stats
 from scipy.optimize import least_squares
 
 from quakedesign.errors import RecordError
+from quakedesign.identification.correlated_noise import CorrelatedNoise
 from quakedesign.identification.experiment import Experiment
 
 # ----------------------------------------------------------------------
@@ -19,6 +20,7 @@ from quakedesign.identification.experiment import Experiment
 
 CONFIDENCE = 0.95
 _SHARE_OF_NOISE = 3e-3
+_ALONE = 0.4  # of an outlier, what lies beside it on the same side: more is a peak that is not explained
 _SHARE_OF_EXCESS = 2e-3  # by which a search may still get better when it ends
 
 
@@ -68,6 +70,8 @@ class Fit:
         Samples that count.
     agreeing, starts : int
         Searches that end in the best fit, of how many.
+    correlated : CorrelatedNoise, optional
+        Noise that samples share with their neighbours.
     """
 
     experiment: Experiment
@@ -77,6 +81,7 @@ class Fit:
     kept: "np.ndarray"
     agreeing: int
     starts: int
+    correlated: CorrelatedNoise | None = None
 
     @cached_property
     def residuals(self) -> "np.ndarray":
@@ -86,20 +91,31 @@ class Fit:
 
     @property
     def scaled(self) -> "np.ndarray":
-        """Residuals [-] in units of one measurement: the noise of a mean of n falls with the root of n."""
-        scaled: np.ndarray = self.residuals * np.sqrt(self.counts)
+        """Residuals [-] in units of one measurement, without the part that samples share with their neighbours.
+
+        The noise of a mean of n falls with the root of n.
+        """
+        own = self.residuals if self.correlated is None else self.correlated.own_part(self.residuals, self.kept)
+        scaled: np.ndarray = own * np.sqrt(self.counts)
         return scaled
 
-    @property
+    @cached_property
     def weights(self) -> "np.ndarray":
-        """Of all residuals; 0 for outliers."""
+        """Of all residuals, 0 for outliers; a matrix that makes them independent where noise is correlated."""
+        if self.correlated is not None:
+            return self.correlated.whitener(self.kept)
         weights: np.ndarray = np.sqrt(self.counts) * self.kept
         return weights
+
+    @cached_property
+    def whitened(self) -> "np.ndarray":
+        """Residuals that count, made independent with the variance of one measurement."""
+        return weighed(self.weights, self.residuals)
 
     @property
     def squares(self) -> float:
         """Sum of squares of the residuals that count."""
-        return float(np.sum(self.scaled[self.kept] ** 2))
+        return float(np.sum(self.whitened**2))
 
     @property
     def freedom(self) -> int:
@@ -122,7 +138,7 @@ class Fit:
 
         Summed over lags up to five times itself (Sokal 1997, in Functional Integration, NATO ASI B361, 131).
         """
-        kept = self.scaled[self.kept]
+        kept = self.whitened
         size = 1 << (2 * len(kept) - 1).bit_length()
         spectrum = np.abs(np.fft.rfft(kept, size)) ** 2
         covariance = np.fft.irfft(spectrum, size)[: len(kept) // 2]
@@ -140,13 +156,13 @@ class Fit:
 
     def distance(self, fitted: "np.ndarray") -> float:
         """`excess` of given coordinates, infinite where there is no such experiment."""
-        squares = float(np.sum(((self.measured - self.experiment.friction(fitted)) * self.weights)[self.kept] ** 2))
+        squares = float(np.sum(weighed(self.weights, self.measured - self.experiment.friction(fitted)) ** 2))
         return self.excess(squares) if np.isfinite(squares) else np.inf
 
     @cached_property
     def deviations(self) -> "np.ndarray":
         """Standard deviations of what is fitted, from the slopes; infinite where these say nothing."""
-        slopes = (_finite(self.experiment.slopes(self.fitted)) * self.weights[:, None])[self.kept]
+        slopes = weighed(self.weights, _finite(self.experiment.slopes(self.fitted)))
         scale = np.linalg.norm(slopes, axis=0)
         scale[scale == 0] = 1
         values, turn = np.linalg.svd(slopes / scale, full_matrices=False)[1:]
@@ -157,6 +173,17 @@ class Fit:
             spread = np.where(weights > 0, weights * inverse[:, None], 0)
         deviations: np.ndarray = np.sqrt(np.sum(spread**2, axis=0)) / scale * self.noise * np.sqrt(self.correlation)
         return deviations
+
+
+def weighed(weights: "np.ndarray", values: "np.ndarray") -> "np.ndarray":
+    """Values of all samples, or columns of them, by weights of `Fit`; those without a weight are left out."""
+    if weights.ndim == 2:
+        kept = np.any(weights != 0, axis=0)
+        product: np.ndarray = weights[:, kept] @ values[kept]
+        return product
+    kept = weights > 0
+    scaled: np.ndarray = (values[kept].T * weights[kept]).T
+    return scaled
 
 
 def fit(
@@ -200,8 +227,7 @@ def fit(
         )
     counts = np.ones(len(measured)) if counts is None else counts
     roots = np.sqrt(counts)
-    experiment, starts = _starts(experiment, measured, roots, seed, how)
-    starts = starts if near is None else [near, *starts]
+    experiment, starts = _starts(experiment, measured, roots, seed, how, near)
     minima: list[tuple[np.ndarray, float]] = []
     for start in starts:
         minima.append(minimised(experiment, measured, roots, start, steps=how.coarse))
@@ -222,13 +248,20 @@ def fit(
 
 
 def _starts(
-    experiment: Experiment, measured: "np.ndarray", roots: "np.ndarray", seed: int, how: FitSearch
+    experiment: Experiment,
+    measured: "np.ndarray",
+    roots: "np.ndarray",
+    seed: int,
+    how: FitSearch,
+    near: "np.ndarray | None" = None,
 ) -> "tuple[Experiment, list[np.ndarray]]":
-    """The candidates that come nearest, and the experiment with steps for the best of them."""
+    """The candidates that come nearest, behind the one that is known, and the experiment with steps for the first."""
     draw = np.random.default_rng(seed)
     ends = np.array([[c.inward(end) for end in c.start] for c in experiment.coordinates])
     candidates = draw.uniform(ends[:, 0], ends[:, 1], (how.candidates, len(ends)))
     scatter = max(float(np.std(np.diff(measured, 2))) / 6**0.5, 1e-9)
+    if near is not None and not how.most:
+        return experiment.resolved(near, scatter), [near]
     experiment = experiment.resolved(ends.mean(axis=1), scatter)
     costs = np.array([np.sum(roots * np.abs(measured - experiment.friction(q))) for q in candidates])
     costs[~np.isfinite(costs)] = np.inf
@@ -239,6 +272,7 @@ def _starts(
             "an experiment must be one that a spring can hold without a jump. No set of parameters gives one for this "
             "record. Check the stiffness, or give a record with measured slip."
         )
+    usable = usable if near is None else [near, *usable]
     return experiment.resolved(usable[0], scatter), usable
 
 
@@ -253,10 +287,8 @@ def minimised(
 ) -> "tuple[np.ndarray, float]":
     """Coordinates with the least sum of squares near a start, and that sum; `fixed` ones stay as they are.
 
-    Residuals count by their weights, not at all with one of 0.
+    Residuals count by their weights, as `weighed` says.
     """
-    kept = weights > 0
-    roots = weights[kept]
     free = np.ones(len(start), dtype=bool) if fixed is None else ~fixed
     low, high = experiment.bounds
     whole = np.clip(np.array(start, dtype=float), low, high)
@@ -267,8 +299,7 @@ def minimised(
         return full
 
     def residuals(part: "np.ndarray") -> "np.ndarray":
-        solution: np.ndarray = roots * (experiment.friction(at(part)) - measured)[kept]
-        return solution
+        return weighed(weights, experiment.friction(at(part)) - measured)
 
     first = residuals(whole[free])
     if not np.all(np.isfinite(first)):
@@ -277,7 +308,7 @@ def minimised(
     solution = least_squares(
         lambda part: residuals(part) / size,
         np.clip(whole[free], np.nextafter(low, high)[free], np.nextafter(high, low)[free]),
-        jac=lambda part: roots[:, None] * _finite(experiment.slopes(at(part)))[kept][:, free] / size,
+        jac=lambda part: weighed(weights, _finite(experiment.slopes(at(part)))[:, free]) / size,
         bounds=(low[free], high[free]),
         x_scale="jac",
         ftol=_SHARE_OF_EXCESS / len(first),
@@ -310,15 +341,19 @@ def settled(fit: Fit, how: FitSearch) -> Fit:
 def outliers(residuals: "np.ndarray", longest: int) -> "np.ndarray":
     """Samples so far off that noise alone has one such among all with a chance of 5 %, in runs of at most `longest`.
 
-    The size of the noise is that of the median residual.
+    The size of the noise is that of the median residual. What rises from its neighbours is no accident, and stays.
     """
     middle = np.median(residuals)
     size = np.median(np.abs(residuals - middle)) / stats.norm.ppf(0.75)
     far = np.abs(residuals - middle) > size * stats.norm.isf((1 - CONFIDENCE) / 2 / len(residuals))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], far.astype(int), [0]])))
     outlying = np.zeros(len(residuals), dtype=bool)
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        outlying[begin:end] = end - begin <= longest
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        beside = residuals[[i for i in (begin - 1, end) if 0 <= i < len(residuals)]] - middle
+        alone = np.max(beside * np.sign(residuals[begin] - middle)) < _ALONE * np.min(
+            np.abs(residuals[begin:end] - middle)
+        )
+        outlying[begin:end] = alone and end - begin <= longest
     return outlying
 
 
@@ -329,6 +364,8 @@ def advantage(one: Fit, other: Fit) -> tuple[float, float]:
     """
     both = one.kept & other.kept
     ours, theirs = (float(np.sum(fit.scaled[both] ** 2)) for fit in (one, other))
+    if one.correlated is not None or other.correlated is not None:
+        ours, theirs = one.squares, other.squares
     independent = float(both.sum()) / min(one.correlation, other.correlation)
     return theirs / ours, independent * float(np.log(theirs / ours))
 
@@ -336,13 +373,13 @@ def advantage(one: Fit, other: Fit) -> tuple[float, float]:
 # ----------------------------------------------------------------------
 # Confidence regions by the profile likelihood: how far one parameter goes when all others give way.
 
-_MOST_TRIALS = 30
+_MOST_TRIALS = 14
 _CLOSE = 0.01  # share of the wanted distance at which an end counts as found
 _LIMIT = 0.98  # share of the way to the limit of a coordinate from which on an end counts as there
 _PATIENCE = 3  # trials after which the limit of a coordinate is tried
 _FIRST = 0.05  # step where the slopes say nothing
 _BETTER = 0.1  # excess by which a profile has to improve on the fit to replace it
-_FAR = 0.5  # move of a coordinate after which the experiment is resolved again
+_FAR = 0.5  # move of a logarithmic coordinate after which the experiment is resolved again
 
 
 class BetterFit(Exception):
@@ -444,11 +481,12 @@ def _distance(fit: Fit, place: int, step: float, near: _ProfilePlace) -> tuple[f
     """Root of the excess with one coordinate moved and all others at their best, and where that is."""
     start = near.fitted.copy()
     start[place] = fit.fitted[place] + step
-    if np.max(np.abs(start - near.resolved_at)) > _FAR:
+    logarithmic = [c.logarithmic for c in fit.experiment.coordinates]
+    if np.max(np.abs(start - near.resolved_at)[logarithmic], initial=0) > _FAR:
         near = replace(near, experiment=near.experiment.resolved(start, fit.accuracy), resolved_at=start)
     fixed = np.zeros(len(start), dtype=bool)
     fixed[place] = True
-    others, squares = minimised(near.experiment, fit.measured, fit.weights, start, fixed=fixed, steps=30)
+    others, squares = minimised(near.experiment, fit.measured, fit.weights, start, fixed=fixed, steps=15)
     if fit.excess(squares) < -_BETTER:
         raise BetterFit(others)
     distance = math.sqrt(max(fit.excess(squares), 0)) if np.isfinite(squares) else math.inf

@@ -11,10 +11,10 @@ import numpy as np
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import FrictionLaw
+from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT, Assessment, Check
 from quakedesign.identification.fitting import CONFIDENCE, Fit
 from quakedesign.identification.record import Record
 
-_CORRELATED = 2.0  # samples
 _DECISIVE = 10.0  # of AIC: odds of about 150 to 1
 
 
@@ -115,6 +115,8 @@ class Identification:
         Of the starts.
     rival : Rival or None
         The law that was fitted as well and not taken, where none was asked for.
+    assessment : Assessment
+        Tests of what was taken for granted, and the verdict.
     """
 
     record: Record
@@ -126,6 +128,7 @@ class Identification:
     notes: tuple[str, ...]
     seed: int
     rival: Rival | None = None
+    assessment: Assessment = Assessment(checks=(), factor=1.0)
 
     def __repr__(self) -> str:
         ends = {e.name: f"{e.value:.4g} ({e.low:.4g} to {e.high:.4g}) {e.unit}" for e in self.estimates.values()}
@@ -133,24 +136,48 @@ class Identification:
         return f"Identification({self.record.name!r}, {self.law.name}: {told})"
 
     @property
-    def identified(self) -> bool:
-        """Whether the record tells every parameter."""
+    def determined(self) -> bool:
+        """Whether every parameter has an interval with both ends."""
         return all(estimate.identified for estimate in self.estimates.values())
 
     @property
+    def identified(self) -> bool:
+        """Whether every parameter has an interval, and the fit explains the record."""
+        return self.determined and self.assessment.verdict != EXPLAINS_NOT
+
+    @property
     def explained(self) -> bool:
-        """Whether law and machine explain the record: whether what is left looks like noise from sample to sample."""
-        return self.fit.correlation <= _CORRELATED
+        """Whether the fit explains the record and leaves nothing open."""
+        return self.assessment.verdict == EXPLAINS
 
     def to_try(self) -> list[str]:
-        """What may explain a record better, where law and machine explain it only in part."""
+        """What may explain a record better."""
         other = "no --law, which fits both laws with a state" if self.law.state_names else "another --law"
         return [
             "--figure, which shows where",
             *([other] if self.rival is None else []),
+            *(["--states 2"] if self.law.state_names == ("theta",) else []),
             *(["--stiffness of the machine, if it was measured"] if "stiffness" in self.estimates else []),
-            "a record without trend, and without steps that differ from the others",
+            "one step alone, cut out with --from and --to",
         ]
+
+    def experiments(self, sign: Check | None = None) -> list[str]:
+        """Experiments that would tell what this record does not."""
+        open_ = {name for name, estimate in self.estimates.items() if not estimate.identified}
+        told = []
+        if "stiffness" in open_:
+            told.append("the stiffness of the machine, from loading or unloading: --stiffness")
+        if open_ & {"direct_effect", "evolution_effect"}:
+            told.append("a step to ten times the rate, with ten samples within a critical slip after it")
+        if open_ & {"critical_slip", "second_slip", "second_effect"}:
+            told.append("longer sliding after the step, until friction stays")
+        if sign is not None and not sign.passed:
+            told.append(
+                "longer sliding before the step, which fixes the trend, and steps up and down by a factor of 10"
+            )
+        if self.assessment.verdict == EXPLAINS and open_ & {"drop", "residual"}:
+            told.append("slip from rest until friction stays")
+        return told
 
     @property
     def box(self) -> dict[str, tuple[float, float]]:
@@ -201,6 +228,7 @@ class Identification:
         fit = self.fit
         return {
             "law": self.law.name,
+            **self.assessment.to_dict(),
             "identified": self.identified,
             "not_identifiable": self.untold(),
             "parameters": {name: estimate.to_dict() for name, estimate in self.estimates.items()},
@@ -218,6 +246,7 @@ class Identification:
                 "unit": "",
                 "samples": int(fit.kept.sum()),
                 "correlation": fit.correlation,
+                "correlated": None if fit.correlated is None else fit.correlated.to_dict(fit.noise),
             },
             "measurements": int(np.sum(fit.counts)),
             "rival": None if self.rival is None else asdict(self.rival),

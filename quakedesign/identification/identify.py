@@ -4,6 +4,7 @@ The second chapter selects the experiment from the friction law and the measured
 """
 
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,15 @@ import sympy as sp
 from quakedesign.errors import RecordError
 from quakedesign.fault import FrictionLaw, friction_law
 from quakedesign.fault.model import require_positive, require_seed
-from quakedesign.identification.experiment import Coordinate, Difference, Experiment
-from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, advantage, fit, interval, settled
+from quakedesign.identification.assessment import DECISIVE, Assessment, checks_of, sign_check
+from quakedesign.identification.correlated_noise import CorrelatedNoise, noise_of
+from quakedesign.identification.experiment import TREND, Coordinate, Difference, Experiment, trended
+from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, advantage, fit, interval, minimised, settled
 from quakedesign.identification.identification_result import Identification, ParameterEstimate, Rival, estimate
-from quakedesign.identification.record import FAR_OFF, Record, first_rate, read_record, scatter, thinned
-from quakedesign.identification.sliding_experiment import STIFFNESS, Drive, SlidingExperiment
+from quakedesign.identification.loading import Loading, prepared
+from quakedesign.identification.record import FAR_OFF, Record, read_record, scatter
+from quakedesign.identification.sliding_experiment import START_STATE, STIFFNESS, SlidingExperiment
+from quakedesign.identification.two_states import SECOND_EFFECT, with_two_states
 from quakedesign.identification.weakening_experiment import START, Drawn, MeasuredSlip
 
 # ----------------------------------------------------------------------
@@ -27,6 +32,8 @@ from quakedesign.identification.weakening_experiment import START, Drawn, Measur
 _EFFECTS = {"low": 1e-5, "high": 1.0, "start": (2e-3, 3e-2)}
 _SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}
 _MODERATE = 1e3
+_NUISANCE = {TREND, START_STATE}
+_START = Coordinate(name=START_STATE, unit="", low=-5.0, high=5.0, start=(-1e-3, 1e-3), logarithmic=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,8 +54,23 @@ class Setup:
     notes: tuple[str, ...]
 
 
-def set_up(record: Record, law: type[FrictionLaw], stiffness: float | None) -> Setup:
-    """The experiment of a record, by what its law depends on and what was measured.
+def set_up(
+    record: Record,
+    law: type[FrictionLaw],
+    stiffness: float | None,
+    loading: Loading | None = None,
+    nuisance: Collection[str] = (),
+) -> Setup:
+    """The experiment of a record as `prepared` gives it, by what its law depends on and what was measured.
+
+    Parameters
+    ----------
+    record : Record
+    law : type of FrictionLaw
+    stiffness : float or None
+    loading : Loading, optional
+    nuisance : collection of str
+        What is fitted besides law and stiffness: `TREND`, `START_STATE`.
 
     Raises
     ------
@@ -56,7 +78,7 @@ def set_up(record: Record, law: type[FrictionLaw], stiffness: float | None) -> S
         When the law is of neither kind, or something is missing.
     """
     if law.state_names:
-        return _sliding(record, law, stiffness)
+        return _with_trend(_sliding(record, law, stiffness, loading, START_STATE in nuisance), record, nuisance)
     template = law(**dict.fromkeys(law.quantities(), 1.0))
     slip, rate = sp.symbols("slip rate", positive=True)
     if sp.sympify(template.symbolic().coefficient(slip, rate)).has(rate):
@@ -64,12 +86,25 @@ def set_up(record: Record, law: type[FrictionLaw], stiffness: float | None) -> S
             f"a law that is identified must depend on slip or on a state. Received {law.name}, which depends on the "
             "slip rate alone. Take another."
         )
-    return _measured_slip(record, law) if record.slip is not None else _drawn(record, law, stiffness)
+    setup = _measured_slip(record, law) if record.slip is not None else _drawn(record, law, stiffness)
+    return _with_trend(setup, record, nuisance)
+
+
+def _with_trend(setup: Setup, record: Record, nuisance: Collection[str]) -> Setup:
+    """An experiment with a trend in the displacement, where that is fitted."""
+    path = record.load_point if record.load_point is not None else record.slip
+    if TREND not in nuisance or path is None or not np.ptp(path[setup.used]) > 0:
+        return setup
+    size = float(np.max(np.abs(record.friction)))
+    return replace(setup, experiment=trended(setup.experiment, path[setup.used] - path[0], size))
 
 
 def _coordinate(name: str, law: type[FrictionLaw], record: Record, path: float) -> Coordinate:
     """Where one quantity of a law is sought; `path` is how far the block can have slipped [m]."""
     unit = law.quantities()[name].metadata["unit"]
+    if law.state_names and name in ("evolution_effect", SECOND_EFFECT):
+        start = (-0.005, 0.025) if name == "evolution_effect" else (-0.01, 0.01)
+        return Coordinate(name=name, unit=unit, low=-1.0, high=1.0, start=start, logarithmic=False)
     size = float(np.max(np.abs(record.friction)))
     ends: dict[str, Any]
     if unit == "m":
@@ -86,45 +121,46 @@ def _coordinate(name: str, law: type[FrictionLaw], record: Record, path: float) 
     return Coordinate(name=name, unit=unit, **ends)
 
 
-def _sliding(record: Record, law: type[FrictionLaw], stiffness: float | None) -> Setup:
-    if record.load_point is None:
+def _sliding(
+    record: Record, law: type[FrictionLaw], stiffness: float | None, loading: Loading | None, unsteady: bool
+) -> Setup:
+    if record.load_point is None or loading is None:
         raise RecordError(
             f"{law.name} needs the motion of the load point, which drives the experiment. Received none. Add "
             "load_point_displacement [um] or load_point_rate [um/s]."
         )
-    lengths = np.diff(record.time)
-    rates = np.diff(record.load_point) / lengths
-    first = record.first_rate or first_rate(record.time, record.load_point)
+    first = loading.first_rate
     if not first > 0:
         raise RecordError(
             f"a record for {law.name} must begin in steady sliding. Received a load point that moves at {first:.3g} "
-            "m/s. Cut off what is before."
+            "m/s. Cut off what is before with --from."
         )
+    drive, measured = loading.drive(record)
     path = float(np.ptp(record.load_point))
-    chosen = _rates(law, rates, first)
+    chosen = _rates(law, drive.rates, first)
     optional = {field.name for field in fields(law) if field.default is not MISSING}  # type: ignore[arg-type]
     names = [name for name in law.quantities() if name not in chosen and name not in optional]
     coordinates = [_coordinate(name, law, record, path) for name in names]
     if stiffness is None:
         coordinates.append(_stiffness(record, path))
     template = law(**dict.fromkeys(names, 1.0), **chosen)
-    log_normal = np.log(record.normal)
-    drive = Drive(
-        lengths=lengths,
-        rates=rates,
-        growth=np.diff(log_normal) / lengths,
-        compliance=np.exp(-(log_normal[1:] + log_normal[:-1]) / 2),
-        first_rate=first,
-    )
+    if unsteady:
+        coordinates.append(_START)
     experiment = SlidingExperiment(
         law=template,
         drive=drive,
         normal_unit=record.normal_unit,
         coordinates=tuple(coordinates),
         stiffness=stiffness,
-        steps=tuple((length,) for length in lengths.tolist()),
+        steps=tuple((length,) for length in drive.lengths.tolist()),
+        measured=measured,
     )
-    notes = (f"the record begins in steady sliding at {first:.4g} m/s",)
+    begins = (
+        f"in a state off that of steady sliding at {first:.4g} m/s"
+        if unsteady
+        else f"in steady sliding at {first:.4g} m/s"
+    )
+    notes = (f"the record begins {begins}", *loading.notes)
     return Setup(experiment=experiment, used=np.ones(len(record.time), dtype=bool), notes=notes)
 
 
@@ -202,8 +238,9 @@ def _drawn(record: Record, law: type[FrictionLaw], stiffness: float | None) -> S
 
 AGEING, SLIP = "rate-and-state-aging", "rate-and-state-slip"
 _LEAST_NEAR = 2  # searches, where the first begins near the fit of a similar law
-_PAIR = ("direct_effect", "evolution_effect")
+_EFFECTS_OF = ("direct_effect", "evolution_effect", SECOND_EFFECT)
 _MOST_BETTER = 10
+_UNSEEN = 1e-5  # of the range of friction
 
 
 def identify(
@@ -212,20 +249,23 @@ def identify(
     *,
     stiffness: float | None = None,
     normal_stress: float | None = None,
+    rates: Sequence[float] = (),
+    states: int = 1,
     seed: int = 0,
 ) -> Identification:
     """Friction parameters of a laboratory record, each with its profile likelihood at 95 %.
 
-    A law with state is fitted to the simulated experiment: a block without inertia that a spring draws after the
-    recorded load point, from steady sliding on. A law that weakens with slip is fitted at the measured slip, or
-    without one to a block that sticks at first and then slips as the stiff spring lets it. Noise is taken for
-    independent from sample to sample and equally large; where residuals are correlated, regions are widened by it. Of
-    a long record, means of neighbouring samples are fitted, each with the weight of its samples.
+    A law with state is fitted to the simulated experiment: a block without inertia that a spring draws after the load
+    point, which moves in straight pieces. A law that weakens with slip is fitted at the measured slip, or without one
+    to a block that sticks at first and then slips as the stiff spring lets it. A trend of friction with displacement
+    and a beginning off steady sliding are fitted as well where their likelihood says so. Noise is white, with a part
+    that fades with time or displacement where that is likelier. Of a long record, means of neighbouring samples are
+    fitted, each with the weight of its samples.
 
     Parameters
     ----------
     record : Record, str or Path
-        Or a CSV file of one, see `read_record`.
+        Or a file of one, see `read_record`.
     law : str, optional
         Name of a friction law with state, or of one that depends on slip. Unless told, the ageing and the slip law are
         both fitted, and the one that leaves the smaller residuals is taken.
@@ -234,6 +274,10 @@ def identify(
         given.
     normal_stress : float, optional
         Constant [Pa], where a file has no such column.
+    rates : sequence of float
+        Of the load point [m/s], one after the other, where they are known; from its displacement unless given.
+    states : int
+        1, or 2 for a second evolution effect with its own slip; no fault file holds two.
     seed : int
         Of the draw of the starts.
 
@@ -249,10 +293,10 @@ def identify(
         For a law that does not exist.
     """
     require_seed(seed)
-    if stiffness is not None:
-        require_positive(stiffness=stiffness)
-    if normal_stress is not None:
-        require_positive(normal_stress=normal_stress)
+    require_positive(stiffness=1.0 if stiffness is None else stiffness)
+    require_positive(normal_stress=1.0 if normal_stress is None else normal_stress)
+    if states not in (1, 2):
+        raise RecordError(f"states must be 1 or 2. Received {states}. Take 2 where one does not explain the record.")
     if isinstance(record, Record):
         if normal_stress is not None:
             raise RecordError("normal_stress goes with a file. Received it beside a Record. Put it into the record.")
@@ -261,76 +305,173 @@ def identify(
         found = read_record(record, normal_stress=normal_stress)
     if len(found.time) < 2 or not np.ptp(found.friction) > 0:
         raise RecordError("a record must have samples in which friction changes. Received none. Give a longer one.")
-    means = thinned(found)
-    if law is not None:
-        return _profiled(_fitted(means, law, stiffness, seed))
-    return _preferred(means, stiffness, seed)
+    kinds = [
+        friction_law(name) if states == 1 else with_two_states(name) for name in ([law] if law else [AGEING, SLIP])
+    ]
+    means, loading = prepared(found, rates)
+    return _Choice(record=means, raw=found, loading=loading, stiffness=stiffness, seed=seed).identified(kinds)
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Fitted:
-    """A record and the best fit of one law to it."""
+    """A setup and the best fit to it."""
 
-    record: Record
+    kind: type[FrictionLaw]
     setup: Setup
     best: Fit
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Choice:
+    """Which law, which nuisance parameters and which noise a record has."""
+
+    record: Record
+    raw: Record
+    loading: Loading | None
+    stiffness: float | None
     seed: int
 
+    def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
+        """The best law, with trend and unsteady beginning where these are likelier, and profiles about its fit."""
+        fits: list[_Fitted] = []
+        for kind in kinds:
+            try:
+                fits.append(self._fitted(kind, {TREND}, fits[0].best if fits else None))
+            except RecordError:  # which no spring holds without a jump
+                if not fits:
+                    raise
+        better = min(fits, key=lambda fitted: fitted.best.squares)
+        noise = self._noise(better)
+        fits = [replace(each, best=_settled(each.best, noise)) for each in fits]
+        fits.sort(key=lambda fitted: fitted.best.squares)
+        better, rival = fits[0], None
+        if len(fits) > 1:
+            squares, excess = advantage(better.best, fits[1].best)
+            rival = Rival(law=fits[1].kind.name, squares=squares, excess=excess)
+        better = self._extended(better)
+        better = replace(better, best=_settled(better.best, self._noise(better)))
+        better = self._without(better, START_STATE)
+        better, other, excess = self._trend(better)
+        better = replace(better, best=_settled(better.best, self._noise(better)))
+        found = replace(self._profiled(better), rival=rival)
+        return replace(found, assessment=self._assessed(found, other, excess))
 
-def _fitted(record: Record, law: str, stiffness: float | None, seed: int, near: Fit | None = None) -> _Fitted:
-    """Best fit of a law, sought first near that of a law with the same quantities."""
-    setup = set_up(record, friction_law(law), stiffness)
-    best = fit(
-        setup.experiment,
-        record.friction[setup.used],
-        seed=seed,
-        counts=None if record.counts is None else record.counts[setup.used],
-        near=None if near is None else near.fitted,
-        search=FitSearch() if near is None else FitSearch(least=_LEAST_NEAR),
-    )
-    return _Fitted(record=record, setup=setup, best=best, seed=seed)
+    def _trend(self, fitted: _Fitted) -> tuple[_Fitted, _Fitted | None, float]:
+        """The fit with or without a trend that is taken, the other one, and by how much the AIC without is higher."""
+        if TREND not in _nuisance(fitted):
+            return fitted, None, 0.0
+        without, squares = self._among(fitted, _nuisance(fitted) - {TREND})
+        excess = fitted.best.excess(squares)
+        taken, other = (fitted, without) if _needed(fitted.best, squares) else (without, fitted)
+        return _again(taken) if taken is without else taken, other, excess - 2
 
+    def _assessed(self, found: Identification, other: _Fitted | None, excess: float) -> Assessment:
+        """Tests of what was taken for granted, and what the record leaves open."""
+        values = found.fit.experiment.outward(found.fit.fitted)
+        checks, factor = checks_of(found.fit, self.raw, self.record, found.used, self.loading, values)
+        doubted = None
+        if other is not None and found.difference is not None and excess < DECISIVE:
+            try:
+                doubted = _difference(other.best, jointly=False)
+            except BetterFit:  # whose valley leads elsewhere: its sign is open
+                doubted = replace(found.difference, low=-math.inf, high=math.inf)
+        sign = sign_check(found.difference, doubted, excess)
+        told = [*found.untold(), *([sign.sentence] if sign is not None and not sign.passed else [])]
+        checks = (*checks, *([sign] if sign is not None else []))
+        return Assessment(checks=checks, factor=factor, open=tuple(told), experiments=tuple(found.experiments(sign)))
 
-def _preferred(record: Record, stiffness: float | None, seed: int) -> Identification:
-    """The one of both laws with state that explains the record better, and by how much."""
-    first = _fitted(record, AGEING, stiffness, seed)
-    try:
-        second = _fitted(record, SLIP, stiffness, seed, first.best)
-    except RecordError:  # which no spring holds without a jump
-        return _profiled(first)
-    better, worse = (second, first) if advantage(second.best, first.best)[1] > 0 else (first, second)
-    squares, excess = advantage(better.best, worse.best)
-    rival = Rival(law=worse.setup.experiment.law.name, squares=squares, excess=excess)
-    return replace(_profiled(better), rival=rival)
+    def _fitted(
+        self, kind: type[FrictionLaw], nuisance: Collection[str], near: Fit | None, start: bool = True
+    ) -> _Fitted:
+        """Best fit of a law, sought near that of a similar one; there alone, or by starts too."""
+        setup = set_up(self.record, kind, self.stiffness, self.loading, nuisance)
+        measured = self.record.friction[setup.used]
+        counts = None if self.record.counts is None else self.record.counts[setup.used]
+        search = FitSearch() if near is None else FitSearch(least=_LEAST_NEAR if start else 1, most=16 if start else 0)
+        at = None if near is None else setup.experiment.near(near.experiment.outward(near.fitted))
+        best = fit(setup.experiment, measured, seed=self.seed, counts=counts, near=at, search=search)
+        return _Fitted(kind=kind, setup=setup, best=best)
 
+    def _noise(self, fitted: _Fitted) -> CorrelatedNoise | None:
+        best, used = fitted.best, fitted.setup.used
+        path = self.record.load_point if self.record.load_point is not None else self.record.slip
+        slopes = np.nan_to_num(best.experiment.slopes(best.fitted), posinf=0, neginf=0)
+        where = None if path is None else path[used]
+        return noise_of(best.residuals, slopes, best.counts, self.record.time[used], where, best.kept)
 
-def _profiled(fitted: _Fitted) -> Identification:
-    """Profiles about the best fit; about a better one if a profile comes upon it."""
-    setup, best = fitted.setup, fitted.best
-    for _ in range(_MOST_BETTER):
-        try:
-            estimates = _estimates(best)
-            difference = _difference(best)
-            break
-        except BetterFit as better:
-            best = settled(replace(best, fitted=better.fitted, agreeing=1), FitSearch())
-    else:
-        raise RecordError(
-            "a record must have one best fit. Received one whose fit gets better wherever it is followed. Give the "
-            "stiffness, or a record with more steps."
+    def _extended(self, fitted: _Fitted) -> _Fitted:
+        """With a beginning off steady sliding, where that is likelier."""
+        if not fitted.kind.state_names:
+            return fitted
+        wider, _ = self._among(fitted, {*_nuisance(fitted), START_STATE})
+        told = replace(wider, best=replace(wider.best, kept=fitted.best.kept))
+        return _again(wider) if _needed(told.best, fitted.best.squares) else fitted
+
+    def _without(self, fitted: _Fitted, name: str) -> _Fitted:
+        """Without a nuisance parameter, where its interval at 95 % holds 0."""
+        if name not in _nuisance(fitted):
+            return fitted
+        narrower, squares = self._among(fitted, _nuisance(fitted) - {name})
+        return fitted if _needed(fitted.best, squares) else _again(narrower)
+
+    def _among(self, fitted: _Fitted, nuisance: Collection[str]) -> tuple[_Fitted, float]:
+        """Fit with other nuisance parameters at the same samples with the same noise, and its sum of squares."""
+        other, best = self._fitted(fitted.kind, nuisance, fitted.best, start=False), fitted.best
+        weights = best.weights
+        at, squares = minimised(other.best.experiment, best.measured, weights, other.best.fitted)
+        told = replace(best, experiment=other.best.experiment, fitted=at)
+        return replace(other, best=told), squares
+
+    def _profiled(self, fitted: _Fitted) -> Identification:
+        """Profiles about the best fit; about a better one if a profile comes upon it."""
+        setup, best = fitted.setup, fitted.best
+        for _ in range(_MOST_BETTER):
+            try:
+                estimates = _estimates(best)
+                difference = _difference(best)
+                break
+            except BetterFit as better:
+                best = settled(replace(best, fitted=better.fitted, agreeing=1), FitSearch())
+        else:
+            raise RecordError(
+                "a record must have one best fit. Received one whose fit gets better wherever it is followed. Give the "
+                "stiffness, or a record with more steps."
+            )
+        pair = [name for name in _EFFECTS_OF if name in estimates]
+        if difference is not None and difference.identified and not any(estimates[name].identified for name in pair):
+            estimates |= {name: _open(estimates[name]) for name in pair}
+        return Identification(
+            record=self.record,
+            fit=best,
+            used=setup.used,
+            estimates=estimates,
+            difference=difference,
+            law=best.experiment.best_law(best.fitted),
+            notes=(*setup.notes, *best.experiment.remarks(best.fitted, best.noise)),
+            seed=self.seed,
         )
-    if difference is not None and difference.identified and not any(estimates[name].identified for name in _PAIR):
-        estimates |= {name: _open(estimates[name]) for name in _PAIR}
-    return Identification(
-        record=fitted.record,
-        fit=best,
-        used=setup.used,
-        estimates=estimates,
-        difference=difference,
-        law=best.experiment.best_law(best.fitted),
-        notes=(*setup.notes, *best.experiment.remarks(best.fitted, best.noise)),
-        seed=fitted.seed,
-    )
+
+
+def _needed(best: Fit, squares: float) -> bool:
+    """Whether a fit is likelier than one with a parameter less, at 95 %, and by more than any machine measures."""
+    floor = _UNSEEN * float(np.ptp(best.measured))
+    seen = squares - best.squares > floor**2 * best.freedom
+    return seen and best.excess(squares) > best.threshold(1)
+
+
+def _nuisance(fitted: _Fitted) -> set[str]:
+    return {c.name for c in fitted.best.experiment.coordinates} & _NUISANCE
+
+
+def _again(fitted: _Fitted) -> _Fitted:
+    return replace(fitted, best=settled(fitted.best, FitSearch()))
+
+
+def _settled(best: Fit, noise: CorrelatedNoise | None) -> Fit:
+    """A fit with another noise."""
+    if noise is None and best.correlated is None:
+        return best
+    return settled(replace(best, correlated=noise), FitSearch())
 
 
 def _estimates(best: Fit) -> dict[str, ParameterEstimate]:
@@ -340,35 +481,43 @@ def _estimates(best: Fit) -> dict[str, ParameterEstimate]:
     only that, the valley of equal fits is straight in them.
     """
     names = [c.name for c in best.experiment.coordinates]
-    if not set(_PAIR) <= set(names):
+    effects = [names.index(name) for name in _EFFECTS_OF if name in names]
+    if len(effects) < 2:
         return {name: _estimate(best, i) for i, name in enumerate(names)}
-    direct, evolution = map(names.index, _PAIR)
-    others_turned = _Turned(best, direct, evolution)
-    first_turned = _Turned(best, evolution, direct)
-    return {name: (first_turned if i == direct else others_turned).estimate(i) for i, name in enumerate(names)}
+    direct, *others = effects
+    others_turned = _Turned(best, direct, tuple(others))
+    first_turned = _Turned(best, others[0], (direct,)) if len(others) == 1 else None
+    return {
+        name: (_estimate(best, i) if first_turned is None else first_turned.estimate(i))
+        if i == direct
+        else others_turned.estimate(i)
+        for i, name in enumerate(names)
+    }
 
 
-def _difference(best: Fit) -> ParameterEstimate | None:
-    """Estimate of the difference of both effects."""
+def _difference(best: Fit, jointly: bool = True) -> ParameterEstimate | None:
+    """Estimate of the difference of the direct effect and all evolution effects."""
     names = [c.name for c in best.experiment.coordinates]
-    if not set(_PAIR) <= set(names):
+    effects = [names.index(name) for name in _EFFECTS_OF if name in names]
+    if len(effects) < 2:
         return None
-    direct, evolution = map(names.index, _PAIR)
-    return _Turned(best, direct, evolution).estimate(direct)
+    return _Turned(best, effects[0], tuple(effects[1:])).estimate(effects[0], jointly)
 
 
 @dataclass(frozen=True)
 class _Turned:
-    """A fit in coordinates with the difference of two in place of the first of them."""
+    """A fit in coordinates with the difference of some in place of the first of them."""
 
     best: Fit
     first: int
-    second: int
+    seconds: tuple[int, ...]
 
-    def estimate(self, place: int) -> ParameterEstimate:
-        turned = Difference(whole=self.best.experiment, first=self.first, second=self.second)
+    def estimate(self, place: int, jointly: bool = True) -> ParameterEstimate:
+        turned = Difference(whole=self.best.experiment, first=self.first, seconds=self.seconds)
         try:
-            return _estimate(replace(self.best, experiment=turned, fitted=turned.difference(self.best.fitted)), place)
+            return _estimate(
+                replace(self.best, experiment=turned, fitted=turned.difference(self.best.fitted)), place, jointly
+            )
         except BetterFit as better:
             raise BetterFit(turned.whole_of(better.fitted)) from None
 
@@ -378,7 +527,7 @@ def _open(told: ParameterEstimate) -> ParameterEstimate:
     return replace(told, low=-math.inf, high=math.inf, least=-math.inf, most=math.inf)
 
 
-def _estimate(best: Fit, place: int) -> ParameterEstimate:
+def _estimate(best: Fit, place: int, jointly: bool = True) -> ParameterEstimate:
     alone = interval(best, place, best.threshold(1))
-    jointly = interval(best, place, best.threshold(len(best.fitted)), inside=alone)
-    return estimate(best, place, (alone.low, alone.high), (jointly.low, jointly.high))
+    of_all = interval(best, place, best.threshold(len(best.fitted)), inside=alone) if jointly else alone
+    return estimate(best, place, (alone.low, alone.high), (of_all.low, of_all.high))

@@ -3,6 +3,7 @@
 Thinning replaces neighbouring samples by their mean where signals vary slowly.
 """
 
+import heapq
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import RecordError, UnitError
@@ -79,8 +79,6 @@ class Record:
         ``"Pa"``, ``"N"`` or nothing.
     counts : ndarray or None
         Of how many measurements every sample is the mean; of one unless told.
-    first_rate : float or None
-        Rate of the load point in its steady beginning [m/s]; that of the samples unless told.
     load_rates : ndarray or None
         Rates of the load point from each sample on [m/s], where these were recorded in place of its displacement.
     remarks : tuple of str
@@ -97,7 +95,6 @@ class Record:
     normal: "np.ndarray"
     normal_unit: str
     counts: "np.ndarray | None" = None
-    first_rate: float | None = None
     load_rates: "np.ndarray | None" = None
     remarks: tuple[str, ...] = ()
     origin: float = 0.0
@@ -443,21 +440,35 @@ def _one_of(given: dict[str, "np.ndarray"], names: Sequence[str], what: str) -> 
 
 
 # ----------------------------------------------------------------------
-# Straight parts of what was measured: its noise from sample to sample, and how far a line goes through it.
+# Noise of what was measured, and long records as means of neighbouring samples.
 
 FAR_OFF = 4.0  # deviations of a displacement that no noise explains
 _FIRST = 20  # samples
 _BENDS = 2  # among the first samples, which a change of rate alone may have
-_MEDIAN = 0.6745  # of the size of a normal deviate
+_MEDIAN, _NINETIETH = 0.6745, 1.645  # of the size of a normal deviate
+MOST_PLAIN = 500  # samples that are taken as they are
+MOST_MEANS = 300
+_MOST_CURVED = 8000  # means, where friction bends far beyond its noise
+_SHARE = 0.5  # of the time since the last change of rate, that a window reaches over
+_PARTS = 8  # of a piece in windows, at least, and of a window in means
+_CURVED = 5.0  # deviations of a mean from its neighbours that noise does not explain
+_FAR_CURVED = 100.0
+_SPIKE, _MOST_SPIKES = 8.0, 20  # deviations from both neighbours; more such samples are no outliers
+_BENT = np.array([[1.0, -1.0, -1.0, 1.0], [1.0, -3.0, 3.0, -1.0]]).T  # of quarters: a bend, and a step in the middle
+_FLOOR = 1e-4  # of the range of friction: what no machine measures
 
 
 def scatter(time: "np.ndarray", values: "np.ndarray") -> float:
-    """Standard deviation of noise from sample to sample: the median distance from the line between both neighbours."""
+    """Standard deviation of noise from sample to sample, of the distances from the line between both neighbours.
+
+    By their median or their ninetieth percentile, whichever is larger: the median of what is read in steps is small.
+    """
     if len(time) < 3:
         return 0.0
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
     off = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
-    return float(np.median(np.abs(off) / np.sqrt(1 + share**2 + (1 - share) ** 2))) / _MEDIAN
+    sizes = np.abs(off) / np.sqrt(1 + share**2 + (1 - share) ** 2)
+    return float(np.max(np.percentile(sizes, (50, 90)) / (_MEDIAN, _NINETIETH)))
 
 
 def reading_step(values: "np.ndarray") -> float:
@@ -468,69 +479,30 @@ def reading_step(values: "np.ndarray") -> float:
     return step if read_in_steps else 1e-9 * float(np.ptp(values))
 
 
-def straight_beginning(time: "np.ndarray", values: "np.ndarray", allowed: float) -> int:
-    """Samples from the first on that lie within `allowed` of their line, at least two."""
-
-    def straight(count: int) -> bool:
-        t, x = time[:count] - np.mean(time[:count]), values[:count] - np.mean(values[:count])
-        return bool(np.max(np.abs(x - t * (t @ x) / (t @ t))) <= allowed)
-
-    good, bad = 2, 4
-    while bad <= len(time) and straight(bad):
-        good, bad = bad, 2 * bad
-    bad = min(bad, len(time) + 1)
-    while bad - good > 1:
-        count = (good + bad) // 2
-        good, bad = (count, bad) if straight(count) else (good, count)
-    return min(good, len(time))
-
-
-def first_rate(time: "np.ndarray", position: "np.ndarray") -> float:
-    """Rate [m/s] of a position that moves steadily at first: of the longest beginning that is a line but for noise."""
-    allowed = FAR_OFF * scatter(time, position) + reading_step(position)
-    count = straight_beginning(time, position, allowed)
-    return float(np.polyfit(time[:count], position[:count], 1)[0])
-
-
-# ----------------------------------------------------------------------
-# Long records as means of neighbouring samples, over times that are short against everything that changes.
-
-MOST_PLAIN = 3000  # samples that are taken as they are
-MOST_MEANS = 20000
-_SHARE = 0.1  # of the time to the nearest bend, that a mean is taken over
-_MOST_COUNT = 2500  # samples of a mean, whose noise would otherwise be less than what a bend adds
-_ACCIDENT = 0.05  # chance that noise alone makes a bend somewhere in a column
-_FRICTION_FLOOR = 1e-4  # of its range, and of a normal load: what no machine measures
-_NORMAL_FLOOR = 1e-5
-_STEEPEST = 1e4  # of friction over any displacement [1/m]: machines and D_c of laboratories are softer and longer
-
-
-def thinned(record: Record) -> Record:
+def thinned(record: Record, begins: "np.ndarray | None" = None, *, follow: bool = False) -> Record:
     """A record with means in place of samples, and how many samples each stands for; short ones as they are.
 
-    Friction, load point, slip and normal load are cut into pieces in which each is a line but for its noise. A mean is
-    taken over at most a tenth of the time to the nearer end of its piece, thus over a twentieth of the piece at most:
-    steps and what follows them keep their samples. Where a piece bends by as much as its noise hides, 5 deviations,
-    the mean over a time then differs from friction at the mean time by 0.004 deviations of a sample, which is a fifth
-    of the noise of the mean of 2500, the most that there are.
+    After every change of the rate of loading, windows reach over at most half of the time since then, and an eighth of
+    the piece. A window over which friction, slip or normal load bends by more than its noise explains is halved, the
+    most curved first, until there are `MOST_MEANS`; eight means are then taken in every window, so that a bend which
+    its noise hides moves a mean by a twentieth of its own noise. Steps and what follows them keep their samples.
 
     Parameters
     ----------
     record : Record
-
-    Raises
-    ------
-    RecordError
-        When too many means are left.
+    begins : ndarray, optional
+        Times at which the rate of loading changes [s].
+    follow : bool
+        Whether the load point bends in between as well.
     """
-    if len(record.time) <= MOST_PLAIN:
+    count = len(record.time)
+    if count <= MOST_PLAIN:
         return record
-    edges = _edges(record.time, _bends(record))
-    if len(edges) - 1 > MOST_MEANS:
-        raise RecordError(
-            f"a record must have at most {MOST_MEANS} samples or means over times in which nothing bends. Received "
-            f"{len(record.time)} samples, which need {len(edges) - 1}. Cut out the part that counts."
-        )
+    starts = np.unique(np.searchsorted(record.time, [record.time[0], *([] if begins is None else begins)]))
+    windows = _edges(record.time, np.append(starts[starts < count], count))
+    edges = _halved(
+        record, np.union1d(windows, _spikes(record.friction, scatter(record.time, record.friction))), follow
+    )
     counts = np.diff(edges)
 
     def means(values: "np.ndarray") -> "np.ndarray":
@@ -541,44 +513,68 @@ def thinned(record: Record) -> Record:
         record,
         time=means(record.time),
         friction=means(record.friction),
+        normal=means(record.normal),
+        load_rates=None,
+        counts=counts,
         load_point=None if record.load_point is None else means(record.load_point),
         slip=None if record.slip is None else means(record.slip),
-        normal=means(record.normal),
-        counts=counts,
-        first_rate=None if record.load_point is None else first_rate(record.time, record.load_point),
     )
 
 
-def _bends(record: Record) -> "np.ndarray":
-    """Samples at which a column leaves its line by more than its noise, with the first and the end."""
-    friction = max(_noise(record.time, record.friction), _FRICTION_FLOOR * float(np.ptp(record.friction)))
-    columns = [(record.friction, friction), (record.normal, _NORMAL_FLOOR * float(np.max(record.normal)))]
-    columns += [(moved, friction / _STEEPEST) for moved in (record.load_point, record.slip) if moved is not None]
-    bends = {0, len(record.time)}
-    for values, floor in columns:
-        allowed, begin = max(_noise(record.time, values), floor), 0
-        while begin < len(record.time):
-            begin += straight_beginning(record.time[begin:], values[begin:], allowed)
-            bends.add(begin)
-    return np.array(sorted(bends))
-
-
-def _noise(time: "np.ndarray", values: "np.ndarray") -> float:
-    """What noise and steps of reading add to a line at most, but for a small chance."""
-    return float(stats.norm.isf(_ACCIDENT / 2 / len(time))) * scatter(time, values) + reading_step(values)
-
-
-def _edges(time: "np.ndarray", bends: "np.ndarray") -> "np.ndarray":
-    """First samples of all means, and the end; nothing bends at the ends of a record, whose first sample stays."""
-    edges = [0, 1]
-    for begin, end in zip(bends[:-1].tolist(), bends[1:].tolist(), strict=True):
-        first = time[begin] if begin > 0 else -np.inf
-        last = time[end - 1] if end < len(time) else np.inf
-        longest, at = _SHARE / 2 * (time[end - 1] - time[begin]), max(begin, 1)
+def _edges(time: "np.ndarray", starts: "np.ndarray") -> "np.ndarray":
+    """First samples of all windows, and the end."""
+    edges = [0]
+    for begin, end in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+        at, longest = begin + 1, (time[end - 1] - time[begin]) / _PARTS
         while at < end:
-            before, after = _SHARE * (time[at] - first), _SHARE * (last - time[at]) / (1 + _SHARE)
-            until = time[at] + min(before, after, longest)
-            ahead = time[at : min(at + _MOST_COUNT, end)]
-            at += max(1, int(np.searchsorted(ahead, until, side="right")))
             edges.append(at)
-    return np.array(edges)
+            until = time[at] + min(_SHARE * (time[at] - time[begin]), longest)
+            at += max(1, int(np.searchsorted(time[at:end], until, side="right")))
+        edges.append(end)
+    return np.unique(edges)
+
+
+def _spikes(values: "np.ndarray", noise: float) -> "np.ndarray":
+    """Samples far from both neighbours, and those after them: an outlier must not be lost in a mean."""
+    off = np.zeros(len(values))
+    off[1:-1] = np.minimum.reduce([(values[1:-1] - values[:-2]) ** 2, (values[1:-1] - values[2:]) ** 2])
+    far = np.flatnonzero(off > (_SPIKE * noise) ** 2)
+    return np.concatenate([far, far + 1]) if len(far) <= _MOST_SPIKES else np.empty(0, dtype=int)
+
+
+def _halved(record: Record, edges: "np.ndarray", follow: bool) -> "np.ndarray":
+    """First samples of all means, and the end: windows halved where a column bends, the most curved first."""
+    time = record.time
+    columns = []
+    followed = ((record.load_point, 1e-3),) if follow else ()
+    for values, least in ((record.friction, _FLOOR), (record.slip, 1e-3), (record.normal, 1e-3), *followed):
+        if values is not None and np.ptp(values) > 0:
+            noise = max(scatter(time, values) + reading_step(values) / 3, least * float(np.ptp(values)))
+            columns.append(np.concatenate([[0.0], np.cumsum((values - values[0]) / noise)]))
+
+    def bend(begin: int, end: int) -> float:
+        """Bend, or step, of the means of quarters in deviations; of two or three samples their largest change."""
+        if end - begin < 2:
+            return 0.0
+        if end - begin < 4:
+            return max(
+                (float(np.max(np.abs(np.diff(sums[begin : end + 1], 2)))) / 2**0.5 for sums in columns), default=0.0
+            )
+        cuts = np.linspace(begin, end, 5).astype(int)
+        each = (end - begin) / 4
+        quarters = np.array([np.diff(sums[cuts]) / np.diff(cuts) for sums in columns])
+        sizes = np.abs(quarters @ _BENT) / np.sqrt(np.sum(_BENT**2, axis=0) / each)
+        return float(np.max(sizes, initial=0.0))
+
+    heap = [(-bend(begin, end), begin, end) for begin, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)]
+    heapq.heapify(heap)
+    means = sum(min(_PARTS, end - begin) for _, begin, end in heap)
+    while heap and -heap[0][0] > (_CURVED if means < MOST_MEANS else _FAR_CURVED) and means < _MOST_CURVED:
+        _, begin, end = heapq.heappop(heap)
+        middle = (begin + end) // 2
+        for part in ((begin, middle), (middle, end)):
+            heapq.heappush(heap, (-bend(*part), *part))
+            means += min(_PARTS, part[1] - part[0])
+        means -= min(_PARTS, end - begin)
+    parts = [np.linspace(begin, end, min(_PARTS, end - begin), endpoint=False).astype(int) for _, begin, end in heap]
+    return np.append(np.sort(np.concatenate(parts)), len(time))

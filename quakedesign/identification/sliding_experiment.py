@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from quakedesign.fault import FrictionLaw
-from quakedesign.identification.experiment import Coordinate, Experiment, fitted_quantities
+from quakedesign.identification.experiment import Coordinate, Experiment, fitted_quantities, holding
 from quakedesign.symbolic.casadi_printer import to_casadi
 from quakedesign.symbolic.plant import x1
 from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
@@ -67,6 +67,8 @@ _MOST_STEPS = 30  # a sample on average; what needs more runs away, or is far to
 _SAFETY = 0.9
 _SHORTEST = 1e-8  # of the time between two samples
 STIFFNESS = "stiffness"
+START_STATE = "start_state"
+"""Logarithm of the state at the first sample over that of steady sliding."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,13 +111,15 @@ class SlidingExperiment(Experiment):
         With any values for what is fitted.
     drive : Drive
     coordinates : tuple of Coordinate
-        Logarithmic: the quantities that are fitted, and the stiffness where it is.
+        The quantities that are fitted, and the stiffness where it is.
     stiffness : float, optional
         Where it is given, in units of normal stress, or of normal force, per m.
     normal_unit : str
         ``"Pa"``, ``"N"`` or nothing.
     steps : tuple of tuple of float
-        Lengths [s] of the steps that are taken between neighbouring samples.
+        Lengths [s] of the steps that are taken between neighbouring instants.
+    measured : ndarray of bool
+        Instants that are samples; the others are changes of rate between them.
     """
 
     law: FrictionLaw
@@ -124,6 +128,7 @@ class SlidingExperiment(Experiment):
     stiffness: float | None
     normal_unit: str
     steps: tuple[tuple[float, ...], ...]
+    measured: "np.ndarray"
 
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
         """Friction coefficient [-] at every sample, sliding steadily at the first."""
@@ -147,7 +152,8 @@ class SlidingExperiment(Experiment):
 
     def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
         """The mass from which on inertia would have been seen."""
-        rates = self.rates(fitted)
+        ends = np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
+        rates = np.exp(self._states(fitted)[0, ends])
         acceleration = float(np.max(np.abs(np.diff(rates) / self.drive.lengths * self.drive.compliance)))
         if not (acceleration > 0 and self.normal_unit):
             return ()
@@ -161,7 +167,8 @@ class SlidingExperiment(Experiment):
             "slowest_rate": float(f"{np.min(rates) / 2:.2g}"),
             "fastest_rate": float(f"{2 * np.max(rates):.2g}"),
         }
-        return replace(law, **{name: end for name, end in ends.items() if name in law.quantities()})  # type: ignore[type-var]
+        effect = {"evolution_effect": getattr(law, "evolution_effect", 1.0)}
+        return holding(law, {n: end for n, end in (ends | effect).items() if n in law.quantities()})
 
     def resolved(self, fitted: "np.ndarray", accuracy: float) -> "SlidingExperiment":
         """The same experiment in as many steps as an accuracy of friction needs at given coordinates.
@@ -183,7 +190,9 @@ class SlidingExperiment(Experiment):
 
     @cached_property
     def _sampled(self) -> "np.ndarray":
-        return np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
+        ends: np.ndarray = np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
+        sampled: np.ndarray = ends[self.measured]
+        return sampled
 
     @cached_property
     def _inputs(self) -> "np.ndarray":
@@ -207,7 +216,8 @@ class SlidingExperiment(Experiment):
 
     @cached_property
     def _build(self) -> dict[str, Any]:
-        return _built(self.law, tuple(c.name for c in self.coordinates), self.stiffness, self.drive.first_rate)
+        linear = frozenset(c.name for c in self.coordinates if not c.logarithmic)
+        return _built(self.law, tuple(c.name for c in self.coordinates), self.stiffness, self.drive.first_rate, linear)
 
 
 @dataclass(frozen=True)
@@ -247,9 +257,11 @@ class _Course:
 
 
 @lru_cache(maxsize=8)
-def _built(law: FrictionLaw, names: tuple[str, ...], stiffness: float | None, first_rate: float) -> dict[str, Any]:
+def _built(
+    law: FrictionLaw, names: tuple[str, ...], stiffness: float | None, first_rate: float, linear: frozenset[str]
+) -> dict[str, Any]:
     """CasADi Functions of a step, its derivatives and what is read, for logarithms of rate, states and coordinates."""
-    model = _Model(law, names, stiffness)
+    model = _Model(law, names, stiffness, linear)
     count, size = len(names), 1 + len(law.state_names)
     q, u = ca.SX.sym("q", count), ca.SX.sym("u", 4)
     y, slopes = ca.SX.sym("y", size), ca.SX.sym("slopes", size, count)
@@ -278,6 +290,7 @@ class _Model:
     law: FrictionLaw
     names: tuple[str, ...]
     stiffness: float | None
+    linear: frozenset[str]
 
     def friction(self, y: Any, q: Any) -> Any:
         return self._casadi([self._expressions[0]], y, q)[0]
@@ -296,10 +309,12 @@ class _Model:
         return ca.vertcat(drawn / (v * mu_rate), *(others[size + i] / ca.exp(y[1 + i]) for i in range(size)))
 
     def start(self, first_rate: float, q: Any) -> Any:
-        """Steady sliding."""
+        """Steady sliding, but for a state that is off by what is fitted."""
         steady = self.law.symbolic().steady_state(rate)
-        values = fitted_quantities(self.law, self.names, q) | {rate: ca.SX(first_rate)}
-        return ca.log(ca.vertcat(first_rate, *to_casadi(steady, values)))
+        values = fitted_quantities(self.law, self.names, q, self.linear) | {rate: ca.SX(first_rate)}
+        states = ca.log(ca.vertcat(*to_casadi(steady, values)))
+        off = q[self.names.index(START_STATE)] if START_STATE in self.names else 0
+        return ca.vertcat(np.log(first_rate), states + off)
 
     @property
     def _states(self) -> tuple[Any, ...]:
@@ -313,4 +328,4 @@ class _Model:
 
     def _casadi(self, expressions: Any, y: Any, q: Any) -> list[Any]:
         moving = {x: ca.exp(y[i]) for i, x in enumerate((rate, *self._states))}
-        return to_casadi(expressions, fitted_quantities(self.law, self.names, q) | moving)
+        return to_casadi(expressions, fitted_quantities(self.law, self.names, q, self.linear) | moving)

@@ -9,6 +9,7 @@ import numpy as np
 
 from quakedesign.errors import OutputError
 from quakedesign.files import write_whole
+from quakedesign.identification.assessment import CANNOT_TELL, EXPLAINS_NOT
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
 from quakedesign.report.drawing import FORMATS, NATURAL, SMALL, clock, figure, figure_bytes, finish
 
@@ -19,9 +20,17 @@ _SHORT, _LONG = 2e-7, 0.01  # D_c [m] that no gouge of a laboratory has
 
 def identification_lines(identification: Identification) -> list[str]:
     """For people, within 80 columns: what was not told first."""
-    fit = identification.fit
-    verdict = "every parameter identified" if identification.identified else "not every parameter is identifiable"
-    head = [f"{identification.record.name}: {identification.law.name}, {verdict}", *identification.untold(), ""]
+    fit, assessment = identification.fit, identification.assessment
+    head = [f"{identification.record.name}: {identification.law.name} {assessment}"]
+    if assessment.verdict == CANNOT_TELL:
+        head = [f"{identification.record.name}: {identification.law.name}, {assessment}"]
+        head += [f"- {said}" for said in assessment.open]
+        head += [f"- would tell: {said}" for said in assessment.experiments]
+    elif assessment.verdict == EXPLAINS_NOT:
+        head += [f"- {said}" for said in identification.untold()]
+        head += [f"- try: {'; '.join(identification.to_try())}"]
+    head += [f"{'' if check.passed else 'NOT '}passed: {check.sentence}" for check in assessment.checks]
+    head += [""]
     columns = f"{'parameter':24}{'value':>12}{'95 %: from':>14}{'to':>12}  unit"
     shown = [*identification.estimates.values(), *([identification.difference] if identification.difference else [])]
     tail = [
@@ -43,7 +52,9 @@ def _wrapped(told: list[str]) -> list[str]:
 
 
 def _row(estimate: ParameterEstimate) -> str:
-    name = "difference a - b" if " - " in estimate.name else estimate.name
+    name = estimate.name
+    if " - " in name:
+        name = "difference a - b" if name.count(" - ") == 1 else "difference a - b - b2"
     low, high = (f"{end:.5g}" if math.isfinite(end) else "?" for end in (estimate.low, estimate.high))
     return f"{name:24}{estimate.value:>12.5g}{low:>14}{high:>12}  {estimate.unit or '-'}"
 
@@ -57,12 +68,10 @@ def _warnings(identification: Identification) -> list[str]:
             f"{'shorter' if short else 'longer'} than the some 1 to 100 um of laboratories: check the unit of the "
             "displacement"
         )
-    if not identification.explained:
-        told.append(
-            f"residuals are correlated over {identification.fit.correlation:.1f} samples: law or machine explain the "
-            "record only in part; regions are widened by that, as if there were fewer samples. Try: "
-            f"{'; '.join(identification.to_try())}"
-        )
+    if (correlated := identification.fit.correlated) is not None:
+        size = identification.fit.noise * correlated.share**0.5
+        length = f"{correlated.length:.2g} {'s' if correlated.of_time else 'm'}"
+        told.append(f"noise that neighbours share: {size:.2g} of friction, fading over {length}; regions include it")
     return told
 
 

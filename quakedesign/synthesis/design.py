@@ -11,7 +11,7 @@ from typing import Any
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError, require_known
-from quakedesign.fault import Fault, require_fault
+from quakedesign.fault import Fault, require_fault, with_accepted_fit
 from quakedesign.fault.units import exact_value
 from quakedesign.guarantees import (
     CLASSES,
@@ -216,6 +216,7 @@ def design(
     spread: Quantity = 0,
     disturbance_class: str = CLASSES[0],
     progress: Callable[[str, float], None] | None = None,
+    accept_poor_fit: bool = False,
     **given: Quantity | None,
 ) -> Design:
     """Find gains with a proof for a fault.
@@ -261,6 +262,9 @@ def design(
         and is no faster either, such as a tide.
     progress : callable, optional
         Called with what the search for a law around friction with a state is doing, and the fraction done [-].
+    accept_poor_fit : bool
+        Whether to go on for a fault whose friction its record does not support (`Fault.poor_fit`); the fault, and what
+        is said of it, is then named so.
     **given : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
@@ -281,6 +285,7 @@ def design(
         For a law that does not apply to friction with a state.
     """
     require_fault(fault)
+    fault = with_accepted_fit(fault, accept_poor_fit)
     law, setup = control_law(controller), setup.with_given(**given)
     if unknown := setup.given().keys() - _DESIGNED_FOR:
         raise ParameterError(

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.exact import exact_text, rational
-from quakedesign.fault import Fault
+from quakedesign.fault import Fault, with_accepted_fit
 from quakedesign.fault.units import exact_value
 from quakedesign.guarantees import CLASSES, OBJECTIVES, LoopAnswer, NoGuarantee
 from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
@@ -87,6 +87,7 @@ def guarantee(
     spread: Quantity = 0,
     plant: str = PLANTS[0],
     progress: Callable[[str, float], None] | None = None,
+    accept_poor_fit: bool = False,
     **given: Quantity | None,
 ) -> LoopAnswer | SlidingAnswer | StickSlipAnswer:
     """Prove bounds of slip, slip rate and pressure of the sampled loop, as the command `guarantee` does.
@@ -122,6 +123,9 @@ def guarantee(
         prediction that is never negative (`StickSlipLaw`), for exact measurements and a pressure that acts at once.
     progress : callable, optional
         Called with what a search for rate-and-state friction or the stick–slip plant does, and the fraction done [-].
+    accept_poor_fit : bool
+        Whether to go on for a fault whose friction its record does not support (`Fault.poor_fit`); the fault, and what
+        is said of it, is then named so.
     **given : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
@@ -138,7 +142,7 @@ def guarantee(
     UnsupportedError
         For a controller that does not apply to the friction.
     """
-    setup = setup.with_given(**given)
+    fault, setup = with_accepted_fit(fault, accept_poor_fit), setup.with_given(**given)
     require_known(plant, PLANTS, "plant")
     if law is None and isinstance(controller, Controller):
         law = controller

@@ -10,7 +10,7 @@ import pytest
 from quakedesign.fault import friction_law
 from quakedesign.identification.fitting import fit
 from quakedesign.identification.identify import set_up
-from quakedesign.identification.record import thinned
+from quakedesign.identification.loading import prepared
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
 synthetic = importlib.util.module_from_spec(SPECIFICATION)
@@ -22,8 +22,8 @@ REPEATS = 100
 
 
 def fitted(made, seed):
-    record = thinned(made.noisy(seed))
-    setup = set_up(record, friction_law(made.law), made.stiffness)
+    record, loading = prepared(made.noisy(seed))
+    setup = set_up(record, friction_law(made.law), made.stiffness, loading)
     counts = None if record.counts is None else record.counts[setup.used]
     return fit(setup.experiment, record.friction[setup.used], seed=seed, counts=counts)
 

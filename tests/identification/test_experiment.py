@@ -9,10 +9,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from quakedesign.fault import friction_law
-from quakedesign.identification.experiment import Difference
+from quakedesign.identification.experiment import TREND, Difference
 from quakedesign.identification.identify import set_up
-from quakedesign.identification.record import first_rate
-from quakedesign.identification.sliding_experiment import step
+from quakedesign.identification.loading import prepared
+from quakedesign.identification.sliding_experiment import START_STATE, step
+from quakedesign.identification.two_states import with_two_states
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
 synthetic = importlib.util.module_from_spec(SPECIFICATION)
@@ -22,7 +23,8 @@ SPECIFICATION.loader.exec_module(synthetic)
 
 def experiment(made):
     """Experiment of a record without noise, and the true coordinates."""
-    setup = set_up(made.noisy(0), friction_law(made.law), made.stiffness)
+    record, loading = prepared(made.noisy(0))
+    setup = set_up(record, friction_law(made.law), made.stiffness, loading)
     values = made.true_at(getattr(setup.experiment.law, "reference_rate", None))
     return setup.experiment, setup.experiment.inward([values[c.name] for c in setup.experiment.coordinates])
 
@@ -64,15 +66,15 @@ def test_slopes_are_those_of_differences(kind):
     slopes = simulated.slopes(truth)
     for i in range(len(truth)):
         moved = np.zeros(len(truth))
-        moved[i] = 1e-5
-        difference = (simulated.friction(truth + moved) - simulated.friction(truth - moved)) / 2e-5
+        moved[i] = 1e-5 if simulated.coordinates[i].logarithmic else 1e-7
+        difference = (simulated.friction(truth + moved) - simulated.friction(truth - moved)) / (2 * moved[i])
         off = np.abs(difference - slopes[:, i]) > 1e-6 * np.max(np.abs(slopes[:, i]))
         assert off.sum() <= 1  # the sample at which a stick ends, where friction has a kink
 
 
 def test_the_difference_of_effects_is_a_coordinate_like_any_other():
     simulated, truth = experiment(synthetic.KINDS["velocity steps, ageing"]())
-    turned = Difference(whole=simulated, first=1, second=2)
+    turned = Difference(whole=simulated, first=1, seconds=(2,))
     at = turned.difference(truth)
     assert at[1] == pytest.approx(0.008 - 0.010)
     np.testing.assert_allclose(turned.friction(at), simulated.friction(truth), rtol=1e-12)
@@ -104,12 +106,58 @@ def test_a_block_does_not_slip_back_when_the_load_point_returns():
     assert drawn.slip(truth)[-1] == drawn.slip(truth)[-3]
 
 
-def test_the_first_rate_is_that_before_the_first_step():
-    time = np.arange(0, 100, 0.1)
-    position = 1e-6 * np.minimum(time, 50) + 2e-6 * np.maximum(time - 50, 0)
-    assert first_rate(time, position) == pytest.approx(1e-6, rel=1e-3)
-    assert first_rate(time, np.round(position / 1e-6) * 1e-6) == pytest.approx(1e-6, rel=3e-2)
-    noise = 1e-8 * np.random.default_rng(0).standard_normal(len(time))
-    assert first_rate(time, position + noise) == pytest.approx(1e-6, rel=1e-3)
-    late = np.array([0.0, 10.0, *range(11, 40)])  # two samples before the step, in uneven time
-    assert first_rate(late, np.where(late <= 10, late, 10 * late - 90)) == pytest.approx(1)
+@pytest.mark.parametrize("kind", ["velocity steps, ageing", "slide-hold-slide, stiffness fitted"])
+def test_slopes_by_trend_and_unsteady_beginning_are_those_of_differences(kind):
+    made = synthetic.KINDS[kind]()
+    record, loading = prepared(made.noisy(0))
+    law = friction_law(made.law)
+    plain, wide = (set_up(record, law, made.stiffness, loading, more).experiment for more in ((), (TREND, START_STATE)))
+    values = made.true_at(plain.law.reference_rate)
+    at = wide.inward([(values | {TREND: 30.0, START_STATE: 0.3})[c.name] for c in wide.coordinates])
+    wide = wide.resolved(at, 1e-5)
+    slopes = wide.slopes(at)
+    for i, coordinate in enumerate(wide.coordinates):
+        moved = np.zeros(len(at))
+        moved[i] = {TREND: 3e-4, "evolution_effect": 1e-7}.get(coordinate.name, 1e-5)
+        difference = (wide.friction(at + moved) - wide.friction(at - moved)) / (2 * moved[i])
+        np.testing.assert_allclose(difference, slopes[:, i], atol=1e-6 * np.max(np.abs(slopes[:, i])))
+    steady = at.copy()
+    steady[-1], steady[-2] = 0, 0
+    same = plain.resolved(plain.near(wide.outward(steady)), 1e-7).friction(plain.near(wide.outward(steady)))
+    np.testing.assert_allclose(wide.resolved(steady, 1e-7).friction(steady), same, atol=1e-6)
+    first = wide.friction(at)[0] - same[0]
+    assert first == pytest.approx(0.3 * values["evolution_effect"])
+    steady[-1] = 30.0
+    path = record.load_point - record.load_point[0]
+    np.testing.assert_allclose(wide.resolved(steady, 1e-7).friction(steady) - same, 30 * path, atol=2e-6)
+
+
+def test_two_states_are_those_of_an_independent_integrator():
+    """The second effect is negative; SciPy's Radau on equations written down here."""
+    made = synthetic.KINDS["velocity steps, ageing"]()
+    record, loading = prepared(made.noisy(0))
+    experiment = set_up(record, with_two_states(made.law), made.stiffness, loading).experiment
+    a, b, d, second, far, mu, k = 0.008, 0.010, 1e-5, -0.004, 6e-5, 0.6, 1e-3 / 1e-6
+    told = {"direct_effect": a, "evolution_effect": b, "critical_slip": d, "second_effect": second, "second_slip": far}
+    values = told | {"reference_coefficient": mu}
+    at = experiment.inward([values[c.name] for c in experiment.coordinates])
+    found = experiment.resolved(at, 1e-7).friction(at)
+    y, exact, begins = np.log([1e-6, d / 1e-6, far / 1e-6]), [], [*loading.pieces.begins, record.time[-1] + 1]
+
+    def rates(speed):
+        def of(_time, y):
+            v, ages = np.exp(y[0]), np.exp(y[1:])
+            change = 1 / ages - v / np.array([d, far])
+            return [(k * (speed - v) - b * change[0] - second * change[1]) / a, *change]
+
+        return of
+
+    for begin, end, speed in zip(begins[:-1], begins[1:], loading.pieces.rates, strict=True):
+        inside = record.time[(record.time >= begin) & (record.time < end)]
+        run = solve_ivp(rates(speed), (begin, end), y, "Radau", t_eval=[*inside, end], rtol=1e-9, atol=1e-11)
+        v, one, two = run.y[:, :-1]
+        exact += (
+            mu + a * (v - np.log(1e-6)) + b * (np.log(1e-6 / d) + one) + second * (np.log(1e-6 / far) + two)
+        ).tolist()
+        y = run.y[:, -1]
+    np.testing.assert_allclose(found, exact, atol=3e-6)

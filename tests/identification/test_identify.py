@@ -25,6 +25,7 @@ from quakedesign.identification.fault_file import (
 )
 from quakedesign.identification.identification_result import ParameterEstimate, Rival
 from quakedesign.identification.identify import identify, set_up
+from quakedesign.identification.loading import prepared
 from quakedesign.identification.record import Record
 from quakedesign.plant import slow_sliding_plant
 from quakedesign.report.identification_page import identification_lines
@@ -65,8 +66,9 @@ def test_reprs_are_one_line_with_what_was_found(weak):
 
 def test_ends_are_those_of_linear_least_squares_where_the_law_is_linear():
     """With a critical slip that is known, friction is linear in the other two: Fisher's ellipsoid in closed form."""
-    found = identify(synthetic.weakening().noisy(4), "exponential-slip-weakening")
+    found = identify(synthetic.weakening().noisy(1), "exponential-slip-weakening")
     assert found.identified
+    assert list(found.estimates) == ["residual", "drop", "critical_slip"]
     fit = found.fit
     slopes = fit.experiment.slopes(fit.fitted)[fit.kept]
     covariance = np.linalg.inv(slopes.T @ slopes) * fit.noise**2
@@ -128,7 +130,8 @@ def test_the_velocity_step_of_rsfmodel_gives_back_its_parameters():
 def test_the_mass_from_which_inertia_counts_and_the_noise_of_slip_are_told():
     """By hand: noise of 5 MPa over the largest change of rate between samples; the steepest friction times 50 µm."""
     made = synthetic.KINDS["velocity steps, ageing"]()
-    experiment = set_up(made.noisy(0), friction_law(made.law), made.stiffness).experiment
+    record, loading = prepared(made.noisy(0))
+    experiment = set_up(record, friction_law(made.law), made.stiffness, loading).experiment
     truth = experiment.inward([made.true_at(experiment.law.reference_rate)[c.name] for c in experiment.coordinates])
     change = np.max(np.abs(np.diff(experiment.rates(truth)))) / 0.2
     (told,) = experiment.remarks(truth, 3e-4)

@@ -1,13 +1,14 @@
 """What is said at the thresholds of what a record tells, with results made by hand."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import friction_law
+from quakedesign.identification.assessment import Assessment
 from quakedesign.identification.experiment import Coordinate, Experiment
 from quakedesign.identification.fitting import Fit
 from quakedesign.identification.identification_result import Identification, Outlier, ParameterEstimate, Rival, estimate
@@ -97,11 +98,14 @@ def test_one_end_that_is_not_set_leaves_a_parameter_untold(end):
     assert not identification(estimates={"drop": found, "residual": told("residual")}).identified
 
 
-def test_up_to_two_samples_for_an_independent_one_a_record_is_explained():
-    for correlation, explained in ((2.0, True), (math.nextafter(2.0, 3), False)):
-        fit = made()
-        vars(fit)["correlation"] = correlation
-        assert identification(fit).explained is explained
+def test_residuals_of_more_than_twice_the_noise_are_not_explained():
+    for factor, verdict in ((2.0, "explains the record"), (math.nextafter(2.0, 3), "does not explain the record")):
+        found = replace(identification(), assessment=Assessment(checks=(), factor=factor))
+        assert found.assessment.verdict == verdict
+        assert found.explained == found.identified == (factor == 2.0)
+        assert found.determined
+    doubtful = replace(identification(), assessment=Assessment(checks=(), factor=1.0, open=("sign",)))
+    assert (doubtful.assessment.verdict, doubtful.explained, doubtful.identified) == ("cannot tell", False, True)
 
 
 def test_an_aic_higher_by_more_than_ten_tells_laws_apart():
@@ -163,7 +167,7 @@ def test_what_to_try_leaves_out_what_was_tried():
     assert "another --law" in identification().to_try()
     assert "no --law, which fits both laws with a state" in identification(law=state).to_try()
     rival = Rival(law="x", squares=2.0, excess=30.0)
-    assert len(identification(law=state, rival=rival).to_try()) == 2
+    assert len(identification(law=state, rival=rival).to_try()) == 3
     measured = identification(estimates={"stiffness": told("stiffness", unit="Pa/m")}, rival=rival).to_try()
     assert measured[1] == "--stiffness of the machine, if it was measured"
 
@@ -171,7 +175,13 @@ def test_what_to_try_leaves_out_what_was_tried():
 def test_the_file_of_a_result_has_its_numbers():
     fit = made(kept=(True, True, True, True, False))
     found = identification(fit, estimates={"drop": told(least=-math.inf)}, difference=told("drop - x")).to_dict()
-    assert found["residual"] == {"noise": fit.noise, "unit": "", "samples": 4, "correlation": fit.correlation}
+    assert found["residual"] == {
+        "noise": fit.noise,
+        "unit": "",
+        "samples": 4,
+        "correlation": fit.correlation,
+        "correlated": None,
+    }
     assert (found["measurements"], found["rival"], found["box"]) == (7, None, {"drop": [None, 4.0]})
     assert found["starts"] == {"seed": 3, "searches": 4, "agreeing": 2}
     assert list(found["chosen"]) == ["residual", "critical_slip"]

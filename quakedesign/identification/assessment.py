@@ -1,0 +1,222 @@
+"""Whether a fit explains a record: tests of what it takes for granted, and a verdict in words.
+
+The noise to compare with is measured where no friction law is needed: from sample to sample, and about a line in the
+steady beginning.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from quakedesign.identification.experiment import TREND
+from quakedesign.identification.fitting import Fit, weighed
+from quakedesign.identification.loading import Loading
+from quakedesign.identification.record import Record, scatter
+from quakedesign.identification.sliding_experiment import START_STATE
+
+SEVERAL = 2.0  # times the noise: residuals as large are no noise
+_PEAK = 10.0  # critical slips after a change of rate
+_DRIFT = 4.0  # deviations by which a trend may change at the last change of rate
+DECISIVE = 10.0  # of AIC, by which a trend is beyond doubt
+EXPLAINS, EXPLAINS_NOT, CANNOT_TELL = "explains the record", "does not explain the record", "cannot tell"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """One test of an assumption.
+
+    Attributes
+    ----------
+    name : str
+    passed : bool
+    value : float
+        What is compared [-].
+    limit : float
+        With what.
+    sentence : str
+    """
+
+    name: str
+    passed: bool
+    value: float
+    limit: float
+    sentence: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assessment:
+    """Tests of a fit, with the verdict on it.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    factor : float
+        Residuals over the noise [-]: the largest of the whole record and of what follows changes of rate.
+    open : tuple of str
+        What the record cannot tell, in sentences.
+    experiments : tuple of str
+        Which would.
+    """
+
+    checks: tuple[Check, ...]
+    factor: float
+    open: tuple[str, ...] = ()
+    experiments: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """One of three."""
+        if self.factor > SEVERAL:
+            return EXPLAINS_NOT
+        return CANNOT_TELL if self.open else EXPLAINS
+
+    def __str__(self) -> str:
+        if self.verdict == EXPLAINS_NOT:
+            return f"{self.verdict}: residuals are {self.factor:.2g} times the noise"
+        return self.verdict
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that JSON can hold."""
+        checks = [asdict(check) for check in self.checks]
+        return {"verdict": self.verdict, "factor": self.factor, "checks": checks, "experiments": list(self.experiments)}
+
+
+def checks_of(
+    fit: Fit, raw: Record, record: Record, used: "np.ndarray", loading: Loading | None, values: Mapping[str, float]
+) -> tuple[tuple[Check, ...], float]:
+    """Tests of beginning, residuals, halves and peaks; and residuals over noise.
+
+    Parameters
+    ----------
+    fit : Fit
+    raw, record : Record
+        Samples, and the means that were fitted.
+    used : ndarray of bool
+        Means that the fit is about.
+    loading : Loading or None
+    values : mapping
+        Best values by name, in SI units.
+    """
+    time = record.time[used]
+    begins = np.empty(0) if loading is None else loading.pieces.begins[1:]
+    first = float(begins[0]) if len(begins) else float("inf")
+    inside = (raw.time >= time[0]) & (raw.time <= time[-1])
+    residuals = (raw.friction - np.interp(raw.time, time, fit.measured - fit.residuals))[inside]
+    noise, known = _noise(raw, first)
+    whole = float(np.sqrt(np.mean(np.sort(residuals**2)[: max(int(0.995 * len(residuals)), 1)]))) / noise
+    checks = [] if loading is None else [_beginning(values, loading)]
+    checks.append(
+        Check(
+            name="residuals",
+            passed=whole <= SEVERAL,
+            value=whole,
+            limit=SEVERAL,
+            sentence=f"residuals are {whole:.2g} times the noise {known}",
+        )
+    )
+    factor = whole
+    if len(begins):
+        peak = _after_steps(fit, time, begins, record, used, values)
+        factor = max(factor, peak)
+        told = "is explained" if peak <= SEVERAL else "is not explained"
+        checks.append(
+            Check(
+                name="peak",
+                passed=peak <= SEVERAL,
+                value=peak,
+                limit=SEVERAL,
+                sentence=f"what follows changes of rate {told}: residuals there are {peak:.2g} times the noise",
+            )
+        )
+        checks += _halves(fit, time, float(begins[-1]), record, used)
+    return tuple(checks), factor
+
+
+def sign_check(difference: Any, other: Any, excess: float) -> Check | None:
+    """Whether a - b has one sign, with and without a trend.
+
+    Parameters
+    ----------
+    difference : ParameterEstimate or None
+    other : ParameterEstimate or None
+        Of the fit with a trend where it was left out, without where it was kept.
+    excess : float
+        By how much the AIC of the fit without a trend is higher.
+    """
+    if difference is None:
+        return None
+    ends = [difference.low, difference.high]
+    doubtful = other is not None and excess < DECISIVE
+    if doubtful:
+        ends = [min(ends[0], other.low), max(ends[1], other.high)]
+    told = "negative: friction weakens with rate" if ends[1] < 0 else "positive: friction strengthens with rate"
+    trend = f", with and without a trend (AIC {excess:+.3g} without)" if other is not None else ""
+    passed = bool(ends[0] > 0 or ends[1] < 0)
+    said = f"a - b is {told}{trend if doubtful else ''}" if passed else f"the sign of a - b is open{trend}"
+    return Check(name="sign", passed=passed, value=difference.value, limit=0.0, sentence=said)
+
+
+def _noise(raw: Record, first: float) -> tuple[float, str]:
+    """Noise of friction, from sample to sample and about a line before the first change of rate."""
+    least = max(scatter(raw.time, raw.friction), 1e-12)
+    before = raw.time < first
+    if np.isinf(first) or before.sum() < 20:
+        return least, "from sample to sample"
+    t, y = raw.time[before], raw.friction[before]
+    about = y - np.polyval(np.polyfit(t - t[0], y, 1), t - t[0])
+    line = float(np.sqrt(np.mean(about**2)))
+    return max(line, least), f"about a line in the beginning ({line / least:.2g} times that from sample to sample)"
+
+
+def _beginning(values: Mapping[str, float], loading: Loading) -> Check:
+    off = abs(values.get(START_STATE, 0.0))
+    told = f"begins in steady sliding at {loading.first_rate:.3g} m/s"
+    if off:
+        older = float(np.exp(values[START_STATE]))
+        told = f"does not begin in steady sliding: the state is {older:.3g} times as old, which is fitted"
+    if TREND in values:
+        told += f", on a trend of {values[TREND]:.3g} 1/m"
+    return Check(name="beginning", passed=not off, value=off, limit=0.0, sentence=f"the record {told}")
+
+
+def _after_steps(
+    fit: Fit, time: "np.ndarray", begins: "np.ndarray", record: Record, used: "np.ndarray", values: Mapping[str, float]
+) -> float:
+    """Largest root mean square of residuals within some critical slips of a change of rate, over their noise."""
+    assert record.load_point is not None
+    path, slip = record.load_point[used], _PEAK * values.get("critical_slip", 0.0)
+    kept, scores = fit.kept, fit.whitened / fit.noise
+    within = max(slip, 0.01 * float(np.ptp(path)))
+    worst = 0.0
+    for begin in begins.tolist():
+        after = (time >= begin) & (path - np.interp(begin, time, path) <= min(within, 0.2 * float(np.ptp(path))))
+        some = scores[after[kept]]
+        if len(some) >= 5:
+            worst = max(worst, float(np.sqrt(np.mean(some**2))))
+    return worst
+
+
+def _halves(fit: Fit, time: "np.ndarray", last: float, record: Record, used: "np.ndarray") -> list[Check]:
+    """Whether the trend is the same before and after the last change of rate, and the noise as large in both halves."""
+    assert record.load_point is not None
+    path = record.load_point[used]
+    hinge = np.maximum(path - np.interp(last, time, path), 0)
+    slopes = np.nan_to_num(weighed(fit.weights, fit.experiment.slopes(fit.fitted)), posinf=0, neginf=0)
+    extra = weighed(fit.weights, hinge)
+    across = extra - slopes @ np.linalg.lstsq(slopes, extra, rcond=None)[0]
+    size = float(np.linalg.norm(across))
+    score = 0.0 if size <= 1e-6 * np.linalg.norm(extra) else float(across @ fit.whitened) / size / fit.noise
+    early, late = (float(np.mean(part**2)) for part in np.array_split(fit.whitened, 2))
+    ratio = float(np.sqrt(max(late / max(early, 1e-300), early / max(late, 1e-300))))
+    return [
+        Check(
+            name="halves",
+            passed=abs(score) <= _DRIFT and ratio <= SEVERAL,
+            value=max(abs(score) / _DRIFT, ratio / SEVERAL),
+            limit=1.0,
+            sentence=f"early and late residuals differ by a factor {ratio:.2g}; a change of the trend at the last "
+            f"change of rate is {abs(score):.2g} of its deviations",
+        )
+    ]

@@ -1,0 +1,169 @@
+"""Noise that samples share with their neighbours: white noise and an Ornstein-Uhlenbeck process.
+
+Servos, filters, screws and the rock itself wander; least squares that takes such noise for independent is too sure.
+The process fades with time or with displacement, whichever has the larger restricted likelihood.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky, cholesky_banded, solve_triangular
+from scipy.optimize import minimize
+
+_LEAST_GAIN = 3.0  # of the log-likelihood, for two parameters: AIC with a margin of 1
+_MOST_DENSE = 1500  # samples whose covariance is factored as a full matrix
+_SHARES = (-2.0, 0.0, 3.0)  # natural logarithms of the first trials, in white variances
+_LENGTHS = (0.003, 0.03)  # of the way
+_LONGEST = 0.05  # of the way: what fades over more of it is not told from the rock
+_LARGEST = 9.0  # natural logarithm of the share
+
+
+@dataclass(frozen=True)
+class CorrelatedNoise:
+    """Covariance of samples, in variances of the white noise of one measurement.
+
+    Attributes
+    ----------
+    share : float
+        Variance of the process that fades.
+    length : float
+        Over which it fades, in units of `along`.
+    along : ndarray
+        Where every sample lies: time [s] or displacement [m].
+    counts : ndarray
+        Measurements in every sample.
+    of_time : bool
+        Whether `along` is time.
+    """
+
+    share: float
+    length: float
+    along: "np.ndarray"
+    counts: "np.ndarray"
+    of_time: bool
+
+    def to_dict(self, noise: float) -> dict[str, Any]:
+        """Size and length with their units, of the white noise [-] of one measurement."""
+        size = noise * self.share**0.5
+        return {"size": size, "size_unit": "", "length": self.length, "length_unit": "s" if self.of_time else "m"}
+
+    @cached_property
+    def covariance(self) -> "np.ndarray":
+        """Of all samples."""
+        apart = np.abs(self.along[:, None] - self.along[None, :]) / self.length
+        whole: np.ndarray = self.share * np.exp(-apart)
+        whole[np.diag_indices(len(self.along))] += 1 / self.counts
+        return whole
+
+    def own_part(self, residuals: "np.ndarray", kept: "np.ndarray") -> "np.ndarray":
+        """Residuals without what their neighbours tell of them; those that are not kept tell nothing."""
+        shared = self.covariance[:, kept] - np.diag(1 / self.counts)[:, kept]
+        told = shared @ np.linalg.solve(self.covariance[np.ix_(kept, kept)], residuals[kept])
+        own: np.ndarray = residuals - told
+        return own
+
+    def whitener(self, kept: "np.ndarray") -> "np.ndarray":
+        """Matrix that makes residuals independent with the variance of one measurement, without what is not kept."""
+        factor = cholesky(self.covariance[np.ix_(kept, kept)], lower=True)
+        whole = np.zeros((int(kept.sum()), len(kept)))
+        whole[:, kept] = solve_triangular(factor, np.eye(len(factor)), lower=True)
+        return whole
+
+
+def restricted_likelihood(
+    residuals: "np.ndarray",
+    slopes: "np.ndarray",
+    counts: "np.ndarray",
+    steps: "np.ndarray",
+    share: float,
+    length: float,
+) -> float:
+    """Logarithm of the restricted likelihood of residuals, but for a constant.
+
+    By the tridiagonal inverse of the process; the size of the noise is at its best.
+
+    Parameters
+    ----------
+    residuals, counts : ndarray
+    slopes : ndarray
+        Of what was fitted, shape (samples, coordinates).
+    steps : ndarray
+        Ways between neighbouring samples.
+    share, length : float
+        As in `CorrelatedNoise`; no process where the share is 0.
+    """
+    number, size = slopes.shape
+    together = np.column_stack([residuals, slopes])
+    weighted = together * counts[:, None]
+    log_det = -float(np.sum(np.log(counts)))
+    if share > 0:
+        fading = np.exp(-np.maximum(steps, 1e-12 * length) / length)
+        left = -np.expm1(-2 * np.maximum(steps, 1e-12 * length) / length)
+        bands = np.zeros((2, number))
+        bands[1] = counts
+        bands[1, 0] += 1 / share
+        bands[1, 1:] += 1 / (share * left)
+        bands[1, :-1] += fading**2 / (share * left)
+        bands[0, 1:] = -fading / (share * left)
+        factor = cholesky_banded(bands)
+        log_det += 2 * float(np.sum(np.log(factor[1]))) + number * np.log(share) + float(np.sum(np.log(left)))
+        weighted = weighted - counts[:, None] * cho_solve_banded((factor, False), weighted)
+    inner = together.T @ weighted
+    sign, log_slopes = np.linalg.slogdet(inner[1:, 1:])
+    if sign <= 0:
+        return -np.inf
+    squares = inner[0, 0] - inner[0, 1:] @ np.linalg.solve(inner[1:, 1:], inner[1:, 0])
+    freedom = number - size
+    return float(-0.5 * (log_det + log_slopes + freedom * np.log(max(squares, 1e-300) / freedom)))
+
+
+def noise_of(
+    residuals: "np.ndarray",
+    slopes: "np.ndarray",
+    counts: "np.ndarray",
+    time: "np.ndarray",
+    path: "np.ndarray | None",
+    kept: "np.ndarray",
+) -> CorrelatedNoise | None:
+    """Likeliest noise of residuals; None where independent samples are as likely.
+
+    Parameters
+    ----------
+    residuals : ndarray
+        Measured less simulated.
+    slopes : ndarray
+        Of what was fitted.
+    counts, time : ndarray
+    path : ndarray or None
+        Displacement.
+    kept : ndarray of bool
+        Samples that count.
+    """
+    if not 3 * slopes.shape[1] < kept.sum() <= _MOST_DENSE:
+        return None
+    scale = np.linalg.norm(slopes[kept], axis=0)
+    basis, values, _ = np.linalg.svd(slopes[kept][:, scale > 0] / scale[scale > 0], full_matrices=False)
+    told = (residuals[kept], basis[:, values > 1e-8 * values[0]], counts[kept])
+    white = restricted_likelihood(*told, np.ones(len(told[0]) - 1), 0.0, 1.0)
+    best, found = white + _LEAST_GAIN, None
+    for along, of_time in ((time, True), (path, False)):
+        if along is None or not np.ptp(along) > 0:
+            continue
+        way, steps = float(np.ptp(along)), np.abs(np.diff(along[kept]))
+
+        def lost(at: "np.ndarray", steps: "np.ndarray" = steps, way: float = way) -> float:
+            inside = np.clip(at, (-30, -30), (_LARGEST, np.log(_LONGEST)))
+            share, length = np.exp(inside) * [1, way]
+            return -restricted_likelihood(*told, steps, share, length) + 10 * float(np.sum(np.abs(at - inside)))
+
+        trials = [np.array([share, np.log(length)]) for share in _SHARES for length in _LENGTHS]
+        start = min(trials, key=lost)
+        simplex = start + np.array([[0.0, 0.0], [1.5, 0.0], [0.0, 1.0]])
+        how = {"initial_simplex": simplex, "xatol": 0.03, "fatol": 0.02, "maxfev": 120}
+        ended = minimize(lost, start, method="Nelder-Mead", options=how)
+        if -ended.fun > best:
+            share, length = np.exp(np.minimum(ended.x, (_LARGEST, np.log(_LONGEST)))) * [1, way]
+            best, found = -ended.fun, CorrelatedNoise(float(share), float(length), along, counts, of_time)
+    return found

@@ -1,0 +1,330 @@
+"""What drives an experiment: load point and normal load as straight pieces, with rates from the data or given.
+
+Noise of a transducer that is followed sample by sample would drive the simulated spring.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from quakedesign.errors import RecordError
+from quakedesign.identification.record import FAR_OFF, Record, reading_step, scatter, thinned
+from quakedesign.identification.sliding_experiment import Drive
+
+_MOST_POINTS = 2000  # means in which changes of rate are sought
+_CANDIDATES = 400
+_FEWEST = 8  # samples
+_MOST_PIECES = 40
+_PATIENCE = 4  # pieces that may explain nothing before the search ends
+_LEAST_CHANGE = 0.03  # of the faster rate: friction feels it by 3 % of a or b
+_ODDS = 4.0  # times log n: what a new piece must improve a fit by, in variances
+_ROUGH = 6.0  # deviations from the pieces, in noise from sample to sample: more is motion
+_SLIGHT = 0.01  # of the whole path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pieces:
+    """A load point that moves at a constant rate in every piece.
+
+    Attributes
+    ----------
+    begins : ndarray
+        Times at which pieces begin [s], the first the first time of the record.
+    rates : ndarray
+        [m/s].
+    noise : float
+        Standard deviation of the displacement from the pieces [m].
+    given : bool
+        Whether the rates were given.
+    rough : bool
+        Whether the motion is not made of a few such pieces.
+    """
+
+    begins: "np.ndarray"
+    rates: "np.ndarray"
+    noise: float
+    given: bool = False
+    rough: bool = False
+
+    def position(self, time: "np.ndarray") -> "np.ndarray":
+        """Displacement since the first time [m]."""
+        corners = np.concatenate([[0.0], np.cumsum(np.diff(self.begins) * self.rates[:-1])])
+        piece = np.clip(np.searchsorted(self.begins, time, side="right") - 1, 0, None)
+        position: np.ndarray = corners[piece] + self.rates[piece] * (time - self.begins[piece])
+        return position
+
+
+def staircase(time: "np.ndarray", rates: "np.ndarray") -> Pieces:
+    """Pieces of a column of rates, each commanded from its sample on."""
+    new = np.concatenate([[True], np.diff(rates) != 0])
+    return Pieces(begins=time[new], rates=rates[new], noise=0.0)
+
+
+def straight_pieces(time: "np.ndarray", position: "np.ndarray", scatter: float, step: float) -> Pieces:
+    """Pieces with the rates of the data, as few as explain it.
+
+    Parameters
+    ----------
+    time, position : ndarray
+    scatter : float
+        Noise from sample to sample [m].
+    step : float
+        In which it was read [m].
+    """
+    if len(time) < _FEWEST or not np.ptp(position) > 0:
+        ends = np.array([time[0]]), np.array([(position[-1] - position[0]) / max(time[-1] - time[0], 1e-300)])
+        return Pieces(begins=ends[0], rates=ends[1], noise=0.0, rough=bool(np.ptp(position) > 0))
+    t, x = _means(time, position)
+    size, span = float(np.ptp(x)) or 1.0, float(np.ptp(t))
+    u, y = (t - t[0]) / span, (x - x[0]) / size
+    candidates = np.unique(u[np.linspace(1, len(u) - 2, min(_CANDIDATES, len(u) - 2)).astype(int)])
+    columns = np.maximum(u[:, None] - candidates, 0)
+    floor = (max(scatter * np.sqrt(len(t) / len(time)), 0.3 * step / np.sqrt(len(time) / len(t))) / size) ** 2
+    knots, squares = np.empty(0), [float(np.sum((y - _hinges(u, y, np.empty(0))[1]) ** 2))]
+    while len(knots) < _MOST_PIECES:
+        basis, _ = np.linalg.qr(_design(u, knots))
+        across = columns - basis @ (basis.T @ columns)
+        norms = np.einsum("ij,ij->j", across, across)
+        gains = np.where(norms > 1e-9 * norms.max(), (across.T @ y) ** 2 / np.maximum(norms, 1e-300), 0)
+        knots = _refined(u, y, np.unique(np.append(knots, candidates[np.argmax(gains)])))
+        left = y - _hinges(u, y, knots)[1]
+        squares.append(float(left @ left))
+        noise = max(squares[-1] / len(u) * _spread(left), floor)
+        before = squares[max(len(squares) - 1 - _PATIENCE, 0)]
+        if squares[-1] < floor * len(u) or (
+            len(squares) > _PATIENCE and before - squares[-1] < _PATIENCE * _ODDS * np.log(len(u)) * noise
+        ):
+            break
+    knots = _needed(u, y, knots, floor)
+    rates, line = _hinges(u, y, knots)
+    off = np.abs(y - line) * size
+    rough = len(knots) >= _MOST_PIECES or np.percentile(off, 99) > max(_ROUGH * scatter + step, _SLIGHT * size)
+    begins = np.concatenate([[time[0]], t[0] + knots * span])
+    nearest = time[np.clip(np.searchsorted(time, begins - 1e-6 * span / len(time)), 0, len(time) - 1)]
+    begins = np.where(np.abs(begins - nearest) < 1e-4 * span / len(time), nearest, begins)
+    rates = np.where(np.abs(rates) < 1e-9 * np.max(np.abs(rates)), 0.0, rates)
+    found = Pieces(begins=begins, rates=rates * size / span, noise=0.0, rough=bool(rough))
+    return replace(found, noise=float(np.std(position - found.position(time))))
+
+
+def given_pieces(time: "np.ndarray", position: "np.ndarray", rates: "np.ndarray") -> Pieces:
+    """Pieces with known rates, beginning at the times that suit the data best.
+
+    Raises
+    ------
+    RecordError
+        When the load point does not move at such rates.
+    """
+    t, x = _means(time, position, most=400)
+
+    def pieces_at(begins: "np.ndarray") -> Pieces:
+        return Pieces(begins=np.concatenate([t[:1], np.sort(begins)]), rates=rates, noise=0.0, given=True)
+
+    def off(begins: "np.ndarray") -> float:
+        return float(np.std(x - pieces_at(begins).position(t)))
+
+    count = len(rates) - 1
+    bounds = [(t[0], t[-1])] * count
+    begins = differential_evolution(off, bounds, rng=0, tol=1e-10, maxiter=400).x if count else np.empty(0)
+    pieces = replace(pieces_at(begins), noise=off(begins))
+    pieces = replace(pieces, begins=np.concatenate([time[:1], pieces.begins[1:]]))
+    if pieces.noise > 0.03 * np.ptp(x):
+        moved = np.array(
+            [
+                np.polyfit(part_t, part_x, 1)[0]
+                for part_t, part_x in zip(np.array_split(t, 8), np.array_split(x, 8), strict=True)
+            ]
+        )
+        told, found = (", ".join(f"{rate:.3g}" for rate in each) for each in (rates, moved))
+        raise RecordError(
+            f"--rates must be those of the load point. Received {told} m/s; in eighths of the record it moves at "
+            f"{found} m/s. Correct the rates, or cut out the part with --from and --to."
+        )
+    return pieces
+
+
+# ----------------------------------------------------------------------
+# Load point and normal load together: the drive of a simulated experiment.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loading:
+    """How the load point of a record moves, and what presses on the fault.
+
+    Attributes
+    ----------
+    pieces : Pieces
+    normal : Pieces or None
+        Of the normal load, in its unit for displacement; None where it is constant or followed sample by sample.
+    level : float or None
+        Normal load at the first sample, or its constant value; None where it is followed sample by sample.
+    notes : tuple of str
+        What was taken for granted.
+    """
+
+    pieces: Pieces
+    normal: Pieces | None
+    level: float | None
+    notes: tuple[str, ...]
+
+    @property
+    def first_rate(self) -> float:
+        """Rate of the load point in the beginning [m/s]."""
+        return float(self.pieces.rates[0])
+
+    def drive(self, record: Record) -> "tuple[Drive, np.ndarray]":
+        """Drive between all samples and changes of rate, and which of these instants are samples."""
+        assert record.load_point is not None
+        inside = self.pieces.begins[(self.pieces.begins > record.time[0]) & (self.pieces.begins < record.time[-1])]
+        changes = np.array([]) if self.pieces.rough else np.setdiff1d(inside, record.time)
+        instants = np.union1d(record.time, changes)
+        lengths = np.diff(instants)
+        if self.pieces.rough:
+            rates = np.diff(record.load_point) / lengths
+        else:
+            middles = (instants[1:] + instants[:-1]) / 2
+            rates = self.pieces.rates[np.searchsorted(self.pieces.begins, middles, side="right") - 1]
+        normal = np.log(np.interp(instants, record.time, record.normal))
+        drive = Drive(
+            lengths=lengths,
+            rates=rates,
+            growth=np.diff(normal) / lengths,
+            compliance=np.exp(-(normal[1:] + normal[:-1]) / 2),
+            first_rate=self.first_rate,
+        )
+        return drive, np.isin(instants, record.time)
+
+    def smoothed(self, record: Record) -> Record:
+        """A record whose load point and normal load are those of the pieces, where these stand for them."""
+        load = record.load_point if self.pieces.rough else self.pieces.position(record.time)
+        normal = record.normal
+        if self.level is not None:
+            normal = np.full_like(normal, self.level)
+        if self.level is not None and self.normal is not None:
+            normal = normal + self.normal.position(record.time)
+        return replace(record, load_point=load, normal=normal)
+
+
+def prepared(record: Record, rates: Sequence[float] = ()) -> tuple[Record, Loading | None]:
+    """A record as means of its samples, with load point and normal load as they drive it; and how these move.
+
+    Parameters
+    ----------
+    record : Record
+    rates : sequence of float
+        Of the load point [m/s], where they are known.
+
+    Raises
+    ------
+    RecordError
+        For rates that are not those of the load point.
+    """
+    time, load = record.time, record.load_point
+    if load is None:
+        if len(rates):
+            raise RecordError(
+                "--rates go with a column of the load point, which says when they change. Received none. Add it."
+            )
+        return thinned(record), None
+    if len(rates):
+        pieces = given_pieces(time, load, np.asarray(rates, dtype=float))
+    elif record.load_rates is not None:
+        pieces = staircase(time, record.load_rates)
+    else:
+        pieces = straight_pieces(time, load, scatter(time, load), reading_step(load))
+    notes = [_said(pieces)]
+    allowed = (
+        FAR_OFF
+        * scatter(time, record.friction)
+        / abs(float(np.median(record.friction)))
+        * float(np.median(record.normal))
+    )
+    normal: Pieces | None = None
+    level: float | None = float(np.mean(record.normal))
+    assert level is not None
+    if np.percentile(np.abs(record.normal - level), 99) > max(allowed, 1e-9 * level):
+        size = scatter(time, record.normal)
+        normal = straight_pieces(time, record.normal, max(size, allowed / FAR_OFF), reading_step(record.normal))
+        level = float(np.mean(record.normal - normal.position(time)))
+        rough = normal.noise > max(allowed, 2 * size)
+        normal, level = (None, None) if rough else (normal, level)
+        notes.append(
+            "the normal load is followed sample by sample" if rough else "the normal load changes in straight pieces"
+        )
+    loading = Loading(pieces=pieces, normal=normal, level=level, notes=tuple(notes))
+    return loading.smoothed(thinned(record, pieces.begins, follow=pieces.rough)), loading
+
+
+def _said(pieces: Pieces) -> str:
+    if pieces.rough:
+        return "the load point moves as it was measured, with its noise: --rates gives its rates"
+    told = [f"{rate:.4g}" for rate in pieces.rates[:6]] + ["…"] * (len(pieces.rates) > 6)
+    return f"the load point moves at {', then '.join(told)} m/s{', as given' if pieces.given else ''}"
+
+
+def _means(time: "np.ndarray", position: "np.ndarray", most: int = _MOST_POINTS) -> "tuple[np.ndarray, np.ndarray]":
+    """Times and positions, or means of as many neighbours each as leave at most so many."""
+    each = -(-len(time) // most)
+    edges = np.arange(0, len(time), each)
+    counts = np.diff([*edges, len(time)])
+    t, x = (np.add.reduceat(values - values[0], edges) / counts + values[0] for values in (time, position))
+    return t, x
+
+
+def _design(u: "np.ndarray", knots: "np.ndarray") -> "np.ndarray":
+    return np.column_stack([np.ones_like(u), u, np.maximum(u[:, None] - knots, 0)])
+
+
+def _hinges(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+    """Rates of all pieces, and the broken line."""
+    design = _design(u, knots)
+    found, *_ = np.linalg.lstsq(design, y, rcond=None)
+    return np.cumsum(found[1:]), design @ found
+
+
+def _refined(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray") -> "np.ndarray":
+    """Knots moved to where broken lines fit best (Muggeo 2003, Stat. Med. 22, 3055)."""
+    best, least = knots, np.inf
+    for _ in range(8):
+        _, line = _hinges(u, y, knots)
+        squares = float(np.sum((y - line) ** 2))
+        if squares < least:
+            best, gained, least = knots, least - squares, squares
+            if gained < 1e-6 * least:
+                break
+        design = np.hstack([_design(u, knots), -1.0 * (u[:, None] > knots)])
+        found, *_ = np.linalg.lstsq(design, y, rcond=None)
+        bends = found[2 : 2 + len(knots)]
+        moved = np.where(np.abs(bends) > 1e-12, found[2 + len(knots) :] / np.where(bends == 0, 1, bends), 0)
+        knots = np.sort(np.clip(knots + np.clip(moved, -0.05, 0.05), u[1], u[-2]))
+        if len(np.unique(knots)) < len(knots):
+            break
+    return best
+
+
+def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float) -> "np.ndarray":
+    """Knots without those that explain no more than noise, and those at which the rate hardly changes."""
+    left = y - _hinges(u, y, knots)[1]
+    noise = max(float(left @ left) / len(u) * _spread(left), floor)
+    allowed = _ODDS * np.log(len(u)) * noise
+    while len(knots):
+        rates, line = _hinges(u, y, knots)
+        squares = float(np.sum((y - line) ** 2))
+        changes = np.abs(np.diff(rates)) / np.maximum(np.maximum(np.abs(rates[1:]), np.abs(rates[:-1])), 1e-300)
+        losses = np.array([float(np.sum((y - _hinges(u, y, np.delete(knots, i))[1]) ** 2)) for i in range(len(knots))])
+        losses = np.where(changes < _LEAST_CHANGE, -1.0, losses - squares)
+        least = int(np.argmin(losses))
+        if losses[least] >= allowed:
+            break
+        knots = np.delete(knots, least)
+        knots = _refined(u, y, knots) if len(knots) else knots
+    return knots
+
+
+def _spread(residuals: "np.ndarray") -> float:
+    """Samples per independent one of residuals that follow each other like AR(1), by their first correlation."""
+    first = float(residuals[1:] @ residuals[:-1] / max(residuals @ residuals, 1e-300))
+    first = min(max(first, 0.0), 0.95)
+    return (1 + first) / (1 - first)

@@ -1,0 +1,124 @@
+"""Load points as straight pieces: rates and times of made-up motions come back, in noise that is white or shared."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from quakedesign.errors import RecordError
+from quakedesign.identification.loading import given_pieces, prepared, staircase, straight_pieces
+from quakedesign.identification.record import Record, reading_step, scatter
+
+TIME = np.arange(0.0, 120.0, 0.05)
+STEPS = ((0.0, 1e-6), (40.0, 1e-5), (60.0, 0.0), (80.0, 3e-6))
+
+
+def moved(steps=STEPS, time=TIME):
+    begins = [begin for begin, _ in steps]
+    whole = np.zeros_like(time)
+    for (begin, rate), end in zip(steps, [*begins[1:], np.inf], strict=True):
+        whole += rate * np.clip(time - begin, 0, end - begin)
+    return whole
+
+
+def shared(size, fading, seed=1):
+    draw, noise = np.random.default_rng(seed).standard_normal(len(TIME)), np.zeros(len(TIME))
+    for i in range(1, len(TIME)):
+        noise[i] = fading * noise[i - 1] + (1 - fading**2) ** 0.5 * draw[i]
+    return size * noise
+
+
+NOISES = {
+    "none": np.zeros_like(TIME),
+    "white, 0.3 um": 3e-7 * np.random.default_rng(0).standard_normal(len(TIME)),
+    "shared, 0.45 um": shared(4.5e-7, 0.95),
+}
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_rates_and_times_come_back(noise):
+    x = moved() + NOISES[noise]
+    pieces = straight_pieces(TIME, x, scatter(TIME, x), reading_step(x))
+    close = 1e-4 if noise == "none" else 0.7  # s; 0.5 um are 0.5 s at 1 um/s
+    np.testing.assert_allclose(pieces.begins, [0, 40, 60, 80], atol=close)
+    np.testing.assert_allclose(pieces.rates, [rate for _, rate in STEPS], rtol=0.02, atol=5e-8)
+    assert not pieces.rough
+    assert pieces.noise == pytest.approx(np.std(NOISES[noise]), abs=3e-8)
+    np.testing.assert_allclose(pieces.position(TIME), moved(), atol=8e-7)
+
+
+def test_readings_in_steps_leave_no_more_pieces():
+    x = np.round(moved() / 1e-7) * 1e-7
+    pieces = straight_pieces(TIME, x, scatter(TIME, x), reading_step(x))
+    np.testing.assert_allclose(pieces.begins, [0, 40, 60, 80], atol=0.05)
+
+
+def test_a_motion_of_no_straight_pieces_is_rough_and_followed_as_it_was_measured():
+    x = 1e-6 * TIME + 2e-5 * np.sin(TIME / 2)
+    assert straight_pieces(TIME, x, scatter(TIME, x), reading_step(x)).rough
+    record, loading = prepared(made(x))
+    assert "with its noise" in loading.notes[0]
+    np.testing.assert_allclose(record.load_point, np.interp(record.time, TIME, x), atol=2e-7)
+    drive, measured = loading.drive(record)
+    np.testing.assert_allclose(drive.rates, np.diff(record.load_point) / np.diff(record.time))
+    assert measured.all()
+
+
+def made(load_point, **more):
+    ones = np.ones_like(TIME)
+    friction = 0.6 + 3e-4 * np.random.default_rng(2).standard_normal(len(TIME))
+    told = {"normal": 5e6 * ones, "normal_unit": "Pa"} | more
+    return Record(name="made", time=TIME, friction=friction, load_point=load_point, slip=None, **told)
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_given_rates_are_taken_exactly_and_their_times_found(noise):
+    x = moved() + NOISES[noise]
+    pieces = given_pieces(TIME, x, np.array([rate for _, rate in STEPS]))
+    assert pieces.rates.tolist() == [rate for _, rate in STEPS]
+    np.testing.assert_allclose(pieces.begins, [0, 40, 60, 80], atol=0.3)
+    assert "as given" in prepared(made(x), [rate for _, rate in STEPS])[1].notes[0]
+    with pytest.raises(RecordError, match="must be those of the load point"):
+        given_pieces(TIME, x, np.array([1e-5, 1e-6]))
+    with pytest.raises(RecordError, match="go with a column of the load point"):
+        prepared(replace(made(x), load_point=None), [1e-6])
+
+
+def test_a_column_of_rates_is_a_staircase():
+    rates = np.where(TIME < 40, 1e-6, 1e-5)
+    pieces = staircase(TIME, rates)
+    assert pieces.begins.tolist() == [0.0, 40.0]
+    assert pieces.rates.tolist() == [1e-6, 1e-5]
+    _, loading = prepared(made(pieces.position(TIME), load_rates=rates))
+    assert loading.pieces.begins.tolist() == [0.0, 40.0]
+
+
+def test_changes_of_rate_between_samples_are_instants_of_their_own():
+    steps = ((0.0, 1e-6), (40.02, 1e-5))
+    record, loading = prepared(made(moved(steps)))
+    drive, measured = loading.drive(record)
+    assert measured.sum() == len(record.time) < len(measured)
+    assert np.all(np.abs(np.union1d(record.time, loading.pieces.begins)[~measured] - 40.02) < 0.03)
+    assert np.sum(drive.lengths * drive.rates) == pytest.approx(record.load_point[-1], rel=1e-9)
+    assert drive.first_rate == pytest.approx(1e-6, rel=1e-6)
+    ends = np.cumsum(drive.lengths)
+    np.testing.assert_allclose(drive.rates[ends < 39.9], 1e-6, rtol=1e-5)
+    np.testing.assert_allclose(drive.rates[ends > 40.2], 1e-5, rtol=1e-5)
+
+
+def test_normal_stress_within_the_noise_of_friction_is_constant():
+    """3e-4 of 0.6 are 2.5 kPa of 5 MPa: 1 kPa of wandering is none, 100 kPa of drift a line, waves are followed."""
+    for wandering, kind in (
+        (shared(1e3, 0.99), "constant"),
+        (1e5 * TIME / 120, "line"),
+        (1e5 * np.sin(TIME), "followed"),
+    ):
+        record, loading = prepared(made(moved(), normal=5e6 + wandering))
+        if kind == "constant":
+            assert np.ptp(record.normal) == 0
+            assert len(loading.notes) == 1
+        else:
+            assert ("sample by sample" in loading.notes[1]) == (kind == "followed")
+            counts = np.concatenate([[0], np.cumsum(record.counts)])
+            means = np.add.reduceat(5e6 + wandering, counts[:-1]) / record.counts
+            np.testing.assert_allclose(record.normal, means, atol=3e3)
