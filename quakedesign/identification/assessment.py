@@ -100,7 +100,7 @@ def checks_of(
         Best values by name, in SI units.
     """
     time = record.time[used]
-    begins = np.empty(0) if loading is None else loading.pieces.begins[1:]
+    begins = np.empty(0) if loading is None else loading.pieces.begins[1:][loading.pieces.large_changes]
     first = float(begins[0]) if len(begins) else float("inf")
     inside = (raw.time >= time[0]) & (raw.time <= time[-1])
     residuals = (raw.friction - np.interp(raw.time, time, fit.measured - fit.residuals))[inside]

@@ -18,6 +18,7 @@ _CANDIDATES = 400
 _FEWEST = 8  # samples
 _MOST_PIECES = 40
 _PATIENCE = 4  # pieces that may explain nothing before the search ends
+_LARGE_CHANGE = 1.25  # of rate, that is a step and no wandering
 _LEAST_CHANGE = 0.03  # of the faster rate: friction feels it by 3 % of a or b
 _ODDS = 4.0  # times log n: what a new piece must improve a fit by, in variances
 _ROUGH = 6.0  # deviations from the pieces, in noise from sample to sample: more is motion
@@ -47,6 +48,13 @@ class Pieces:
     noise: float
     given: bool = False
     rough: bool = False
+
+    @property
+    def large_changes(self) -> "np.ndarray":
+        """Whether the rate changes by more than a quarter, at the beginning of every piece but the first."""
+        slow, fast = np.sort([np.abs(self.rates[1:]), np.abs(self.rates[:-1])], axis=0)
+        large: np.ndarray = fast > _LARGE_CHANGE * slow
+        return large
 
     def position(self, time: "np.ndarray") -> "np.ndarray":
         """Displacement since the first time [m]."""
