@@ -41,7 +41,11 @@ class StickSlipAnswer:
         """For people: the sentence first, then the worst case found."""
         if not self.found.proved:
             return [self.found.sentence(), "the plant without stick may have a guarantee: omit --plant"]
-        said = [f"proved: {self.found.sentence()}"]
+        healing = self.found.covered_healing()
+        said = [
+            f"proved: {self.found.sentence()}",
+            f"in place of a disturbance this covers friction at rest up to {healing:.3g} above friction in slip",
+        ]
         if self.worst is not None:
             said.append(
                 f"worst case found: slip rate {self.worst.slip_rate:.3g} m/s, slip {self.worst.behind:.3g} m behind "
@@ -59,6 +63,7 @@ class StickSlipAnswer:
             "sentence": self.found.sentence(),
             "plant": "stick-slip",
             **self.found.claims.to_dict(),
+            "covered_healing": float(self.found.covered_healing()),
             "worst_found": worst
             and {"slip_rate": worst.slip_rate, "slip_behind": worst.behind, "slip_ahead": worst.ahead},
             "step": str(self.found.held.step),

@@ -1,6 +1,7 @@
 """A guarantee on the stick–slip plant as a statement that checks itself."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from quakedesign import laws
@@ -56,6 +57,30 @@ class StickSlipGuarantee:
     def controller(self) -> "StickSlipController":
         """The law for `simulate`."""
         return laws.StickSlipController(law=self.held.law, step=self.held.step)
+
+    def covered_healing(self, disturbance: Fraction = Fraction(0)) -> LowerBound:
+        """Healing Δμ_h [-] that these claims cover as well where the disturbance is at most the given one [m/s²].
+
+        Friction that holds a fault at rest may then exceed that of the slide by up to Δμ_h, after a rest of any length.
+        It adds at most Δ = N̂Δμ_h(σ' − p) to what holds the fault. Let H be the disturbance and G the force without it,
+        constant within a rest. A fault that rests has G + φ ≤ Δ, hence −G ≥ −(H + Δ). If G ≥ −(H + Δ), the rest is a
+        slide at rate 0 under the disturbance −G, which is at most H + Δ; if not, no φ of at most H can release it
+        before the next sample. These are the two cases of the theorem for the disturbance H + Δ, which must be at most
+        that of the claims.
+
+        Raises
+        ------
+        ParameterError
+            For a disturbance that is negative or above that of the claims.
+        """
+        most = self.task.amplitude
+        if not 0 <= disturbance <= most:
+            raise ParameterError(
+                f"disturbance must be from 0 to that of the claims, {float(most):g} m/s^2, got {float(disturbance):g} "
+                "m/s^2"
+            )
+        stress = self.task.normal_stress - Fraction(self.claims.least_pressure)
+        return LowerBound((most - disturbance) / (self.task.area_per_mass[1] * stress))
 
     def bounds(self) -> StickSlipClaims | NoGuarantee:
         """What the theorem gives, computed anew."""

@@ -69,10 +69,10 @@ def flow(rate, force, slope, time):
     return slip, y, total
 
 
-def piece(rate, force, slope, disturbance, time):
-    """ξ, y and G after a piece; a block that stops in it rests unless the force pushes it forward."""
+def piece(rate, force, slope, disturbance, time, healed=0.0):
+    """ξ, y and G after a piece; a block that stops in it rests unless the force beyond what is healed pushes it."""
     total = force + disturbance
-    moves = (rate > 0) | (total > 0)
+    moves = (rate > 0) | (total > healed)
     slip, y, after = flow(rate, total, slope, time)
     stops = np.flatnonzero(moves & (y < 0))
     if len(stops):
@@ -94,9 +94,13 @@ def rest_pressure(slip, friction):
 
 
 class Blocks:
-    """Many faults, each with a friction law that is chosen as it slips: falling as steeply as it may, or flat."""
+    """Many faults, each with a friction law that is chosen as it slips: falling as steeply as it may, or flat.
 
-    def __init__(self, slip, friction, rate):
+    At rest friction is higher by `healing`.
+    """
+
+    def __init__(self, slip, friction, rate, healing=0.0):
+        self.healing = healing
         self.slip, self.friction, self.rate = slip.copy(), friction.copy(), rate.copy()
         self.peak = rate.copy()
 
@@ -104,6 +108,7 @@ class Blocks:
         """Hold a pressure from now on."""
         at = case()
         stress = at.stress - pressure
+        self.healed = at.per_mass * self.healing * stress
         self.force = at.per_mass * (at.static * at.stress - self.friction * stress) - at.stiffness * self.slip
         self.flat, self.steep = -at.stiffness, -at.stiffness + at.per_mass * at.weakening * stress
 
@@ -113,7 +118,7 @@ class Blocks:
         room = self.friction - at.weakening * 2 * at.claims["peak_slip_rate"] * time > at.least
         falls = weakens & room
         moved, self.rate, self.force = piece(
-            self.rate, self.force, np.where(falls, self.steep, self.flat), disturbance, time
+            self.rate, self.force, np.where(falls, self.steep, self.flat), disturbance, time, self.healed
         )
         self.friction = self.friction - np.where(falls, at.weakening * moved, 0)
         self.slip = self.slip + moved
@@ -149,7 +154,7 @@ def vertices():
     return found / np.maximum((found @ facets.T).max(axis=1), 1)[:, None]
 
 
-def one_period(random, count, pieces, amplitude=1.0):
+def one_period(random, count, pieces, amplitude=1.0, healing=0.0):
     """States in P before and after a period, the slip in it and the slip rate that it reached."""
     at, corners = case(), vertices()
     weights = random.dirichlet([0.3] * 4, count)
@@ -166,7 +171,7 @@ def one_period(random, count, pieces, amplitude=1.0):
     slip = random.random(count) * at.target_slip
     least = np.maximum(at.least, at.static - at.weakening * slip)
     friction = least + np.select([choice == 1, choice == 3], [0, 1], random.random(count)) * (at.static - least)
-    blocks, before = Blocks(slip, friction, rate), rest_pressure(slip, friction)
+    blocks, before = Blocks(slip, friction, rate, healing), rest_pressure(slip, friction)
     wanted = reference - at.return_rate * error
     expected = np.maximum(wanted, 0)
     blocks.push(before - (level + at.rate_gain * rate - at.target_gain * wanted))
@@ -215,6 +220,24 @@ def test_one_period_from_anywhere_in_the_polytope_ends_in_it(trials):
         assert peak.max() <= at.claims["peak_slip_rate"]
         slid = max(slid, tops[moved > 1e-8].max())
     assert slid > 0.99  # the trials come near
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+@pytest.mark.parametrize("trials", [2_000, pytest.param(200_000, marks=pytest.mark.slow)])
+def test_friction_that_heals_at_rest_takes_the_place_of_a_part_of_the_disturbance(trials, share):
+    at, random, kept, slid = case(), np.random.default_rng(11), 0, 0.0
+    claims = load_guarantee(FILE)
+    healing = float(claims.covered_healing(share * claims.task.amplitude))
+    stress = at.stress - at.claims["least_pressure"]
+    assert healing == pytest.approx((1 - share) * at.amplitude / (at.per_mass * stress), rel=1e-9)
+    for _ in range(trials // 2_000):
+        _, after, moved, peak = one_period(random, 2_000, 30, share, healing)
+        tops = (after @ at.facets.T).max(axis=1)
+        assert tops.max() <= 1 + ROUNDING
+        assert peak.max() <= at.claims["peak_slip_rate"]
+        kept, slid = kept + np.sum(moved == 0), max(slid, tops[moved > 1e-8].max())
+    assert kept > trials / 50  # rests that last because friction has healed are among them
+    assert slid > 0.8
 
 
 def test_a_larger_disturbance_drives_states_out():

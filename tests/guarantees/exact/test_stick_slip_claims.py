@@ -325,6 +325,13 @@ def test_a_run_on_the_plant_that_sticks_stays_within_the_claims(proof):
     assert metrics.time_at_rest_fraction > 0.5
 
 
+@pytest.mark.parametrize("disturbance", [F(-1, 10**6), F(1, 1000)])
+def test_healing_needs_a_disturbance_within_the_claims(proof, disturbance):
+    with pytest.raises(ParameterError, match=r"from 0 to that of the claims, 0\.00032 m/s"):
+        proof.covered_healing(disturbance)
+    assert proof.covered_healing(proof.task.amplitude) == 0
+
+
 def test_claims_are_rounded_outward(bounds):
     claims = bounds.rounded()
     assert claims.follow(bounds)
