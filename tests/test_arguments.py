@@ -94,7 +94,7 @@ WRONG = {
     "too few gains": (lambda: summed_integrals((), Fraction(1)), "gains of summed_integrals must be four"),
     "no path": (lambda: qd.load_certificate(3), "path of load_certificate must be a text or a Path. Received 3"),
     "no entry": (lambda: headline(None), "entry of headline must be an Entry. Received None"),
-    "no task": (lambda: guarantee(3, 3), "task of guarantee must be an FaultPlant. Received 3"),
+    "no task": (lambda: guarantee(3, 3), "task of guarantee must be a FaultPlant. Received 3"),
     "no campaign": (lambda: run_campaign(None, 3, "x"), "must be a CampaignProblem. Received None"),
     "no such quantity": (lambda: qd.guarantee(LAB, wind=Fraction(1)), "quantity of the loop setup must be .*'wind'"),
     "no law to guarantee": (
