@@ -170,6 +170,13 @@ def test_people_are_told_that_there_is_nothing(capsys):
         ]
 
 
+def test_files_that_are_written_are_named(tmp_path):
+    usual = "results.json, samples.csv, distribution.png"
+    assert simulate_commands._written({}, ["png"]) == usual
+    again = {"rerun": {"file": str(tmp_path / "sample-2.nc")}}
+    assert simulate_commands._written(again, ["png"]) == f"{usual}, sample-2.nc"
+
+
 def test_a_sample_is_run_again_by_its_number_or_its_name(tmp_path):
     def trajectory(index):
         outcome, metrics = (SimpleNamespace(to_dict=lambda: {"of": index}) for _ in range(2))

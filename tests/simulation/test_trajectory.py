@@ -260,6 +260,18 @@ def test_a_run_through_an_actuator_has_its_signals_beside_those_of_every_run(run
     assert actuated.signals()["well_pressure"][1:] == ("pressure at the well", "Pa")
 
 
+def test_the_well_is_drawn_in_the_panel_of_the_pressure(actuated):
+    panels, well = actuated.panels(), actuated.actuation["well_pressure"][0]
+    names = ["slip", "slip rate", "pressure", "slip error", "slip-rate error", "injected volume", "injected flow rate"]
+    assert [panel[0] for panel in panels] == names
+    assert panels[2][2] is actuated.pressure
+    assert panels[2][3] == ("at the well", well)
+    without = {name: signal for name, signal in actuated.actuation.items() if name != "well_pressure"}
+    alone = replace(actuated, actuation=without).panels()
+    assert [panel[0] for panel in alone] == names
+    assert alone[2][3] == ("at the well", None)
+
+
 def test_the_figure_shows_the_well_and_what_flows(actuated):
     axes = actuated.plot().axes
     assert [axis.get_ylabel() for axis in axes[5:]] == ["injected volume [m³]", "injected flow rate [m³/s]"]

@@ -293,7 +293,7 @@ def test_a_search_begins_at_the_worst_sample_and_passes_over_failures(tmp_path, 
     asked, lost = [], calm.sample(30)
 
     def search(space, metric, evaluate, starts, *, noise_seed, rounds):
-        values = evaluate([calm.sample(20), lost]) + evaluate([calm.sample(21)])
+        values = evaluate([calm.sample(20), lost]) + evaluate([lost, calm.sample(21)])
         asked.append((metric, [point.tolist() for point in starts], noise_seed, rounds, values))
 
     monkeypatch.setattr(running, "search", search)
@@ -306,8 +306,8 @@ def test_a_search_begins_at_the_worst_sample_and_passes_over_failures(tmp_path, 
     assert (metric, starts, rounds) == (wanted, [calm.point(worst).tolist()], 3)
     assert noise_seed == calm.sample(worst).noise_seed
     others = run_campaign(calm, 22, tmp_path, executor=SerialExecutor()).values(wanted)
-    assert evaluated == [others[20], -np.inf, others[21]]
-    assert [failure.samples for failure in found.failures] == [("search-1",)]
+    assert evaluated == [others[20], -np.inf, -np.inf, others[21]]
+    assert [failure.samples for failure in found.failures] == [("search-1",), ("search-2",)]
 
 
 def test_a_search_needs_a_metric_that_some_sample_has(tmp_path):
