@@ -116,10 +116,11 @@ def check_polynomial(document: dict[str, Any]) -> Result:
 
 
 def check_guarantee(document: dict[str, Any]) -> Result:
-    """Verify a file of the kind ``guarantee``, ``slow_sliding`` or ``stick_slip``."""
+    """Verify a file about a loop that runs."""
     kind = document["kind"]
     modules = {"guarantee": "tracking", "slow_sliding": "slow_sliding", "stick_slip": "stick_slip"}
-    need(kind in tuple(modules), "kind", "guarantee, slow_sliding or stick_slip", kind)
+    modules["uncertain_plant"] = "plant"
+    need(kind in tuple(modules), "kind", "guarantee, slow_sliding, stick_slip or uncertain_plant", kind)
     return Result("proved", tuple(beside(f"guarantee.{modules[kind]}").verify(document)))
 
 

@@ -18,6 +18,8 @@ from .lyapunov import Verdict as Verdict
 from .lyapunov import certify as certify
 from .lyapunov import load_certificate as load_certificate
 from .lyapunov import synthesise as synthesise
+from .plant import Sector as Sector
+from .plant import UncertainPlant as UncertainPlant
 from .report import compare as compare
 from .simulation import Trajectory as Trajectory
 from .simulation import export_controller as export_controller

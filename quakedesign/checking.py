@@ -17,6 +17,7 @@ from quakedesign.lyapunov.exact.certificate_files import (
     LOOP,
     SLOW_SLIDING,
     STICK_SLIP,
+    UNCERTAIN_PLANT,
     entry_lines,
     evidence_of,
     kind_of,
@@ -76,6 +77,8 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
         kind = kind_of(raw)
         if kind in (GUARANTEE, SLOW_SLIDING, STICK_SLIP):
             return _running(raw, fault)
+        if kind == UNCERTAIN_PLANT:
+            return _plant(raw, fault)
         if kind != LOOP:
             verdict_of, said = _attraction(raw) if kind == ATTRACTION else _polynomial(raw)
             return verdict_of, said if fault is None else [
@@ -94,7 +97,7 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
 
 def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     """Verdict on a file about a loop that runs, and whether its data are those of a fault."""
-    claim = guarantees.read_guarantee(raw)
+    claim: Any = guarantees.read_guarantee(raw)
     if claim.check() is not Verdict.PROVED:
         raise CertificateError("the claims do not follow from the loop and the fault's data")
     about = entry_lines(guarantees.guarantee_document(claim))
@@ -104,6 +107,18 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
             raise CertificateError(f'the data are not those of "{fault.name}"')
         lines.append(f'the data are those of "{fault.name}"{_other_step(claim, fault)}')
     return str(Verdict.PROVED), lines
+
+
+def _plant(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
+    """Verdict on a file about an uncertain plant, which names no fault."""
+    claim = guarantees.read_guarantee(raw)
+    if claim.check() is not Verdict.PROVED:
+        raise CertificateError("the claims do not follow from the plant and the law")
+    lines = [claim.sentence(), *entry_lines(guarantees.guarantee_document(claim))]
+    return str(Verdict.PROVED), lines if fault is None else [
+        *lines,
+        f'names no fault: nothing is said about "{fault.name}"',
+    ]
 
 
 def _task(claim: "Claim", fault: "Fault") -> "FaultPlant | SlidingPlant":

@@ -188,6 +188,64 @@ def _facts(answer: Any, path: Path | None) -> dict[str, Any]:
 
 
 # ----------------------------------------------------------------------
+# The command about several blocks.
+
+
+@app.command
+def blocks(
+    fault: FaultName,
+    /,
+    *,
+    most: Whole = 10,
+    least: Whole = 2,
+    wells: Literal["one", "each"] = "one",
+    coupling: str | None = None,
+    step: ExactSeconds | None = None,
+    box: Box = None,
+    disturbance: Shaking = None,
+    out: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Say whether one block may stand for a fault: what is proved when it is cut into several blocks.
+
+    Each block has its own friction law of the box and its own disturbance, with springs between neighbours; a law is
+    designed for each number of blocks. Exit code 0 only if every number of blocks has a proof.
+
+    Parameters
+    ----------
+    most, least
+        Numbers of blocks, from the least to the most.
+    wells
+        one well for all blocks, whose law measures the means of slip and slip rate; or a well for each.
+    coupling
+        Stiffness of a spring over the mass of a block in 1/s^2; that of elastic strips by default.
+    step
+        Sampling time T_s; the fault's by default.
+    out
+        Folder for the certificate files, one for each number of blocks that has a proof.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.guarantees.exact.guarantee_files import save_guarantee
+    from quakedesign.studies import one_block
+
+    loaded = load_fault(fault, box=box, disturbance=disturbance)
+    files = {count: out / f"{loaded.name}-{count}-blocks.json" for count in range(least, most + 1)} if out else {}
+    if out is not None:
+        require_room(out)
+        hold(out)
+    for path in files.values() if out is not None and out.exists() else ():
+        new_file(path, "certificate file", force=force)
+    answer = one_block(loaded, range(least, most + 1), wells=wells, coupling=coupling, step=step)
+    for count, found in answer.found.items():
+        if files and found.proved:
+            with made_folder(files[count].parent):
+                save_guarantee(found, files[count])
+    output.show(answer.to_dict(), answer.lines())
+    return 0 if answer.proved else 1
+
+
+# ----------------------------------------------------------------------
 # The command about what no controller can do.
 
 

@@ -198,7 +198,7 @@ class SampledLaw(SampledController):
         require_known(output, (OUTPUT,), "output of a law")
         for name in inputs:
             require_known(name, SIGNALS, "input of a law")
-        A, B, C, D = (_exact(part, name) for name, part in zip("ABCD", parts, strict=True))
+        A, B, C, D = (exact_matrix(part, name) for name, part in zip("ABCD", parts, strict=True))
         size = len(A)
         if size > MOST_STATES:
             raise ParameterError(
@@ -207,7 +207,7 @@ class SampledLaw(SampledController):
         _require_shapes(
             {"A": (A, size, size), "B": (B, size, len(inputs)), "C": (C, 1, size), "D": (D, 1, len(inputs))}
         )
-        A, notes = _integrating(A, C[0] if C else ())
+        A, notes = integrating(A, C[0] if C else ())
         zero, of_errors, of_reference = Fraction(0), [], []
         for row in (*B, D[0]):
             errors, moved = [zero, zero], [zero, zero]
@@ -299,7 +299,7 @@ def _step(value: Any) -> Fraction:
     return step
 
 
-def _exact(part: Any, name: str) -> Matrix:
+def exact_matrix(part: Any, name: str) -> Matrix:
     """Rows of rationals."""
     rows = part.tolist() if hasattr(part, "tolist") else part
     if not isinstance(rows, list | tuple) or not all(isinstance(row, list | tuple) for row in rows):
@@ -326,7 +326,7 @@ _NEAR = 1e-6
 _DEPENDENT = 1e-6
 
 
-def _integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
+def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
     """A law with an integrator but for rounding as one with an integrator, and what was changed."""
     size = len(A)
     if not size or _asks_for_any_pressure(A, C):

@@ -7,3 +7,5 @@ from .sliding_plant import Cuts as Cuts
 from .sliding_plant import SlidingPlant as SlidingPlant
 from .sliding_plant import cells as cells
 from .sliding_plant import parts as parts
+from .user_plant import Sector as Sector
+from .user_plant import UncertainPlant as UncertainPlant

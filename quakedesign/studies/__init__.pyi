@@ -1,3 +1,4 @@
+from .blocks import one_block as one_block
 from .comparison import Entry as Entry
 from .paper import FrontPoint as FrontPoint
 from .paper import objective_front as objective_front

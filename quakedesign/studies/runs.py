@@ -20,6 +20,7 @@ from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, Fault, SlidingReference
 from quakedesign.fault.model import require_positive
 from quakedesign.guarantees import ContinuousPeaks, Guarantee, SlidingGuarantee, load_guarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.exact.statement import differences
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.guarantees.search.compensated_search import recovered
@@ -626,6 +627,11 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         For a sliding mode whose gains cannot be read off its implicit step.
     """
     claim = load_guarantee(path)
+    if isinstance(claim, PlantGuarantee):
+        raise CertificateError(
+            f"the certificate of a law must be about a fault. Received {path}, about an uncertain plant. Give a "
+            f"file of guarantee {fault.name} --out FILE."
+        )
     if isinstance(claim, ContinuousPeaks) or isinstance(claim, SlidingGuarantee) != bool(fault.friction.state_names):
         raise CertificateError(
             "the law of a certificate runs once per sample, and is about friction with a state where that of the fault "

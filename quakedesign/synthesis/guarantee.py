@@ -12,14 +12,16 @@ from quakedesign.fault import Fault, with_accepted_fit
 from quakedesign.fault.units import exact_value
 from quakedesign.guarantees import CLASSES, OBJECTIVES, LoopAnswer, NoGuarantee
 from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
 from quakedesign.guarantees.search.linear_design import nearest_setup
 from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer, answer_stick_slip
 from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
-from quakedesign.plant import FaultPlant, uncertain_plant
+from quakedesign.plant import FaultPlant, UncertainPlant, uncertain_plant
 from quakedesign.synthesis.method import Wanted, method_of
+from quakedesign.synthesis.plant_guarantees import guarantee_plant
 
 Found = TypeVar("Found")
 
@@ -74,11 +76,11 @@ _OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise
 
 
 def guarantee(
-    fault: Fault,
+    fault: Fault | UncertainPlant,
     controller: str | type[Controller] | Controller = "elqr",
     setup: LoopSetup = IDEAL,
     *,
-    law: Controller | None = None,
+    law: Any = None,
     objective: str = "tracking",
     gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]" = (),
     scheme: str | None = None,
@@ -89,20 +91,23 @@ def guarantee(
     progress: Callable[[str, float], None] | None = None,
     accept_poor_fit: bool = False,
     **given: Quantity | None,
-) -> LoopAnswer | SlidingAnswer | StickSlipAnswer:
+) -> LoopAnswer | SlidingAnswer | StickSlipAnswer | PlantGuarantee | NoGuarantee:
     """Prove bounds of slip, slip rate and pressure of the sampled loop, as the command `guarantee` does.
 
     The controller is designed for the loop setup unless gains are given.
 
     Parameters
     ----------
-    fault : Fault
+    fault : Fault or UncertainPlant
+        Of the latter, peaks of its outputs for a law or gains; law, gains, step, delay and lag apply. Several blocks of
+        a fault (`UncertainPlant.from_blocks`) have a law that is designed unless one is given.
     controller : str, type of Controller, or SampledLaw
         ``elqr``, or a sliding mode, ``cta`` or ``dia``; or a user's law.
     setup : LoopSetup
         Sampling, delay, lag, diffusion path, noise, jitter, pump and initial errors. A user's law has its own T_s.
-    law : SampledLaw, optional
-        The same as a user's law as `controller`.
+    law : SampledLaw or control.StateSpace, optional
+        The same as a user's law as `controller`. The second, in discrete time, for an `UncertainPlant`: from what it
+        measures to its controls.
     objective : str
         Of a design: ``tracking``, or ``peak`` for the smallest proved slip-rate error.
     gains : sequence or array of str, float or Fraction, optional
@@ -133,7 +138,8 @@ def guarantee(
     -------
     LoopAnswer, SlidingAnswer or StickSlipAnswer
         Its ``lines()`` are what the command prints; ``found`` is the guarantee, which has a ``controller`` for
-        `simulate`, `loop_transfer` and `export_controller`, or the reason why there is none.
+        `simulate`, `loop_transfer` and `export_controller`, or the reason why there is none. Of an `UncertainPlant` the
+        guarantee, `PlantGuarantee`, or `NoGuarantee` itself.
 
     Raises
     ------
@@ -144,6 +150,18 @@ def guarantee(
     """
     fault, setup = with_accepted_fit(fault, accept_poor_fit), setup.with_given(**given)
     require_known(plant, PLANTS, "plant")
+    if isinstance(fault, UncertainPlant):
+        usual = (plant, objective, scheme, disturbance_class) == (PLANTS[0], OBJECTIVES[0], None, CLASSES[0])
+        if not usual or controller != "elqr" or stress is not None or exact_value(spread, "", "spread"):
+            raise ParameterError(
+                "an uncertain plant is guaranteed with a law or gains alone. Received controller, objective, scheme, "
+                "class, plant, stress or spread. Omit these."
+            )
+        return guarantee_plant(fault, law, gains, setup)
+    if law is not None and not isinstance(law, Controller):
+        raise ParameterError(
+            f"law of a fault must be a SampledLaw. Received {type(law).__name__}. Use SampledLaw.from_statespace."
+        )
     if law is None and isinstance(controller, Controller):
         law = controller
     elif law is not None and controller != "elqr":

@@ -33,7 +33,7 @@ SQUARES = {"numbers", "squares", "polynomials"}
 FORGED = 'raise SystemExit("another module")\n'
 
 
-OTHERS = {"guarantee.slow_sliding", "guarantee.stick_slip", "guarantee.polytope"}
+OTHERS = {"guarantee.slow_sliding", "guarantee.stick_slip", "guarantee.polytope", "guarantee.plant"}
 
 
 def guarantee():
@@ -42,6 +42,10 @@ def guarantee():
 
 def stick_slip():
     return {"format": 1, "kind": "stick_slip"}
+
+
+def uncertain_plant():
+    return {"format": 1, "kind": "uncertain_plant"}
 
 
 KINDS = {
@@ -57,6 +61,10 @@ KINDS = {
     "stick_slip": (
         stick_slip,
         {"numbers", *(f"guarantee.{name}" for name in ("reading", "task", "matrices", "polytope", "stick_slip"))},
+    ),
+    "uncertain_plant": (
+        uncertain_plant,
+        {"numbers", *(f"guarantee.{name}" for name in ("reading", "matrices", "plant"))},
     ),
     "attraction": (ATTRACTIONS.cubic, SQUARES | {"attraction"}),
 }
@@ -101,7 +109,7 @@ def test_modules_of_the_working_directory_are_not_taken(folder, tmp_path, option
     files = written(planted, *KINDS)
     result = run(folder / "check.py", *files, options=options, cwd=planted, PYTHONPATH=str(planted))
     verdicts = [line.split(": ")[1] for line in result.stdout.splitlines() if line[0] != " "]
-    assert verdicts == ["proved", "refuted", "proved", "refuted", "refuted", "invalid", "invalid", "proved"]
+    assert verdicts == ["proved", "refuted", "proved", "refuted", "refuted", "invalid", "invalid", "invalid", "proved"]
     assert (result.stderr, result.returncode) == ("", 1)
     assert sorted(folder.rglob("*")) == before
 
@@ -129,7 +137,7 @@ def test_a_kind_of_file_needs_the_kernel_and_its_own_modules(kind, folder):
     try:
         checker.check(json.dumps(make()))
     except checker.Refused:
-        assert kind in ("guarantee", "stick_slip")
+        assert kind in ("guarantee", "stick_slip", "uncertain_plant")
     loaded = {name.removeprefix(f"{checker.PACKAGE}.") for name in sys.modules if name.startswith(checker.PACKAGE)}
     assert loaded - {checker.PACKAGE, "lyapunov", "guarantee"} == needed
 

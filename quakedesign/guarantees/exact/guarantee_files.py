@@ -15,6 +15,7 @@ from quakedesign.exact import LowerBound, UpperBound, exact_text
 from quakedesign.files import write_whole
 from quakedesign.guarantees.exact.invariant_set import MOST_FACETS, MOST_PIECES, InvariantPolytope, require_fit
 from quakedesign.guarantees.exact.loop import Held
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, plant_document, read_plant_guarantee
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.guarantees.exact.statement import Claims, ContinuousPeaks, Guarantee, SlidingGuarantee
@@ -26,6 +27,7 @@ from quakedesign.lyapunov.exact.certificate_files import (
     GUARANTEE,
     SLOW_SLIDING,
     STICK_SLIP,
+    UNCERTAIN_PLANT,
     kind_of,
     read_json,
 )
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
     from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 
 Claim = Union[Guarantee, ContinuousPeaks, SlidingGuarantee, "StickSlipGuarantee"]
+"""What files about a fault claim."""
 _Claimed = TypeVar("_Claimed")
 _ROCK = ("density", "shear_modulus", "length", "damping")
 _SPREADS = ("stiffness", "damping", "authority")
@@ -66,10 +69,12 @@ _MOST_STATES = 20
 _ZERO = Fraction(0)
 
 
-def guarantee_document(claim: Claim) -> dict[str, Any]:
+def guarantee_document(claim: Claim | PlantGuarantee) -> dict[str, Any]:
     """Content of the file."""
     if not hasattr(claim, "claims"):
         raise ParameterError(f"a claim must be a guarantee. Received {shown(claim)}. Prove one with guarantee.")
+    if isinstance(claim, PlantGuarantee):
+        return plant_document(claim)
     if isinstance(claim, Guarantee | ContinuousPeaks):
         about = _of_tracking(claim)
     else:
@@ -79,12 +84,12 @@ def guarantee_document(claim: Claim) -> dict[str, Any]:
     return {"format": 1, **about, "claims": claims}
 
 
-def guarantee_text(claim: Claim) -> str:
+def guarantee_text(claim: Claim | PlantGuarantee) -> str:
     """Text of the file."""
     return json.dumps(guarantee_document(claim), indent=1) + "\n"
 
 
-def load_guarantee(path: str | Path) -> Claim:
+def load_guarantee(path: str | Path) -> Claim | PlantGuarantee:
     """Read a file of `guarantee`; reading verifies nothing, `check` of what is read does.
 
     Parameters
@@ -93,7 +98,7 @@ def load_guarantee(path: str | Path) -> Claim:
 
     Returns
     -------
-    Guarantee, ContinuousPeaks or SlidingGuarantee
+    Guarantee, ContinuousPeaks, SlidingGuarantee, StickSlipGuarantee or PlantGuarantee
         The first has a ``controller`` for `simulate`, `export_controller` and `loop_transfer`: the law with its T_s and
         its limit at rest, behind the delay, lag and rock that it is proved for.
 
@@ -105,7 +110,7 @@ def load_guarantee(path: str | Path) -> Claim:
     return read_guarantee(read_json(path))
 
 
-def save_guarantee(claim: Claim, path: str | Path) -> None:
+def save_guarantee(claim: Claim | PlantGuarantee, path: str | Path) -> None:
     """Write the file whole."""
     write_whole(Path(path), guarantee_text(claim))
 
@@ -115,7 +120,7 @@ def parse_guarantee(text: str) -> Any:
     return read_guarantee(parse(text))
 
 
-def read_guarantee(raw: Any) -> Claim:
+def read_guarantee(raw: Any) -> Claim | PlantGuarantee:
     """Claim from a parsed file.
 
     Raises
@@ -129,6 +134,8 @@ def read_guarantee(raw: Any) -> Claim:
             headed(raw, {"fault", "reference", "disturbance", "loop", "set", "claims"}, STICK_SLIP)
             reader = partial(read_claims, raw=raw)
             return cast("StickSlipGuarantee", _stick_slip().read_stick_slip(raw, read_task(raw), reader))
+        if kind == UNCERTAIN_PLANT:
+            return read_plant_guarantee(raw)
         return _read_sliding(raw) if kind == SLOW_SLIDING else _read_tracking(raw)
     except ParameterError as error:
         raise CertificateError(str(error)) from None

@@ -312,6 +312,8 @@ def save_certificate(certificate: Evidence, path: str | Path) -> None:
 # Which claim a parsed file makes: told without loading what decides each of them.
 
 GUARANTEE, SLOW_SLIDING, STICK_SLIP, ATTRACTION = "guarantee", "slow_sliding", "stick_slip", "attraction"
+UNCERTAIN_PLANT = "uncertain_plant"
+_KINDS = GUARANTEE, SLOW_SLIDING, STICK_SLIP, ATTRACTION, UNCERTAIN_PLANT
 POLYNOMIAL, LOOP = "polynomial", "loop"
 
 
@@ -319,7 +321,7 @@ def kind_of(raw: Any) -> str:
     """What a parsed file says that it is, else what its keys say: about a polynomial, or a closed loop."""
     if not isinstance(raw, dict):
         return LOOP
-    said = next((kind for kind in (GUARANTEE, SLOW_SLIDING, STICK_SLIP, ATTRACTION) if raw.get("kind") == kind), None)
+    said = next((kind for kind in _KINDS if raw.get("kind") == kind), None)
     return said or (POLYNOMIAL if "polynomial" in raw else LOOP)
 
 

@@ -1,0 +1,172 @@
+"""Laws for several blocks of a fault, with a well each or with one well, chosen by an estimate of what is proved.
+
+A well each: linear-quadratic feedback of all errors, with an estimate of the disturbance of every block from the
+innovation of its slip rate. One well: a law of the means, as for one block.
+"""
+
+from fractions import Fraction
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+from scipy.optimize import minimize
+
+from quakedesign.exact import rational
+from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
+from quakedesign.guarantees.search.plant_search import linear_part, pieces_of
+from quakedesign.plant.plant_values import Row, unit
+from quakedesign.plant.user_plant import UncertainPlant
+
+_START = (0.0325, 1.6e-4, 0.13, 0.88, 1.2)
+"""Weight of the slip rates, of the pressures, share of an innovation, gain of the model over the middle, and how much
+more differences of neighbours weigh than means."""
+_STEPS = (0.5, 0.7, 0.5, 0.1, 0.5)
+_EVALUATIONS = 1000  # over the number of blocks
+_DIGITS = 8
+_SLOWEST = 0.92  # eigenvalue of a period: a loop that forgets later takes longer to prove
+_FORGET, _LEFT = 400, 1e-4  # periods that an estimate follows at most, share that is left
+
+
+def block_law(plant: UncertainPlant, step: Fraction) -> MatrixLaw:
+    """A law for a plant of `UncertainPlant.from_blocks`, by a search with the estimate of its slip-rate errors."""
+    part, scale = linear_part(plant, {}), np.array(_START)
+    made = _for_one_well if len(plant.controls) == 1 else _for_every_well
+
+    def cost(x: np.ndarray) -> float:
+        values = scale * np.exp(x)
+        if values[2] >= 1:
+            return 1e3
+        found = estimate(part, made(part, step, values))
+        return found[0] if found[0] >= 1 else float(np.log(found[1])) - 100
+
+    simplex = np.vstack([np.zeros(len(_STEPS)), np.diag(_STEPS)])
+    options = {"maxfev": _EVALUATIONS // (len(part.A) // 2), "xatol": 1e-2, "fatol": 1e-3, "initial_simplex": simplex}
+    best = minimize(cost, np.zeros(len(_STEPS)), method="Nelder-Mead", options=options)
+    return made(part, step, scale * np.exp(best.x))
+
+
+def _middle(part: LinearPart) -> tuple[np.ndarray, np.ndarray]:
+    """A and B with every sector at its middle."""
+    A, B = np.array(part.A, dtype=float), np.array(part.B, dtype=float)
+    for sector in part.sectors:
+        share = (
+            float(sum(sector.slopes))
+            / 2
+            * np.outer(np.array(sector.entry, dtype=float), np.array(sector.row, dtype=float))
+        )
+        A, B = A + share[:, : len(A)], B + share[:, len(A) :]
+    return A, B
+
+
+def _held(A: np.ndarray, E: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    n, m = E.shape
+    whole = expm(np.block([[A, E], [np.zeros((m, n + m))]]) * step)
+    return whole[:n, :n], whole[:n, n:]
+
+
+def _feedback(A: np.ndarray, G: np.ndarray, x: np.ndarray) -> np.ndarray:
+    count = G.shape[1]
+    chain = 2 * np.eye(count) - np.eye(count, k=1) - np.eye(count, k=-1)
+    chain[0, 0] = chain[-1, -1] = min(count - 1, 1)
+    apart = np.eye(count) + x[4] * chain
+    Q = np.block([[apart, np.zeros((count, count))], [np.zeros((count, count)), x[0] * np.eye(count)]])
+    P = solve_discrete_are(A, G, Q, x[1] * apart)
+    gain: np.ndarray = np.linalg.solve(x[1] * apart + G.T @ P @ G, G.T @ P @ A)
+    return gain
+
+
+def _for_every_well(part: LinearPart, step: Fraction, x: np.ndarray) -> MatrixLaw:
+    """Feedback of all errors, in exact numbers: π⁺ = Pe, d⁺ = d + M(e2 − π), p = −Ke/g − d⁺/g."""
+    count = len(part.A) // 2
+    A, B = _middle(part)
+    gain = float(B[count, 0] * x[3])
+    phi, reach = _held(A, np.vstack([np.zeros((count, count)), np.eye(count)]), float(step))
+    K = _feedback(phi, reach, x)
+    g, feedback = rational(f"{gain:.8g}"), _rounded(K)
+    learned = _rounded(float(x[2]) * np.linalg.inv(reach[count:]))
+    expected = _rounded(phi[count:] - reach[count:] @ np.array(feedback, dtype=float))
+    return _law(step, g, feedback, learned, expected)
+
+
+def _for_one_well(part: LinearPart, step: Fraction, x: np.ndarray) -> MatrixLaw:
+    """The same for the means of slip and slip rate, of which springs are no part."""
+    count = len(part.A) // 2
+    A, B = _middle(part)
+    mean = np.kron(np.eye(2), np.ones((1, count)) / count)
+    own = mean @ A @ np.kron(np.eye(2), np.ones((count, 1)))
+    gain = float(B[count:].mean() * x[3])
+    phi, reach = _held(own, np.array([[0.0], [1.0]]), float(step))
+    K = _feedback(phi, reach, x)
+    g, feedback = rational(f"{gain:.8g}"), _rounded(K)
+    learned = _rounded(float(x[2]) / reach[1:])
+    expected = _rounded(phi[1:] - reach[1:] @ np.array(feedback, dtype=float))
+    return _law(step, g, feedback, learned, expected)
+
+
+def _law(
+    step: Fraction, gain: Fraction, feedback: tuple[Row, ...], learned: tuple[Row, ...], expected: tuple[Row, ...]
+) -> MatrixLaw:
+    """States π [m/s] and d [m/s²]; a constant d is balanced by p = −d/g exactly."""
+    size, zero = len(feedback), Fraction(0)
+    still = (zero,) * size
+    return MatrixLaw(
+        step=step,
+        delay=zero,
+        update=(
+            *[(*still, *still)] * size,
+            *((*(-v for v in row), *unit(size, i)) for i, row in enumerate(learned)),
+        ),
+        measured=(*expected, *((*still, *row) for row in learned)),
+        output=tuple((*(v / gain for v in row), *(-v / gain for v in unit(size, i))) for i, row in enumerate(learned)),
+        feedback=tuple(
+            tuple(-(a + b) / gain for a, b in zip(row, (*still, *more), strict=True))
+            for row, more in zip(feedback, learned, strict=True)
+        ),
+    )
+
+
+def _rounded(values: np.ndarray) -> tuple[Row, ...]:
+    return tuple(tuple(rational(f"{v:.{_DIGITS}g}") for v in row) for row in values)
+
+
+def estimate(part: LinearPart, law: MatrixLaw) -> tuple[float, float]:
+    """Small gain of a loop without delay in floats, and the largest bound of the outputs' second half."""
+    loop = part.loop(law)
+    flow, rows = np.array(loop.flow, dtype=float), np.array(loop.rows, dtype=float)
+    jump, time = np.array(loop.segments[0][0], dtype=float), float(loop.segments[0][1])
+    kinds: dict[Row, int] = {}
+    kind = [kinds.setdefault(entry, len(kinds)) for entry in loop.inputs]
+    entries, pieces = np.array(list(kinds), dtype=float).T, max(pieces_of(loop) // 2, 2)
+    h = time / pieces
+    powers = [np.linalg.matrix_power(expm(flow * h), i) for i in range(pieces + 1)]
+    period = powers[-1] @ jump
+    radius = float(max(abs(np.linalg.eigvals(period))))
+    if radius > _SLOWEST:
+        return 1e2 * radius, np.inf
+    widths = [h / 2, *[h] * (pieces - 1), h / 2]
+    columns = np.hstack([power @ entries * width for power, width in zip(powers, widths, strict=True)])
+    now = np.vstack([rows @ power @ jump for power in powers])
+    sums = np.zeros((len(now), len(kinds)))
+    for _ in range(_FORGET):
+        added = np.abs(now @ columns).reshape(len(now), pieces + 1, -1).sum(axis=1)
+        sums += added
+        if (added <= _LEFT * sums).all():
+            break
+        now = now @ period
+    ends = sums.reshape(pieces + 1, len(rows), -1)
+    heights = [np.abs(rows @ power @ entries) for power in powers]
+    since, largest = np.zeros_like(heights[0]), ends[0]
+    for i in range(pieces):
+        since = since + (heights[i] + heights[i + 1]) * h / 2
+        largest = np.maximum(largest, ends[i + 1] + since)
+    gains = largest[:, kind]
+    count, first = len(part.outputs), len(part.disturbances) + len(part.loads)
+    span = slice(count, count + len(part.sectors))
+    halves = np.array([float(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors])
+    matrix = halves[:, None] * gains[span, first:]
+    small = float(max(abs(np.linalg.eigvals(matrix))))
+    if small >= 1:
+        return small, np.inf
+    own = np.array([float(size) for _, size in part.disturbances] + [float(load.rate) for load in part.loads])
+    numbers = np.linalg.solve(np.eye(len(halves)) - matrix, halves * (gains[span, :first] @ own))
+    bounds = gains[:count, :first] @ own + gains[:count, first:] @ numbers
+    return small, float(bounds[count // 2 :].max())

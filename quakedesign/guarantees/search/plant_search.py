@@ -1,0 +1,186 @@
+"""Search for a guarantee of an uncertain plant under a sampled law: bounds of sectors, numbers of the small gain."""
+
+from dataclasses import replace
+from fractions import Fraction
+from math import ceil
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import UpperBound, rational
+from quakedesign.guarantees.exact.plant_guarantee import (
+    MOST_PIECES,
+    PlantClaims,
+    PlantGuarantee,
+    peaks,
+    row_bounds,
+)
+from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, PlantLoop, ResponseBounds, response_bounds
+from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.statement import MARGIN, above
+from quakedesign.plant.plant_values import Row
+from quakedesign.plant.user_plant import UncertainPlant
+
+_TURNS = 60  # of bounds of sectors that are found
+_WIDER = Fraction(51, 50)  # what each bound has more than the last one needed
+_PIECES = ((36, 16), (96, 8))  # of a flow, by the states of the loop
+_ROOM = 1.002  # so that another way to bound the same integrals closes with the same numbers
+
+
+def linear_part(plant: UncertainPlant, bounds: dict[str, Fraction]) -> LinearPart:
+    """An uncertain plant in exact numbers, sectors with callable slopes up to bounds by their names."""
+    sectors = plant.exact_sectors(lambda name: bounds.get(name, Fraction(1)))
+    return LinearPart(
+        A=plant.A,
+        B=plant.B,
+        C=plant.C,
+        disturbances=tuple(plant.disturbances.values()),
+        loads=tuple(plant.loads.values()),
+        sectors=tuple(sectors.values()),
+        noise=tuple(plant.noise.get(name, Fraction(0)) for name in plant.measurements),
+        start=plant.start,
+        outputs=tuple((plant.outputs or {}).values()),
+    )
+
+
+def plant_guarantee(plant: UncertainPlant, law: MatrixLaw) -> PlantGuarantee | NoGuarantee:
+    """Peaks of a plant under a law, or why none are proved.
+
+    Raises
+    ------
+    ParameterError
+        For a law that does not fit the plant.
+    """
+    free = [name for name, sector in plant.sectors.items() if callable(sector.slopes) and sector.within is None]
+    bounds = dict.fromkeys(free, Fraction(0))
+    for name in free:
+        row = linear_part(plant, {}).sectors[list(plant.sectors).index(name)].row
+        first = sum((abs(a) * b for a, b in zip(row, plant.start, strict=False)), Fraction(0))
+        bounds[name] = _rounded(first * _WIDER) or Fraction(1, 1000)
+    for _ in range(_TURNS):
+        part = linear_part(plant, bounds)
+        loop = part.loop(law)
+        if reason := _unstable(part, loop):
+            return NoGuarantee(reason=reason, small_gain=None)
+        pieces = pieces_of(loop)
+        try:
+            found = response_bounds(loop, pieces)
+        except ParameterError as error:
+            return NoGuarantee(reason=str(error), small_gain=None)
+        inputs = _numbers(plant, part, found)
+        if isinstance(inputs, NoGuarantee):
+            return inputs
+        rows = row_bounds(part, found, inputs)[len(part.outputs) :]
+        reached = {name: rows[list(plant.sectors).index(name)] for name in free}
+        left = [name for name in free if reached[name] >= bounds[name]]
+        if not left:
+            return _claimed(plant, part, law, pieces, found, inputs)
+        for name in left:
+            bounds[name] = _rounded(reached[name] * _WIDER)
+    name = free[0]
+    reason = f"the argument of {name} moves further for every bound, up to {UpperBound(bounds[name]):.3g}"
+    return NoGuarantee(reason=reason, small_gain=None)
+
+
+def _claimed(
+    plant: UncertainPlant, part: LinearPart, law: MatrixLaw, pieces: int, found: ResponseBounds, inputs: Row
+) -> PlantGuarantee | NoGuarantee:
+    bounds = peaks(part, found, inputs)
+    if bounds is None:
+        rows = row_bounds(part, found, inputs)[len(part.outputs) :]
+        names = [*plant.sectors, *plant.gains]
+        beyond = [
+            f"{name} holds for arguments up to {UpperBound(s.within):.4g}, which may reach {UpperBound(row):.4g}"
+            for name, s, row in zip(names, part.sectors, rows, strict=False)
+            if s.within is not None and row >= s.within
+        ]
+        return NoGuarantee(reason="; ".join(beyond) or "the numbers of the small gain do not close", small_gain=None)
+    claimed = tuple(UpperBound(above(v * MARGIN)) for v in bounds)
+    count = len(part.outputs)
+    return PlantGuarantee(
+        part=part,
+        law=law,
+        pieces=pieces,
+        inputs=inputs,
+        claims=PlantClaims(outputs=claimed[:count], controls=claimed[count:]),
+        outputs=tuple(plant.outputs or ()),
+        controls=tuple(plant.controls),
+        name=plant.name,
+    )
+
+
+def _numbers(plant: UncertainPlant, part: LinearPart, found: ResponseBounds) -> Row | NoGuarantee:
+    """W of the theorem, from floats; or the small gain and the sector that makes most of it."""
+    count, names = len(part.outputs), [*plant.sectors, *plant.gains]
+    halves = np.array([float(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors])
+    if not halves.any():
+        return (Fraction(0),) * len(halves)
+    first = len(part.disturbances) + len(part.loads)
+    span = slice(count, count + len(halves))
+    gains = np.array([[float(v) for v in row[span]] for row in found.inputs[first:]]).T
+    matrix = halves[:, None] * gains
+    radius = max(abs(np.linalg.eigvals(matrix)))
+    if radius * _ROOM >= 1:
+        alone = int(np.argmax(np.diag(matrix)))
+        return NoGuarantee(
+            reason=f"small gain {radius:.3g}, which must be below 1: {names[alone]} alone makes "
+            f"{matrix[alone, alone]:.3g}",
+            small_gain=UpperBound(rational(f"{radius:.6g}")),
+        )
+    none = tuple(Fraction(0) for _ in halves)
+    own = halves * np.array([float(v) for v in row_bounds(part, found, none)[span]])
+    own += 1e-12 * max(own.max(), 1e-300)
+    solved = np.linalg.solve(np.eye(len(own)) - _ROOM * matrix, _ROOM * own)
+    return tuple(_rounded(rational(float(v)), 8) for v in solved)
+
+
+def _rounded(value: Fraction, digits: int = 4) -> Fraction:
+    """At least a number that is not negative, with a few digits."""
+    if not value:
+        return value
+    scale = Fraction(10) ** (digits - 1 - len(str(ceil(value))) if value >= 1 else digits - 1 + _zeros(value))
+    return Fraction(ceil(value * scale)) / scale
+
+
+def _zeros(value: Fraction) -> int:
+    return len(str(int(1 / value)))
+
+
+def pieces_of(loop: PlantLoop) -> int:
+    """Pieces of a flow: few of a large loop, more where a mode is fast."""
+    size, flow = len(loop.flow), np.array(loop.flow, dtype=float)
+    fastest = max(abs(np.linalg.eigvals(flow)))
+    fast = max(float(time) for _, time in loop.segments) * fastest
+    usual = next(count for most, count in _PIECES if size <= most)
+    return int(min(max(usual, 2 * ceil(fast)), MOST_PIECES))
+
+
+def spectral_radius(loop: PlantLoop) -> tuple[float, np.ndarray]:
+    """Largest size of an eigenvalue of a period, and its eigenvector."""
+    flow, period = np.array(loop.flow, dtype=float), np.eye(len(loop.flow))
+    for jump, time in loop.segments:
+        period = expm(flow * float(time)) @ np.array(jump, dtype=float) @ period
+    values, vectors = np.linalg.eig(period)
+    place = int(np.argmax(abs(values)))
+    return float(abs(values[place])), vectors[:, place]
+
+
+def _unstable(part: LinearPart, loop: PlantLoop) -> str:
+    """Why the nominal loop is not stable; empty where it is."""
+    radius, mode = spectral_radius(loop)
+    if radius < 1:
+        return ""
+    states = np.real(mode[: len(part.A)] / mode[np.argmax(abs(mode[: len(part.A)]))])
+    shape = ", ".join(f"{v:.2g}" for v in states)
+    return f"the nominal loop is not stable: the mode ({shape}) of the states grows by {radius:.4g} a sample"
+
+
+def escaping(plant: UncertainPlant, law: MatrixLaw) -> tuple[float, np.ndarray]:
+    """Growth per sample and states of the fastest mode where every sector is at its high slope."""
+    part = linear_part(plant, {})
+    steep = tuple(replace(s, slopes=(s.slopes[1], s.slopes[1])) for s in part.sectors)
+    radius, mode = spectral_radius(replace(part, sectors=steep).loop(law))
+    states: Any = mode[: len(plant.A)]
+    return radius, np.real(states / states[np.argmax(abs(states))])

@@ -1,0 +1,37 @@
+"""Exact values that uncertain plants are made of, for what decides about them."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+Row = tuple[Fraction, ...]
+Matrix = tuple[Row, ...]
+
+MOST = 40
+"""States, measurements, sectors and outputs of a plant."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExactSector:
+    """A sector in exact numbers, its row over states and controls."""
+
+    entry: Row
+    row: Row
+    slopes: tuple[Fraction, Fraction]
+    within: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowLoad:
+    """A load v = control·λ(t), |λ′| ≤ rate, λ(0) = 0, balanced by u = v with x = shift·λ, which is not measured.
+
+    The states of a statement are x − shift·λ.
+    """
+
+    control: Row
+    shift: Row
+    rate: Fraction
+
+
+def unit(size: int, place: int) -> Row:
+    """Unit row."""
+    return tuple(Fraction(i == place) for i in range(size))

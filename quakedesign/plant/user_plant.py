@@ -1,0 +1,456 @@
+"""Plants of a user's own, and of several blocks: a linear part, sectors, loads and disturbances, in exact numbers.
+
+x′ = Ax + B(u − v) + Σ entry·φ(row·(x, u − v), t) + Σ entry·d(t). A sector φ lies between two slopes, for all values of
+its argument or for those within a bound; a load v(t) changes slowly; a disturbance d is any measurable function of a
+bounded size. The law measures Cx at every sample, and noise.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field, replace
+from fractions import Fraction
+from math import ceil
+from types import MappingProxyType
+from typing import Any, Self
+
+from flint import fmpq, fmpq_mat
+
+from quakedesign.arguments import checked_dataclass
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.exact import rational, shortly
+from quakedesign.fault import Fault
+from quakedesign.fault.units import exact_value
+from quakedesign.plant.of_fault import uncertain_plant
+from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad, unit
+from quakedesign.plant.ranges import FaultPlant
+
+Slopes = tuple[Any, Any] | Callable[[Fraction], tuple[Any, Any]]
+
+
+@checked_dataclass(frozen=True, kw_only=True)
+class Sector:
+    """An uncertain term entry·φ(row·(x, u − v), t) of a plant with slopes·y² between: low·y² ≤ y·φ(y, t) ≤ high·y².
+
+    Attributes
+    ----------
+    entry : sequence of numbers
+        How it enters x′, one number for every state.
+    row : sequence of numbers
+        Its argument y: one number for every state, and for every control too where it depends on these.
+    slopes : (number, number) or callable
+        Low and high. A callable gives them for a bound of |y|, such as ``lambda y: (-2.5 * y * y, 0)``, and the bound
+        is found.
+    within : number, optional
+        Bound of |y| up to which it is so; the proof shows that it is not passed. Of the states alone.
+    """
+
+    entry: Any
+    row: Any
+    slopes: Any
+    within: Any = None
+
+    def at(self, bound: Fraction | None, sizes: tuple[int, int], name: str) -> "ExactSector":
+        """The sector in exact numbers; one with callable slopes up to a bound of its argument."""
+        n, m = sizes
+        row = vector(self.row, f"row of sector {name}")
+        if len(row) == n:
+            row = (*row, *[Fraction(0)] * m)
+        entry = vector(self.entry, f"entry of sector {name}", n)
+        if len(row) != n + m:
+            raise ParameterError(
+                f"row of sector {name} must have {n} entries, or {n + m} with the controls. Received {len(row)}."
+            )
+        within = None if self.within is None else rational(self.within, f"within of sector {name}")
+        if callable(self.slopes):
+            within = bound if within is None else within
+            assert within is not None
+            slopes = self.slopes(within)
+        else:
+            slopes = self.slopes
+        ends = vector(slopes, f"slopes of sector {name}", 2)
+        if ends[0] > ends[1] or (within is not None and (within <= 0 or any(row[n:]))):
+            raise ParameterError(
+                f"sector {name} must have slopes in order, and a positive bound of an argument of states alone where "
+                f"it has one. Received slopes {shortly(ends[0])} and {shortly(ends[1])}, within "
+                f"{'None' if within is None else shortly(within)}."
+            )
+        return ExactSector(entry=entry, row=row, slopes=(ends[0], ends[1]), within=within)
+
+
+@checked_dataclass(frozen=True, kw_only=True)
+class UncertainPlant:
+    """A linear plant with sectors, gains and disturbances, whose peaks `guarantee` proves for a sampled law.
+
+    All numbers may be floats, texts or rationals, and are exact from then on.
+
+    Attributes
+    ----------
+    A, B : matrices
+        x′ = Ax + Bu + …; n × n and n × m.
+    C : matrix, optional
+        What is measured; all states unless given.
+    sectors : mapping of str to Sector
+    gains : mapping of str to (number, number)
+        Least and largest factor of a control, by its name: any course of it between.
+    disturbances : mapping of str to (sequence, number)
+        How it enters x′, and its largest size.
+    loads : mapping of str to (sequence, sequence or None, number)
+        Controls that balance it, shift of the states at balance (0 for None) and largest rate; see `SlowLoad`.
+    outputs : mapping of str to sequence
+        Rows over the states whose peaks are proved; the measurements unless given.
+    controls, measurements : sequence of str
+        Names of u and Cx; u1 … and y1 … unless given.
+    noise : mapping of str to number
+        Largest measurement error by the name of a measurement.
+    start : sequence of numbers, optional
+        |x_i(0)| ≤ start_i; from rest unless given.
+    name : str
+
+    Raises
+    ------
+    ParameterError
+        For sizes that do not fit, unknown names, or numbers out of their range.
+    """
+
+    A: Any
+    B: Any
+    C: Any = None
+    sectors: Mapping[str, Sector] = field(default_factory=dict)
+    gains: Mapping[str, Any] = field(default_factory=dict)
+    disturbances: Mapping[str, Any] = field(default_factory=dict)
+    loads: Mapping[str, Any] = field(default_factory=dict)
+    outputs: Mapping[str, Any] | None = None
+    controls: Sequence[str] = ()
+    measurements: Sequence[str] = ()
+    noise: Mapping[str, Any] = field(default_factory=dict)
+    start: Any = None
+    name: str = "plant"
+
+    def __post_init__(self) -> None:
+        keep: Any = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
+        A, B = matrix(self.A, "A"), matrix(self.B, "B")
+        n, m = len(A), len(B[0]) if B else 0
+        C = matrix(self.C, "C") if self.C is not None else tuple(unit(n, i) for i in range(n))
+        if not 1 <= n <= MOST or not 1 <= m <= MOST or len(C) > MOST:
+            raise ParameterError(
+                f"a plant must have 1 to {MOST} states, controls and measurements. Received {n}, {m} and {len(C)}."
+            )
+        for name, part, height, width in (("A", A, n, n), ("B", B, n, m), ("C", C, len(C), n)):
+            if [len(row) for row in part] != [width] * height:
+                raise ParameterError(
+                    f"matrix {name} of a plant must be {height} x {width}. Received {len(part)} rows of "
+                    f"{', '.join(map(str, sorted({len(row) for row in part})))} entries."
+                )
+        keep("A", A)
+        keep("B", B)
+        keep("C", C)
+        keep("controls", _names(self.controls, "u", m, "controls"))
+        keep("measurements", _names(self.measurements, "y", len(C), "measurements"))
+        outputs = dict(zip(self.measurements, C, strict=True)) if self.outputs is None else self.outputs
+        keep("outputs", _frozen({name: vector(row, f"output {name}", n) for name, row in outputs.items()}))
+        keep("disturbances", _frozen({name: _disturbance(name, one, n) for name, one in self.disturbances.items()}))
+        keep("loads", _frozen({name: _load(name, one, (n, m), C) for name, one in self.loads.items()}))
+        for given, known, what in ((self.gains, self.controls, "gains"), (self.noise, self.measurements, "noise")):
+            if unknown := set(given) - set(known):
+                raise ParameterError(
+                    f"{what} of a plant must be of {', '.join(known)}. Received {', '.join(sorted(unknown))}."
+                )
+        ends = {name: vector(pair, f"gains of {name}", 2) for name, pair in self.gains.items()}
+        if any(low > high for low, high in ends.values()):
+            raise ParameterError("gains of a control must be the least, then the largest. Received them reversed.")
+        keep("gains", _frozen(ends))
+        sizes = {name: rational(size, f"noise of {name}") for name, size in self.noise.items()}
+        start = (Fraction(0),) * n if self.start is None else vector(self.start, "start", n)
+        if min([*sizes.values(), *start, Fraction(0)]) < 0:
+            raise ParameterError("noise and start must be 0 or more. Received a negative number. Give absolute values.")
+        keep("noise", _frozen(sizes))
+        keep("start", start)
+        keep("sectors", _frozen(dict(self.sectors)))
+        if len(self.sectors) + len(ends) > MOST or not 1 <= len(self.outputs or ()) <= MOST:
+            raise ParameterError(f"a plant must have at most {MOST} sectors and gains, and 1 to {MOST} outputs.")
+        if double := set(self.sectors) & set(ends):
+            raise ParameterError(f"sectors and gains must have different names. Received {', '.join(sorted(double))}.")
+        self.exact_sectors(lambda _: Fraction(1))
+
+    @classmethod
+    def from_statespace(cls, system: Any, **more: Any) -> Self:
+        """Plant of a `control.StateSpace` in continuous time, with the names of its signals and other fields.
+
+        Raises
+        ------
+        ParameterError
+            For a system in discrete time, or whose outputs depend on its inputs at once.
+        """
+        if getattr(system, "dt", 0) or any(v for row in system.D.tolist() for v in row):
+            raise ParameterError(
+                "a plant must be in continuous time, with D = 0. Received a system of another kind. "
+                "Use control.ss(A, B, C, 0)."
+            )
+        labels = {"controls": tuple(system.input_labels), "measurements": tuple(system.output_labels)}
+        return cls(**({"A": system.A, "B": system.B, "C": system.C, "name": system.name} | labels | more))
+
+    @classmethod
+    def from_blocks(cls, fault: Fault, blocks: int, *, wells: str = "each", coupling: Any = None) -> Self:
+        """Strips of a fault with springs between neighbours, each with its own friction of the box and disturbance.
+
+        States: slip errors [m], then slip-rate errors [m/s] of all blocks; controls: pressures of the wells [Pa].
+        With a well for each block the errors are those from the reference, and all are measured. With one well for all
+        the slip error of a block is that from its balance under the pressure that holds the mean slip at the reference;
+        the means of slip and slip rate are measured.
+
+        Parameters
+        ----------
+        fault : Fault
+        blocks : int
+            2 to 20.
+        wells : str
+            ``"each"`` or ``"one"``.
+        coupling : number, optional
+            Stiffness of a spring over the mass of a block [1/s²]; that of elastic strips, G·blocks²/(ρL²), unless
+            given.
+
+        Raises
+        ------
+        ParameterError
+            Also where the balance under one well may not be unique, although no mode escapes.
+        """
+        return cls(**block_parts(fault, blocks, wells, coupling))
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Numbers of states and of controls."""
+        return len(self.A), len(self.controls)
+
+    def exact_sectors(self, bound: Callable[[str], Fraction]) -> dict[str, ExactSector]:
+        """Sectors and gains, those with callable slopes up to a bound of the argument by their name."""
+        n, m = self.sizes
+        found = {name: sector.at(bound(name), (n, m), name) for name, sector in self.sectors.items()}
+        for name, (low, high) in self.gains.items():
+            k = list(self.controls).index(name)
+            entry = tuple(row[k] for row in self.B)
+            found[name] = ExactSector(entry=entry, row=unit(n + m, n + k), slopes=(low - 1, high - 1))
+        return found
+
+    def behind(self, lag: Any) -> "UncertainPlant":
+        """The plant behind actuators with a time constant [s] each, q′ = (u − q)/lag, which are further states."""
+        time = rational(lag, "lag")
+        if time <= 0:
+            raise ParameterError(f"lag must be positive. Received {shortly(time)} s. Omit lag.")
+        (n, m), zero = self.sizes, Fraction(0)
+        still = (zero,) * m
+
+        def moved(row: Row) -> Row:
+            return (*row[:n], *row[n:], *still)
+
+        exact = self.exact_sectors(lambda _: Fraction(1))
+        sectors = {
+            name: Sector(
+                entry=(*exact[name].entry, *still),
+                row=moved(exact[name].row),
+                slopes=one.slopes,
+                within=one.within,
+            )
+            for name, one in self.sectors.items()
+        }
+        for name in self.gains:
+            one_gain = exact[name]
+            sectors[name] = Sector(entry=(*one_gain.entry, *still), row=moved(one_gain.row), slopes=one_gain.slopes)
+        return replace(
+            self,
+            A=[[*a, *b] for a, b in zip(self.A, self.B, strict=True)]
+            + [[zero] * n + [-(i == j) / time for j in range(m)] for i in range(m)],
+            B=[still] * n + [[(i == j) / time for j in range(m)] for i in range(m)],
+            C=[(*row, *still) for row in self.C],
+            sectors=sectors,
+            gains={},
+            disturbances={name: ((*entry, *still), size) for name, (entry, size) in self.disturbances.items()},
+            loads={name: (one.control, (*one.shift, *one.control), one.rate) for name, one in self.loads.items()},
+            outputs={name: (*row, *still) for name, row in (self.outputs or {}).items()},
+            start=(*self.start, *still),
+        )
+
+
+# ----------------------------------------------------------------------
+# Several blocks of a fault. About r(t), or with one well about their balance x*(t) under the pressure p*(t) for which
+# the mean of x* is r, block i has e1′ = e2 + (r′ − x*′) and
+# e2′ = s·e1 + K(e1₋ − 2e1 + e1₊) − w·e2 + βb(p − p*) + φ − w·r′ − r″
+# with chords s, w and β of its own friction in the ranges of the fault. With a well for each block x* = r.
+#
+# With one well let x*′ = r′(1 + ξ), where ξ has the mean 0, and b·p*′ = r′·q. As all forces balance, s(1 + ξ) − KΛξ +
+# βq = 0 in every block, Λ the Laplacian of the chain, so (KΛ − s0)ξ = P[(s − s0)(1 + ξ) + (β − β0)q] with the
+# projection P that takes the mean away, and mean(s(1 + ξ)) + mean(β)q = 0. With R the largest absolute row sum of
+# (KΛ − s0)⁻¹P and X = max|ξ|: |q| ≤ S(1 + X), S = max|s|, as β ≥ 1, and X ≤ R·c·(1 + X), c = δs + δβ·S. Where R·c < 1,
+# X ≤ Rc/(1 − Rc), and the balance is a Lipschitz function of r. The mean of all forces is that of one block whose
+# coefficient is the mean of μ at x*, so σ′ − p* lies in the range of one block whose friction weakens and strengthens
+# 1 + X times as fast; from any bound of X a better one follows.
+
+_STEEP = Fraction(10**9)  # of friction that may have any coefficient at once
+_TURNS = 6
+_GRID = 10**4
+
+
+def block_parts(fault: Fault, blocks: int, wells: str, coupling: Any) -> dict[str, Any]:
+    """Fields of the plant of several blocks."""
+    require_known(wells, ("each", "one"), "wells")
+    if not 2 <= blocks <= MOST // 2:
+        raise ParameterError(f"blocks must be 2 to {MOST // 2}. Received {blocks}.")
+    task, N, zero = uncertain_plant(fault), blocks, Fraction(0)
+    elastic = task.shear_modulus * N**2 / (task.density * task.length**2)
+    K = elastic if coupling is None else exact_value(coupling, "1/s^2", "coupling")
+    if K <= 0:
+        raise ParameterError(f"coupling of blocks must be positive. Received {shortly(K)} 1/s^2.")
+    one = wells == "one"
+    slope, damping, differ = task.slip_chord, task.rate_chord, zero
+    if one:
+        if any(task.spreads):
+            raise ParameterError(
+                f"one well for several blocks needs blocks whose constants are known, box paper. Received {task.name} "
+                "with spreads. Use fault.with_box('paper')."
+            )
+        slope, damping, differ = _balanced(task, N, K)
+    moving = max(map(abs, slope)) * (1 + differ) * task.reference_rates[0]
+    first, second = task.reference_rates
+    size, middle = 2 * N, (damping[0] + damping[1]) / 2
+    A = [unit(size, N + i) for i in range(N)]
+    for i in range(N):
+        row = [zero] * size
+        for j in (i - 1, i + 1):
+            if 0 <= j < N:
+                row[j], row[i] = K, row[i] - K
+        row[N + i] = -middle
+        A.append(tuple(row))
+    share = [[Fraction(1)] if one else [Fraction(i == j) for j in range(N)] for i in range(N)]
+    B = [(zero,) * len(share[0])] * N + [tuple(task.authority * v for v in row) for row in share]
+    rate = [unit(size, N + i) for i in range(N)]
+    sectors = {f"slope of block {i + 1}": Sector(entry=rate[i], row=unit(size, i), slopes=slope) for i in range(N)}
+    if damping[0] < damping[1]:
+        half = (damping[1] - damping[0]) / 2
+        for i in range(N):
+            sectors[f"damping of block {i + 1}"] = Sector(entry=rate[i], row=rate[i], slopes=(-half, half))
+    for i in range(N):
+        acts = (*[zero] * size, *(task.authority * v for v in share[i]))
+        sectors[f"input gain of block {i + 1}"] = Sector(entry=rate[i], row=acts, slopes=(0, task.beta[1] - 1))
+    force = max(map(abs, damping)) * first + second + task.amplitude
+    disturbances = {f"force on block {i + 1}": (rate[i], force) for i in range(N)}
+    if one and differ:
+        disturbances |= {f"balance of block {i + 1}": (unit(size, i), first * differ) for i in range(N)}
+    mean = Fraction(1, N)
+    means = [[mean] * N + [zero] * N, [zero] * N + [mean] * N]
+    return {
+        "A": A,
+        "B": B,
+        "C": means if one else None,
+        "sectors": sectors,
+        "disturbances": disturbances,
+        "loads": {
+            f"pressure {k + 1}": (unit(len(share[0]), k), None, moving / task.authority) for k in range(len(share[0]))
+        },
+        "outputs": {
+            **{f"slip error {i + 1}": unit(size, i) for i in range(N)},
+            **{f"slip-rate error {i + 1}": rate[i] for i in range(N)},
+        },
+        "controls": tuple(f"pressure {k + 1}" for k in range(len(share[0]))),
+        "name": f"{N} blocks of {task.name}, {'one well' if one else f'{N} wells'}",
+    }
+
+
+def _balanced(task: FaultPlant, blocks: int, K: Fraction) -> tuple[tuple[Fraction, Fraction], Any, Fraction]:
+    """Ranges of slope and damping under one well, and X; 0 where a mode escapes at the steepest slope anyway."""
+    differ: Fraction | None = None
+    slope = damping = task.slip_chord
+    for _ in range(_TURNS):
+        steep = _STEEP if differ is None else 1 + differ
+        law = task.friction
+        faster = replace(law, weakening=law.weakening * steep, strengthening=law.strengthening * steep)
+        stress = replace(task, friction=faster).stress
+        slope, damping = task.slip_slopes(stress), task.rate_slopes(stress)
+        s0, half = (slope[0] + slope[1]) / 2, (slope[1] - slope[0]) / 2
+        rows = [[-s0 * (i == j) for j in range(blocks)] for i in range(blocks)]
+        for i in range(blocks - 1):
+            for a, b in ((i, i + 1), (i + 1, i)):
+                rows[a][a] += K
+                rows[a][b] -= K
+        away = [[v + (1 + abs(s0)) for v in row] for row in rows]  # the same but for the mean
+        inverse = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in away]).inv()
+        mean = fmpq(1, blocks)
+        project = fmpq_mat([[fmpq(int(i == j)) - mean for j in range(blocks)] for i in range(blocks)])
+        found = (inverse * project).tolist()
+        reach = max(sum((abs(Fraction(int(v.p), int(v.q))) for v in row), Fraction(0)) for row in found)
+        least = 2 * K * (1 - _cosine(blocks))  # of the modes that differ, from below
+        share = reach * (half + (task.beta[1] - 1) / 2 * max(map(abs, slope)))
+        if share >= 1 or least <= s0:
+            if differ is not None:
+                break
+            if least <= slope[1]:
+                return slope, damping, Fraction(0)
+            raise ParameterError(
+                f"the balance of {blocks} blocks under one well must be unique for every friction of the box. Received "
+                f"springs of {shortly(K)} 1/s^2, for which this is not proved. Give stiffer springs, or a well each."
+            )
+        better = Fraction(ceil(share / (1 - share) * _GRID), _GRID)
+        if differ is not None and better >= differ:
+            break
+        differ = better
+    return slope, damping, differ or Fraction(0)
+
+
+def _cosine(blocks: int) -> Fraction:
+    """At least cos(π/blocks)."""
+    x = Fraction(314159265, 10**8) / blocks
+    return 1 - x**2 / 2 + x**4 / 24
+
+
+def _frozen(values: dict[str, Any]) -> Mapping[str, Any]:
+    return MappingProxyType(values)
+
+
+def vector(values: Any, name: str, length: int | None = None) -> Row:
+    """Exact numbers of a sequence or array."""
+    entries = values.tolist() if hasattr(values, "tolist") else values
+    if isinstance(entries, str) or not isinstance(entries, Sequence):
+        raise ParameterError(f"{name} must be a sequence of numbers. Received {entries!r:.60}.")
+    found = tuple(rational(v, name) for v in entries)
+    if length is not None and len(found) != length:
+        raise ParameterError(f"{name} must have {length} numbers. Received {len(found)}.")
+    return found
+
+
+def matrix(values: Any, name: str) -> Matrix:
+    """Exact numbers of rows or a matrix."""
+    rows = values.tolist() if hasattr(values, "tolist") else values
+    if isinstance(rows, str) or not isinstance(rows, Sequence):
+        raise ParameterError(f"matrix {name} must be a sequence of rows. Received {rows!r:.60}.")
+    return tuple(vector(row, f"a row of {name}") for row in rows)
+
+
+def _names(given: Sequence[str], letter: str, count: int, what: str) -> tuple[str, ...]:
+    names = tuple(given) or tuple(f"{letter}{i + 1}" for i in range(count))
+    if len(names) != count or len(set(names)) != count:
+        raise ParameterError(f"{what} must be {count} different names. Received {', '.join(map(str, names))}.")
+    return names
+
+
+def _disturbance(name: str, given: Any, n: int) -> tuple[Row, Fraction]:
+    entry, size = given
+    found = vector(entry, f"entry of disturbance {name}", n), rational(size, f"size of disturbance {name}")
+    if found[1] < 0:
+        raise ParameterError(f"size of disturbance {name} must be 0 or more. Received {shortly(found[1])}.")
+    return found
+
+
+def _load(name: str, given: Any, sizes: tuple[int, int], C: Matrix) -> SlowLoad:
+    if isinstance(given, SlowLoad):
+        return given
+    control, shift, rate = given
+    n, m = sizes
+    found = SlowLoad(
+        control=vector(control, f"control of load {name}", m),
+        shift=(Fraction(0),) * n if shift is None else vector(shift, f"shift of load {name}", n),
+        rate=rational(rate, f"rate of load {name}"),
+    )
+    seen = any(sum(c * s for c, s in zip(row, found.shift, strict=True)) for row in C)
+    if found.rate < 0 or seen:
+        raise ParameterError(
+            f"load {name} must have a rate of 0 or more and a shift that is not measured, C·shift = 0. Received the "
+            f"rate {shortly(found.rate)}{' and a shift that is measured' * seen}."
+        )
+    return found

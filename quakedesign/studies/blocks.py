@@ -1,0 +1,109 @@
+"""May one block stand for a fault? What is proved of a fault that is cut into several blocks."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quakedesign.exact import rational
+from quakedesign.fault import Fault
+from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.loop.loop_setup import LoopSetup
+from quakedesign.plant import UncertainPlant
+from quakedesign.synthesis import guarantee
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlocksAnswer:
+    """What is proved of a fault cut into numbers of blocks.
+
+    Attributes
+    ----------
+    fault : Fault
+    wells : str
+        ``"one"`` or ``"each"``.
+    step : Fraction
+        T_s [s].
+    found : mapping of int to PlantGuarantee or NoGuarantee
+        By the number of blocks.
+    """
+
+    fault: Fault
+    wells: str
+    step: Fraction
+    found: Mapping[int, PlantGuarantee | NoGuarantee]
+
+    @property
+    def proved(self) -> bool:
+        """Whether all numbers of blocks have a guarantee."""
+        return all(one.proved for one in self.found.values())
+
+    def peaks(self, blocks: int) -> tuple[Any, Any] | None:
+        """Largest slip error [m] and slip-rate error [m/s] of all blocks, as they are proved."""
+        one = self.found[blocks]
+        if not one.proved:
+            return None
+        outputs = one.claims.outputs
+        return max(outputs[:blocks]), max(outputs[blocks:])
+
+    def lines(self) -> list[str]:
+        """For people."""
+        held = "one well for all" if self.wells == "one" else "a well for each block"
+        said = [f"{self.fault.name} cut into blocks, {held}, each block its own friction of the box:"]
+        for blocks, one in self.found.items():
+            ends = self.peaks(blocks)
+            if isinstance(one, NoGuarantee) or ends is None:
+                said.append(f"{blocks:3} blocks: {one.sentence()}")
+                continue
+            about = "its balance" if self.wells == "one" else "the reference"
+            said.append(
+                f"{blocks:3} blocks: proved: slip-rate error at most {ends[1]:.4g} m/s, slip within {ends[0]:.4g} m of "
+                f"{about}"
+            )
+        return said
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI."""
+        rows = []
+        for blocks, one in self.found.items():
+            ends = self.peaks(blocks)
+            known: dict[str, Any] = {"blocks": blocks, "verdict": "proved" if one.proved else "undecided"}
+            known |= {"reason": None if one.proved else one.reason}
+            known |= {"slip_error": ends and ends[0].exact, "slip_rate_error": ends and ends[1].exact}
+            rows.append(known)
+        return {"fault": self.fault.name, "wells": self.wells, "step": str(self.step), "blocks": rows}
+
+
+def one_block(
+    fault: Fault,
+    blocks: Sequence[int] = range(2, 11),
+    *,
+    wells: str = "one",
+    coupling: Any = None,
+    step: Any = None,
+) -> BlocksAnswer:
+    """Whether one block may stand for a fault: what is proved when it is cut into several.
+
+    Parameters
+    ----------
+    fault : Fault
+    blocks : sequence of int
+    wells : str
+        ``"one"`` well for all blocks, whose law measures the means of slip and slip rate, or ``"each"``.
+    coupling : number, optional
+        As of `UncertainPlant.from_blocks` [1/s²].
+    step : str, float or Fraction, optional
+        T_s; the fault's unless given.
+
+    Returns
+    -------
+    BlocksAnswer
+    """
+    setup = LoopSetup(step=rational(fault.sampling_time) if step is None else step)
+    found: dict[int, Any] = {}
+    for count in blocks:
+        plant = UncertainPlant.from_blocks(fault, count, wells=wells, coupling=coupling)
+        found[count] = guarantee(plant, setup=setup)
+    assert setup.step is not None
+    return BlocksAnswer(fault=fault, wells=wells, step=setup.step, found=found)

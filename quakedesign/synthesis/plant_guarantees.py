@@ -1,0 +1,96 @@
+"""Guarantee of an uncertain plant, with a law as control engineers have it in exact numbers."""
+
+from typing import Any
+
+import numpy as np
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import rational
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.guarantees.exact.plant_loop import MatrixLaw
+from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.search.block_design import block_law
+from quakedesign.guarantees.search.plant_search import escaping, plant_guarantee
+from quakedesign.laws.user_law import exact_matrix, integrating
+from quakedesign.loop.loop_setup import LoopSetup
+from quakedesign.plant import UncertainPlant
+
+_KNOWN = {"step", "delay", "lag"}
+_UNSEEN = 1e-9
+
+
+def guarantee_plant(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup) -> PlantGuarantee | NoGuarantee:
+    """Peaks of a plant's outputs under a law, a gain matrix, or a law that is designed for several blocks.
+
+    Parameters
+    ----------
+    plant : UncertainPlant
+    law : object with A, B, C, D and dt, SampledLaw or None
+    gains : matrix
+        u = −gains·y, with the step of the setup.
+    setup : LoopSetup
+        Step, delay and lag.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if unknown := setup.given().keys() - _KNOWN:
+        raise ParameterError(
+            f"a guarantee of an uncertain plant has step, delay and lag of the loop setup; noise and start are fields "
+            f"of the plant. Received {', '.join(sorted(unknown))}. Omit these."
+        )
+    around = plant.behind(setup.lag) if setup.lag else plant
+    exact = _law_of(around, law, gains, setup)
+    radius, mode = escaping(around, exact)
+    if radius >= 1:
+        shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[: _shown(around)], 9))
+        seen = np.abs(np.array(around.C, dtype=float) @ mode).max() > _UNSEEN
+        return NoGuarantee(
+            reason=f"a mode escapes{'' if seen else ', which is not measured'}: with every uncertain term at its "
+            f"steepest the states ({shape}) grow by {radius:.4g} a sample",
+            small_gain=None,
+        )
+    return plant_guarantee(around, exact)
+
+
+def _shown(plant: UncertainPlant) -> int:
+    """Slip errors of blocks, or all states."""
+    return len(plant.A) // 2 if any("block" in name for name in plant.sectors) else len(plant.A)
+
+
+def _law_of(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup) -> MatrixLaw:
+    """A law in exact numbers."""
+    given: Any = gains if hasattr(gains, "shape") else list(gains)
+    empty = len(given) == 0
+    if (law is None) == empty and not (law is None and "slope of block 1" in plant.sectors and not setup.delay):
+        raise ParameterError(
+            "an uncertain plant needs a law, or gains with a step. Received "
+            f"{'none of them' if empty else 'both'}. Give law=control.ss(A, B, C, D, dt), or gains=K and step."
+        )
+    if law is None:
+        if setup.step is None:
+            raise ParameterError("gains of an uncertain plant need a step. Received none. Give step='0.1 s', say.")
+        if empty:
+            return block_law(plant, setup.step)
+        rows = exact_matrix(np.atleast_2d(np.asarray(given, dtype=object)), "gains")
+        feedback = tuple(tuple(-v for v in row) for row in rows)
+        output: tuple[Any, ...] = ((),) * len(feedback)
+        return MatrixLaw(step=setup.step, delay=setup.delay, update=(), measured=(), output=output, feedback=feedback)
+    linear = getattr(law, "law", None)
+    step = rational(law.step if linear is not None else getattr(law, "dt", None) or 0, "dt")
+    if step <= 0 or getattr(law, "dt", 0) is True or (setup.step or step) != step:
+        raise ParameterError(
+            f"a law must be in discrete time with its step as dt, and that of the setup if there is one. Received dt "
+            f"= {getattr(law, 'dt', None)!r}. Use control.ss(A, B, C, D, dt)."
+        )
+    if linear is not None:
+        if linear.of_reference or linear.root is not None:
+            raise ParameterError("a law of an uncertain plant is linear in what is measured. Received another one.")
+        parts: tuple[Any, ...] = (linear.update, linear.measured, (linear.output,), (linear.feedback,))
+    else:
+        parts = tuple(exact_matrix(getattr(law, name, None), name) for name in "ABCD")
+        if len(parts[2]) == 1 and plant.loads:
+            parts = (integrating(parts[0], parts[2][0])[0], *parts[1:])
+    A, B, C, D = parts
+    return MatrixLaw(step=step, delay=setup.delay, update=A, measured=B, output=C, feedback=D)

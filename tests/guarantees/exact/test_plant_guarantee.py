@@ -1,0 +1,409 @@
+"""Peaks of uncertain plants: independent runs inside, other discretisations of the norms, forged files refused."""
+
+import importlib.util
+import json
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import quakedesign as qd
+from quakedesign.checking import check_files
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.guarantees.exact.guarantee_files import guarantee_document, read_guarantee, save_guarantee
+from quakedesign.guarantees.exact.plant_loop import response_bounds
+
+CHECK = Path(__file__).parents[3] / "proofs" / "check.py"
+REAL = qd.load_fault("real-fault")
+
+
+@pytest.fixture(scope="module")
+def checker():
+    specification = importlib.util.spec_from_file_location("check_plants", CHECK)
+    module = importlib.util.module_from_spec(specification)
+    sys.modules["check_plants"] = module
+    specification.loader.exec_module(module)
+    yield module
+    del sys.modules["check_plants"]
+
+
+def lqr(A, B, step, Q, R):
+    plant = control.c2d(control.ss(A, B, np.eye(len(A)), 0), step)
+    return control.dlqr(plant.A, plant.B, Q, R)[0]
+
+
+def spring():
+    """x″ + x′ + x + 2.5x³ = u, |x(0)| ≤ 1."""
+    A, B = [[0, 1], [-1, -1]], [[0], [1]]
+    sectors = {"spring": qd.Sector(entry=[0, -1], row=[1, 0], slopes=lambda y: (0, 2.5 * float(y) ** 2))}
+    return qd.UncertainPlant(A=A, B=B, sectors=sectors, start=[1, 0], outputs={"x": [1, 0], "v": [0, 1]}), lqr(
+        A, B, 0.1, np.diag([10, 1]), [[0.1]]
+    )
+
+
+def pendulum():
+    """θ″ = 9.81·sin θ − 0.2θ′ + u + d about the upright position; the lag comes with the loop setup."""
+    A, B = [[0, 1], [9.81, -0.2]], [[0], [1]]
+    # sin θ less θ has slopes between sin(y)/y − 1 ≥ −y²/6 and 0 for |θ| ≤ y
+    sine = qd.Sector(entry=[0, 9.81], row=[1, 0], slopes=lambda y: (-(float(y) ** 2) / 6, 0))
+    slow = np.array([[0, 1, 0], [9.81, -0.2, 1], [0, 0, -50]])
+    K = lqr(slow, [[0], [0], [50]], 0.02, np.diag([10, 1, 0.01]), [[0.1]])[:, :2]
+    plant = qd.UncertainPlant(
+        A=A,
+        B=B,
+        sectors={"sine": sine},
+        disturbances={"push": ([0, 1], 0.1)},
+        start=[0.1, 0],
+        outputs={"x": [1, 0], "v": [0, 1]},
+        noise={"y1": 1e-4},
+    )
+    return plant, K
+
+
+def bearing():
+    """Magnetic bearing: x″ = 2000·x + 10·i with 20 % of both unknown, and a shock."""
+    A, B = [[0, 1], [2000, 0]], [[0], [10]]
+    plant = qd.UncertainPlant(
+        A=A,
+        B=B,
+        sectors={"stiffness": qd.Sector(entry=[0, 1], row=[1, 0], slopes=(-200, 200))},
+        gains={"u1": (0.9, 1.1)},
+        disturbances={"shock": ([0, 1], 5)},
+        outputs={"x": [1, 0], "v": [0, 1]},
+    )
+    return plant, lqr(A, B, 0.001, np.diag([1e4, 1]), [[0.01]])
+
+
+def converter():
+    """Averaged buck converter about its operating point: L = 1 mH, C = 0.1 mF, load 5 to 20 Ω, source 12 V ± 10 %."""
+    L, C, low, high = 1e-3, 1e-4, 1 / 20, 1 / 5
+    A, B = [[0, -1 / L], [1 / C, -(low + high) / 2 / C]], [[12 / L], [0]]
+    half = (high - low) / 2 / C
+    plant = qd.UncertainPlant(
+        A=A,
+        B=B,
+        sectors={"load": qd.Sector(entry=[0, 1], row=[0, 1], slopes=(-half, half))},
+        gains={"u1": (0.9, 1.1)},
+        disturbances={"current": ([0, 1 / C], 0.05)},
+        outputs={"x": [1, 0], "v": [0, 1]},
+    )
+    return plant, lqr(A, B, 2e-5, np.diag([1, 1]), [[100.0]])
+
+
+PLANTS = {
+    "spring": (spring, {"step": "0.1"}),
+    "pendulum": (pendulum, {"step": "0.02", "lag": "0.02"}),
+    "bearing": (bearing, {"step": "0.001", "delay": "0.0003"}),
+    "converter": (converter, {"step": "2e-5"}),
+}
+
+
+@pytest.fixture(scope="module", params=PLANTS)
+def proved(request):
+    make, setup = PLANTS[request.param]
+    plant, K = make()
+    found = qd.guarantee(plant, gains=K, **setup)
+    assert found.proved, found
+    return request.param, plant, K, found
+
+
+def test_both_checkers_decide_the_file_and_refuse_tighter_claims(proved, checker, tmp_path):
+    path = tmp_path / "plant.json"
+    save_guarantee(proved[3], path)
+    assert check_files([path])[str(path)][0] == "proved"
+    assert checker.check(path.read_text()).verdict == "proved"
+    for name in ("output_1", "output_2", "control_1"):
+        document = json.loads(path.read_text())
+        document["claims"][name] = str(Fraction(document["claims"][name]) * Fraction(98, 100))
+        with pytest.raises(checker.Refused):
+            checker.check(json.dumps(document))
+        assert str(read_guarantee(document).check()) != "proved"
+
+
+ACCELERATION = {
+    "spring": lambda x, u, d, r: -x[0] - x[1] - 2.5 * x[0] ** 3 + u,
+    "pendulum": lambda x, u, d, r: 9.81 * np.sin(x[0]) - 0.2 * x[1] + u + 0.1 * d,
+    "bearing": lambda x, u, d, r: (2000 + 200 * r[0]) * x[0] + 10 * (1 + 0.1 * r[1]) * u + 5 * d,
+}
+
+
+def test_an_independent_run_with_adverse_disturbances_stays_inside(proved):
+    """SciPy on the nonlinear equations, each disturbance and uncertain term at an end that resonates."""
+    name, _, K, found = proved
+    step, delay, lag = (float(Fraction(PLANTS[name][1].get(key, "0"))) for key in ("step", "delay", "lag"))
+    random, largest = np.random.default_rng(5), np.zeros(2)
+    for course in range(6):
+        period, ends = step * random.uniform(3, 40), random.choice([-1, 1], 3)
+        first = {"spring": [random.choice([-1, 1]), 0], "pendulum": [0.1 * random.choice([-1, 1]), 0]}
+        x, before = np.array([*first.get(name, [0, 0]), 0.0], dtype=float), 0.0
+
+        def rates(t, x, u, period=period, ends=ends):
+            d = np.sign(np.sin(2 * np.pi * t / period)) or 1.0
+            acts = x[2] if lag else u
+            if name == "converter":
+                load = 0.125 + 0.075 * ends[0]
+                current = (12 * (1 + 0.1 * ends[1]) * acts - x[1]) / 1e-3
+                voltage = (x[0] - load * x[1] + 0.05 * d) / 1e-4
+                return [current, voltage, 0]
+            return [x[1], ACCELERATION[name](x, acts, d, ends), (u - x[2]) / lag if lag else 0]
+
+        for k in range(80 if course else 200):
+            seen = x[:2] + ([1e-4 * random.choice([-1, 1]), 0] if name == "pendulum" else 0)
+            u = -float(K[0] @ seen)
+            for acts, start, end in ((before, 0, delay), (u, delay, step)):
+                if end > start:
+                    span = (k * step + start, k * step + end)
+                    run = solve_ivp(rates, span, x, args=(acts,), max_step=step / 4, rtol=1e-8, atol=1e-12)
+                    largest = np.maximum(largest, np.abs(run.y[:2]).max(axis=1))
+                    x = run.y[:, -1]
+            before = u
+    claims = [float(v) for v in found.claims.outputs]
+    assert largest[0] <= claims[0]
+    assert largest[1] <= claims[1]
+    assert largest[0] >= 0.2 * claims[0]  # the runs are no idle ones
+
+
+def test_norms_are_those_of_another_discretisation():
+    """Sums of |impulse responses| by matrix exponentials in steps of a 64th of a period, from below."""
+    _, _, _, found = None, None, None, qd.guarantee(bearing()[0], gains=bearing()[1], step="0.001", delay="0.0003")
+    loop = found.part.loop(found.law)
+    bounds = response_bounds(loop, 16)
+    flow = np.array(loop.flow, dtype=float)
+    rows, fine = np.array(loop.rows, dtype=float), 1e-3 / 200
+    jumps = [np.array(jump, dtype=float) for jump, _ in loop.segments]
+    counts = [round(float(time) / fine) for _, time in loop.segments]
+    step = expm(flow * fine)
+    for i, entry in enumerate(np.array(loop.inputs, dtype=float)):
+        # responses at the end of a period to impulses at all earlier times
+        total, now = np.zeros(len(rows)), np.eye(len(flow))
+        for _ in range(300):
+            for jump, count in zip(reversed(jumps), reversed(counts), strict=True):
+                for _ in range(count):
+                    total += np.abs(rows @ now @ entry) * fine
+                    now = now @ step
+                now = now @ jump
+        exact = np.array([float(v) for v in bounds.inputs[i]])
+        assert (exact >= total * (1 - 1e-2)).all()
+        assert (exact[:2] <= 1.6 * total[:2]).all()  # the largest of all phases, which a period's end need not be
+
+
+def leaves(value, way=()):
+    if isinstance(value, dict):
+        for key, entry in value.items():
+            yield from leaves(entry, (*way, key))
+    elif isinstance(value, list):
+        for place, entry in enumerate(value):
+            yield from leaves(entry, (*way, place))
+    elif way[0] not in ("format", "kind"):
+        yield way
+
+
+def test_every_number_of_a_file_is_bound_by_what_is_printed(checker):
+    plant, K = bearing()
+    document = guarantee_document(qd.guarantee(plant, gains=K, step="0.001"))
+    stated = checker.check(json.dumps(document)).statement
+    ways = list(leaves(document))
+    assert len(ways) > 40
+    for way in ways:
+        changed = json.loads(json.dumps(document))
+        inner = changed
+        for key in way[:-1]:
+            inner = inner[key]
+        value = inner[way[-1]]
+        moved = value + 1 if isinstance(value, int) else str(Fraction(value) * Fraction(1001, 1000) + Fraction(1, 997))
+        inner[way[-1]] = moved
+        try:
+            assert checker.check(json.dumps(changed)).statement != stated, way
+        except checker.Refused:
+            pass
+
+
+def test_a_sector_that_holds_up_to_a_bound_needs_it_in_both_checkers(checker):
+    plant, K = spring()
+    document = guarantee_document(qd.guarantee(plant, gains=K, step="0.1"))
+    document["plant"]["sectors"][0]["within"] = "11/10"
+    with pytest.raises(checker.Refused, match="stay where its sector holds"):
+        checker.check(json.dumps(document))
+    assert str(read_guarantee(document).check()) == "undecided"
+    document["plant"]["sectors"][0]["within"] = "2"
+    document["inputs"] = ["1"]
+    with pytest.raises(checker.Refused, match="close the small gain"):
+        checker.check(json.dumps(document))
+    assert str(read_guarantee(document).check()) == "undecided"
+
+
+def broken(document, way, value):
+    for key in way[:-1]:
+        document = document[key]
+    document[way[-1]] = value
+
+
+@pytest.mark.parametrize(
+    ("way", "value"),
+    [
+        (("pieces",), 0),
+        (("pieces",), 65),
+        (("pieces",), "16"),
+        (("plant", "A"), [["0"]]),
+        (("plant", "noise"), ["-1", "0"]),
+        (("plant", "start"), ["-1", "0"]),
+        (("plant", "disturbances", 0, "size"), "-1"),
+        (("plant", "sectors", 0, "slopes"), ["1", "0"]),
+        (("plant", "sectors", 0, "row"), ["1", "0"]),
+        (("plant", "sectors", 1, "within"), "1"),
+        (("law", "step"), "0"),
+        (("law", "delay"), "1"),
+        (("law", "D"), [["1"]]),
+        (("inputs",), ["1"]),
+        (("claims", "output_3"), "1"),
+        (("more",), "1"),
+    ],
+)
+def test_a_file_that_breaks_a_rule_is_refused_by_both(way, value, checker):
+    plant, K = bearing()
+    document = guarantee_document(qd.guarantee(plant, gains=K, step="0.001"))
+    broken(document, way, value)
+    with pytest.raises(checker.Refused):
+        checker.check(json.dumps(document))
+    with pytest.raises(CertificateError):
+        read_guarantee(document)
+
+
+def test_none_says_why():
+    plant, K = bearing()
+    assert "a mode escapes" in qd.guarantee(plant, gains=0 * K, step="0.001").reason
+    wide = qd.UncertainPlant(
+        A=[[0, 1], [-1, -1]],
+        B=[[0], [1]],
+        sectors={"s": qd.Sector(entry=[0, 1], row=[1, 0], slopes=(-9, 0.5))},
+        disturbances={"d": ([0, 1], 1)},
+    )
+    none = qd.guarantee(wide, gains=[[1, 1]], step="0.1")
+    assert "s alone makes" in none.reason
+    assert none.small_gain > 1
+    far = qd.UncertainPlant(
+        A=[[-1]],
+        B=[[1]],
+        sectors={"s": qd.Sector(entry=[1], row=[1], slopes=(0, 0.5), within=0.5)},
+        disturbances={"d": ([1], 2)},
+    )
+    assert "holds for arguments up to 0.5" in qd.guarantee(far, gains=[[0]], step="0.1").reason
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: qd.guarantee(bearing()[0]), "needs a law, or gains"),
+        (lambda: qd.guarantee(bearing()[0], gains=[[1, 1]]), "need a step"),
+        (lambda: qd.guarantee(bearing()[0], gains=[[1, 1]], step="1", jitter="1 ms"), "has step, delay and lag"),
+        (lambda: qd.guarantee(bearing()[0], gains=[[1]], step="1"), "must be 1 x 2"),
+        (lambda: qd.guarantee(bearing()[0], law=control.ss(1, [[1, 1]], 1, [[0, 0]])), "in discrete time"),
+        (lambda: qd.guarantee(bearing()[0], "cta", gains=[[1, 1]], step="1"), "with a law or gains alone"),
+        (lambda: qd.UncertainPlant(A=[[1, 2]], B=[[1]]), "matrix A of a plant must be 1 x 1"),
+        (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"v": (1, 2)}), "gains of a plant must be of u1"),
+        (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"u1": (2, 1)}), "least, then the largest"),
+        (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], noise={"y1": -1}), "noise and start must be 0 or more"),
+        (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], disturbances={"d": ([1], -1)}), "must be 0 or more"),
+        (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], loads={"l": ([1], [1], 1)}), "a shift that is not measured"),
+        (lambda: qd.UncertainPlant.from_statespace(control.ss(1, 1, 1, 1)), "with D = 0"),
+        (lambda: qd.UncertainPlant.from_blocks(REAL, 1), "blocks must be 2 to 20"),
+        (lambda: qd.UncertainPlant.from_blocks(REAL, 3, coupling=0), "coupling of blocks must be positive"),
+        (lambda: qd.UncertainPlant.from_blocks(REAL.with_box("ten-percent"), 3, wells="one"), "box paper"),
+    ],
+)
+def test_what_does_not_fit_is_refused(call, said):
+    with pytest.raises(ParameterError, match=said):
+        call()
+
+
+def test_a_dynamic_law_with_a_load_holds_it():
+    """An integrator holds a load at the input: the peak under a ramp is below that of an independent run's claim."""
+    A, B = [[-1]], [[2]]
+    plant = qd.UncertainPlant(A=A, B=B, loads={"weight": ([1], None, 0.5)}, outputs={"x": [1]})
+    law = control.ss([[1]], [[0.1]], [[-2]], [[-1.5]], 0.1)
+    found = qd.guarantee(plant, law=law)
+    assert found.proved
+    x, z, reached = 0.0, 0.0, 0.0
+    for k in range(400):
+        u = -2 * z - 1.5 * x
+        z += 0.1 * x
+        run = solve_ivp(
+            lambda t, x, u=u: -x + 2 * (u - 0.5 * t), (0.1 * k, 0.1 * k + 0.1), [x], rtol=1e-9, max_step=0.02
+        )
+        reached, x = max(reached, np.abs(run.y).max()), run.y[0, -1]
+    assert 0.5 * float(found.bound("x")) < reached <= found.bound("x")
+    with pytest.raises(ParameterError, match="integral action"):
+        qd.guarantee(plant, gains=[[1.5]], step="0.1")
+
+
+def test_a_plant_of_python_control_has_its_names():
+    system = control.ss([[0, 1], [-4, -1]], [[0], [1]], [[1, 0]], 0, inputs=["force"], outputs=["place"], name="arm")
+    plant = qd.UncertainPlant.from_statespace(system, gains={"force": (0.9, 1.1)}, disturbances={"d": ([0, 1], 1)})
+    found = qd.guarantee(plant, gains=[[1.0]], step="0.05")
+    assert found.bound("place") > 0
+    assert "|place|" in found.sentence()
+    assert found.to_dict()["peaks"]["place"] == found.bound("place").exact
+
+
+def friction_run(found, law, blocks, one, seed):
+    """Largest errors of blocks whose slopes, gains and disturbances switch between their ends, by exponentials."""
+    part, random = found.part, np.random.default_rng(seed)
+    A, B, C = (np.array(m, dtype=float) for m in (part.A, part.B, part.C))
+    F, G, H, D = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output, law.feedback))
+    force = float(part.disturbances[0][1])
+    n = 2 * blocks
+    x, z, largest, pieces = np.zeros(n), np.zeros(len(F)), np.zeros(n), 4
+    period, slopes = random.uniform(1, 8), [float(v) for v in part.sectors[0].slopes]
+    gain = float(part.sectors[blocks].slopes[1])
+    for k in range(300):
+        y = C @ x
+        u = H @ z + D @ y
+        z = F @ z + G @ y
+        for j in range(pieces):
+            sign = np.sign(
+                np.sin(2 * np.pi * (k + j / pieces) / period + np.arange(blocks) * random.choice([0, np.pi]))
+            )
+            steep = np.where(x[:blocks] * sign > 0, slopes[1], slopes[0])
+            moved = A.copy()
+            moved[blocks:, :blocks] += np.diag(steep)
+            pushed = B[blocks:] @ u * (1 + gain * random.choice([0, 1], blocks)) + force * sign
+            whole = expm(np.block([[moved, np.r_[np.zeros(blocks), pushed][:, None]], [np.zeros((1, n + 1))]]) * 0.046)
+            x = (whole @ [*x, 1])[:n]
+            largest = np.maximum(largest, np.abs(x))
+    return largest
+
+
+@pytest.mark.parametrize("wells", ["each", "one"])
+def test_several_blocks_stay_inside_and_both_checkers_decide(wells, checker):
+    plant = qd.UncertainPlant.from_blocks(REAL, 2, wells=wells)
+    found = qd.guarantee(plant, step="0.184")
+    assert found.proved
+    document = guarantee_document(found)
+    assert checker.check(json.dumps(document)).verdict == "proved"
+    document["claims"]["output_3"] = str(Fraction(document["claims"]["output_3"]) * Fraction(98, 100))
+    with pytest.raises(checker.Refused):
+        checker.check(json.dumps(document))
+    claims = np.array([float(v) for v in found.claims.outputs])
+    for seed in range(4):
+        assert (friction_run(found, found.law, 2, wells == "one", seed) < claims).all()
+    assert max(claims[2:]) < (2.4e-4 if wells == "each" else 9e-4)
+
+
+def test_blocks_that_one_well_does_not_hold_name_the_mode_that_escapes():
+    plant = qd.UncertainPlant.from_blocks(REAL, 2, wells="one", coupling=0.5)
+    none = qd.guarantee(plant, step="0.184")
+    assert "a mode escapes, which is not measured" in none.reason
+    assert "(1, -1)" in none.reason or "(-1, 1)" in none.reason
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("wells", "most"), [("each", "3.5e-4"), ("one", "1.4e-3")])
+def test_five_blocks_of_the_real_fault(wells, most, checker):
+    found = qd.guarantee(qd.UncertainPlant.from_blocks(REAL, 5, wells=wells), step="0.184")
+    assert max(found.claims.outputs[5:]) <= Fraction(most)
+    assert checker.check(json.dumps(guarantee_document(found))).verdict == "proved"
