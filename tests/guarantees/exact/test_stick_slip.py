@@ -227,7 +227,7 @@ def test_one_period_from_anywhere_in_the_polytope_ends_in_it(trials):
 def test_friction_that_heals_at_rest_takes_the_place_of_a_part_of_the_disturbance(trials, share):
     at, random, kept, slid = case(), np.random.default_rng(11), 0, 0.0
     claims = load_guarantee(FILE)
-    healing = float(claims.covered_healing(share * claims.task.amplitude))
+    healing = float(claims.covered_healing(F(share) * claims.task.amplitude))
     stress = at.stress - at.claims["least_pressure"]
     assert healing == pytest.approx((1 - share) * at.amplitude / (at.per_mass * stress), rel=1e-9)
     for _ in range(trials // 2_000):

@@ -59,7 +59,7 @@ def test_nothing_is_searched_beyond_what_any_controller_can_do(asked):
 
 def test_it_is_compared_behind_its_path_without_what_acts_at_once(asked, monkeypatch):
     runs = []
-    monkeypatch.setattr(comparison, "natural_earthquake", lambda fault: Mock(spec=qd.Trajectory))
+    monkeypatch.setattr(comparison, "natural_earthquake", lambda fault, plant: Mock(spec=qd.Trajectory))
     monkeypatch.setattr(comparison, "simulate", lambda fault, law, **more: runs.append(law))
     monkeypatch.setattr(comparison, "attacked", lambda fault, found: SimpleNamespace(found=found, compensation=None))
     monkeypatch.setattr(comparison, "replace", lambda entry, **more: entry)

@@ -156,8 +156,8 @@ def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for(asked
     assert (design.details["measured"], design.details["slip_noise"]) == ("slip", "1/1000000")
     ran = []
     monkeypatch.setattr(comparison, "simulate", lambda *_, measurement, **__: ran.append(measurement))
-    comparison._entry("designed", design, {"designed": "explicit"}, lambda *_: None)
-    comparison._entry("designed", replace(design, setup=LoopSetup()), {"designed": "explicit"}, lambda *_: None)
+    comparison._entry("designed", design, {"designed": "explicit"}, lambda *_: None, None)
+    comparison._entry("designed", replace(design, setup=LoopSetup()), {"designed": "explicit"}, lambda *_: None, None)
     assert ran == [Measurement(slip_noise=1e-6, bounded=True), None]
 
 
