@@ -148,7 +148,7 @@ def guarantee(
     UnsupportedError
         For a controller that does not apply to the friction.
     """
-    fault, setup = with_accepted_fit(fault, accept_poor_fit), setup.with_given(**given)
+    setup = setup.with_given(**given)
     require_known(plant, PLANTS, "plant")
     if isinstance(fault, UncertainPlant):
         usual = (plant, objective, scheme, disturbance_class) == (PLANTS[0], OBJECTIVES[0], None, CLASSES[0])
@@ -158,6 +158,7 @@ def guarantee(
                 "class, plant, stress or spread. Omit these."
             )
         return guarantee_plant(fault, law, gains, setup)
+    fault = with_accepted_fit(fault, accept_poor_fit)
     if law is not None and not isinstance(law, Controller):
         raise ParameterError(
             f"law of a fault must be a SampledLaw. Received {type(law).__name__}. Use SampledLaw.from_statespace."
