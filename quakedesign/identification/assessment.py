@@ -86,19 +86,7 @@ class Assessment:
 def checks_of(
     fit: Fit, raw: Record, record: Record, used: "np.ndarray", loading: Loading | None, values: Mapping[str, float]
 ) -> tuple[tuple[Check, ...], float]:
-    """Tests of beginning, residuals, halves and peaks; and residuals over noise.
-
-    Parameters
-    ----------
-    fit : Fit
-    raw, record : Record
-        Samples, and the means that were fitted.
-    used : ndarray of bool
-        Means that the fit is about.
-    loading : Loading or None
-    values : mapping
-        Best values by name, in SI units.
-    """
+    """Tests of beginning, residuals, peaks and halves of the `used` means of a record; and residuals over noise."""
     time = record.time[used]
     begins = np.empty(0) if loading is None else loading.pieces.begins[1:][loading.pieces.large_changes]
     first = float(begins[0]) if len(begins) else float("inf")
@@ -135,16 +123,7 @@ def checks_of(
 
 
 def sign_check(difference: Any, other: Any, excess: float) -> Check | None:
-    """Whether a - b has one sign, with and without a trend.
-
-    Parameters
-    ----------
-    difference : ParameterEstimate or None
-    other : ParameterEstimate or None
-        Of the fit with a trend where it was left out, without where it was kept.
-    excess : float
-        By how much the AIC of the fit without a trend is higher.
-    """
+    """Whether a - b has one sign, with a trend and, unless its AIC is higher by `DECISIVE` (`excess`), without."""
     if difference is None:
         return None
     ends = [difference.low, difference.high]

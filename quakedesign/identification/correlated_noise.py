@@ -82,17 +82,8 @@ def restricted_likelihood(
 ) -> float:
     """Logarithm of the restricted likelihood of residuals, but for a constant.
 
-    By the tridiagonal inverse of the process; the size of the noise is at its best.
-
-    Parameters
-    ----------
-    residuals, counts : ndarray
-    slopes : ndarray
-        Of what was fitted, shape (samples, coordinates).
-    steps : ndarray
-        Ways between neighbouring samples.
-    share, length : float
-        As in `CorrelatedNoise`; no process where the share is 0.
+    By the tridiagonal inverse of the process; the size of the noise is at its best. `steps` are the ways between
+    neighbouring samples, `slopes` those of what was fitted; there is no process where the share is 0.
     """
     number, size = slopes.shape
     together = np.column_stack([residuals, slopes])
@@ -127,20 +118,7 @@ def noise_of(
     path: "np.ndarray | None",
     kept: "np.ndarray",
 ) -> CorrelatedNoise | None:
-    """Likeliest noise of residuals; None where independent samples are as likely.
-
-    Parameters
-    ----------
-    residuals : ndarray
-        Measured less simulated.
-    slopes : ndarray
-        Of what was fitted.
-    counts, time : ndarray
-    path : ndarray or None
-        Displacement.
-    kept : ndarray of bool
-        Samples that count.
-    """
+    """Likeliest noise of residuals, by slopes of what was fitted; None where independent samples are as likely."""
     if not 3 * slopes.shape[1] < kept.sum() <= _MOST_DENSE:
         return None
     scale = np.linalg.norm(slopes[kept], axis=0)

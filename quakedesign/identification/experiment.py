@@ -128,49 +128,90 @@ TREND = "trend"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trended(Experiment):
-    """An experiment whose friction rises, or falls, with the displacement of the load point as well.
+class Widened(Experiment):
+    """An experiment, `whole`, with further coordinates, which come last."""
 
-    Attributes
-    ----------
-    whole : Experiment
-        Without the trend.
-    path : ndarray
-        Displacement since the first sample [m].
-    coordinates : tuple of Coordinate
-        Those of `whole`, then the trend [1/m].
-    """
-
-    whole: Experiment
-    path: "np.ndarray"
+    whole: Any
     coordinates: tuple[Coordinate, ...]
 
     @property
     def law(self) -> FrictionLaw:  # type: ignore[override]
         """That of the experiment."""
-        return self.whole.law
+        law: FrictionLaw = self.whole.law
+        return law
+
+    def own(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Coordinates of the experiment without the others."""
+        return fitted[: len(self.whole.coordinates)]
+
+    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+        """Those of the experiment."""
+        told: tuple[str, ...] = self.whole.remarks(self.own(fitted), noise)
+        return told
+
+    def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
+        """That of the experiment."""
+        law: FrictionLaw = self.whole.best_law(self.own(fitted))
+        return law
+
+    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "Widened":
+        """With the experiment resolved."""
+        finer = self.whole.resolved(self.own(fitted), accuracy)
+        return self if finer is self.whole else replace(self, whole=finer)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trended(Widened):
+    """An experiment whose friction changes with the displacement of the load point, `path` [m], as well [1/m]."""
+
+    path: "np.ndarray"
 
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
         """Friction of the experiment and the trend."""
-        friction: np.ndarray = self.whole.friction(fitted[:-1]) + fitted[-1] * self.path
+        friction: np.ndarray = self.whole.friction(self.own(fitted)) + fitted[-1] * self.path
         return friction
 
     def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
         """Derivatives; that by the trend is the path."""
-        return np.column_stack([self.whole.slopes(fitted[:-1]), self.path])
+        return np.column_stack([self.whole.slopes(self.own(fitted)), self.path])
 
-    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
-        """Those of the experiment."""
-        return self.whole.remarks(fitted[:-1], noise)
 
-    def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
-        """That of the experiment."""
-        return self.whole.best_law(fitted[:-1])
+@dataclass(frozen=True, kw_only=True)
+class Delayed(Widened):
+    """An experiment whose changes of rate come later by what is fitted [s], to first order.
 
-    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "Trended":
-        """With the experiment resolved."""
-        finer = self.whole.resolved(fitted[:-1], accuracy)
-        return self if finer is self.whole else replace(self, whole=finer)
+    `after`, of shape (samples, changes), says which samples follow each change, up to the next.
+    """
+
+    after: "np.ndarray"
+
+    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Friction of the experiment, less its growth over the delays."""
+        own = self.own(fitted)
+        with np.errstate(invalid="ignore", over="ignore"):
+            late = self.whole.growth(own) * (self.after @ fitted[len(own) :])
+            friction: np.ndarray = self.whole.friction(own) - late
+        return friction
+
+    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Derivatives at delays that are small against what follows the changes."""
+        own = self.own(fitted)
+        return np.column_stack([self.whole.slopes(own), -self.whole.growth(own)[:, None] * self.after])
+
+
+DELAY = "delay"
+
+
+def delayed(whole: Any, after: "np.ndarray", most: "np.ndarray") -> Experiment:
+    """An experiment with a delay of each change of rate, of at most so much [s]."""
+    if not after.shape[1]:
+        return whole  # type: ignore[no-any-return]
+    names = [f"{DELAY}_{place}" for place in range(1, after.shape[1] + 1)]
+    delays = [
+        Coordinate(name=name, unit="s", low=-end, high=end, start=(-1e-3 * end, 1e-3 * end), logarithmic=False)
+        for name, end in zip(names, most.tolist(), strict=True)
+    ]
+    return Delayed(whole=whole, after=after, coordinates=(*whole.coordinates, *delays))
 
 
 def trended(whole: Experiment, path: "np.ndarray", size: float) -> Trended:

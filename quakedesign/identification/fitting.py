@@ -179,7 +179,8 @@ def weighed(weights: "np.ndarray", values: "np.ndarray") -> "np.ndarray":
     """Values of all samples, or columns of them, by weights of `Fit`; those without a weight are left out."""
     if weights.ndim == 2:
         kept = np.any(weights != 0, axis=0)
-        product: np.ndarray = weights[:, kept] @ values[kept]
+        with np.errstate(invalid="ignore", over="ignore"):
+            product: np.ndarray = weights[:, kept] @ values[kept]
         return product
     kept = weights > 0
     scaled: np.ndarray = (values[kept].T * weights[kept]).T

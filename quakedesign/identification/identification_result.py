@@ -175,7 +175,7 @@ class Identification:
             told.append(
                 "longer sliding before the step, which fixes the trend, and steps up and down by a factor of 10"
             )
-        if self.assessment.verdict == EXPLAINS and open_ & {"drop", "residual"}:
+        if open_ & {"drop", "residual"}:
             told.append("slip from rest until friction stays")
         return told
 

@@ -17,7 +17,7 @@ from quakedesign.fault import FrictionLaw, friction_law
 from quakedesign.fault.model import require_positive, require_seed
 from quakedesign.identification.assessment import DECISIVE, Assessment, checks_of, sign_check
 from quakedesign.identification.correlated_noise import CorrelatedNoise, noise_of
-from quakedesign.identification.experiment import TREND, Coordinate, Difference, Experiment, trended
+from quakedesign.identification.experiment import DELAY, TREND, Coordinate, Difference, Experiment, delayed, trended
 from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, advantage, fit, interval, minimised, settled
 from quakedesign.identification.identification_result import Identification, ParameterEstimate, Rival, estimate
 from quakedesign.identification.loading import Loading, prepared
@@ -161,7 +161,8 @@ def _sliding(
         else f"in steady sliding at {first:.4g} m/s"
     )
     notes = (f"the record begins {begins}", *loading.notes)
-    return Setup(experiment=experiment, used=np.ones(len(record.time), dtype=bool), notes=notes)
+    late = delayed(experiment, *loading.delays(record))
+    return Setup(experiment=late, used=np.ones(len(record.time), dtype=bool), notes=notes)
 
 
 def _rates(law: type[FrictionLaw], rates: "np.ndarray", first: float) -> dict[str, float]:
@@ -332,7 +333,19 @@ class _Choice:
     seed: int
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
-        """The best law, with trend and unsteady beginning where these are likelier, and profiles about its fit."""
+        """Profiles about the best fit, and tests of it."""
+        choice, better, rival, other, excess = self.chosen(kinds)
+        found = replace(choice._profiled(better), rival=rival)
+        return replace(found, assessment=choice._assessed(found, other, excess))
+
+    def chosen(
+        self, kinds: Sequence[type[FrictionLaw]]
+    ) -> "tuple[_Choice, _Fitted, Rival | None, _Fitted | None, float]":
+        """The best law, with trend and unsteady beginning where these are likelier.
+
+        After the choice with the times of changes of rate that friction shows, and before the law that it was preferred
+        to, the fit with or without a trend that was not taken, and by how much the AIC without is higher.
+        """
         fits: list[_Fitted] = []
         for kind in kinds:
             try:
@@ -340,6 +353,27 @@ class _Choice:
             except RecordError:  # which no spring holds without a jump
                 if not fits:
                     raise
+        better = min(fits, key=lambda fitted: fitted.best.squares)
+        if moved := self._moved(better):
+            return moved._chosen([moved._fitted(each.kind, {TREND}, each.best, start=False) for each in fits])
+        return self._chosen(fits)
+
+    def _moved(self, fitted: _Fitted) -> "_Choice | None":
+        """The same with changes of rate at the times that friction shows; nothing where these are known."""
+        values = fitted.best.experiment.outward(fitted.best.fitted)
+        delays = [value for name, value in values.items() if name.startswith(DELAY)]
+        if not delays or self.loading is None:
+            return None
+        pieces, (after, _) = self.loading.pieces, self.loading.delays(self.record)
+        begins = pieces.begins.copy()
+        for delay, samples in zip(delays, after.T, strict=True):
+            first = self.record.time[np.flatnonzero(samples)[0]]
+            begins[np.searchsorted(begins, first, side="right") - 1] += delay
+        pieces = replace(pieces, begins=np.maximum.accumulate(np.clip(begins, self.raw.time[0], None)))
+        record, loading = prepared(self.raw, (), pieces)
+        return replace(self, record=record, loading=loading)
+
+    def _chosen(self, fits: "list[_Fitted]") -> "tuple[_Choice, _Fitted, Rival | None, _Fitted | None, float]":
         better = min(fits, key=lambda fitted: fitted.best.squares)
         noise = self._noise(better)
         fits = [replace(each, best=_settled(each.best, noise)) for each in fits]
@@ -352,9 +386,7 @@ class _Choice:
         better = replace(better, best=_settled(better.best, self._noise(better)))
         better = self._without(better, START_STATE)
         better, other, excess = self._trend(better)
-        better = replace(better, best=_settled(better.best, self._noise(better)))
-        found = replace(self._profiled(better), rival=rival)
-        return replace(found, assessment=self._assessed(found, other, excess))
+        return self, replace(better, best=_settled(better.best, self._noise(better))), rival, other, excess
 
     def _trend(self, fitted: _Fitted) -> tuple[_Fitted, _Fitted | None, float]:
         """The fit with or without a trend that is taken, the other one, and by how much the AIC without is higher."""
@@ -388,7 +420,9 @@ class _Choice:
         measured = self.record.friction[setup.used]
         counts = None if self.record.counts is None else self.record.counts[setup.used]
         search = FitSearch() if near is None else FitSearch(least=_LEAST_NEAR if start else 1, most=16 if start else 0)
-        at = None if near is None else setup.experiment.near(near.experiment.outward(near.fitted))
+        known = {} if near is None else near.experiment.outward(near.fitted)
+        known = {name: value for name, value in known.items() if start or not name.startswith(DELAY)}
+        at = None if near is None else setup.experiment.near(known)
         best = fit(setup.experiment, measured, seed=self.seed, counts=counts, near=at, search=search)
         return _Fitted(kind=kind, setup=setup, best=best)
 

@@ -18,6 +18,8 @@ _CANDIDATES = 400
 _FEWEST = 8  # samples
 _MOST_PIECES = 40
 _PATIENCE = 4  # pieces that may explain nothing before the search ends
+_TIMELY = 0.01  # of a sampling period, by which the time of a change may be off unseen
+_MOST_DELAYS = 3
 _LARGE_CHANGE = 1.25  # of rate, that is a step and no wandering
 _LEAST_CHANGE = 0.03  # of the faster rate: friction feels it by 3 % of a or b
 _ODDS = 4.0  # times log n: what a new piece must improve a fit by, in variances
@@ -71,16 +73,7 @@ def staircase(time: "np.ndarray", rates: "np.ndarray") -> Pieces:
 
 
 def straight_pieces(time: "np.ndarray", position: "np.ndarray", scatter: float, step: float) -> Pieces:
-    """Pieces with the rates of the data, as few as explain it.
-
-    Parameters
-    ----------
-    time, position : ndarray
-    scatter : float
-        Noise from sample to sample [m].
-    step : float
-        In which it was read [m].
-    """
+    """Pieces with the rates of the data, as few as explain it within its noise (`scatter`) and reading step [m]."""
     if len(time) < _FEWEST or not np.ptp(position) > 0:
         ends = np.array([time[0]]), np.array([(position[-1] - position[0]) / max(time[-1] - time[0], 1e-300)])
         return Pieces(begins=ends[0], rates=ends[1], noise=0.0, rough=bool(np.ptp(position) > 0))
@@ -118,13 +111,7 @@ def straight_pieces(time: "np.ndarray", position: "np.ndarray", scatter: float, 
 
 
 def given_pieces(time: "np.ndarray", position: "np.ndarray", rates: "np.ndarray") -> Pieces:
-    """Pieces with known rates, beginning at the times that suit the data best.
-
-    Raises
-    ------
-    RecordError
-        When the load point does not move at such rates.
-    """
+    """Pieces with known rates, beginning at the times that suit the data best; refused where they do not suit."""
     t, x = _means(time, position, most=400)
 
     def pieces_at(begins: "np.ndarray") -> Pieces:
@@ -182,6 +169,21 @@ class Loading:
         """Rate of the load point in the beginning [m/s]."""
         return float(self.pieces.rates[0])
 
+    def delays(self, record: Record) -> "tuple[np.ndarray, np.ndarray]":
+        """Samples that follow each change of rate whose time noise hides, and by how much it may be off at most [s]."""
+        begins, rates = self.pieces.begins, self.pieces.rates
+        ends = np.append(begins[1:], np.inf)
+        off = self.pieces.noise / np.maximum(np.abs(np.diff(rates)), 1e-300)
+        period = (record.time[-1] - record.time[0]) / float(np.sum(record.counts if record.counts is not None else 1.0))
+        known = self.pieces.rough or off.size == 0
+        hidden = [
+            i for i in range(len(off)) if not known and self.pieces.large_changes[i] and off[i] > _TIMELY * period
+        ]
+        hidden = sorted(sorted(hidden, key=lambda i: -abs(rates[i + 1] - rates[i]))[:_MOST_DELAYS])
+        after = [(record.time >= begins[i + 1]) & (record.time < ends[i + 1]) for i in hidden]
+        table = np.array(after).T.reshape(len(record.time), len(hidden)).astype(float)
+        return table, np.array([3 * off[i] + period for i in hidden])
+
     def drive(self, record: Record) -> "tuple[Drive, np.ndarray]":
         """Drive between all samples and changes of rate, and which of these instants are samples."""
         assert record.load_point is not None
@@ -215,14 +217,10 @@ class Loading:
         return replace(record, load_point=load, normal=normal)
 
 
-def prepared(record: Record, rates: Sequence[float] = ()) -> tuple[Record, Loading | None]:
+def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None = None) -> tuple[Record, Loading | None]:
     """A record as means of its samples, with load point and normal load as they drive it; and how these move.
 
-    Parameters
-    ----------
-    record : Record
-    rates : sequence of float
-        Of the load point [m/s], where they are known.
+    `rates` of the load point [m/s], or the pieces, may be known.
 
     Raises
     ------
@@ -236,7 +234,9 @@ def prepared(record: Record, rates: Sequence[float] = ()) -> tuple[Record, Loadi
                 "--rates go with a column of the load point, which says when they change. Received none. Add it."
             )
         return thinned(record), None
-    if len(rates):
+    if known is not None:
+        pieces = known
+    elif len(rates):
         pieces = given_pieces(time, load, np.asarray(rates, dtype=float))
     elif record.load_rates is not None:
         pieces = staircase(time, record.load_rates)

@@ -147,8 +147,17 @@ class SlidingExperiment(Experiment):
 
     def rates(self, fitted: "np.ndarray") -> "np.ndarray":
         """Slip rate [m/s] at every sample."""
-        rates: np.ndarray = np.exp(self._states(fitted)[0, self._sampled])
+        with np.errstate(over="ignore"):
+            rates: np.ndarray = np.exp(self._states(fitted)[0, self._sampled])
         return rates
+
+    def growth(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Slope of friction in time [1/s] at every sample, as the spring gives it behind a change of rate."""
+        ends, place = np.flatnonzero(self.measured), [c.name for c in self.coordinates]
+        after = np.minimum(ends, len(self.drive.rates) - 1)
+        stiffness = self.stiffness if self.stiffness is not None else float(np.exp(fitted[place.index(STIFFNESS)]))
+        pulled: np.ndarray = stiffness * self.drive.compliance[after] * (self.drive.rates[after] - self.rates(fitted))
+        return pulled
 
     def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
         """The mass from which on inertia would have been seen."""

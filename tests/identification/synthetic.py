@@ -1,6 +1,6 @@
 """Records of made-up experiments: equations and integrator are SciPy's and this file's own, not the package's."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -56,25 +56,46 @@ def read_in_steps(values):
     return np.round(values / (0.1 * MICRON)) * 0.1 * MICRON
 
 
-def sliding(law, pieces, *, sample=0.2, stiffness_given=True, a=0.008, b=0.010, critical_slip=10 * MICRON, spring=1e-3):
-    """Friction and state of a block, by Radau from piece to piece; the spring is in 1/µm."""
+def sliding(
+    law,
+    pieces,
+    *,
+    sample=0.2,
+    stiffness_given=True,
+    a=0.008,
+    b=0.010,
+    critical_slip=10 * MICRON,
+    spring=1e-3,
+    second=(0.0, 100 * MICRON),
+    drift=0.0,
+):
+    """Friction and states of a block, by Radau from piece to piece; the spring is in 1/µm.
+
+    The normal stress grows by a share `drift` of its first value a second; `second` has the effect and the slip of
+    another state.
+    """
     k, reference = spring / MICRON, 0.6
     shift = np.log(pieces[0][1] / MICRON)
-    y, now, moved = np.array([reference + (a - b) * shift, -shift]), 0.0, 0.0
+    more, far = second
+    y, now, moved = np.array([reference + (a - b - more) * shift, -shift, -shift]), 0.0, 0.0
     times, friction, path = [], [], []
 
-    def rates(speed):
-        def of(_time, y):
-            rate = MICRON * np.exp((y[0] - reference - b * y[1]) / a)
-            share = rate * np.exp(y[1]) / MICRON
+    def rates(speed, begin):
+        def of(time, y):
+            rate = MICRON * np.exp((y[0] - reference - b * y[1] - more * y[2]) / a)
+            share = rate * np.exp(y[1:]) / MICRON
             ageing = (1 - share) if law.endswith("aging") else -share * np.log(share)
-            return [k * (speed - rate), ageing * MICRON / critical_slip * np.exp(-y[1])]
+            grown = 1 + drift * (begin + time)
+            pulled = (k * (speed - rate) - y[0] * drift) / grown
+            return [pulled, *(ageing * MICRON / np.array([critical_slip, far]) * np.exp(-y[1:]))]
 
         return of
 
     for length, speed in pieces:
         instants = np.arange(0.0, length - sample / 2, sample)
-        run = solve_ivp(rates(speed), (0, length), y, method="Radau", rtol=1e-9, atol=1e-11, t_eval=[*instants, length])
+        run = solve_ivp(
+            rates(speed, now), (0, length), y, method="Radau", rtol=1e-9, atol=1e-11, t_eval=[*instants, length]
+        )
         assert run.success
         times.append(now + instants)
         friction.append(run.y[0, :-1])
@@ -141,6 +162,79 @@ KINDS = {
     "slip weakening at measured slip": weakening,
     "slip weakening behind a spring": drawn,
 }
+
+ONE_STEP = ((30.0, 1 * MICRON), (25.0, 10 * MICRON))
+DRIFT = 2e-4
+
+
+def _step(**more):
+    told = {"sample": 0.05, "a": 0.008, "b": 0.012, "spring": 3e-3, "stiffness_given": False} | more
+    return sliding("rate-and-state-slip", told.pop("pieces", ONE_STEP), **told)
+
+
+def shared(draw, count, fading):
+    """Noise of size one that fades by a factor from sample to sample."""
+    noise = draw.standard_normal(count)
+    for i in range(1, count):
+        noise[i] = fading * noise[i - 1] + (1 - fading**2) ** 0.5 * noise[i]
+    return noise
+
+
+def _cut(record, kept):
+    return replace(
+        record,
+        time=record.time[kept] - record.time[kept][0],
+        friction=record.friction[kept],
+        load_point=record.load_point[kept] - record.load_point[kept][0],
+        normal=record.normal[kept],
+    )
+
+
+def _with(record, draw, kind):
+    """A record with one trouble of laboratories."""
+    count = len(record.time)
+    if kind == "trend":
+        return replace(record, friction=record.friction - 25 * record.load_point)
+    if kind == "noisy load point":
+        return replace(record, load_point=record.load_point + 0.3 * MICRON * draw.standard_normal(count))
+    if kind == "correlated transducer":
+        return replace(record, load_point=record.load_point + 0.45 * MICRON * shared(draw, count, 0.9))
+    if kind == "correlated friction":
+        return replace(record, friction=record.friction + 5e-4 * shared(draw, count, 0.9))
+    if kind == "drifting normal stress":
+        return replace(record, normal=NORMAL * (1 + DRIFT * record.time))
+    if kind == "unsteady beginning":
+        return _cut(record, record.time >= 8.0)
+    if kind == "uneven sampling":
+        return _cut(record, (draw.uniform(size=count) < 0.5) | (np.arange(count) == 0))
+    if kind == "rate column":
+        return replace(record, load_rates=np.where(record.time < 30, 1 * MICRON, 10 * MICRON))
+    return record
+
+
+TROUBLES = {
+    "trend": cache(_step),
+    "noisy load point": cache(_step),
+    "correlated transducer": cache(_step),
+    "correlated friction": cache(_step),
+    "drifting normal stress": cache(lambda: _step(drift=DRIFT)),
+    "unsteady beginning": cache(lambda: _step(pieces=((3.0, 3 * MICRON), *ONE_STEP))),
+    "two states": cache(lambda: _step(second=(-0.003, 60 * MICRON), b=0.010)),
+    "uneven sampling": cache(_step),
+    "rate column": cache(_step),
+}
+"""Experiments with one trouble each; `troubled` gives a record."""
+
+
+def troubled(kind, seed):
+    """A record with a trouble, and the truth that its fit must hold, but for the trend and the beginning."""
+    made = TROUBLES[kind]()
+    record = _with(made.noisy(seed), np.random.default_rng(10_000 + seed), kind)
+    truth = dict(made.truth)
+    if kind == "two states":
+        truth |= {"second_effect": -0.003, "second_slip": 60 * MICRON}
+    return record, truth
+
 
 LONG = {
     "long velocity steps, stiffness fitted": cache(
