@@ -138,7 +138,7 @@ class Identification:
     @property
     def determined(self) -> bool:
         """Whether every parameter has an interval with both ends."""
-        return all(estimate.identified for estimate in self.estimates.values())
+        return all(e.identified for e in self.estimates.values() if not e.name.startswith("delay"))
 
     @property
     def identified(self) -> bool:
@@ -210,7 +210,7 @@ class Identification:
 
     def untold(self) -> list[str]:
         """Sentences about what the record cannot tell; none where it tells everything."""
-        open_ = [estimate for estimate in self.estimates.values() if not estimate.identified]
+        open_ = [e for e in self.estimates.values() if not (e.identified or e.name.startswith("delay"))]
         names = {estimate.name for estimate in open_}
         told = []
         if self.difference is not None and self.difference.identified:
