@@ -182,8 +182,8 @@ refused = replace(certificate, claims=smaller).check() is Verdict.UNDECIDED
 print(certificate.sentence())
 
 # %% [markdown]
-# It holds from rest and inside the model: where the slip rate is negative the printed plant continues friction as if the slip went on. A run of the first
-# 4000 s with the sine of the task stays far below.
+# It holds from rest, on the plant without stick. A run of the first 4000 s on the stick–slip plant
+# with the sine of the task stays far below.
 
 # %%
 run = qd.simulate(fault, design.controller, duration=4000)

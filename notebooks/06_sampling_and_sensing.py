@@ -28,6 +28,7 @@ import pandas as pd
 # %matplotlib inline
 import quakedesign as qd
 from quakedesign import simulation as sim
+from quakedesign.loop import Actuator, Diffusion, Saturation, sensing
 
 fault = qd.load_fault("real-fault")
 design = qd.design(fault, "cta", continuous=True)
@@ -36,12 +37,12 @@ print(design.verdict, {name: f"{float(value):.4g}" for name, value in design.gai
 
 # %% [markdown]
 # ## One run, and where its energy went
-# The first 2000 s of the task; `continuous` evaluates the law in every stage of the integrator. The budget is integrated along with the motion, so what is
+# The first 2000 s of the task, on the plant without stick, for which the orders of schemes are known; `continuous` evaluates the law in every stage of the integrator. The budget is integrated along with the motion, so what is
 # missing in it is the error of the integration. Where the law switches inside a step, the integrator gets the energy of the chatter wrong; a pressure that is
 # held costs no accuracy. Runs with `continuous` show what the law would do, not what a controller does.
 
 # %%
-SHORT = {"duration": 2000.0, "samples": 2000}
+SHORT = {"duration": 2000.0, "samples": 2000, "plant": "printed"}
 runs = {scheme: qd.simulate(fault, law, scheme=scheme, **SHORT) for scheme in ("continuous", "explicit")}
 for scheme, run in runs.items():
     print(f"{scheme}: residual {run.energy.relative_residual:.1e} of the largest energy, events {dict(run.events)}")
@@ -103,7 +104,7 @@ schemes = ("explicit", "compensated")
 noise = sim.noise_sensitivity(
     fault, law, levels=(1e-8, 1e-7, 1e-6, 1e-5), of="rate_noise", schemes=schemes, duration=1000.0
 )
-gain = sim.gain_sensitivity(fault.with_box("ten-percent"), law, points=2, schemes=("compensated",), duration=1000.0)
+gain = sim.gain_sensitivity(fault.with_box("ten-percent"), law, points=2, schemes=("compensated",), duration=1000.0, plant="printed")
 print(noise.to_pandas())
 gain.to_pandas()
 
@@ -112,8 +113,8 @@ gain.to_pandas()
 # The pressure that a law asks for is cut off, held, and diffuses through the rock before it acts. Volume and flow rate at the well are outputs.
 
 # %%
-rock = sim.Diffusion(length=1.0, diffusivity=7.0, storage=1e-9, cells=3)
-actuator = sim.Actuator(stages=(sim.Saturation(lowest=-5e6, highest=5e6), rock))
+rock = Diffusion(length=1.0, diffusivity=7.0, storage=1e-9, cells=3)
+actuator = Actuator(stages=(Saturation(lowest=-5e6, highest=5e6), rock))
 lagged = qd.simulate(fault, law, scheme="implicit", actuator=actuator, substeps=20, **SHORT)
 print(f"through rock with L²/D = {rock.time * 1e3:.0f} ms: slip error {lagged.metrics.max_slip_error:.2g} m")
 lagged.to_xarray()[["well_pressure", "injected_volume", "flow_rate"]].isel(time=-1)
@@ -128,16 +129,16 @@ lab, cta = qd.load_fault("lab-fault"), qd.published("lab-fault")["cta"]
 
 
 def loop(differentiator, scheme):
-    sensor = sim.OutputFeedback(differentiator=differentiator)
-    return qd.simulate(lab, cta, step=differentiator.step, scheme=scheme, measurement=sensor, duration=0.5, samples=50)
+    sensor = sensing.OutputFeedback(differentiator=differentiator)
+    return qd.simulate(lab, cta, step=differentiator.step, scheme=scheme, measurement=sensor, duration=0.5, samples=50, plant="printed")
 
 
 fine = {"step": 1e-5, "discretisation": "homogeneous"}
-printed = loop(sim.Differentiator(bound=1e-5, order=2, filter_order=2, **fine), "explicit")
-chosen = sim.Differentiator(bound=100.0, **fine)
-least = sim.smallest_bound(lab, cta, chosen, acceleration=0.073)
+printed = loop(sensing.Differentiator(bound=1e-5, order=2, filter_order=2, **fine), "explicit")
+chosen = sensing.Differentiator(bound=100.0, **fine)
+least = sensing.smallest_bound(lab, cta, chosen, acceleration=0.073)
 better = loop(chosen, "explicit")
-coarse = loop(sim.Differentiator(bound=100.0, step=1e-3), "implicit")
+coarse = loop(sensing.Differentiator(bound=100.0, step=1e-3), "implicit")
 print(f"printed: {printed.metrics.max_slip_error:.1e} m; smallest bound at 10 µs: {least:.2g} m/s²")
 print(f"n_d = 1, 100 m/s²: {better.metrics.max_slip_error:.1e} m; implicit at 1 ms: {coarse.metrics.max_slip_error:.1e} m")
 

@@ -107,7 +107,7 @@ loop = control.interconnect(
     outputs=["slip", "p"],
 )
 at_once = control.input_output_response(loop, time, [r, r_rate], solve_ivp_method="LSODA", solve_ivp_kwargs={"rtol": 1e-8, "atol": 1e-12})
-run = qd.simulate(fault, law, scheme="explicit", duration=duration)
+run = qd.simulate(fault, law, scheme="explicit", duration=duration, plant="printed")  # without stick, as the plant of to_iosystem
 
 fig, (upper, below) = plt.subplots(2, sharex=True, figsize=(7, 5))
 upper.plot(time, 1e6 * (at_once.outputs[0] - r), label="python-control, pressure at once")

@@ -52,9 +52,9 @@ def test_a_design_is_a_folder_whose_certificates_both_checkers_accept(tmp_path, 
     scope="module", params=[pytest.param(name, marks=pytest.mark.slow) for name in ("real-fault", "lab-fault")]
 )
 def main_job(request, tmp_path_factory):
-    """The main job as a user runs it."""
+    """The main job as a user runs it, on the plant of the paper, whose published results it is compared with."""
     folder = tmp_path_factory.mktemp("job")
-    command = [sys.executable, "-m", "quakedesign", "design", request.param, "--json"]
+    command = [sys.executable, "-m", "quakedesign", "design", request.param, "--plant", "printed", "--json"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stderr
     return request.param, folder / f"quakedesign-{request.param}", json.loads(done.stdout)
