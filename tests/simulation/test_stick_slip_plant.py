@@ -222,7 +222,7 @@ def test_the_monitor_agrees_with_numpy():
     kept = run.time > 10.0
     assert run.metrics.time_at_rest_fraction == np.mean(run.slip_rate[kept] == 0)
     assert 0.05 < run.metrics.time_at_rest_fraction < 0.95
-    assert run.metrics.reverse_slip_fraction == 0
+    assert not np.any(run.slip_rate < 0)
     assert run.events["stick"] == run.time[1:][np.argmax(run.slip_rate[1:] == 0)]
     assert Metrics.unit("time_at_rest_fraction") == ""
     assert simulate(REAL, duration=10.0, plant="printed").metrics.time_at_rest_fraction is None
