@@ -36,6 +36,10 @@ _COURSES, _LEAST_COURSES = 24, 8  # for each of the two outputs; fewer where the
 _CLIMBING, _CLIMBS = 48, 8  # courses that climb from the best of those, and how often
 _CHANGED = 0.15, 0.4, 1.0  # shares of the pieces whose inputs are those of the adjoint, in turn
 _BLOCK = 8  # pieces that change together, at most
+_RESTING, _ROUNDS = 96, 9  # courses that rest before a push, and how often they change; of 128 periods
+_FIRST_PUSH, _LONGEST_PUSH = 20, 7  # periods within which a push ahead of the reference begins, and that it lasts
+_NEAR = np.array([[2], [2], [_PIECES]])  # pieces by which start, length and end of the rest change from round to round
+_MOST_RESTED = 128  # periods
 _SOON = 1, 2, 4, 8, 16  # periods after which errors are looked at as well where a loop does not start at rest
 _SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
 _LEVELS = 400  # of a disturbance of bounded rate above 0
@@ -75,11 +79,12 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64 to 512
     periods long, as the loop forgets; in continuous time a period is that of the fastest pole, 1/|λ|. A disturbance of
     bounded rate is the best of all for a costate (`_steepest`). With `sticks` the fault does not slide backward:
-    friction holds it wherever the loop would, along the reference at its largest rate and at a twentieth of that, and
-    courses that switch after random times are tried as well. Noise is at its ends too. An implicit step ends where its
-    equation says, inside its lines or not. A box of starts is left from its corners. With jitter each event is as early
-    or as late as it may be, by no clock each interval as short or as long; pressures rise at once, as a pump of any
-    rate may do, and means are of their middle alone.
+    friction holds it wherever the loop would, along the reference at its largest rate and at a twentieth of that,
+    and courses that switch after random times are tried as well, and courses that rest before a push
+    (`rest_and_push`) for as long as the reference takes to catch up with the slip error that is proved. Noise is at
+    its ends too. An implicit step ends where its equation says, inside its lines or not. A box of starts is left
+    from its corners. With jitter each event is as early or as late as it may be, by no clock each interval as short
+    or as long; pressures rise at once, as a pump of any rate may do, and means are of their middle alone.
     """
     slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     least, largest = pressures or (None, None)
@@ -97,12 +102,24 @@ def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
             best = searches[1].best(min(_CLIMBING, 2 * len(searches[0].aim)))
             searches.append(_CourseSearch(claim, sticks, len(best), numbers=best))
             searches[2].ascend(switched[:, best])
+            if isinstance(claim, Guarantee) and claim.task.reference_rates[0]:
+                searches.append(_resting(claim, searches[0]))
+                searches[3].rest_and_push(_ROUNDS)
     for periods in _SOON if claim.loop.start else ():
         searches.append(_CourseSearch(claim, sticks, 2 * _COURSES, periods))
         searches[-1].follow(searches[-1].random(), _SWEEPS)
     pressures = [search.rest_limit.seen for search in searches if search.rest_limit is not None]
     ends = [min(low for low, _ in pressures), max(high for _, high in pressures)] if pressures else []
     return [max(search.largest[k] for search in searches) for k in (0, 1)] + ends
+
+
+def _resting(claim: Guarantee, like: "_CourseSearch") -> "_CourseSearch":
+    """Courses of the slip-rate error along the fastest reference, longer by the rest of a fault ahead of it."""
+    way = claim.task.reference_rates[0] * claim.held.step
+    periods = like.periods + int(np.ceil(min(float(claim.claims.slip_error / way), _MOST_RESTED)))
+    courses = max(_RESTING * 2 * PERIODS // (periods * len(like.parts)), _LEAST_COURSES)
+    numbers = np.array([number for number in range(8 * courses) if number % 16 in (6, 7, 14, 15)])
+    return _CourseSearch(claim, True, len(numbers), periods, numbers=numbers)
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,7 +298,7 @@ class _CourseSearch:
         beta = [float(b) for b in task.beta]
         push = np.zeros(self.size)
         push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
-        ends = product(task.beta, task.slip_chord, task.rate_chord)
+        ends = product(*map(dict.fromkeys, (task.beta, task.slip_chord, task.rate_chord)))
         vertices = [_at(task, flow, push, *map(float, v)) for v in ends]
         more = claim.held.slack if isinstance(claim, Guarantee) else Fraction(0)
         events = _events(loop, off, early, more) if loop.segments else [_flowing(flow)]
@@ -307,7 +324,7 @@ class _CourseSearch:
         else:
             self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
         self.marks = np.empty((0, courses))
-        self.steps = periods * len(self.parts) * _PIECES
+        self.periods, self.steps = periods, periods * len(self.parts) * _PIECES
         self.largest = (0.0, 0.0)
 
     def follow(self, costates: np.ndarray, sweeps: int) -> np.ndarray:
@@ -347,6 +364,32 @@ class _CourseSearch:
             kept = np.where(better[None, :, None], tried, kept)
             top = np.maximum(top, reached)
             chosen, held, jumped = now
+
+    def rest_and_push(self, rounds: int) -> None:
+        """Push ahead of the reference, hold the fault back while it rests and its law follows, and push as it lets go.
+
+        Start and length of the first push, and the end of the rest, change from round to round, from those of the best
+        courses with the same input gain. The adjoint sees none of this: it is 0 where the fault rests.
+        """
+        random, courses, period = np.random.default_rng(_SEED), len(self.aim), self.steps // self.periods
+        limits = [[_FIRST_PUSH * period], [_LONGEST_PUSH * period], [1]]
+        tried: np.ndarray = np.array([[0], [1], [self.steps]]) + random.integers(0, limits, (3, courses))
+        kept, top, number = tried, np.zeros(courses), np.arange(self.steps)[:, None]
+        for turn in range(rounds):
+            begun, lasted, free = tried
+            costates = np.zeros((self.steps, *self.aim.shape))
+            costates[:, :, 1] = np.where(((number >= begun) & (number < begun + lasted)) | (number >= free), 1, -1)
+            _, held, _ = self._forward(costates, None)
+            if turn:
+                reached = self.marks.max(axis=0)
+                kept, top = np.where(reached > top, tried, kept), np.maximum(top, reached)
+                ranked = np.argsort(-top.reshape(-1, 2), axis=0)  # the input gain is that of even or odd courses
+                chosen = random.integers(max(len(ranked) // 4, 1), size=ranked.shape)
+                parents = (2 * np.take_along_axis(ranked, chosen, axis=0) + [0, 1]).ravel()
+                tried = kept[:, parents] + random.integers(-_NEAR, _NEAR + 1, kept.shape)
+            else:
+                kept[2] = _let_go(np.array([mask[:, 1] for mask in held]))
+                tried = kept + random.integers(-_NEAR, _NEAR + 1, kept.shape) * [[0], [0], [1]]
 
     def _slopes(self, costates: np.ndarray, chosen: list[np.ndarray], limit: float) -> np.ndarray:
         """Of a disturbance of bounded rate, in every piece, over the largest: the best along the vertices chosen."""
@@ -477,6 +520,17 @@ class _CourseSearch:
             if number % _PIECES == 0:
                 costate = np.where(jumped[number // _PIECES][:, None], costate @ part.jump, costate)
         return np.array(found[::-1])
+
+
+def _let_go(stuck: np.ndarray) -> np.ndarray:
+    """Of every course the piece in which its longest rest ends, or the last one."""
+    rested, longest = np.zeros(stuck.shape[1]), np.zeros(stuck.shape[1])
+    found = np.full(stuck.shape[1], len(stuck) - 1)
+    for number, rests in enumerate(stuck):
+        ends = ~rests & (rested > longest)
+        longest, found = np.where(ends, rested, longest), np.where(ends, number, found)
+        rested = np.where(rests, rested + 1, 0)
+    return found
 
 
 def _steepest(held: np.ndarray, moved: np.ndarray, most: np.ndarray, limit: float) -> np.ndarray:
