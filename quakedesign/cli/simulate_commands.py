@@ -122,7 +122,8 @@ def simulate(
         trajectory.save(out)
     proved, outside = None, list[str]()
     if chosen and chosen.claim:
-        proved, outside = chosen.claim.sentence(), _outside(changed_options(simulate, options), chosen.claim.held)
+        changed = changed_options(simulate, options)
+        proved, outside = chosen.claim.sentence(), _outside(changed, chosen.claim, trajectory.provenance["plant"])
     answer = _answer(trajectory, loaded, premises) | {
         "guarantee": {"sentence": proved} if proved else None,
         "outside": outside,
@@ -131,12 +132,14 @@ def simulate(
     return 0
 
 
-def _outside(changed: dict[str, Any], held: Any) -> list[str]:
-    """Options of a run of a law that what is proved of it does not know."""
+def _outside(changed: dict[str, Any], claim: Any, plant: str) -> list[str]:
+    """Options of a run of a law that what is proved of it does not know, its plant among them."""
+    held, changed = claim.held, changed | {"plant": plant}
     known = {name: float(time) for name, time in held.path.items()}
     starts = zip(("initial_slip", "initial_slip_rate"), map(float, held.start), strict=True)
     within = {name for name, most in starts if abs(changed.get(name, 0.0)) <= most}
     within |= {name for name, time in known.items() if changed.get(name) == time}
+    within |= {"plant"} if plant == claim.plant else set()
     kinds: tuple[Any, ...] = (ActuatorOptions, SensorOptions)
     groups = (option.name for kind in kinds for option in fields(kind))
     return [name for name in (*_BESIDE, *groups) if name in changed and name not in within]

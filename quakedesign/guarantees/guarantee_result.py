@@ -128,7 +128,9 @@ class LoopAnswer:
                 )
         said += [*self._told(), *self.task_lines()]
         if self.leaves_with_stick:
-            said.append("with stick a course was found that leaves the bounds, which are those of the continued plant")
+            said.append(
+                "with stick a course was found that leaves the bounds, which are those of the plant without stick"
+            )
         return said if self.compensation is None else [*said, self.compensation.sentence()]
 
     @property

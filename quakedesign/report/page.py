@@ -351,8 +351,8 @@ MODEL_LIMITS = (
     "in these runs the pressure has no limit and is even over the patch",
 )
 REST_LIMITS = (
-    "proofs are about a plant continued to negative slip rates; the worst found with stick is what a search found on "
-    "one that stops and reverses",
+    "proofs are about the plant without stick, the linear continuation to negative slip rates; the worst case found "
+    "with stick is a lower bound that a search found on the stick–slip plant",
 )
 _WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "rock of L^2/D ="}
 SLIDING_LIMITS = (
@@ -414,7 +414,7 @@ def answer(comparison: "Compared") -> list[str]:
     if proved:
         lines.append(
             f"With a designed controller the slip rate never exceeds {', '.join(proved.values())}: proved, for the "
-            f"loop as it runs, {covers}"
+            f"sampled loop, {covers}"
         )
     for why, titles in _without(e for e in designed if e.design.title not in proved).items():
         lines.append(f"No guarantee was found for the designed {', '.join(titles)}{f': {why}' if why else ''}")

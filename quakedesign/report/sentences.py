@@ -548,7 +548,9 @@ def proved_line(sentence: str | None, outside: list[str]) -> str:
     """What is proved of the law of a run, and which options of the run the proof does not know; empty without one."""
     if sentence is None:
         return ""
-    return f"NOT proved of this run, by {', '.join(outside)}; without: {sentence}" if outside else f"proved: {sentence}"
+    if outside:
+        return f"NOT proved of this run, which differs in {', '.join(outside)}; the proof says: {sentence}"
+    return f"proved: {sentence}"
 
 
 def sliding_run_lines(answer: dict[str, Any]) -> list[str]:

@@ -57,7 +57,7 @@ from quakedesign.simulation import (
 )
 from quakedesign.simulation import simulate as run_loop
 from quakedesign.simulation.recorder import Metrics
-from quakedesign.simulation.run import PRINTED
+from quakedesign.simulation.run import PRINTED, STICK_SLIP
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
 from quakedesign.simulation.state_plant import TIDE, Tide
 from quakedesign.simulation.stick_slip import (
@@ -569,14 +569,16 @@ def _note(order: int, reached: float, condition: JointCondition) -> str:
 
 
 def largest_acceleration(fault: Fault, law: Controller, *, scheme: str, step: float) -> tuple[float, float | None]:
-    """Largest |Δx2|/T_s [m/s²] of the sampled loop with exact states over 4000 periods, on the plant without stick.
+    """Largest |Δx2|/T_s [m/s²] of the sampled loop with exact states over 4000 periods, on both plants.
 
-    The second entry is the time [s] of its divergence, after which nothing counts, or None.
+    The second entry is the time [s] of the first divergence, after which nothing counts, or None.
     """
     window = min(WINDOW * step, fault.reference.operation_time)
-    run = simulate(fault, law, scheme=scheme, step=step, duration=window, samples=WINDOW, plant=PRINTED)
-    steps = np.abs(np.diff(run.slip_rate)) / np.diff(run.time)
-    return float(np.max(steps, initial=0.0)), run.events.get("diverged")
+    setting: dict[str, Any] = {"scheme": scheme, "step": step, "duration": window, "samples": WINDOW}
+    runs = [simulate(fault, law, plant=plant, **setting) for plant in (STICK_SLIP, PRINTED)]
+    steps = [np.max(np.abs(np.diff(run.slip_rate)) / np.diff(run.time), initial=0.0) for run in runs]
+    ends = [run.events["diverged"] for run in runs if "diverged" in run.events]
+    return float(max(steps)), min(ends, default=None)
 
 
 # ----------------------------------------------------------------------
@@ -594,13 +596,13 @@ class Choice:
     controller : Controller
     lipschitz : Fraction or None
         Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law.
-    claim : Guarantee, SlidingGuarantee or None
-        What is proved of the law as it runs, where it comes from the file of that.
+    claim : Guarantee, SlidingGuarantee, StickSlipGuarantee or None
+        What is proved of the law, where it comes from a certificate file.
     """
 
     controller: Controller
     lipschitz: Fraction | None = None
-    claim: Guarantee | SlidingGuarantee | None = None
+    claim: Guarantee | SlidingGuarantee | StickSlipGuarantee | None = None
 
     def noise(self, seed: int) -> Measurement:
         """Bounds of the measurement errors in the guarantee of the controller; none without one."""
@@ -648,7 +650,7 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         controller = claim.controller
     if claim.check() is not Verdict.PROVED:
         raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
-    return Choice(controller=controller, claim=None if isinstance(claim, StickSlipGuarantee) else claim)
+    return Choice(controller=controller, claim=claim)
 
 
 def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee | StickSlipGuarantee) -> list[str]:

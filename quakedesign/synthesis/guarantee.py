@@ -70,7 +70,7 @@ def _asked(question: Callable[[], Found]) -> Found | QuakedesignError:
         return refused
 
 
-PLANTS = ("continued", "stick-slip")
+PLANTS = ("printed", "stick-slip")
 _PUMP = ("saturation", "withdrawal", "rate_limit")
 _OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", *_PUMP)
 
@@ -123,7 +123,7 @@ def guarantee(
     spread : str, float or Fraction
         Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
     plant : str
-        ``continued``: the plant without stick, its friction continued to negative slip rates; ``stick-slip``: friction
+        ``printed``: the plant without stick, its friction continued to negative slip rates; ``stick-slip``: friction
         holds the fault at rest and it never slips backward. The second designs an e-LQR with a
         prediction that is never negative (`StickSlipLaw`), for exact measurements and a pressure that acts at once.
     progress : callable, optional
@@ -171,7 +171,7 @@ def guarantee(
         usual = (plant, objective, tuple(gains), scheme) == (PLANTS[0], OBJECTIVES[0], (), None)
         if not usual or exact_value(spread, "", "spread") or stress is not None or fault.friction.state_names:
             raise ParameterError(
-                "a user's law is guaranteed as it is, for friction without a state and the plant continued. Received "
+                "a user's law is guaranteed as it is, for friction without a state and the plant printed. Received "
                 f"it with {fault.friction.name} friction, or with plant, objective, gains, scheme, stress or spread. "
                 "Omit these."
             )

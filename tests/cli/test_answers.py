@@ -121,7 +121,7 @@ def test_what_is_asked_is_what_was_typed(prove):
         "stress": "3",
         "disturbance_class": "rate",
         "spread": "0.1",
-        "plant": "continued",
+        "plant": "printed",
     }
 
 
@@ -232,7 +232,7 @@ def test_limits_are_written_where_a_folder_is_given(call, monkeypatch, tmp_path)
         ({"delay": 0.03, "lag": 2.0, "diffusion": 1.0}, ["delay", "diffusion"]),
         ({"initial_slip": 1e-3, "initial_slip_rate": -1e-2}, []),
         ({"initial_slip": 1.1e-3, "initial_slip_rate": -1.1e-2}, ["initial_slip", "initial_slip_rate"]),
-        ({"slip_noise": 1e-6, "saturation": 1e6, "plant": "stick-slip"}, ["plant", "saturation", "slip_noise"]),
+        ({"slip_noise": 1e-6, "saturation": 1e6}, ["saturation", "slip_noise"]),
         ({"averaging": 2, "drift": 1e-9, "scheme": "implicit"}, ["scheme", "drift", "averaging"]),
         ({"perturbation": "time", "weight": 0.5, "authority": 1.0}, ["perturbation", "weight", "authority"]),
     ],
@@ -240,7 +240,11 @@ def test_limits_are_written_where_a_folder_is_given(call, monkeypatch, tmp_path)
 def test_what_a_proof_does_not_know_of_a_run_is_named(changed, outside):
     """Delay 20 ms and lag 2 s, and from initial errors of at most 1 mm and 1 cm/s."""
     held = SimpleNamespace(path={"delay": F(1, 50), "lag": F(2)}, start=(F(1, 1000), F(1, 100)))
-    assert simulate_commands._outside(changed, held) == outside
+    claim = SimpleNamespace(held=held, plant="printed")
+    assert simulate_commands._outside(changed, claim, "printed") == outside
+    asked = {**changed, "plant": "printed"}  # what ran counts, not what was asked for
+    named = simulate_commands._outside(asked, claim, "stick-slip")
+    assert named == sorted([*outside, "plant"], key=lambda name: (name != "scheme", name != "plant"))
 
 
 @pytest.mark.parametrize("full", [True, False])

@@ -197,9 +197,9 @@ class Guarantee:
     slow_gain : SlowGain, optional
         How the proof uses that the input gain is slow; None for one that lets it jump.
     reach : InvariantPolytope, optional
-        Of samples that follow no clock, the set that the loop never leaves; None for others.
-    covers, lasts : str
-        For what it holds, and for how long, in short.
+        Of aperiodic sampling, the set that the loop never leaves; None for others.
+    covers, lasts, plant : str
+        For what it holds, for how long, and the plant of `simulate` that it is about.
     """
 
     proved: ClassVar[Literal[True]] = True
@@ -209,10 +209,10 @@ class Guarantee:
     slow_gain: SlowGain | None = None
     reach: InvariantPolytope | None = None
     covers: ClassVar[str] = (
-        "every friction law of the box and every disturbance up to the stated size, for a plant continued to negative "
-        "slip rates"
+        "every friction law of the box and every disturbance up to the stated size, on the plant without stick"
     )
     lasts: ClassVar[str] = "for all t >= 0"
+    plant: ClassVar[str] = "printed"
 
     def __repr__(self) -> str:
         held, claims = self.held, self.claims

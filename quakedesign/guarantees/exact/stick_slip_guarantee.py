@@ -31,8 +31,8 @@ class StickSlipGuarantee:
     held : SampledStickSlip
     reach : StickSlipPolytope
     claims : StickSlipClaims
-    covers, lasts : str
-        For what it holds, and for how long, in short.
+    covers, lasts, plant : str
+        For what it holds, for how long, and the plant of `simulate` that it is about.
     """
 
     proved: ClassVar[Literal[True]] = True
@@ -44,6 +44,7 @@ class StickSlipGuarantee:
         "every friction law of the box and every disturbance up to the stated size, whether the fault slides or sticks"
     )
     lasts: ClassVar[str] = "for all t >= 0"
+    plant: ClassVar[str] = "stick-slip"
 
     def __repr__(self) -> str:
         return f"StickSlipGuarantee({self.task.name}: slip rate at most {self.claims.peak_slip_rate:.4g} m/s)"

@@ -179,6 +179,21 @@ class SampledStickSlip:
         if self.step <= 0:
             raise ParameterError(f"T_s must be positive, got {shortly(self.step)} s")
 
+    @property
+    def noise(self) -> dict[str, Fraction]:
+        """Bounds of measurement errors, as `Held.noise`: none."""
+        return {}
+
+    @property
+    def path(self) -> dict[str, Fraction]:
+        """Delay, lag and diffusion [s], as `Held.path`: none."""
+        return {}
+
+    @property
+    def start(self) -> tuple[Fraction, Fraction]:
+        """Bounds of the initial errors [m, m/s], as `Held.start`: rest."""
+        return Fraction(0), Fraction(0)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StickSlipClaims:

@@ -11,17 +11,20 @@ import pytest
 from scipy.optimize import linprog
 
 import quakedesign as qd
+from quakedesign.cli.simulate_commands import _outside
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import guarantee_document, load_guarantee, read_guarantee
 from quakedesign.guarantees.exact import stick_slip_set
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
-from quakedesign.guarantees.exact.stick_slip_guarantee import stick_slip_guarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import gap, ranges, stick_slip_bounds, stop_bounds
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip, worst_stick_slip
 from quakedesign.laws.stick_slip_law import StickSlipLaw
+from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
+from quakedesign.studies.runs import certified_choice
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "stick_slip_real-fault.json"
 
@@ -330,6 +333,16 @@ def test_healing_needs_a_disturbance_within_the_claims(proof, disturbance):
     with pytest.raises(ParameterError, match=r"from 0 to that of the claims, 0\.00032 m/s"):
         proof.covered_healing(disturbance)
     assert proof.covered_healing(proof.task.amplitude) == 0
+
+
+def test_a_run_of_its_file_knows_what_is_proved_and_on_which_plant(proof, monkeypatch):
+    monkeypatch.setattr(StickSlipGuarantee, "check", lambda _: Verdict.PROVED)
+    choice = certified_choice(qd.load_fault("real-fault"), FILE)
+    assert choice.claim.claims == proof.claims
+    assert choice.noise(0) == EXACT
+    assert _outside({"duration": 5.0}, choice.claim, "stick-slip") == []
+    outside = _outside({"initial_slip": 1e-9, "initial_slip_rate": 1e-9, "delay": 0.02}, choice.claim, "printed")
+    assert outside == ["plant", "initial_slip", "initial_slip_rate", "delay"]
 
 
 def test_claims_are_rounded_outward(bounds):
