@@ -84,7 +84,7 @@ def natural_earthquake(
     if pressure:
         return earthquake
     natural = earthquake if growth <= 0 else _with_peak(earthquake, fault, growth)
-    if plant is None:
+    if recorder.loop.sticks:
         _PEAKS[_alone(fault)] = natural.criterion.natural_peak
         if len(_PEAKS) > _MOST_PEAKS:
             del _PEAKS[next(iter(_PEAKS))]

@@ -10,6 +10,7 @@ from quakedesign.simulation.integrators import Integrator
 
 _BISECTIONS = 4  # of the step, which leave a sixteenth of it, from where Newton's method converges quadratically
 _NEWTON_STEPS = 3
+_TINY = 1e-300  # at the least of the slope, so that a flat root is no division by zero
 
 
 @dataclass(frozen=True)
@@ -175,6 +176,6 @@ class _Quartic:
             low, high = ca.if_else(positive, middle, low), ca.if_else(positive, high, middle)
         share = (low + high) / 2
         for _ in range(_NEWTON_STEPS):
-            slope = self.slope(share)
-            share = ca.fmin(ca.fmax(share - self.at(share) / ca.if_else(slope == 0, 1, slope), low), high)
+            falling = ca.fmin(self.slope(share), -_TINY)
+            share = ca.fmin(ca.fmax(share - self.at(share) / falling, low), high)
         return share

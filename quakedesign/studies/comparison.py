@@ -32,7 +32,6 @@ from quakedesign.lyapunov.exact.fault_bounds import equilibrium_pressure, sector
 from quakedesign.lyapunov.exact.premises import Variant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.integrators import amplification
-from quakedesign.simulation.run import loop_class
 from quakedesign.studies.certified import certified_bound, largest_sampling_time, on_trajectory
 from quakedesign.studies.runs import StateRun, designed_run, natural_run
 from quakedesign.synthesis import Design, assess, designable, left_out
@@ -188,7 +187,7 @@ def compared(
 
 
 def require_plant(fault: Fault, plant: str | None) -> None:
-    """Refuse an unknown plant of the runs, and any of friction with a state, which never rests.
+    """Refuse a plant of the runs for friction with a state, which never rests.
 
     Raises
     ------
@@ -199,7 +198,6 @@ def require_plant(fault: Fault, plant: str | None) -> None:
             f"plant is for friction without a state, got {plant!r} with {fault.friction.name}, which never rests: omit "
             "it."
         )
-    loop_class(plant)
 
 
 def behind_path(fault: Fault) -> dict[str, str]:

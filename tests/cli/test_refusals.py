@@ -82,6 +82,15 @@ def test_what_is_misspelt_is_asked_for_by_its_nearest_name(capsys, tmp_path, mon
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("command", ["design", "compare", "figures"])
+def test_friction_with_a_state_has_no_other_plant_and_nothing_is_done(capsys, tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, command, "crustal-patch", "--plant", "printed")
+    assert (code, out) == (2, "")
+    assert "plant is for friction without a state, got 'printed'" in err
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

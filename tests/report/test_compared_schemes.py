@@ -60,6 +60,21 @@ def test_every_row_says_its_scheme_and_is_the_run_of_it(compared):
     assert replace(alone.metrics, seconds=0) == replace(compared.entries[2].run.metrics, seconds=0)
 
 
+def test_the_plant_of_a_comparison_is_that_of_its_runs(monkeypatch):
+    given = []
+    monkeypatch.setattr(comparison, "compare", lambda *_, **told: given.append(told["plant"]))
+    comparison.designed_comparison(SHORT, [], lambda *_: None, plant="printed")
+    comparison.designed_comparison(SHORT, [], lambda *_: None)
+    assert given == ["printed", None]
+
+
+def test_friction_with_a_state_has_no_other_plant():
+    with pytest.raises(ParameterError, match=r"plant is for friction without a state, got 'printed'.*never rests"):
+        compare(load_fault("crustal-patch"), plant="printed")
+    with pytest.raises(ParameterError, match=r"stick-slip, printed.*'sticky'"):
+        compare(SHORT, plant="sticky")
+
+
 def test_what_is_only_known_of_the_continuous_scheme_is_not_said_of_others(compared):
     assert all(e.growth_per_step is None and e.largest_step is None for e in compared.entries)
     said = {e.label: "; ".join(sentences(e)) for e in compared.entries}
@@ -92,7 +107,10 @@ def test_a_divergence_among_them_is_told_and_leaves_no_number_that_is_none(compa
     assert "inf" not in text
     page = (tmp_path / "out" / "report.html").read_text()
     assert SCHEMES in page
+    assert "on the plant without stick, the slip rate is negative in part of the steps: " in page
     assert {run.provenance["scheme"] for run in study.close_ups.values()} == {"explicit", "compensated"}
+    runs = [compared.uncontrolled, study.induced, *study.close_ups.values(), *(e.run for e in compared.entries)]
+    assert {run.provenance["plant"] for run in runs} == {"printed"}
 
 
 def test_the_terminal_says_it_and_no_table_is_wider_than_eighty_columns_or_breaks_a_number(compared):

@@ -1,5 +1,6 @@
 """What a run is said to have come to, how far a proof reaches, and when a comparison is a positive answer."""
 
+import dataclasses
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,7 +9,7 @@ import pytest
 from quakedesign.cli.design_commands import positive
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import ContinuousPeaks
-from quakedesign.laws import control_law
+from quakedesign.laws import SampledLaw, control_law
 from quakedesign.linear.sampled_stability import HeldLoop
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.premises import Premise
@@ -58,6 +59,28 @@ def test_the_headline_says_the_outcome_before_the_verdict_and_the_pressure_is_no
     assert "(withdrawal) to" in parts[3]
     assert headline(entry(slow, FINE)).startswith("; ".join(parts[:3]))
     assert entry(slow).to_dict()["outcome"] == slow.outcome.to_dict()
+
+
+@pytest.mark.parametrize(
+    ("plant", "said"),
+    [
+        ("printed", "proved for the loop that ran, for all t >= 0"),
+        ("stick-slip", "proved for this sampled loop on the plant without stick, for all t >= 0"),
+    ],
+)
+def test_a_proof_of_one_plant_is_not_said_of_a_run_on_another(slow, plant, said):
+    run = dataclasses.replace(slow, provenance={**slow.provenance, "plant": plant})
+    shown = entry(run, FINE)
+    law = SampledLaw.from_gains([3e8, 2e8, 2e7], step="184 ms")
+    proved = dataclasses.replace(shown, design=dataclasses.replace(shown.design, controller=law))
+    assert sentences(proved)[1] == said
+
+
+def test_a_negative_slip_rate_is_said_with_its_plant(slow):
+    share = f"{100 * slow.metrics.reverse_slip_fraction:.3g}"
+    assert f"on the plant without stick, the slip rate is negative in {share} % of the steps" in sentences(entry(slow))
+    still = dataclasses.replace(slow, metrics=dataclasses.replace(slow.metrics, reverse_slip_fraction=0.0))
+    assert not any("negative" in sentence for sentence in sentences(entry(still)))
 
 
 def test_cells_are_short_and_say_what_is_not_known(slow):

@@ -116,11 +116,11 @@ def test_an_unstable_fault_that_does_not_move_is_a_defect(monkeypatch):
 
 @pytest.mark.slow
 def test_the_measure_of_events_is_found_with_the_event(monkeypatch):
-    """Whatever disturbance and box the fault has; under pressure or with stick it is another event."""
+    """Whatever disturbance and box the fault has; under pressure or without stick it is another event."""
     monkeypatch.setattr(memoryless_earthquake, "_PEAKS", {})
     runs, run = [], memoryless_earthquake.run
     monkeypatch.setattr(memoryless_earthquake, "run", lambda *given, **more: runs.append(1) or run(*given, **more))
-    natural_earthquake(LAB, plant="stick-slip")
+    natural_earthquake(LAB, plant="printed")
     peak = memoryless_earthquake.natural_peak(LAB)
     assert len(runs) == 2
     event = natural_earthquake(LAB, compiled=False)

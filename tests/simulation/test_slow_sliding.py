@@ -262,6 +262,11 @@ def test_a_pump_acts_between_samples_as_with_an_independent_integrator():
     assert np.max(np.abs(log_rate - sooner)) > 1e-3
 
 
+def test_it_moves_with_inertia_unless_asked_otherwise():
+    controller = Held(law=sliding_law(sliding_model(fault()), STEP), step=STEP).controller
+    assert simulate(fault(), controller, duration=80.0, samples=2).provenance["plant"] == "smooth"
+
+
 def test_a_noisy_transducer_reads_other_slips_from_another_seed():
     law = sliding_law(sliding_model(fault()), STEP)
     ends = [

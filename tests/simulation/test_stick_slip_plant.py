@@ -14,7 +14,7 @@ from quakedesign.fault import Disturbance, load_fault
 from quakedesign.laws import published
 from quakedesign.simulation import Metrics, natural_earthquake, simulate
 from quakedesign.simulation.integrators import ClassicRungeKutta, DormandPrince
-from quakedesign.simulation.stick_slip_plant import StickSlipLoop, _crossing, _Quartic
+from quakedesign.simulation.stick_slip_plant import StickSlipLoop, _crossing, _Quartic, _SplitStep
 
 REAL = load_fault("real-fault")
 BLOCK = dataclasses.replace(REAL, damping=0.0, friction=dataclasses.replace(REAL.friction, drop=0.0))
@@ -305,6 +305,48 @@ def test_under_a_friction_of_one_a_step_is_made_of_parabolas(load, rate, length,
     assert found[2:] == pytest.approx([*[length] * law_states, 2 * length], rel=1e-13)
 
 
+def test_a_pressure_on_its_way_goes_on_as_if_the_fault_had_not_stopped():
+    """It decays as exp(−t/2); the fault stops after 0.3 of the step."""
+    loop = Unit(REAL, published("real-fault")["cta"])
+
+    def motion(plant, passed, now):
+        return ca.vertcat(plant(0.5 * passed, now[:2], 0), -now[2] / 2)
+
+    found = ca.evalf(loop.advance(DormandPrince, motion, ca.DM([0, 0.15, 1]), 0.5)).full().ravel()
+    assert found[1] == 0
+    assert found[2] == pytest.approx(math.exp(-0.25), rel=1e-7)
+
+
+def test_a_pressure_that_rises_at_rest_releases_the_fault():
+    """A pressure of 1.6 t is carried up to 1; the rate is then 0.8 τ², τ = t − 0.625."""
+
+    class Eased(StickSlipLoop):
+        plant = property(lambda self: lambda _, x, pressure: ca.vertcat(x[1], pressure - 1))
+
+    def motion(plant, passed, now):
+        return ca.vertcat(plant(passed, now[:2], now[2]), 1.6)
+
+    loop = Eased(REAL, published("real-fault")["cta"])
+    found = ca.evalf(loop.advance(ClassicRungeKutta, motion, ca.DM([0, 0, 0]), 1.0)).full().ravel()
+    assert found == pytest.approx([1.6 / 6 * 0.375**3, 0.8 * 0.375**2, 1.6], rel=1e-12)
+
+
+@pytest.mark.parametrize("law_states", [0, 1])
+def test_a_stop_after_a_release_is_counted_from_the_start_of_the_step(law_states):
+    """Sliding from a quarter of the step on at 0.5, braked by 1: half a step later it rests, 0.125 further."""
+    step = _SplitStep(lambda _, x, __: ca.vertcat(x[1], -1), DormandPrince, _motion, 1.0, 1)
+    start = ca.DM([0, 0.5, *[0.25] * law_states, 0.5])
+    stop, stopped = step.stop(0.25, start, step.slid(0.25, 0.75, start))
+    assert float(ca.evalf(stop)) == pytest.approx(0.75, rel=1e-12)
+    found = ca.evalf(stopped).full().ravel()
+    assert found == pytest.approx([0.125, 0, *[0.75] * law_states, 1.5], rel=1e-12, abs=1e-15)
+
+
+def _motion(plant, passed, now):
+    """States of the law that grow by 1 a second, and a work that grows by 2."""
+    return ca.vertcat(plant(passed, now[:2], 0), ca.DM.ones(now.shape[0] - 3), 2)
+
+
 @pytest.mark.parametrize("law_states", [0, 1])
 def test_it_stops_at_the_root_of_a_slip_rate_that_is_a_quartic_in_time(law_states):
     """x2 = 0.6 − t − 2 t⁴, which Dormand and Prince's method carries exactly."""
@@ -328,6 +370,13 @@ def test_the_quartic_stops_at_its_root_and_has_the_values_that_make_it(root, fur
     found = float(quartic.root())
     assert found == pytest.approx(root, abs=1e-8)
     assert made.integ()(found) == pytest.approx(made.integ()(root), rel=1e-13, abs=1e-15)  # stationary at the root
+
+
+def test_a_flat_root_is_found_where_it_is():
+    """−(s − 17/32)³, whose slope vanishes at the first point that Newton's method takes."""
+    flat = -np.polynomial.Polynomial.fromroots([17 / 32] * 3)
+    ends = flat(0), flat(1), flat.deriv()(0), flat.deriv()(1), flat.integ()(1)
+    assert float(_Quartic.of(*(ca.DM(v) for v in ends)).root()) == pytest.approx(17 / 32, abs=1e-5)
 
 
 def test_a_standstill_at_the_start_stops_at_once_and_a_straight_fall_where_the_line_does():

@@ -1,5 +1,8 @@
 """Sensors as the command line makes them, and the premise of their differentiator."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError
@@ -7,6 +10,7 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.loop.sensing import Measurement, joint_condition
 from quakedesign.loop.sensing.measurement import EXACT
+from quakedesign.studies import runs
 from quakedesign.studies.runs import differentiator_premise, largest_acceleration, sensor
 
 LAB = load_fault("lab-fault")
@@ -65,6 +69,19 @@ def test_the_acceleration_is_that_of_the_chattering_loop():
     reached, diverged = largest_acceleration(LAB, LAW, scheme="explicit", step=1e-4)
     assert reached == pytest.approx(3.0, rel=0.2)
     assert diverged is None
+
+
+def test_the_acceleration_is_the_larger_of_both_plants_and_the_divergence_the_first(monkeypatch):
+    rates = {"stick-slip": [0.0, 3.0, 1.0], "printed": [0.0, 1.0, -1.5]}
+    ends = {"stick-slip": {"diverged": 7.0}, "printed": {"stick": 1.0}}
+
+    def simulated(*_, plant, **__):
+        return SimpleNamespace(slip_rate=np.array(rates[plant]), time=np.arange(3.0), events=ends[plant])
+
+    monkeypatch.setattr(runs, "simulate", simulated)
+    assert largest_acceleration(LAB, LAW, scheme="explicit", step=1e-4) == (3.0, 7.0)
+    rates["printed"], ends["printed"] = [0.0, 1.0, -3.5], {"diverged": 2.0}
+    assert largest_acceleration(LAB, LAW, scheme="explicit", step=1e-4) == (4.5, 2.0)
 
 
 def test_the_premise_is_the_joint_condition_with_that_acceleration():

@@ -83,8 +83,9 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     and courses that switch after random times are tried as well, and courses that rest before a push
     (`rest_and_push`) for as long as the reference takes to catch up with the slip error that is proved. Noise is at
     its ends too. An implicit step ends where its equation says, inside its lines or not. A box of starts is left
-    from its corners. With jitter each event is as early or as late as it may be, with aperiodic sampling each interval as short
-    or as long; pressures rise at once, as a pump of any rate may do, and means are of their middle alone.
+    from its corners. With jitter each event is as early or as late as it may be, with aperiodic sampling each
+    interval as short or as long; pressures rise at once, as a pump of any rate may do, and means are of their middle
+    alone.
     """
     slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     least, largest = pressures or (None, None)

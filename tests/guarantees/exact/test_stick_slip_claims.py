@@ -20,6 +20,7 @@ from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import gap, ranges, stick_slip_bounds, stop_bounds
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip, worst_stick_slip
+from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.lyapunov import Verdict
@@ -333,6 +334,20 @@ def test_healing_needs_a_disturbance_within_the_claims(proof, disturbance):
     with pytest.raises(ParameterError, match=r"from 0 to that of the claims, 0\.00032 m/s"):
         proof.covered_healing(disturbance)
     assert proof.covered_healing(proof.task.amplitude) == 0
+
+
+def test_healing_counts_the_largest_area_per_mass_and_is_part_of_the_answer(proof):
+    wide = replace(proof, task=uncertain_plant(qd.load_fault("real-fault", box="ten-percent")))
+    low, high = wide.task.area_per_mass
+    assert low < high
+    stress = 50 * 10**6 - F(proof.claims.least_pressure)
+    assert wide.covered_healing() == wide.task.amplitude / (high * stress)
+    answer = StickSlipAnswer(fault=qd.load_fault("real-fault"), found=proof)
+    assert answer.to_dict()["covered_healing"] == float(proof.covered_healing()) <= proof.covered_healing()
+    assert (
+        answer.lines()[1]
+        == "in place of a disturbance this covers friction at rest up to 6.22e-05 above friction in slip"
+    )
 
 
 def test_a_run_of_its_file_knows_what_is_proved_and_on_which_plant(proof, monkeypatch):
