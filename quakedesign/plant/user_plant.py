@@ -28,7 +28,7 @@ Slopes = tuple[Any, Any] | Callable[[Fraction], tuple[Any, Any]]
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Sector:
-    """An uncertain term entry·φ(row·(x, u − v), t) of a plant with slopes·y² between: low·y² ≤ y·φ(y, t) ≤ high·y².
+    """An uncertain term entry·φ(y, t) of a plant, y = row·(x, u − v): φ lies between low·y and high·y, φ(0, t) = 0.
 
     Attributes
     ----------

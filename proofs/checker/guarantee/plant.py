@@ -23,7 +23,7 @@ COARSE, PLACE, HALF = 58, 128, 64  # bits of entries that are multiplied at once
 
 @dataclass
 class Sector:
-    """low*y^2 <= y*phi(y) <= high*y^2 for the argument y, a row over states and controls; up to `within`, if any."""
+    """phi(y, t) between low*y and high*y for the argument y, a row over states and controls; up to `within`, if any."""
 
     entry: Row
     line: Row

@@ -1,9 +1,9 @@
 """Guarantee of a sampled loop around an uncertain plant: vector small gain, claims that check themselves, files.
 
 **Theorem.** Of a loop about the balance of its loads, with every sector at its middle, let P_r be a bound of a row r by
-the sizes of the disturbances, the rates of the loads, the noise, the box of starts and numbers W_s for what the sectors
-are more than their middles: P_r = start_r + Σ g_ri·size_i + Σ g_rs·W_s. Let h_s be half the width of sector s, and
-h_s·P_s < W_s for the argument of every sector with h_s > 0, and P_s < `within` for every sector that holds up to a
+the sizes of the disturbances, the rates of the loads, the noise, the box of starts and numbers W_s ≥ 0 for what the
+sectors are more than their middles: P_r = start_r + Σ g_ri·size_i + Σ g_rs·W_s. Let h_s be half the width of sector s,
+and h_s·P_s < W_s for the argument of every sector with h_s > 0, and P_s < `within` for every sector that holds up to a
 bound. Then every row stays below P_r for all t ≥ 0.
 
 **Proof.** Let all sectors hold up to t. What a sector is more than its middle is at most h_s|y_s|, so the suprema W(t)
@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Literal
 
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, PlantLoop, ResponseBounds, response_bounds
+from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds, response_bounds
 from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad
@@ -36,7 +36,6 @@ from quakedesign.sos.exact.strict import (
 
 MOST_PIECES = 64
 _MOST_LAW_STATES = 48
-_MOST_NUMBERS = 96
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,6 +130,8 @@ class PlantGuarantee:
 
 def peaks(part: LinearPart, found: ResponseBounds, inputs: Row) -> Row | None:
     """Bounds of outputs and controls by numbers for the sectors; None where these do not close."""
+    if min(inputs, default=Fraction(0)) < 0:  # the comparison of Collatz and Wielandt is one of numbers >= 0
+        return None
     bounds = row_bounds(part, found, inputs)
     count = len(part.outputs)
     for sector, bound, most in zip(part.sectors, bounds[count:], inputs, strict=False):
@@ -212,7 +213,7 @@ def read_plant_guarantee(raw: Any) -> PlantGuarantee:
     headed(raw, {"plant", "law", "pieces", "inputs", "claims"}, UNCERTAIN_PLANT)
     try:
         part, law = _read_part(raw["plant"]), _read_law(raw["law"])
-        loop = part.loop(law)
+        part.loop(law)  # refuses sizes that do not fit, and a load that the law cannot hold
     except ParameterError as error:
         raise CertificateError(str(error)) from None
     need(type(raw["pieces"]) is int and 1 <= raw["pieces"] <= MOST_PIECES, f"pieces must be 1 to {MOST_PIECES}")
@@ -220,19 +221,16 @@ def read_plant_guarantee(raw: Any) -> PlantGuarantee:
     names = {kind: [f"{kind}_{i}" for i in range(1, most + 1)] for kind, most in count.items()}
     given = read_exactly(raw["claims"], [*names["output"], *names["control"]])
     claims = {f"{kind}s": tuple(UpperBound(given[name]) for name in of) for kind, of in names.items()}
-    _require_sizes(loop, part)
+    inputs = read_row(raw["inputs"], "inputs", length=len(part.sectors))
+    sizes = (*part.noise, *part.start, *(size for _, size in part.disturbances), *inputs)
+    need(min(sizes, default=Fraction(0)) >= 0, "noise, start, sizes of disturbances and inputs must be 0 or more")
     return PlantGuarantee(
         part=part,
         law=law,
         pieces=raw["pieces"],
-        inputs=read_row(raw["inputs"], "inputs", length=len(part.sectors)),
+        inputs=inputs,
         claims=PlantClaims(**claims),
     )
-
-
-def _require_sizes(loop: PlantLoop, part: LinearPart) -> None:
-    need(min((*part.noise, *part.start, *(s for _, s in part.disturbances)), default=0) >= 0, "sizes must be 0 or more")
-    need(len(loop.flow) <= _MOST_NUMBERS, f"at most {_MOST_NUMBERS} states in all")
 
 
 def _matrix(raw: Any, name: str, width: int | None = None, height: int | None = None) -> Matrix:

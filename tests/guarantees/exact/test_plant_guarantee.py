@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -235,6 +236,26 @@ def test_a_sector_that_holds_up_to_a_bound_needs_it_in_both_checkers(checker):
     with pytest.raises(checker.Refused, match="close the small gain"):
         checker.check(json.dumps(document))
     assert str(read_guarantee(document).check()) == "undecided"
+
+
+def test_negative_numbers_close_no_small_gain(checker):
+    """x′ = −x + φ + d is unstable at φ = 9x, but −10 is above 9·(1 − 10), and −9 is below every claim."""
+    wide = qd.UncertainPlant(
+        A=[[-1]],
+        B=[[1]],
+        sectors={"s": qd.Sector(entry=[1], row=[1], slopes=(-0.5, 0.5))},
+        disturbances={"d": ([1], 1)},
+    )
+    found = qd.guarantee(wide, gains=[[0]], step="0.1")
+    document = guarantee_document(found)
+    document["plant"]["sectors"][0]["slopes"], document["inputs"] = ["-9", "9"], ["-10"]
+    with pytest.raises(checker.Refused, match="must be >= 0"):
+        checker.check(json.dumps(document))
+    with pytest.raises(CertificateError, match="inputs must be 0 or more"):
+        read_guarantee(document)
+    sectors = (replace(found.part.sectors[0], slopes=(Fraction(-9), Fraction(9))),)
+    unread = replace(found, part=replace(found.part, sectors=sectors), inputs=(Fraction(-10),))
+    assert str(unread.check()) == "undecided"
 
 
 def broken(document, way, value):
