@@ -1,4 +1,4 @@
-"""Plants of a user's own, and of several blocks: a linear part, sectors, loads and disturbances, in exact numbers.
+"""Plants of users, and of several blocks: a linear part, sectors, loads and disturbances, in exact numbers.
 
 x′ = Ax + B(u − v) + Σ entry·φ(row·(x, u − v), t) + Σ entry·d(t). A sector φ lies between two slopes, for all values of
 its argument or for those within a bound; a load v(t) changes slowly; a disturbance d is any measurable function of a
@@ -37,8 +37,8 @@ class Sector:
     row : sequence of numbers
         Its argument y: one number for every state, and for every control too where it depends on these.
     slopes : (number, number) or callable
-        Low and high. A callable gives them for a bound of |y|, such as ``lambda y: (-2.5 * y * y, 0)``, and the bound
-        is found.
+        Low and high. A callable gives them for a bound of |y|, such as ``lambda y: (-5 * y**2 / 2, 0)``, and the
+        bound is found; y is a `Fraction`, and floats are taken as the decimals that they print as.
     within : number, optional
         Bound of |y| up to which it is so; the proof shows that it is not passed. Of the states alone.
     """
@@ -90,7 +90,7 @@ class UncertainPlant:
         What is measured; all states unless given.
     sectors : mapping of str to Sector
     gains : mapping of str to (number, number)
-        Least and largest factor of a control, by its name: any course of it between.
+        Least and largest factor of a control less its loads, by its name: any course of it between.
     disturbances : mapping of str to (sequence, number)
         How it enters x′, and its largest size.
     loads : mapping of str to (sequence, sequence or None, number)
@@ -273,7 +273,7 @@ class UncertainPlant:
 # Several blocks of a fault. About r(t), or with one well about their balance x*(t) under the pressure p*(t) for which
 # the mean of x* is r, block i has e1′ = e2 + (r′ − x*′) and
 # e2′ = s·e1 + K(e1₋ − 2e1 + e1₊) − w·e2 + βb(p − p*) + φ − w·r′ − r″
-# with chords s, w and β of its own friction in the ranges of the fault. With a well for each block x* = r.
+# with chords s, w and β of the friction of block i in the ranges of the fault. With a well for each block x* = r.
 #
 # With one well let x*′ = r′(1 + ξ), where ξ has the mean 0, and b·p*′ = r′·q. As all forces balance, s(1 + ξ) − KΛξ +
 # βq = 0 in every block, Λ the Laplacian of the chain, so (KΛ − s0)ξ = P[(s − s0)(1 + ξ) + (β − β0)q] with the
@@ -375,12 +375,12 @@ def _balanced(task: FaultPlant, blocks: int, K: Fraction) -> tuple[tuple[Fractio
         project = fmpq_mat([[fmpq(int(i == j)) - mean for j in range(blocks)] for i in range(blocks)])
         found = (inverse * project).tolist()
         reach = max(sum((abs(Fraction(int(v.p), int(v.q))) for v in row), Fraction(0)) for row in found)
-        least = 2 * K * (1 - _cosine(blocks))  # of the modes that differ, from below
+        least = 2 * K * (1 - _cosine(blocks)[1])  # of the modes that differ, from below
         share = reach * (half + (task.beta[1] - 1) / 2 * max(map(abs, slope)))
         if share >= 1 or least <= s0:
             if differ is not None:
                 break
-            if least <= slope[1]:
+            if 2 * K * (1 - _cosine(blocks)[0]) <= slope[1]:  # a mode escapes, and nothing is proved
                 return slope, damping, Fraction(0)
             raise ParameterError(
                 f"the balance of {blocks} blocks under one well must be unique for every friction of the box. Received "
@@ -393,10 +393,10 @@ def _balanced(task: FaultPlant, blocks: int, K: Fraction) -> tuple[tuple[Fractio
     return slope, damping, differ or Fraction(0)
 
 
-def _cosine(blocks: int) -> Fraction:
-    """At least cos(π/blocks)."""
-    x = Fraction(314159265, 10**8) / blocks
-    return 1 - x**2 / 2 + x**4 / 24
+def _cosine(blocks: int) -> tuple[Fraction, Fraction]:
+    """Bounds of cos(π/blocks), 3.14159265 < π < 3.14159266."""
+    x, y = Fraction(314159266, 10**8) / blocks, Fraction(314159265, 10**8) / blocks
+    return 1 - x**2 / 2 + x**4 / 24 - x**6 / 720, 1 - y**2 / 2 + y**4 / 24 - y**6 / 720 + y**8 / 40320
 
 
 def _frozen(values: dict[str, Any]) -> Mapping[str, Any]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from quakedesign.exact import rational
+from quakedesign.exact import UpperBound, rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees import NoGuarantee
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
@@ -50,7 +50,12 @@ class BlocksAnswer:
     def lines(self) -> list[str]:
         """For people."""
         held = "one well for all" if self.wells == "one" else "a well for each block"
-        said = [f"{self.fault.name} cut into blocks, {held}, each block its own friction of the box:"]
+        said = [
+            f"{self.fault.name} cut into blocks, {held}, a law designed for each number of blocks; the certificates are about "
+            "the plants without stick that are derived from the fault, not about the derivation",
+            f"from rest, with zero-order hold over {UpperBound(self.step):.6g} s, each block its own friction of the "
+            "box, for all t >= 0:",
+        ]
         for blocks, one in self.found.items():
             ends = self.peaks(blocks)
             if isinstance(one, NoGuarantee) or ends is None:

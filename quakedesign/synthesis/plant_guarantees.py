@@ -1,11 +1,12 @@
 """Guarantee of an uncertain plant, with a law as control engineers have it in exact numbers."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from quakedesign.errors import ParameterError
-from quakedesign.exact import rational
+from quakedesign.exact import rational, shortly
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
@@ -41,7 +42,7 @@ def guarantee_plant(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetu
             f"of the plant. Received {', '.join(sorted(unknown))}. Omit these."
         )
     around = plant.behind(setup.lag) if setup.lag else plant
-    exact = _law_of(around, law, gains, setup)
+    exact, notes = _law_of(around, law, gains, setup)
     radius, mode = escaping(around, exact)
     if radius >= 1:
         shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[: _shown(around)], 9))
@@ -51,7 +52,8 @@ def guarantee_plant(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetu
             f"steepest the states ({shape}) grow by {radius:.4g} a sample",
             small_gain=None,
         )
-    return plant_guarantee(around, exact)
+    found = plant_guarantee(around, exact)
+    return replace(found, notes=notes) if isinstance(found, PlantGuarantee) else found
 
 
 def _shown(plant: UncertainPlant) -> int:
@@ -59,8 +61,8 @@ def _shown(plant: UncertainPlant) -> int:
     return len(plant.A) // 2 if any("block" in name for name in plant.sectors) else len(plant.A)
 
 
-def _law_of(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup) -> MatrixLaw:
-    """A law in exact numbers."""
+def _law_of(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup) -> tuple[MatrixLaw, tuple[str, ...]]:
+    """A law in exact numbers, and what was changed for it."""
     given: Any = gains if hasattr(gains, "shape") else list(gains)
     empty = len(given) == 0
     if (law is None) == empty and not (law is None and "slope of block 1" in plant.sectors and not setup.delay):
@@ -72,25 +74,36 @@ def _law_of(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup) -> Ma
         if setup.step is None:
             raise ParameterError("gains of an uncertain plant need a step. Received none. Give step='0.1 s', say.")
         if empty:
-            return block_law(plant, setup.step)
+            return block_law(plant, setup.step), ()
         rows = exact_matrix(np.atleast_2d(np.asarray(given, dtype=object)), "gains")
         feedback = tuple(tuple(-v for v in row) for row in rows)
         output: tuple[Any, ...] = ((),) * len(feedback)
-        return MatrixLaw(step=setup.step, delay=setup.delay, update=(), measured=(), output=output, feedback=feedback)
-    linear = getattr(law, "law", None)
+        static: dict[str, Any] = {"update": (), "measured": (), "output": output, "feedback": feedback}
+        return MatrixLaw(step=setup.step, delay=setup.delay, **static), ()
+    linear, notes = getattr(law, "law", None), tuple(getattr(law, "notes", ()))
     step = rational(law.step if linear is not None else getattr(law, "dt", None) or 0, "dt")
     if step <= 0 or getattr(law, "dt", 0) is True or (setup.step or step) != step:
         raise ParameterError(
-            f"a law must be in discrete time with its step as dt, and that of the setup if there is one. Received dt "
-            f"= {getattr(law, 'dt', None)!r}. Use control.ss(A, B, C, D, dt)."
+            "dt of a law must be positive, and the step of the loop setup where that is given"
+            f"{f', here {shortly(setup.step)} s' if setup.step else ''}. Received dt = {getattr(law, 'dt', step)!r}. "
+            "Use control.ss(A, B, C, D, dt)."
         )
     if linear is not None:
-        if linear.of_reference or linear.root is not None:
-            raise ParameterError("a law of an uncertain plant is linear in what is measured. Received another one.")
+        others = {
+            "an implicit root": linear.root,
+            "r or r' as an input": linear.of_reference,
+            "other first states": linear.first,
+        }
+        if received := [said for said, part in others.items() if part]:
+            raise ParameterError(
+                "a law of an uncertain plant must be linear in what is measured, and begin with z = 0. Received one "
+                f"with {' and '.join(received)}. Give law=control.ss(A, B, C, D, dt) of the measurements."
+            )
         parts: tuple[Any, ...] = (linear.update, linear.measured, (linear.output,), (linear.feedback,))
     else:
         parts = tuple(exact_matrix(getattr(law, name, None), name) for name in "ABCD")
         if len(parts[2]) == 1 and plant.loads:
-            parts = (integrating(parts[0], parts[2][0])[0], *parts[1:])
+            update, notes = integrating(parts[0], parts[2][0])
+            parts = (update, *parts[1:])
     A, B, C, D = parts
-    return MatrixLaw(step=step, delay=setup.delay, update=A, measured=B, output=C, feedback=D)
+    return MatrixLaw(step=step, delay=setup.delay, update=A, measured=B, output=C, feedback=D), notes

@@ -41,7 +41,7 @@ def test_answers_are_told_in_lines_and_numbers():
     answer = one_block(REAL, [2], coupling="0.5")
     assert not answer.proved
     assert answer.peaks(2) is None
-    assert answer.lines()[1].startswith("  2 blocks: none: a mode escapes")
+    assert answer.lines()[2].startswith("  2 blocks: none: a mode escapes")
     assert answer.to_dict()["blocks"][0]["verdict"] == "undecided"
 
 

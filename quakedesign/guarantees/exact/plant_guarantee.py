@@ -12,6 +12,7 @@ radius of M is below 1 (Collatz and Wielandt), W(t) is finite, and W(t) ≤ (1 �
 P_s, those with a bound strictly within it; as they are continuous and within it at first, they never leave it. ∎
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar, Literal
@@ -63,6 +64,8 @@ class PlantGuarantee:
     outputs, controls : tuple of str
         Names for people.
     name : str
+    notes : tuple of str
+        What was changed when the law became one in exact numbers.
     """
 
     proved: ClassVar[Literal[True]] = True
@@ -74,6 +77,7 @@ class PlantGuarantee:
     outputs: tuple[str, ...] = ()
     controls: tuple[str, ...] = ()
     name: str = "plant"
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"PlantGuarantee({self.name}: {', '.join(self._peaks())})"
@@ -101,19 +105,22 @@ class PlantGuarantee:
 
     def lines(self) -> list[str]:
         """What is printed."""
-        return [f"proved: {self.sentence()}"]
+        return [f"proved: {self.sentence()}", *self.notes]
 
     def sentence(self) -> str:
-        """What is guaranteed, for people."""
+        """What is guaranteed, for people, of the plant and the law in the file; what it covers is rounded inward."""
         part, law = self.part, self.law
-        when = f"held over {UpperBound(law.step):.6g} s"
-        when += f", {UpperBound(law.delay):.6g} s late" if law.delay else ""
-        started = "from every start of the box" if any(part.start) else "from rest"
-        said = f"{started}, {when}, for {len(part.sectors)} uncertain terms within their sectors"
-        sizes = [f"{LowerBound(size):.4g}" for _, size in part.disturbances]
-        said += f", every disturbance of at most {', '.join(dict.fromkeys(sizes))}" if sizes else ""
-        said += ", loads that change within their rates" if part.loads else ""
-        said += ", measurement noise within its bounds" if any(part.noise) else ""
+        said = f"on the uncertain plant of the certificate ({len(part.A)} states, {len(part.B[0])} controls), "
+        said += f"from |x_i(0)| <= {_listed(part.start)}" if any(part.start) else "from rest"
+        said += f", with zero-order hold over {UpperBound(law.step):.6g} s"
+        said += f", {UpperBound(law.delay):.6g} s late" if law.delay else ""
+        said += f", for all uncertain terms in {len(part.sectors)} sectors" if part.sectors else ""
+        regions = [s.within for s in part.sectors if s.within is not None]
+        said += f", {len(regions)} of which hold for |y| <= {_listed(regions)}" if regions else ""
+        sizes = [size for _, size in part.disturbances]
+        said += f", disturbances of at most {_listed(sizes)}" if sizes else ""
+        said += f", loads of rates of at most {_listed(load.rate for load in part.loads)}" if part.loads else ""
+        said += f", measurement noise of at most {_listed(part.noise)}" if any(part.noise) else ""
         return f"{said}, for all t >= 0: {', '.join(self._peaks())}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -125,7 +132,13 @@ class PlantGuarantee:
             "peaks": {name: bound.exact for name, bound in named},
             "step": str(self.law.step),
             "delay": str(self.law.delay),
+            "notes": list(self.notes),
         }
+
+
+def _listed(values: Iterable[Fraction]) -> str:
+    """Different numbers that are covered, in their order."""
+    return ", ".join(dict.fromkeys(f"{LowerBound(v):.4g}" for v in values))
 
 
 def peaks(part: LinearPart, found: ResponseBounds, inputs: Row) -> Row | None:

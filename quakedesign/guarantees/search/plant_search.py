@@ -53,12 +53,8 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw) -> PlantGuarantee | N
     ParameterError
         For a law that does not fit the plant.
     """
-    free = [name for name, sector in plant.sectors.items() if callable(sector.slopes) and sector.within is None]
-    bounds = dict.fromkeys(free, Fraction(0))
-    for name in free:
-        row = linear_part(plant, {}).sectors[list(plant.sectors).index(name)].row
-        first = sum((abs(a) * b for a, b in zip(row, plant.start, strict=False)), Fraction(0))
-        bounds[name] = _rounded(first * _WIDER) or Fraction(1, 1000)
+    bounds = _first_bounds(plant)
+    free = list(bounds)
     for _ in range(_TURNS):
         part = linear_part(plant, bounds)
         loop = part.loop(law)
@@ -82,6 +78,16 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw) -> PlantGuarantee | N
     name = free[0]
     reason = f"the argument of {name} moves further for every bound, up to {UpperBound(bounds[name]):.3g}"
     return NoGuarantee(reason=reason, small_gain=None)
+
+
+def _first_bounds(plant: UncertainPlant) -> dict[str, Fraction]:
+    """Bounds of the arguments whose slopes are callable, from the box of starts."""
+    exact, bounds = plant.exact_sectors(lambda _: Fraction(1)), {}
+    for name, sector in plant.sectors.items():
+        if callable(sector.slopes) and sector.within is None:
+            first = sum((abs(a) * b for a, b in zip(exact[name].row, plant.start, strict=False)), Fraction(0))
+            bounds[name] = _rounded(first * _WIDER) or Fraction(1, 1000)
+    return bounds
 
 
 def _claimed(
@@ -178,8 +184,8 @@ def _unstable(part: LinearPart, loop: PlantLoop) -> str:
 
 
 def escaping(plant: UncertainPlant, law: MatrixLaw) -> tuple[float, np.ndarray]:
-    """Growth per sample and states of the fastest mode where every sector is at its high slope."""
-    part = linear_part(plant, {})
+    """Growth per sample and states of the fastest mode where every sector is at its high slope at first."""
+    part = linear_part(plant, _first_bounds(plant))
     steep = tuple(replace(s, slopes=(s.slopes[1], s.slopes[1])) for s in part.sectors)
     radius, mode = spectral_radius(replace(part, sectors=steep).loop(law))
     states: Any = mode[: len(plant.A)]

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 import sys
 from dataclasses import replace
 from fractions import Fraction
@@ -316,6 +317,12 @@ def test_none_says_why():
     assert "holds for arguments up to 0.5" in qd.guarantee(far, gains=[[0]], step="0.1").reason
 
 
+USER_LAW = control.ss(1, [[1, 1]], 1, [[0, 0]], 0.1)
+FOLLOWING = qd.SampledLaw.from_gains([1, 1], step="0.1", inputs=("slip", "slip_rate"))
+STARTED = qd.SampledLaw.from_gains([1, 1, 1], step="0.1")
+STARTED = replace(STARTED, law=replace(STARTED.law, first=((Fraction(1), Fraction(0)),)))
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -323,7 +330,10 @@ def test_none_says_why():
         (lambda: qd.guarantee(bearing()[0], gains=[[1, 1]]), "need a step"),
         (lambda: qd.guarantee(bearing()[0], gains=[[1, 1]], step="1", jitter="1 ms"), "has step, delay and lag"),
         (lambda: qd.guarantee(bearing()[0], gains=[[1]], step="1"), "must be 1 x 2"),
-        (lambda: qd.guarantee(bearing()[0], law=control.ss(1, [[1, 1]], 1, [[0, 0]])), "in discrete time"),
+        (lambda: qd.guarantee(bearing()[0], law=control.ss(1, [[1, 1]], 1, [[0, 0]])), "dt of a law must be positive"),
+        (lambda: qd.guarantee(bearing()[0], law=USER_LAW, step="0.2"), "here 0.2 s. Received dt = 0.1"),
+        (lambda: qd.guarantee(bearing()[0], law=FOLLOWING), "Received one with r or r' as an input"),
+        (lambda: qd.guarantee(bearing()[0], law=STARTED), "Received one with other first states"),
         (lambda: qd.guarantee(bearing()[0], "cta", gains=[[1, 1]], step="1"), "with a law or gains alone"),
         (lambda: qd.UncertainPlant(A=[[1, 2]], B=[[1]]), "matrix A of a plant must be 1 x 1"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"v": (1, 2)}), "gains of a plant must be of u1"),
@@ -360,6 +370,43 @@ def test_a_dynamic_law_with_a_load_holds_it():
     assert 0.5 * float(found.bound("x")) < reached <= found.bound("x")
     with pytest.raises(ParameterError, match="integral action"):
         qd.guarantee(plant, gains=[[1.5]], step="0.1")
+    moved = qd.guarantee(plant, law=control.ss([[1 - 1e-9]], [[0.1]], [[-2]], [[-1.5]], 0.1))
+    assert moved.law.update == ((1,),)
+    assert "is taken for an integrator" in moved.lines()[-1]
+    assert moved.to_dict()["notes"] == list(moved.notes) != []
+
+
+def test_a_sentence_names_every_size_that_it_covers_rounded_inward():
+    half = Fraction(1, 10**6)
+    plant = qd.UncertainPlant(
+        A=[[0, 1], [-1, -1]],
+        B=[[0], [1]],
+        sectors={"s": qd.Sector(entry=[0, 1], row=[1, 0], slopes=(-0.1, 0.1), within=Fraction(7, 3))},
+        disturbances={"d": ([0, 1], Fraction(2, 30))},
+        loads={"l": ([1], None, Fraction(1, 60))},
+        noise={"y1": Fraction(2, 3000)},
+        start=[Fraction(2, 3), 0],
+    )
+    law = control.ss([[1]], [[0.1, 0]], [[-0.5]], [[-2, -1.5]], 0.1)
+    found = qd.guarantee(plant, law=law, delay="0.05")
+    assert found.sentence().startswith(
+        "on the uncertain plant of the certificate (2 states, 1 controls), from |x_i(0)| <= 0.6666, 0, with zero-"
+        "order hold over 0.1 s, 0.05 s late, for all uncertain terms in 1 sectors, 1 of which hold for |y| <= 2.333, "
+        "disturbances of at most 0.06666, loads of rates of at most 0.01666, measurement noise of at most 0.0006666, 0"
+        ", for all t >= 0: |y1| <= "
+    )
+    for name, bound in zip(
+        ("y1", "y2", "u1 less its load"), (*found.claims.outputs, *found.claims.controls), strict=True
+    ):
+        (shown,) = re.findall(rf"\|{name}\| <= ([0-9.e-]+)", found.sentence())
+        assert bound <= Fraction(shown) < bound * (1 + 2000 * half)
+
+
+def test_slopes_that_are_steep_only_far_from_the_start_let_no_mode_escape():
+    """x′ = −x + y³·50 with |y| ≤ 0.1 has slopes up to 0.5 there; at |y| = 1 they would be 50."""
+    cubic = qd.Sector(entry=[1], row=[1], slopes=lambda y: (0, 50 * y**2))
+    plant = qd.UncertainPlant(A=[[-1]], B=[[1]], sectors={"cubic": cubic}, start=["0.01"])
+    assert qd.guarantee(plant, gains=[[0]], step="0.1").proved
 
 
 def test_a_plant_of_python_control_has_its_names():
