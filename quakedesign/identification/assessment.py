@@ -18,6 +18,7 @@ from quakedesign.identification.sliding_experiment import START_STATE
 
 SEVERAL = 2.0  # times the noise: residuals as large are no noise
 _PEAK = 10.0  # critical slips after a change of rate
+_FADED = 5.0  # critical slips
 _DRIFT = 4.0  # deviations by which a trend may change at the last change of rate
 DECISIVE = 10.0  # of AIC, by which a trend is beyond doubt
 EXPLAINS, EXPLAINS_NOT, CANNOT_TELL = "explains the record", "does not explain the record", "cannot tell"
@@ -88,7 +89,7 @@ def checks_of(
 ) -> tuple[tuple[Check, ...], float]:
     """Tests of beginning, residuals, peaks and halves of the `used` means of a record; and residuals over noise."""
     time = record.time[used]
-    begins = np.empty(0) if loading is None else loading.pieces.begins[1:][loading.pieces.large_changes]
+    begins = np.empty(0) if loading is None else loading.steps
     first = float(begins[0]) if len(begins) else float("inf")
     inside = (raw.time >= time[0]) & (raw.time <= time[-1])
     residuals = (raw.friction - np.interp(raw.time, time, fit.measured - fit.residuals))[inside]
@@ -122,19 +123,49 @@ def checks_of(
     return tuple(checks), factor
 
 
-def sign_check(difference: Any, other: Any, excess: float) -> Check | None:
-    """Whether a - b has one sign, with a trend and, unless its AIC is higher by `DECISIVE` (`excess`), without."""
+def sign_check(
+    difference: Any, other: Any, excess: float, shift: float | None = None, unsteady: str = ""
+) -> Check | None:
+    """Whether a - b has one sign, with a trend and, unless its AIC is higher by `DECISIVE` (`excess`), without.
+
+    Parameters
+    ----------
+    difference, other : ParameterEstimate or None
+        a - b of the fit, and of that with or without the trend.
+    excess : float
+        By how much the AIC without a trend is higher.
+    shift : float or None
+        By how much a - b changes if the trend begins with the first change of rate [-]; None where the beginning has
+        it too.
+    unsteady : str
+        Why the beginning tells nothing of steady sliding; nothing where it does.
+    """
     if difference is None:
         return None
     ends = [difference.low, difference.high]
-    doubtful = other is not None and excess < DECISIVE
+    doubtful = other is not None and (excess < DECISIVE or shift is not None)
     if doubtful:
         ends = [min(ends[0], other.low), max(ends[1], other.high)]
+    ends = [ends[0] + min(shift or 0.0, 0.0), ends[1] + max(shift or 0.0, 0.0)]
     told = "negative: friction weakens with rate" if ends[1] < 0 else "positive: friction strengthens with rate"
     trend = f", with and without a trend (AIC {excess:+.3g} without)" if other is not None else ""
-    passed = bool(ends[0] > 0 or ends[1] < 0)
-    said = f"a - b is {told}{trend if doubtful else ''}" if passed else f"the sign of a - b is open{trend}"
+    passed = bool(ends[0] > 0 or ends[1] < 0) and not unsteady
+    why = ": the trend may begin with the change of rate, as slow evolution does" if shift is not None else trend
+    said = f"a - b is {told}{trend if doubtful else ''}" if passed else f"the sign of a - b is open{unsteady or why}"
     return Check(name="sign", passed=passed, value=difference.value, limit=0.0, sentence=said)
+
+
+def unsteady_beginning(difference: Any, values: Mapping[str, float], loading: Loading) -> str:
+    """Why a fitted beginning off steady sliding hides the sign of a - b; nothing where it does not.
+
+    It does where it moves friction by more than the change of rate, and does not fade before that: a drift looks alike.
+    """
+    step, slip = loading.first_step, values.get("critical_slip", 0.0)
+    moved = abs(values.get("evolution_effect", 0.0) * values.get(START_STATE, 0.0))
+    if difference is None or step is None or loading.before >= _FADED * slip or moved <= abs(difference.value * step):
+        return ""
+    began = f": the beginning, of {loading.before / slip:.2g} critical slips,"
+    return f"{began} is off steady sliding by {moved:.2g} of friction"
 
 
 def _noise(raw: Record, first: float) -> tuple[float, str]:

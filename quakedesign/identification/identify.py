@@ -15,7 +15,7 @@ import sympy as sp
 from quakedesign.errors import RecordError
 from quakedesign.fault import FrictionLaw, friction_law
 from quakedesign.fault.model import require_positive, require_seed
-from quakedesign.identification.assessment import DECISIVE, Assessment, checks_of, sign_check
+from quakedesign.identification.assessment import DECISIVE, Assessment, checks_of, sign_check, unsteady_beginning
 from quakedesign.identification.correlated_noise import CorrelatedNoise, noise_of
 from quakedesign.identification.experiment import DELAY, TREND, Coordinate, Difference, Experiment, delayed, trended
 from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, advantage, fit, interval, minimised, settled
@@ -401,16 +401,37 @@ class _Choice:
         """Tests of what was taken for granted, and what the record leaves open."""
         values = found.fit.experiment.outward(found.fit.fitted)
         checks, factor = checks_of(found.fit, self.raw, self.record, found.used, self.loading, values)
-        doubted = None
-        if other is not None and found.difference is not None and excess < DECISIVE:
+        doubted, shift = None, self._late_trend(found)
+        if other is not None and found.difference is not None and (excess < DECISIVE or shift is not None):
             try:
                 doubted = _difference(other.best, jointly=False)
             except BetterFit:  # whose valley leads elsewhere: its sign is open
                 doubted = replace(found.difference, low=-math.inf, high=math.inf)
-        sign = sign_check(found.difference, doubted, excess)
+        off = unsteady_beginning(found.difference, values, self.loading) if self.loading is not None else ""
+        sign = sign_check(found.difference, doubted, excess, shift, off)
         told = [*found.untold(), *([sign.sentence] if sign is not None and not sign.passed else [])]
         checks = (*checks, *([sign] if sign is not None else []))
         return Assessment(checks=checks, factor=factor, open=tuple(told), experiments=tuple(found.experiments(sign)))
+
+    def _late_trend(self, found: Identification) -> float | None:
+        """By how much a - b changes if the trend begins with the first change of rate; None if it does not.
+
+        A slow evolution of friction after a change of rate looks like a trend that the beginning does not have.
+        """
+        fit, loading, load = found.fit, self.loading, self.record.load_point
+        values = fit.experiment.outward(fit.fitted)
+        if TREND not in values or loading is None or load is None or not len(loading.steps):
+            return None
+        setup = set_up(self.record, type(fit.experiment.law), self.stiffness, loading, {START_STATE})
+        after = np.maximum(load - load[0] - loading.before, 0)
+        late: Experiment = trended(setup.experiment, after, float(np.max(np.abs(self.record.friction))))
+        at = late.near(values)
+        for _ in range(2):
+            late = late.resolved(at, fit.accuracy)
+            at, squares = minimised(late, fit.measured, fit.weights, at)
+        if fit.excess(squares) >= DECISIVE:
+            return None
+        return values[TREND] * float(after[-1]) / (loading.first_step or math.inf)
 
     def _fitted(
         self, kind: type[FrictionLaw], nuisance: Collection[str], near: Fit | None, start: bool = True

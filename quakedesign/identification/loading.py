@@ -169,6 +169,26 @@ class Loading:
         """Rate of the load point in the beginning [m/s]."""
         return float(self.pieces.rates[0])
 
+    @property
+    def steps(self) -> "np.ndarray":
+        """Times of large changes of rate [s]."""
+        times: np.ndarray = self.pieces.begins[1:][self.pieces.large_changes]
+        return times
+
+    @property
+    def before(self) -> float:
+        """Displacement of the load point before the first of them [m]."""
+        return float(self.pieces.position(self.steps[:1])[0]) if len(self.steps) else 0.0
+
+    @property
+    def first_step(self) -> float | None:
+        """Logarithm of the ratio of rates at the first of them; None without one, or with a hold."""
+        places = np.flatnonzero(self.pieces.large_changes)
+        if not len(places):
+            return None
+        slow, fast = self.pieces.rates[places[0]], self.pieces.rates[places[0] + 1]
+        return float(np.log(fast / slow)) if slow > 0 and fast > 0 else None
+
     def delays(self, record: Record) -> "tuple[np.ndarray, np.ndarray]":
         """Samples that follow each change of rate whose time noise hides, and by how much it may be off at most [s]."""
         begins, rates = self.pieces.begins, self.pieces.rates

@@ -10,7 +10,9 @@ import pytest
 
 from quakedesign.errors import ParameterError, RecordError
 from quakedesign.fault import fault_toml, load_fault, parse_fault, with_accepted_fit
+from quakedesign.identification.assessment import sign_check
 from quakedesign.identification.fault_file import identified_fault, next_command, poor_fit
+from quakedesign.identification.identification_result import ParameterEstimate
 from quakedesign.identification.identify import identify
 from quakedesign.identification.record import Record
 from quakedesign.report.identification_page import identification_lines
@@ -75,6 +77,58 @@ def test_a_sign_that_a_trend_turns_is_not_told():
     assert "cannot tell" in text
     assert "would tell:" in text
     assert not found.explained
+
+
+@pytest.mark.parametrize("second", [(-0.004, 2e-4), (0.004, 4e-4)])
+def test_slow_evolution_that_looks_like_a_trend_leaves_the_sign_open(second):
+    """a - b - b_2 has the other sign than a - b: evolution follows the step, and the beginning has none."""
+    plain = ((60.0, 1e-6), (40.0, 1e-5))
+    made = synthetic.sliding(
+        "rate-and-state-aging", plain, sample=0.1, a=0.01, b=0.01 - second[0] / 2, spring=3e-3, second=second
+    )
+    found = identify(made.noisy(7), "rate-and-state-aging")
+    assert "trend" in found.estimates
+    assert found.assessment.verdict == "cannot tell"
+    assert "the trend may begin with the change of rate" in found.assessment.open[-1]
+
+
+def test_a_drift_that_dies_out_and_looks_like_an_unsteady_beginning_leaves_the_sign_open():
+    made = synthetic.sliding("rate-and-state-slip", ONE, sample=0.1, a=0.010, b=0.008, spring=3e-3)
+    drift = -0.02 * (1 - np.exp(-made.load_point / 4e-5))
+    found = identify(record(made, 2, friction=made.noisy(2).friction + drift), "rate-and-state-slip")
+    assert found.assessment.verdict == "cannot tell"
+    assert "the beginning, of 2" in found.assessment.open[-1]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "shift", "passed"),
+    [
+        (0.001, 0.003, None, True),
+        (0.001, 0.003, -0.0009, True),
+        (0.001, 0.003, -0.0011, False),
+        (-0.003, -0.001, 0.0009, True),
+        (-0.003, -0.001, 0.0011, False),
+        (-0.003, -0.001, -0.0011, True),
+        (-0.003, 0.0, None, False),
+    ],
+)
+def test_a_sign_must_hold_with_what_a_late_trend_adds(low, high, shift, passed):
+    told = estimate_between(low, high)
+    assert sign_check(told, None, 0.0, shift).passed == passed
+    assert not sign_check(told, None, 0.0, shift, ": the beginning is not steady").passed
+
+
+def test_the_fit_with_or_without_a_trend_counts_unless_it_is_worse_by_ten():
+    told, other = estimate_between(0.001, 0.003), estimate_between(-0.003, -0.001)
+    assert not sign_check(told, other, 9.9).passed
+    assert sign_check(told, other, 10.0).passed
+    assert not sign_check(told, other, 10.0, 0.0).passed
+    assert sign_check(None, None, 0.0) is None
+
+
+def estimate_between(low, high):
+    value = (low + high) / 2
+    return ParameterEstimate(name="a - b", unit="", value=value, low=low, high=high, least=low, most=high)
 
 
 def test_a_law_that_leaves_a_peak_is_said_not_to_explain():
