@@ -51,8 +51,8 @@ class BlocksAnswer:
         """For people."""
         held = "one well for all" if self.wells == "one" else "a well for each block"
         said = [
-            f"{self.fault.name} cut into blocks, {held}, a law designed for each number of blocks; the certificates are about "
-            "the plants without stick that are derived from the fault, not about the derivation",
+            f"{self.fault.name} cut into blocks, {held}, a law designed for each number of blocks; the certificates "
+            "are about the plants without stick that are derived from the fault, not about the derivation",
             f"from rest, with zero-order hold over {UpperBound(self.step):.6g} s, each block its own friction of the "
             "box, for all t >= 0:",
         ]
