@@ -5,6 +5,7 @@ from bisect import bisect
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 from itertools import takewhile
+from math import floor, log10
 from unicodedata import category
 
 _OBEYED = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, invisible formats, half characters, line separators
@@ -98,3 +99,27 @@ def lasting(seconds: float, digits: int = 4) -> str:
     """A time in seconds, and in years, days or hours where it lasts two of them or more."""
     unit = next(((size, name) for size, name in _TIMES if seconds >= 2 * size), None)
     return f"{seconds:.{digits}g} s" + (f" ({seconds / unit[0]:.3g} {unit[1]})" if unit else "")
+
+
+# ----------------------------------------------------------------------
+# Measured numbers for people; those of bounds are rounded outward by `quakedesign.exact.Bound`.
+
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """A measured number with a unit and its engineering prefix, such as ``74.5 mm/s``."""
+    power = power_of(float(f"{value:.{digits}g}"))
+    return f"{plain(value / 10.0**power, digits)} {PREFIXES[power]}{unit}"
+
+
+def power_of(value: float) -> int:
+    """Power of ten of the engineering prefix of a number."""
+    if not value:
+        return 0
+    return min(max(3 * floor(log10(abs(value)) / 3 + 1e-12), min(PREFIXES)), max(PREFIXES))
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """Significant digits without a power of ten."""
+    return f"{float(f'{value + 0.0:.{digits}g}'):.15g}"

@@ -63,7 +63,7 @@ def main_job(request, tmp_path_factory):
 def test_the_folder_is_complete(main_job):
     _, folder, results = main_job
     found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
-    names = ("uncontrolled", "states", "pressure", "errors", "metrics")
+    names = ("overview", "uncontrolled", "states", "pressure", "errors", "metrics")
     assert {f"figures/{n}.svg" for n in names} | {"results.json", "report.html", "certificates/cta.json"} <= found
     assert json.loads((folder / "results.json").read_text()) == results
     assert [p.name for p in folder.parent.iterdir()] == [folder.name]
@@ -79,7 +79,7 @@ def test_the_report_holds_everything_and_asks_for_nothing(main_job, tmp_path, ca
     assert set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text)) <= {
         pair for name in re.findall(r'\bid="([^"]+)"', text) for pair in ((name, ""), ("", name))
     }
-    figures = [f"figure-{name}" for name in ("uncontrolled", "states", "pressure", "errors", "metrics")]
+    figures = [f"figure-{name}" for name in ("overview", "uncontrolled", "states", "pressure", "errors", "metrics")]
     assert re.findall(r'<figure id="([^"]+)"', text) == figures
     if browser.CHROMIUM is None:
         with capsys.disabled():
@@ -169,7 +169,7 @@ def test_every_guarantee_is_said_first_and_holds_in_what_was_seen(main_job):
         own = page[page.index(f"<h3>{title} (designed)") :]
         assert (
             own.index("guarantee: on the plant without stick, from rest")
-            < own.index("worst found")
+            < own.index("worst case found")
             < own.index("tracked: peak")
         )
 

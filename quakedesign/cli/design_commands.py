@@ -175,7 +175,7 @@ def design(
     out
         Output folder; ./quakedesign-FAULT by default.
     verbose
-        Also print premises, certified domains and feed-forward terms, as in the report.
+        Also print the fault, gains, verdicts with premises, certified domains and all metrics, as in the report.
     """
     from quakedesign.report.folder import prepare
 
@@ -196,7 +196,7 @@ def design(
         print_comparison(comparison, console(), whole=verbose)
         print_lines(["", f"written: {folder}/ (results.json, report.html, certificates, figures)"])
         if not verbose:
-            print_lines([f"premises, margins and equations: {folder}/report.html, or --verbose"])
+            print_lines([f"gains, premises and equations: {folder}/report.html, or --verbose"])
 
     output.show(results, said)
     return 0 if positive(comparison) else 1
@@ -249,11 +249,17 @@ def compare(
     /,
     *,
     options: DesignOptions = _FIGURES_AS_USUAL,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
     output: Output = PLAIN,
 ) -> int:
     """Run the same work as `design` and print the comparison without writing files.
 
     Exit code as for `design`.
+
+    Parameters
+    ----------
+    verbose
+        Also print the fault, gains, verdicts with premises, all metrics, and numbers that the paper prints.
     """
     from quakedesign.report.comparison_table import designed_comparison
     from quakedesign.report.folder import results
@@ -269,8 +275,9 @@ def compare(
     else:
         from quakedesign.report.terminal import print_comparison
 
-        print_comparison(comparison, console())
-        print_lines(printed_lines(printed(comparison)))
+        print_comparison(comparison, console(), whole=verbose)
+        if verbose:
+            print_lines(printed_lines(printed(comparison)))
     return 0 if positive(comparison) else 1
 
 

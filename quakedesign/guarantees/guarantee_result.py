@@ -45,6 +45,7 @@ from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.of_fault import slow_sliding_plant
 from quakedesign.plant.sliding_plant import SlidingPlant
 from quakedesign.sos.exact.strict import texts
+from quakedesign.text import quantity
 
 # ----------------------------------------------------------------------
 # What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds.
@@ -118,18 +119,18 @@ class LoopAnswer:
                 said.append("no T_s was found for which a design is proved with this box, disturbance and setup")
             return said
         said = [f"proved: {self.found.sentence()}", *self._at_rest()]
-        for name, seen in (("worst found", self.worst), ("worst found with stick", self.worst_with_stick)):
+        for name, seen in (("", self.worst), (" on the stick-slip plant", self.worst_with_stick)):
             if seen is not None:
-                ends = seen.pressures
-                pressure = "" if ends is None else f", pressure {ends[0] / 1e6:.4g} MPa to {ends[1] / 1e6:.4g} MPa"
+                ends = [quantity(end, "Pa", 4) for end in seen.pressures or ()]
                 said.append(
-                    f"{name}: slip error {seen.slip_error:.3g} m, slip-rate error {seen.slip_rate_error:.3g} m/s"
-                    f"{pressure}"
+                    f"worst case found{name}: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
+                    f"{quantity(seen.slip_rate_error, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
                 )
         said += [*self._told(), *self.task_lines()]
         if self.leaves_with_stick:
             said.append(
-                "with stick a course was found that leaves the bounds, which are those of the plant without stick"
+                "on the stick-slip plant a course was found that exceeds the bounds, which are those of the plant "
+                "without stick"
             )
         return said if self.compensation is None else [*said, self.compensation.sentence()]
 
@@ -180,8 +181,8 @@ class LoopAnswer:
         held = self.found.held
         step = f"{float(max(held.step, held.longest_step)):.6g} s"
         step += " with that noise" if held.noise else ""
-        both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error:.3g} m as well"
-        rate = f"{limit.slip_rate_error:.3g} m/s"
+        both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error.quantity('m')} as well"
+        rate = limit.slip_rate_error.quantity("m/s")
         return [f"no controller with zero-order hold over T_s = {step} keeps the slip-rate error below {rate}{both}"]
 
     def task_lines(self) -> list[str]:
@@ -398,8 +399,8 @@ class SlidingAnswer:
         """For people."""
         if self.worst is None:
             return [self.found.sentence()]
-        seen = f"slip error {self.worst.slip_error:.3g} m, slip rate {exp(self.worst.log_rate):.4g} V"
-        return [f"proved: {self.found.sentence()}", f"worst found without inertia: {seen}"]
+        seen = f"slip error {quantity(self.worst.slip_error, 'm')}, slip rate {exp(self.worst.log_rate):.4g} V"
+        return [f"proved: {self.found.sentence()}", f"worst case found without inertia: {seen}"]
 
     def limit_lines(self) -> list[str]:
         """Performance limits at the same T_s; none is known."""

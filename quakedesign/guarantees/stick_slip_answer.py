@@ -14,6 +14,7 @@ from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip, desi
 from quakedesign.laws.stick_slip_law import GAIN_UNITS
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.plant.of_fault import uncertain_plant
+from quakedesign.text import quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,8 +49,9 @@ class StickSlipAnswer:
         ]
         if self.worst is not None:
             said.append(
-                f"worst case found: slip rate {self.worst.slip_rate:.3g} m/s, slip {self.worst.behind:.3g} m behind "
-                f"and {self.worst.ahead:.3g} m ahead of the reference"
+                f"worst case found: slip rate {quantity(self.worst.slip_rate, 'm/s')}, slip "
+                f"{quantity(self.worst.behind, 'm')} behind and {quantity(self.worst.ahead, 'm')} ahead of the "
+                "reference"
             )
         return said
 

@@ -4,7 +4,7 @@ Cycles and slow sliding are for faults with friction state. Published and design
 figure.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from quakedesign.fault import Fault
 from quakedesign.guarantees import Guarantee
 from quakedesign.report.drawing import (
+    INDUCED,
     NATURAL,
     ORIGINS,
     SMALL,
@@ -29,9 +30,11 @@ from quakedesign.report.drawing import (
     style,
     with_diverged,
 )
+from quakedesign.report.summary import worst_slip_rate
 from quakedesign.simulation.slow_sliding import SlidingRun
 from quakedesign.studies.facts import Plane, StabilityRegions, stability_regions
 from quakedesign.studies.runs import StateRun
+from quakedesign.text import quantity
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
@@ -280,10 +283,14 @@ def _width(time: "np.ndarray") -> int:
 
 
 def figures(comparison: "Compared") -> dict[str, Any]:
-    """Figures by name: ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``; others with a state."""
+    """Figures by name.
+
+    ``overview``, ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``; with a state ``overview``,
+    ``cycle``, ``slow-sliding``, ``sliding-errors``.
+    """
     if isinstance(comparison.uncontrolled, StateRun):
-        return state_figures(comparison, comparison.uncontrolled)
-    drawn = {"uncontrolled": uncontrolled(comparison)}
+        return overviews(comparison) | state_figures(comparison, comparison.uncontrolled)
+    drawn = overviews(comparison) | {"uncontrolled": uncontrolled(comparison)}
     if runs_of(comparison.entries):
         drawn |= {
             "states": states(comparison),
@@ -292,6 +299,70 @@ def figures(comparison: "Compared") -> dict[str, Any]:
             "metrics": metrics(comparison),
         }
     return drawn
+
+
+def overviews(comparison: "Compared") -> dict[str, Any]:
+    """``overview`` where there are both a natural earthquake and a run under control."""
+    natural = comparison.uncontrolled
+    failed = isinstance(natural, StateRun) and natural.failed
+    return {} if failed or not runs_of(comparison.of("designed")) else {"overview": overview(comparison)}
+
+
+def overview(comparison: "Compared") -> Any:
+    """Slip rate and slip with and without control over logarithmic time, with the proved bound and what limits it."""
+    natural = comparison.uncontrolled
+    free: Any = natural.trajectory if isinstance(natural, StateRun) else natural
+    best, own = min(runs_of(comparison.of("designed")), key=lambda pair: _peak(pair[0]))
+    drawing, ((rate,), (slip,)) = figure(2, 5.0, height_ratios=(3, 2))
+    floor = 1e-3 * float(known(own.reference_rate).max())
+    speed = np.abs(free.slip_rate)
+    moves = free.time[int(np.argmax(speed > 2 * max(floor, float(speed[0]))))]
+    rate.plot(free.time, np.where(speed > floor, speed, np.nan), color=NATURAL, label="without control")
+    for entry, run in [*runs_of(comparison.of("published")), (best, own)]:
+        middle, values = _largest(run.time, np.abs(run.slip_rate))
+        look = style(entry) | {"linewidth": 1.8 if entry is best else 0.9}
+        rate.plot(middle, np.where(values > floor, values, np.nan), **look)
+    for value, text, line, shade in _levels(best):
+        rate.axhline(value, color=shade, linestyle=line, linewidth=1.2, label=text)
+    size, unit = length(max(float(known(own.reference).max()), float(free.slip.max())))
+    slip.plot(free.time, free.slip / size, color=NATURAL)
+    slip.plot(own.time, own.slip / size, **(style(best) | {"linewidth": 2.4}))
+    slip.plot(own.time, known(own.reference) / size, color="black", linestyle=":", linewidth=1, label="reference")
+    slip.legend(loc="upper left", fontsize=SMALL)
+    rate.set(yscale="log", ylabel="slip rate [m/s]", ylim=(floor, 3 * max(float(speed.max()), floor)))
+    slip.set_ylabel(f"slip [{unit}]")
+    last = max(float(run.time[-1]) for run in (free, own))
+    slip.set(xscale="log", xlabel="time [s]", xlim=(min(float(own.time[1]), max(0.1 * moves, 1e-9 * last)), last))
+    note = f"largest of each twenty-fifth of a decade; slip rates below {floor:.1g} m/s are not drawn"
+    title = f"{comparison.fault.name}: with and without control"
+    return finish(drawing, title, [own], with_diverged(comparison.entries, note), legend=rate)
+
+
+def _peak(entry: "Entry") -> float:
+    return float("inf") if entry.guaranteed is None else float(entry.guaranteed.peak_slip_rate)
+
+
+def _levels(entry: "Entry") -> "Iterator[tuple[float, str, str, str]]":
+    """Proved bound of the slip rate, worst case found, and performance limit, as far as they are known."""
+    if entry.guaranteed is None or entry.answer is None:
+        return
+    peak = entry.guaranteed.peak_slip_rate
+    yield float(peak), f"proved: at most {peak.quantity('m/s')}", "dashed", colour(entry.design.name)
+    if entry.answer.worst is not None:
+        worst = worst_slip_rate(entry.answer.worst, entry.guaranteed)
+        yield worst, f"worst case found: {quantity(worst, 'm/s')}", "dotted", INDUCED
+    limit = getattr(entry.answer, "limit", None)
+    if limit is not None:
+        least = limit.slip_rate_error
+        yield float(least), f"none can: below {least.quantity('m/s')}", "dashdot", "#777777"
+
+
+def _largest(time: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+    """Time and largest value of each twenty-fifth of a decade."""
+    inside = time > 0
+    steps = np.floor(25 * np.log10(time[inside])).astype(int)
+    starts = np.flatnonzero(np.diff(steps, prepend=steps[0] - 1))
+    return time[inside][starts], np.maximum.reduceat(values[inside], starts)
 
 
 def uncontrolled(comparison: "Compared") -> Any:

@@ -54,3 +54,9 @@ for (const frame of document.querySelectorAll(".frame")) {
   };
   svg.ondblclick = () => show(whole);
 }
+// Folded parts: a link opens the part that it leads to; all of them are printed.
+const unfold = (part) => { for (let d = part && part.closest("details"); d; d = d.parentElement.closest("details")) d.open = true; };
+const follow = () => { const part = location.hash && document.getElementById(location.hash.slice(1)); unfold(part); if (part) part.scrollIntoView(); };
+addEventListener("hashchange", follow);
+addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
+follow();

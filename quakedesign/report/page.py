@@ -20,27 +20,26 @@ from markupsafe import Markup, escape
 
 from quakedesign.fault import Fault, fault_toml
 from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, WIDTHS
-from quakedesign.guarantees import NoGuarantee, SlidingGuarantee
+from quakedesign.guarantees import SlidingGuarantee
 from quakedesign.lyapunov import Verdict
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
-    GRADES,
     beside_guarantee,
     cycle_sentence,
     domain_sentence,
     feedforward_rows,
     grade,
     guarantee_lines,
-    left_out_lines,
     limit_lines,
     run_sentences,
     scheme_sentence,
     sentences,
 )
-from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
+from quakedesign.report.summary import SUMMARY_COLUMNS, summary, summary_cells
+from quakedesign.report.tables import COLUMNS, rows
 from quakedesign.studies.facts import coordinates, fault_sentences, law_latex, plant_latex
 from quakedesign.studies.runs import StateRun
-from quakedesign.text import visible
+from quakedesign.text import quantity, visible
 
 if TYPE_CHECKING:
     from quakedesign.laws import Controller
@@ -315,6 +314,9 @@ def reproduction(fault: Fault, command: str = "") -> Reproduction:
 # What every figure shows, in words: below it in the report, and for readers who do not see it.
 
 CAPTIONS = {
+    "overview": "How fast does the fault slip? Slip rate and slip over logarithmic time: without control, with "
+    "published gains, and with the designed controller of the smallest proved bound. Horizontal lines: that bound, the "
+    "worst case found, and what no controller can do.",
     "uncontrolled": "Without control: slip, with the slip at which the statics let the fault rest, and slip rate of "
     "the natural earthquake.",
     "cycle": "Without control, loaded from afar at the reference rate of the law: slip and slip rate; dotted: the "
@@ -370,25 +372,26 @@ def table_html(comparison: "Compared") -> str:
 
 def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Reproduction) -> str:
     """Whole report as HTML with its figures, SVG elements by name, inside."""
-    told = accounts(comparison)
+    told, said = accounts(comparison), summary(comparison)
     page: str = (
         _environment()
         .get_template("page.html")
         .render(
             fault=comparison.fault,
-            answer=answer(comparison),
+            natural=_natural(comparison),
+            said=said,
+            overview=_figure("overview", figures["overview"]) if "overview" in figures else None,
             facts=fault_sentences(comparison.fault),
             coordinates=coordinates(comparison.fault),
             plant=[mathml(equation) for equation in plant_latex(comparison.fault)],
             **_tables(comparison),
             accounts=told,
-            grades=GRADES,
             schemes=scheme_sentence(comparison),
             limits=_limits(comparison, told),
             known_columns=FEEDFORWARD_COLUMNS,
             glossary=[(mathml(s, display="inline") if s else "", *rest) for s, *rest in _terms(comparison.fault)],
             asked=[(name, ASKED[name]) for name in ASKED if any(name == row[0] for a in told for row in a.premises)],
-            figures=[{"name": name, "svg": drawn, "caption": CAPTIONS[name]} for name, drawn in figures.items()],
+            figures=[_figure(name, drawn) for name, drawn in figures.items() if name != "overview"],
             parameters=parameter_rows(comparison.fault),
             parameter_headings=HEADINGS,
             made=made,
@@ -399,35 +402,8 @@ def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Repro
     return page
 
 
-def answer(comparison: "Compared") -> list[str]:
-    """What a reader in a hurry wants: the earthquake, what is guaranteed against it, and of whom nothing is."""
-    designed = comparison.of("designed")
-    lines, proved, covers = [_natural(comparison)], {}, ""
-    for entry in designed:
-        if entry.guaranteed is not None:
-            title = entry.design.title
-            proved[title] = f"{entry.guaranteed.peak_slip_rate:.3g} m/s ({title})"
-            covers = entry.guaranteed.covers
-    others = ((e.design.title, e.design.other_step_first) for e in designed)
-    faster = {title: said for title, said in others if said and title in proved}
-    lines += [f"{title}: {said}" for title, said in faster.items()]
-    if proved:
-        lines.append(
-            f"With a designed controller the slip rate never exceeds {', '.join(proved.values())}: proved, for the "
-            f"sampled loop, {covers}"
-        )
-    for why, titles in _without(e for e in designed if e.design.title not in proved).items():
-        lines.append(f"No guarantee was found for the designed {', '.join(titles)}{f': {why}' if why else ''}")
-    return [*lines, *left_out_lines(comparison)]
-
-
-def _without(entries: Iterable["Entry"]) -> dict[str, list[str]]:
-    """Titles of laws without a guarantee, by why there is none; no reason where nothing was asked."""
-    found: dict[str, list[str]] = {}
-    for entry in entries:
-        why = entry.guarantee.reason if isinstance(entry.guarantee, NoGuarantee) else entry.design.details.get("reason")
-        found.setdefault(str(why or ""), []).append(entry.design.title)
-    return found
+def _figure(name: str, drawn: Markup) -> dict[str, str]:
+    return {"name": name, "svg": drawn, "caption": CAPTIONS[name]}
 
 
 def _natural(comparison: "Compared") -> str:
@@ -439,7 +415,9 @@ def _natural(comparison: "Compared") -> str:
         f" of magnitude {fault.magnitude:.2f}" if run.outcome.kind == "earthquake" and fault.seismic_moment > 0 else ""
     )
     rate = run.outcome.peak_slip_rate
-    return f"Without control: {run.outcome.kind}{size}" + ("" if rate is None else f", slip rate up to {rate:.3g} m/s")
+    return f"Without control: {run.outcome.kind}{size}" + (
+        "" if rate is None else f", slip rate up to {quantity(rate, 'm/s')}"
+    )
 
 
 def _limits(comparison: "Compared", told: list[Account]) -> list[str]:
@@ -472,7 +450,8 @@ def _way(comparison: "Compared") -> str:
 
 def _tables(comparison: "Compared") -> dict[str, Any]:
     """Columns and rows of both tables."""
-    return {"outcomes": (OUTCOMES, outcome_rows(comparison)), "numbers": (COLUMNS, rows(comparison))}
+    first = (SUMMARY_COLUMNS, summary_cells(summary(comparison).rows))
+    return {"summary": first, "numbers": (COLUMNS, rows(comparison))}
 
 
 def _terms(fault: "Fault") -> list[list[str]]:

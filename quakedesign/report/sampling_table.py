@@ -9,7 +9,6 @@ from rich.table import Table
 
 from quakedesign.files import whole_folder
 from quakedesign.report.drawing import write_figures, write_results
-from quakedesign.report.sentences import OUTCOME_COLUMNS, outcome_cells
 from quakedesign.report.terminal import table
 from quakedesign.simulation import Study
 from quakedesign.simulation.sensitivity import QUANTITIES
@@ -25,7 +24,7 @@ _CELLS = {
     "pressure_total_variation": (1e9, ".3g"),
     "time_at_rest_fraction": (1, ".2f"),
 }
-OUTCOMES = ("law", "scheme", *OUTCOME_COLUMNS, "least p [MPa]", "largest p [MPa]")
+OUTCOMES = ("law", "scheme", "outcome", "peak rate [m/s]", "of natural", "least p [MPa]", "largest p [MPa]")
 COLUMNS = (
     "law",
     "scheme",
@@ -90,9 +89,11 @@ def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], widths: tuple[int
 
 def row_outcome(row: SchemeRow) -> tuple[str, ...]:
     """Texts of a law under `OUTCOMES`; a dash means diverged."""
-    extremes = pressure_extremes(row.run)
+    extremes, outcome = pressure_extremes(row.run), row.run.outcome
+    peak = "–" if outcome.peak_slip_rate is None else f"{outcome.peak_slip_rate:.2e}"
+    share = "–" if outcome.share_of_natural is None else f"{100 * outcome.share_of_natural:.3g} %"
     pressures = (f"{p / 1e6 + 0.0:.3g}" for p in extremes) if extremes else ("–", "–")
-    return (row.label, row.scheme, *outcome_cells(row.run), *pressures)
+    return (row.label, row.scheme, outcome.kind, peak, share, *pressures)
 
 
 def row_cells(row: SchemeRow) -> tuple[str, ...]:

@@ -28,7 +28,6 @@ from quakedesign.text import lasting
 
 if TYPE_CHECKING:
     from quakedesign.guarantees import Guarantee, SlidingGuarantee
-    from quakedesign.studies.comparison import Run
     from quakedesign.studies.runs import StateRun
 
 
@@ -37,11 +36,6 @@ if TYPE_CHECKING:
 
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
 """Premises of a linear law's stability that its certified peaks do without."""
-GRADES = (
-    "guaranteed: proved bounds of slip rate and slip error of the sampled loop, for friction without a state on the "
-    "plant without stick; proved for this loop and task: every premise holds in the run that is shown; proved, but …: "
-    "what the proof does not cover, and how many times over"
-)
 
 
 def grade(entry: "Entry") -> str:
@@ -109,7 +103,6 @@ def _held(entry: "Entry") -> list[str]:
 
 _NEGLIGIBLE = 1e-6
 """Of the larger end of a range of pressures: a smaller end is said to be zero."""
-OUTCOME_COLUMNS = ("outcome", "peak rate [m/s]", "of natural")
 
 
 def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
@@ -139,15 +132,6 @@ def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
     if event.onset is None:
         return f"{said}: nothing has pushed it forward; without --duration it is nudged"
     return f"{said}: growing by {event.growth:.3g} 1/s it would at about {event.onset:.3g} s"
-
-
-def outcome_cells(run: "Run | None") -> tuple[str, ...]:
-    """Texts under `OUTCOME_COLUMNS`; a dash means not applicable or not known."""
-    if run is None:
-        return ("–", "–", "–")
-    outcome = run.outcome
-    peak = "–" if outcome.peak_slip_rate is None else f"{outcome.peak_slip_rate:.2e}"
-    return outcome.kind, peak, "–" if outcome.share_of_natural is None else _percent(outcome.share_of_natural)
 
 
 def pressure_sentence(least: float, largest: float) -> str:

@@ -4,17 +4,14 @@ import csv
 import io
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.report.sentences import OUTCOME_COLUMNS, grade, outcome_cells
-
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Compared
 
 
 # ----------------------------------------------------------------------
-# The two tables of a comparison, as plain rows for every medium: what every run came to, and its numbers.
+# Metrics of a comparison, as plain rows for every medium.
 
-OUTCOMES = ("controller", *OUTCOME_COLUMNS, "verdict")
 COLUMNS = (
     "controller",
     "slip error [m]",
@@ -34,12 +31,6 @@ _METRICS = (
     "pressure_total_variation",
     "time_at_rest_fraction",
 )
-
-
-def outcome_rows(comparison: "Compared") -> list[tuple[str, ...]]:
-    """One row a run under `OUTCOMES`: outcome, and how far the proof reaches; a dash means not applicable."""
-    uncontrolled = ("uncontrolled", *outcome_cells(comparison.uncontrolled), "")
-    return [uncontrolled, *((e.label, *outcome_cells(e.run), grade(e)) for e in comparison.entries)]
 
 
 def rows(comparison: "Compared") -> list[tuple[str, ...]]:

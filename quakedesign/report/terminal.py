@@ -8,7 +8,6 @@ from rich.table import Table
 from quakedesign.report.comparison_table import Comparison
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
-    GRADES,
     beside_guarantee,
     cycle_sentence,
     domain_sentence,
@@ -21,7 +20,8 @@ from quakedesign.report.sentences import (
     run_sentences,
     scheme_sentence,
 )
-from quakedesign.report.tables import COLUMNS, OUTCOMES, outcome_rows, rows
+from quakedesign.report.summary import summary, summary_lines
+from quakedesign.report.tables import COLUMNS, rows
 from quakedesign.studies.facts import fault_sentences
 from quakedesign.studies.runs import StateRun
 
@@ -33,10 +33,12 @@ if TYPE_CHECKING:
 
 
 def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True) -> None:
-    """What came of it, fault, gains, verdicts with premises, and tables.
-
-    Unless `whole` no premise that holds, no domain, no variant, and no tables of the one law of slow sliding.
-    """
+    """The summary; with `whole` also fault, gains, verdicts with premises, and tables."""
+    for line in summary_lines(summary(comparison)):
+        console.print(line)
+    if not whole:
+        return
+    console.print()
     console.print(comparison.fault.name, style="bold", end=" ")
     console.print(f"({comparison.fault.source})")
     for entry in comparison.of("designed"):
@@ -52,16 +54,12 @@ def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True
     for entry in entries:
         console.print()
         console.print(f"{entry.label}:", style="bold")
-        for line in _whole(entry) if whole else _brief(entry):
+        for line in _whole(entry):
             console.print(f"  {line}")
-        if whole and entry.variants:
+        if entry.variants:
             known = zip(FEEDFORWARD_COLUMNS, (None,) * len(FEEDFORWARD_COLUMNS), "lrrrr", strict=True)
             console.print(table(known, feedforward_rows(entry.variants), indent=2))
-    shared = [] if whole else list(dict.fromkeys(line for entry in entries for line in _of_task(entry)))
-    for line in [""] * bool(shared) + shared:
-        console.print(line)
-    if whole or not isinstance(comparison.uncontrolled, StateRun):
-        _print_tables(comparison, console)
+    _print_tables(comparison, console)
 
 
 def _whole(entry: "Entry") -> list[str]:
@@ -69,30 +67,13 @@ def _whole(entry: "Entry") -> list[str]:
     others = [premise for premise in entry.design.premises if premise not in entry.design.conditions]
     return [
         *guarantee_lines(entry),
-        *_seen(entry),
+        *beside_guarantee([headline(entry), *remarks(entry)], entry),
         _gains(entry),
         *map(_line, entry.design.conditions),
         *(["of the certificate of its base gains, in continuous time:"] if others else []),
         *map(_line, others),
         *([domain_sentence(entry.design.domain)] if entry.design.domain is not None else []),
     ]
-
-
-def _brief(entry: "Entry") -> list[str]:
-    """What is guaranteed and was seen, the gains, and premises that fail."""
-    said = entry.answer and entry.answer.compensation and entry.answer.compensation.sentence()
-    guaranteed = [line for line in guarantee_lines(entry) if line != said and line not in _of_task(entry)]
-    failing = [_line(premise) for premise in entry.design.conditions if not premise.holds]
-    return [*guaranteed, *_seen(entry), _gains(entry), *failing]
-
-
-def _seen(entry: "Entry") -> list[str]:
-    return beside_guarantee([headline(entry), *remarks(entry)], entry)
-
-
-def _of_task(entry: "Entry") -> list[str]:
-    """What is the same of all designs that run alike."""
-    return entry.answer.task_lines() if entry.answer else []
 
 
 _OF_SLIDING = (
@@ -111,12 +92,6 @@ def _gains(entry: "Entry") -> str:
 
 
 def _print_tables(comparison: Comparison, console: Any) -> None:
-    console.print()
-    console.print("outcome", style="bold", end=", ")
-    console.print("peak slip rate of the whole run, and its share of the natural earthquake's")
-    outcomes = zip(OUTCOMES, (17, 10, 8, 10, 31), "llrrl", strict=True)
-    console.print(table(outcomes, outcome_rows(comparison)), soft_wrap=False)
-    console.print(f"{GRADES}.")
     console.print()
     console.print("closed loop", style="bold", end=", ")
     console.print("errors after a quarter of the run; p < 0 is withdrawal")

@@ -80,7 +80,7 @@ def test_given_gains_for_people(call):
         "proved: on the plant without stick, from rest, with zero-order hold over 0.184 s, for every disturbance of at "
         "most 0.00032 m/s^2 (4 kPa"
     )
-    assert "worst found with stick" in out
+    assert "worst case found on the stick-slip plant" in out
     assert "of the box: the slip rate never exceeds" in " ".join(out.split())
     assert max(map(len, out.splitlines())) <= 200
 

@@ -68,7 +68,7 @@ def test_a_disturbance_that_is_slow_has_a_class_of_its_own(monkeypatch):
 def test_a_course_beyond_both_is_said_and_the_narrow_claims_stay(monkeypatch):
     found = stuck(monkeypatch, between("slip_error", F(2)), 0.0)
     assert found.found == SLOW
-    assert "leaves the bounds" in found.lines()[-1]
+    assert "exceeds the bounds" in found.lines()[-1]
     assert found.limit_lines()[0].startswith(
         "no controller with zero-order hold over T_s = 0.184 s keeps the slip-rate error below "
     )

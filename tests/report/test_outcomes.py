@@ -14,7 +14,7 @@ from quakedesign.linear.sampled_stability import HeldLoop
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.report import headline
-from quakedesign.report.sentences import grade, outcome_cells, outcome_sentence, pressure_sentence, sentences
+from quakedesign.report.sentences import grade, outcome_sentence, pressure_sentence, sentences
 from quakedesign.simulation import simulate
 from quakedesign.studies import Entry
 from quakedesign.synthesis import Design
@@ -81,13 +81,6 @@ def test_a_negative_slip_rate_is_said_with_its_plant(slow):
     assert f"on the plant without stick, the slip rate is negative in {share} % of the steps" in sentences(entry(slow))
     still = dataclasses.replace(slow, metrics=dataclasses.replace(slow.metrics, reverse_slip_fraction=0.0))
     assert not any("negative" in sentence for sentence in sentences(entry(still)))
-
-
-def test_cells_are_short_and_say_what_is_not_known(slow):
-    assert outcome_cells(None) == ("–", "–", "–")
-    kind, peak, share = outcome_cells(slow)
-    assert (kind, peak) == ("earthquake", f"{slow.metrics.peak_slip_rate:.2e}")
-    assert share.endswith(" %")
 
 
 @pytest.mark.parametrize(

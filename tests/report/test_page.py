@@ -135,7 +135,7 @@ def test_figures_are_the_same_twice_and_carry_their_fonts(drawing, kind):
 
 
 def test_every_figure_has_a_caption_and_every_premise_is_told():
-    own = {"errors", "metrics", "peak-against-tracking", "cycle", "slow-sliding", "sliding-errors"}
+    own = {"overview", "errors", "metrics", "peak-against-tracking", "cycle", "slow-sliding", "sliding-errors"}
     assert set(PAPER) | own == set(CAPTIONS)
     assert all(said.endswith(".") for said in CAPTIONS.values())
     source = "".join(path.read_text(encoding="utf-8") for path in Path(qd.__file__).parent.rglob("*premise*.py"))

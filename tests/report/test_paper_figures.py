@@ -81,7 +81,7 @@ def caption(drawing):
 
 def test_every_figure_of_the_paper_that_shows_a_simulation_is_drawn(study):
     assert set(PAPER) <= set(study.figures())
-    assert set(study.figures()) - set(PAPER) == {"errors", "metrics"}
+    assert set(study.figures()) - set(PAPER) == {"overview", "errors", "metrics"}
 
 
 def test_every_axis_has_a_unit_and_every_figure_says_how_it_was_made(study):

@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import re
 from dataclasses import replace
 from fractions import Fraction
@@ -10,19 +11,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from quakedesign import compare
 from quakedesign.cli import main
+from quakedesign.cli.app import console as terminal
 from quakedesign.errors import ParameterError, SimulationError, UnsupportedError
+from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoGuarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.guarantee_result import SlidingAnswer
 from quakedesign.report.figures import cycle, errors, slow_sliding
 from quakedesign.report.folder import write_folder
-from quakedesign.report.page import accounts, answer, parameter_rows
+from quakedesign.report.page import accounts, parameter_rows
 from quakedesign.report.sentences import cycle_sentence, part_of_task, sentences, state_run_lines
+from quakedesign.report.summary import summary
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
 from quakedesign.simulation.stick_slip import sliding
@@ -78,7 +81,12 @@ def test_the_folder_holds_the_certificate_the_figures_and_the_keys_of_all_design
     assert parse_guarantee((folder / elqr["certificate"]).read_text()).claims == comparison.entries[0].guarantee.claims
     assert found["uncontrolled"]["cycle"] == {"recurrence_interval": None, "slip": None, "magnitude": None}
     assert set(found["not_applicable"]) == {"cta", "dia"}
-    assert {path.stem for path in (folder / "figures").iterdir()} == {"cycle", "slow-sliding", "sliding-errors"}
+    assert {path.stem for path in (folder / "figures").iterdir()} == {
+        "overview",
+        "cycle",
+        "slow-sliding",
+        "sliding-errors",
+    }
     page = (folder / "report.html").read_text()
     assert "state of rate-and-state friction, the age of contacts" in page
     assert "signed power" not in page  # of sliding modes, which such faults have not
@@ -86,10 +94,19 @@ def test_the_folder_holds_the_certificate_the_figures_and_the_keys_of_all_design
 
 def test_the_terminal_says_first_what_came_of_it(comparison):
     told = io.StringIO()
-    print_comparison(comparison, Console(file=told, width=200), whole=False)
-    name, outcome, *_ = told.getvalue().splitlines()
-    assert name.startswith("crustal-patch (")
-    assert outcome == "  e-LQR (designed): guaranteed: slip rate <= 1.2e-06 m/s, slip error <= 8.33e-05 m"
+    print_comparison(comparison, terminal(file=told, width=80), whole=False)
+    lines = told.getvalue().splitlines()
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= 80
+    said = " ".join(told.getvalue().split())
+    assert said.startswith("crustal-patch: guaranteed. With the e-LQR (designed) the slip rate never exceeds 1.2 µm/s,")
+    assert "the slip stays within 83.3 µm of the reference" in said
+    (row,) = (line.split() for line in lines if line.startswith("e-LQR  "))
+    claims, worst = comparison.entries[0].guarantee.claims, comparison.entries[0].answer.worst
+    assert row[2] == f"{UpperBound(10**6 * Fraction(comparison.entries[0].guarantee.peak_slip_rate)):.3g}"
+    assert row[3] == f"{1e6 * math.exp(worst.log_rate) * float(comparison.entries[0].guarantee.task.rate):.3g}"
+    assert row[5:7] == [f"{UpperBound(10**6 * Fraction(claims.slip_error)):.3g}", f"{1e6 * worst.slip_error:.3g}"]
+    print_comparison(comparison, terminal(file=told, width=200))
     gains = next(line for line in told.getvalue().splitlines() if "gains: " in line)
     assert re.search(r"k1 = \S+ Pa/m, k2 = 0 Pa s/m, slip = \S+ Pa, ", gains)
     assert "slip error, state of friction, modes of the rock's pressure" in " ".join(told.getvalue().split())
@@ -106,28 +123,26 @@ def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(compar
     without, told = compare(SHORT, [design(SHORT, "elqr")]), io.StringIO()
     assert accounts(without)[0].verdict == ["undecided"]
     assert accounts(without)[0].guarantee == [f"guarantee: none: {why}"]
-    for whole in (False, True):
-        print_comparison(without, Console(file=told, width=200), whole=whole)
-        assert told.getvalue().count("whose loop is stable") == 1 + whole
-        assert ("closed loop" in told.getvalue()) == whole  # one law alone needs no table
-    (first, second, *_) = answer(without)
-    assert first.startswith("Without control")
-    assert second == f"No guarantee was found for the designed e-LQR: {why}"
+    print_comparison(without, terminal(file=told, width=80), whole=False)
+    said = " ".join(told.getvalue().split())
+    assert said.startswith("crustal-patch: no guarantee for any designed controller. ")
+    assert said.count("whose loop is stable") == 1
+    assert summary(without).conditions == f"e-LQR (designed): none: {why}"
 
 
 def test_the_report_is_the_one_of_all_faults(folder):
     page = (folder / "report.html").read_text()
-    parts = ("fault", "outcome", "limits", "proof", "figures", "parameters", "again")
+    parts = ("limits", "figures", "fault", "outcome", "proof", "parameters", "again")
     places = [page.index(f'<section id="{part}"') for part in parts]
     assert places == sorted(places)
     first = page[page.index('<div class="answer">') : page.index("<nav>")]
-    assert first.index("Without control: the fault creeps") < first.index("With a designed controller the slip rate")
+    assert first.index("Without control: the fault creeps") < first.index("With the e-LQR (designed) the slip rate")
     assert first.index("never exceeds") < first.index("Not designed, 2-CTA, 2-DIA")
     assert "the slip rate follows the pressure at once" in first
     assert "guaranteed as it runs" in page
     assert "Uncertainty box" not in page
     assert not re.search(r"for ever\b", page[: page.index("Glossary")])
-    assert first.index("every shear stress disturbance up to") < first.index("while the reference goes")
+    assert first.index("for every shear stress disturbance of at most") < first.index("while the reference goes")
     assert "a well near the fault" in page
     assert "continued to negative slip rates" not in page
 
@@ -244,7 +259,7 @@ def test_a_design_goes_on_where_no_cycle_can_be_computed(comparison, monkeypatch
     found = write_folder(without, tmp_path / "patch", force=False)
     assert found["uncontrolled"]["outcome"]["kind"] == "unknown"
     assert {path.stem for path in (tmp_path / "patch" / "figures").iterdir()} == {"slow-sliding", "sliding-errors"}
-    print_comparison(without, Console(file=told, width=200))
+    print_comparison(without, terminal(file=told, width=200))
     said = "Without control: unknown, since its cycle could not be computed (the integration stopped)"
     assert said in told.getvalue()
     assert said in (tmp_path / "patch" / "report.html").read_text()

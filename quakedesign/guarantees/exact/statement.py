@@ -326,8 +326,8 @@ def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from 
     step = "" if largest is None else f", that asked for changes by at most {largest.quantity('Pa')} a sample"
     return (
         f"on the plant without stick, {start}, {when}, {kind}, for all friction and constant parameters of the box: "
-        f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, the slip stays within "
-        f"{claims.slip_error:.3g} m of the reference, the pressure {', at the valve '.join(pressures)}{step}"
+        f"the slip rate never exceeds {claims.peak_slip_rate.quantity('m/s')}, the slip stays within "
+        f"{claims.slip_error.quantity('m')} of the reference, the pressure {', at the valve '.join(pressures)}{step}"
     )
 
 
@@ -731,8 +731,8 @@ class SlidingGuarantee:
         return (
             f"{empty}from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, "
             f"{under}, {_along(task)}{_box(task)}: the slip rate never "
-            f"exceeds {ratio:.4g} V = {self.peak_slip_rate:.3g} m/s {self.lasts}, the slip stays within "
-            f"{claims.slip_error:.3g} m of it, the pressure in the fault between {low.quantity('Pa')} and "
+            f"exceeds {ratio:.4g} V = {self.peak_slip_rate.quantity('m/s')} {self.lasts}, the slip stays within "
+            f"{claims.slip_error.quantity('m')} of it, the pressure in the fault between {low.quantity('Pa')} and "
             f"{high.quantity('Pa')}, at the valve between {least.quantity('Pa')} and {largest.quantity('Pa')} "
             f"({', '.join(['with inertia', *_friction(task)])})"
         )

@@ -101,14 +101,15 @@ class StickSlipGuarantee:
         task, held, claims = self.task, self.held, self.claims
         stress = LowerBound(task.amplitude / task.area_per_mass[1])
         size = f"{LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
+        behind, ahead = claims.slip_behind.quantity("m"), claims.slip_ahead.quantity("m")
         pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
         return (
             f"from rest, with zero-order hold over {UpperBound(held.step):.6g} s and exact measurements of slip and "
             "slip rate, "
             f"for every disturbance of at most {size}, for all friction and constant parameters of the box: "
-            f"the slip rate never exceeds {claims.peak_slip_rate:.3g} m/s, whether the fault slides or sticks, "
-            f"the slip stays between {claims.slip_behind:.3g} m behind and {claims.slip_ahead:.3g} m ahead of the "
-            f"reference, the pressure between {pressures}, for all t >= 0"
+            f"the slip rate never exceeds {claims.peak_slip_rate.quantity('m/s')}, whether the fault slides or sticks, "
+            f"the slip stays between {behind} behind and {ahead} ahead of the reference, the pressure between "
+            f"{pressures}, for all t >= 0"
         )
 
 

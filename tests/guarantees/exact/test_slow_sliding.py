@@ -98,7 +98,7 @@ def test_the_guarantee_is_proved_by_both_checkers_and_survives_its_file(tmp_path
     path.write_text(text)
     ((verdict, lines),) = check_files([path]).values()
     assert verdict == "proved"
-    assert any("never exceeds 1.649 V = 1.98e-06 m/s" in line for line in lines)
+    assert any("never exceeds 1.649 V = 1.98 µm/s" in line for line in lines)
     result = checker.check(text)
     assert result.verdict == "proved"
     assert any("never exceeds 1.979e-06 m/s" in line for line in result.statement)

@@ -1,0 +1,287 @@
+"""Summary of a comparison: the answer in a sentence, one table, and what else matters, for terminal and report."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import exp
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+from quakedesign.exact import Bound, UpperBound
+from quakedesign.guarantees import Guarantee, SlidingGuarantee
+from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines
+from quakedesign.studies.comparison import pressure_extremes
+from quakedesign.studies.runs import StateRun
+from quakedesign.text import PREFIXES, plain, power_of, quantity
+
+if TYPE_CHECKING:
+    from quakedesign.studies.comparison import Compared, Entry, Run
+
+WIDTH = 80
+_NAME, _OUTCOME, _NUMBERS, _PRESSURE = 17, 10, (7, 6, 6), 15
+Number = Bound | float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """What is proved and what was seen of one controller.
+
+    Attributes
+    ----------
+    name, outcome : str
+    slip_rate, slip : tuple
+        Proved bound, worst case found, and largest value of the run: slip rate [m/s], slip error [m]; None without.
+    pressure : (float, float) or None
+        Range [Pa]: the proved one, or that of the run.
+    """
+
+    name: str
+    outcome: str
+    slip_rate: tuple[Number, Number, Number]
+    slip: tuple[Number, Number, Number]
+    pressure: tuple[Bound | float, Bound | float] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """What is said first of a comparison.
+
+    Attributes
+    ----------
+    answer : str
+        What is guaranteed, against the natural earthquake.
+    rows : tuple of Row
+    conditions : str
+        Sentence of the guarantee of the answer, or why there is none.
+    notes : tuple of str
+        What limits the answer.
+    """
+
+    answer: str
+    rows: tuple[Row, ...]
+    conditions: str
+    notes: tuple[str, ...]
+
+
+def summary(comparison: "Compared") -> Summary:
+    """Answer, table and notes of a comparison."""
+    designed = comparison.of("designed")
+    proved = [entry for entry in designed if entry.guaranteed is not None]
+    best = min(proved, key=lambda entry: _rate(entry), default=None)
+    rows = [_uncontrolled(comparison.uncontrolled), *map(_row, (*designed, *comparison.of("published")))]
+    return Summary(
+        answer=_answer(comparison, best),
+        rows=tuple(rows),
+        conditions=_conditions(designed, best),
+        notes=tuple(_notes(comparison, best)),
+    )
+
+
+def _rate(entry: "Entry") -> float:
+    assert entry.guaranteed is not None
+    return float(entry.guaranteed.peak_slip_rate)
+
+
+def _answer(comparison: "Compared", best: "Entry | None") -> str:
+    natural, name = comparison.uncontrolled, comparison.fault.name
+    if best is None or best.guaranteed is None:
+        return f"{name}: no guarantee for any designed controller"
+    found, peak = best.guaranteed, natural.outcome.peak_slip_rate
+    share = ""
+    if peak and natural.outcome.kind == "earthquake":
+        ratio = UpperBound(100 * found.peak_slip_rate / UpperBound(f"{peak:.3g}"))
+        share = f" ({ratio:.2g} % of the natural earthquake's {quantity(peak, 'm/s')})"
+    step = f" at {best.design.other_step_first}" if best.design.other_step else ""
+    return (
+        f"{name}: guaranteed{step}. With the {best.label} the slip rate never exceeds "
+        f"{found.peak_slip_rate.quantity('m/s')}{share}, and the slip stays within "
+        f"{found.claims.slip_error.quantity('m')} of the reference"
+    )
+
+
+def _conditions(designed: Sequence["Entry"], best: "Entry | None") -> str:
+    if best is not None and best.guaranteed is not None:
+        return f"{best.label}, proved: {best.guaranteed.sentence()}"
+    told = [(e.label, e.answer.lines()[0] if e.answer else str(e.design.details.get("reason", ""))) for e in designed]
+    return "; ".join(f"{label}: {reason or 'undecided'}" for label, reason in told)
+
+
+def _uncontrolled(run: "Run") -> Row:
+    pressure = None if isinstance(run, StateRun) else pressure_extremes(run)
+    peak = run.outcome.peak_slip_rate
+    return Row(
+        name="uncontrolled",
+        outcome=run.outcome.kind,
+        slip_rate=(None, None, peak),
+        slip=(None, None, None),
+        pressure=pressure,
+    )
+
+
+def _row(entry: "Entry") -> Row:
+    found, run = entry.guaranteed, entry.run
+    worst = entry.answer.worst if entry.answer else None
+    rate = None if worst is None else worst_slip_rate(worst, found)
+    seen = pressure_extremes(run) if run else None
+    pressure: tuple[Bound | float, Bound | float] | None = seen
+    if isinstance(found, SlidingGuarantee):
+        pressure = found.valve_pressures
+    elif isinstance(found, Guarantee):
+        pressure = found.claims.pressures[-1]
+    label = entry.label.removesuffix(" (designed)").replace(" (published)", ", published")
+    return Row(
+        name=label,
+        outcome=run.outcome.kind if run else "not run",
+        slip_rate=(found.peak_slip_rate if found else None, rate, run.outcome.peak_slip_rate if run else None),
+        slip=(
+            found.claims.slip_error if found else None,
+            None if worst is None else worst.slip_error,
+            run.metrics.max_slip_error if run else None,
+        ),
+        pressure=pressure,
+    )
+
+
+def worst_slip_rate(worst: object, found: object) -> float:
+    """Slip rate of the worst case found; of its error where no more is followed."""
+    if isinstance(found, SlidingGuarantee):
+        return float(found.task.rate) * exp(worst.log_rate)  # type: ignore[attr-defined]
+    return float(worst.slip_rate_error)  # type: ignore[attr-defined]
+
+
+def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
+    fault, designed = comparison.fault, comparison.of("designed")
+    if fault.source.startswith("poor fit accepted"):
+        yield f"{fault.source}"
+    if isinstance(comparison.uncontrolled, StateRun):
+        yield cycle_sentence(comparison.uncontrolled)
+    yield from (f"assumed: {said}" for said in fault.assumed)
+    for entry in designed:
+        if (entry.guaranteed is None and best is not None) or ", but " in grade(entry):
+            yield f"{entry.label}: {grade(entry)}"
+        if assumed := entry.design.details.get("assumed"):
+            yield f"{entry.label} assumes {assumed}"
+    yield from _alike(designed)
+    published: dict[str, list[str]] = {}
+    for entry in comparison.of("published"):
+        published.setdefault(_published(grade(entry)), []).append(entry.design.title)
+    yield from (f"{', '.join(names)} (published): {said}" for said, names in published.items())
+    yield from left_out_lines(comparison)
+    if best is not None and best.answer is not None:
+        yield from best.answer.limit_lines()
+
+
+def _published(said: str) -> str:
+    """The verdict on published gains without the names of their premises, which the report explains."""
+    end = "; UNSTABLE if p is held over T_s"
+    if said.startswith("proved, but "):
+        held = "; unstable with zero-order hold over T_s" if said.endswith(end) else ""
+        return f"proved in continuous time only, under premises that fail here{held}"
+    return said
+
+
+def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
+    """Why two sliding modes have the same bounds."""
+    sliding = [entry for entry in designed if entry.answer is not None and entry.answer.compensation is not None]
+    same = [entry for entry in sliding if entry.guaranteed and sliding[0].guaranteed]
+    if len(same) > 1 and all(e.guaranteed.claims == same[0].guaranteed.claims for e in same):  # type: ignore[union-attr]
+        names = " and ".join(entry.design.title for entry in same)
+        yield (
+            f"{names} coincide: with these gains the implicit step of both is deadbeat for all errors that are "
+            "claimed; in continuous time (--continuous) they differ"
+        )
+
+
+# ----------------------------------------------------------------------
+# The table with units in its cells, for pages.
+
+SUMMARY_COLUMNS = (
+    "controller",
+    "outcome",
+    "slip rate proved",
+    "worst found",
+    "run",
+    "slip error proved",
+    "worst found",
+    "run",
+    "pressure",
+)
+
+
+def summary_cells(rows: Sequence[Row]) -> list[tuple[str, ...]]:
+    """Cells under `SUMMARY_COLUMNS`."""
+
+    def shown(value: Number, unit: str) -> str:
+        return "–" if value is None else value.quantity(unit) if isinstance(value, Bound) else quantity(value, unit)
+
+    found = []
+    for row in rows:
+        numbers = [shown(value, "m/s") for value in row.slip_rate] + [shown(value, "m") for value in row.slip]
+        found.append((row.name, row.outcome, *numbers, _range(row)))
+    return found
+
+
+def _range(row: Row) -> str:
+    """Pressures of a row with one unit."""
+    if row.pressure is None:
+        return "–"
+    power = power_of(max(abs(float(end)) for end in row.pressure))
+    return f"{' … '.join(_cell(end, power, coarse=True) for end in row.pressure)} {PREFIXES[power]}Pa"
+
+
+# ----------------------------------------------------------------------
+# The summary on a terminal of 80 columns.
+
+
+_LEGEND = "worst: worst error found by falsification; pressure: proved range, or the run's"
+
+
+def summary_lines(said: Summary) -> list[str]:
+    """Lines of at most 80 characters."""
+    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), _LEGEND, ""]
+    lines += wrap(said.conditions, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    for note in said.notes:
+        lines += wrap(note, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return lines
+
+
+def _table(rows: Sequence[Row]) -> list[str]:
+    rates, slips = (_scale([getattr(row, name) for row in rows]) for name in ("slip_rate", "slip"))
+    power = power_of(max((abs(float(end)) for row in rows if row.pressure for end in row.pressure), default=0.0))
+    wide = sum(_NUMBERS)
+    heads = (f"slip rate [{PREFIXES[rates]}m/s]", f"slip error [{PREFIXES[slips]}m]", "pressure")
+    first = f"{'':{_NAME + _OUTCOME}}{heads[0]:>{wide}}{heads[1]:>{wide}}{heads[2]:>{_PRESSURE}}"
+    columns = "".join(f"{head:>{width}}" for head, width in zip(("proved", "worst", "run"), _NUMBERS, strict=True))
+    second = f"{'controller':{_NAME}}{'outcome':{_OUTCOME}}{columns}{columns}{f'[{PREFIXES[power]}Pa]':>{_PRESSURE}}"
+    lines = [first, second]
+    for row in rows:
+        ends = "–" if row.pressure is None else " … ".join(_cell(end, power, coarse=True) for end in row.pressure)
+        numbers = _cells(row.slip_rate, rates, "m/s") + _cells(row.slip, slips, "m")
+        if len(row.name) >= _NAME:
+            lines.append(row.name)
+        name = row.name if len(row.name) < _NAME else ""
+        lines.append(f"{name:{_NAME}}{row.outcome:{_OUTCOME}}{numbers}{ends:>{_PRESSURE}}")
+    return [line.rstrip() for line in lines]
+
+
+def _scale(groups: Sequence[Sequence[Number]]) -> int:
+    """Power of ten that suits what is proved, or else what was seen under control."""
+    proved = [float(group[0]) for group in groups if group[0] is not None]
+    seen = [float(group[2]) for group in groups[1:] if group[2] is not None]
+    return power_of(max(proved, default=max(seen, default=0.0)))
+
+
+def _cells(group: Sequence[Number], power: int, unit: str) -> str:
+    """Three cells; where one would be too wide, its number alone, with its unit."""
+    shown = [_cell(value, power) for value in group]
+    if any(len(cell) >= width for cell, width in zip(shown, _NUMBERS, strict=True)):
+        known = [value for value in group if value is not None]
+        return f"{', '.join(quantity(float(value), unit) for value in known):>{sum(_NUMBERS)}}"
+    return "".join(f"{cell:>{width}}" for cell, width in zip(shown, _NUMBERS, strict=True))
+
+
+def _cell(value: Number, power: int, *, coarse: bool = False) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, Bound):
+        return plain(float(format(type(value)(value / type(value)(10) ** power), ".3g")))
+    return plain(round(value / 10.0**power, 3) if coarse else value / 10.0**power)

@@ -1,0 +1,152 @@
+"""The summary of a comparison: what is said first, in 40 lines of 80 characters, with numbers on their outer side."""
+
+from fractions import Fraction
+from types import SimpleNamespace
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.exact import UpperBound
+from quakedesign.report.summary import Row, Summary, summary, summary_lines
+from quakedesign.text import plain, power_of, quantity
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (0.0745, "74.5 mm/s"),
+        (1.8e-4, "180 µm/s"),
+        (0.001, "1 mm/s"),
+        (9.996e-4, "1 mm/s"),
+        (0.0, "0 m/s"),
+        (-14.29e6, "-14.3 Mm/s"),
+        (3e-14, "0.03 pm/s"),
+        (5e12, "5000 Gm/s"),
+    ],
+)
+def test_a_measured_number_has_an_engineering_prefix(value, shown):
+    assert quantity(value, "m/s") == shown
+
+
+def test_a_number_keeps_its_significant_digits_without_a_power_of_ten():
+    assert [plain(v) for v in (123456.0, 0.012345, -0.0)] == ["123000", "0.0123", "0"]
+    assert [power_of(v) for v in (1.0, 999.0, 1000.0, 0.999, -2e-6)] == [0, 0, 3, -3, -6]
+
+
+def made(**changes):
+    rows = (
+        Row(name="uncontrolled", outcome="earthquake", slip_rate=(None, None, 0.369), slip=(None,) * 3, pressure=None),
+        Row(
+            name="e-LQR",
+            outcome="tracked",
+            slip_rate=(UpperBound(Fraction(14801, 10**12)), 1.37e-8, 1.17e-8),
+            slip=(UpperBound(Fraction(1, 3 * 10**5)), 1.3e-6, 6.4e-7),
+            pressure=(-1.19e5, 1.81e6),
+        ),
+        Row(
+            name="a law with a long name",
+            outcome="slow slip",
+            slip_rate=(None, None, 2e-8),
+            slip=(None, None, None),
+            pressure=(-0.8e6, 0.2),
+        ),
+    )
+    parts = {"answer": "f: guaranteed", "rows": rows, "conditions": "e-LQR, proved: " + "from rest " * 20, "notes": ()}
+    return Summary(**(parts | changes))
+
+
+def test_the_table_has_proved_bounds_rounded_up_beside_the_worst_found_and_the_run():
+    lines = summary_lines(made())
+    heads, columns, natural, law, name, other, legend = lines[2:9]
+    assert heads.split() == ["slip", "rate", "[nm/s]", "slip", "error", "[µm]", "pressure"]
+    assert columns.split() == ["controller", "outcome", *["proved", "worst", "run"] * 2, "[MPa]"]
+    assert natural.split() == ["uncontrolled", "earthquake", "369", "mm/s", "–", "–", "–", "–"]
+    assert law.split() == ["e-LQR", "tracked", "14.9", "13.7", "11.7", "3.34", "1.3", "0.64", "-0.119", "…", "1.81"]
+    assert name == "a law with a long name"
+    assert other.split() == ["slow", "slip", "–", "–", "20", "–", "–", "–", "-0.8", "…", "0"]
+    assert "falsification" in legend
+    assert max(map(len, lines)) <= 80
+
+
+def test_without_a_proof_the_scale_is_that_of_the_runs():
+    rows = (
+        Row(name="uncontrolled", outcome="creep", slip_rate=(None, None, 5.0), slip=(None,) * 3, pressure=None),
+        Row(name="x", outcome="tracked", slip_rate=(None, None, 3e-6), slip=(None, None, 2e-9), pressure=None),
+    )
+    assert summary_lines(made(rows=rows))[2].split() == ["slip", "rate", "[µm/s]", "slip", "error", "[nm]", "pressure"]
+
+
+def entry(label, peak=None, slip=None, *, compensation=None, origin="designed"):
+    claims = SimpleNamespace(slip_error=slip and UpperBound(slip))
+    found = peak and SimpleNamespace(
+        peak_slip_rate=UpperBound(peak), claims=claims, sentence=lambda: f"the sentence of {label}"
+    )
+    outcome = SimpleNamespace(kind="tracked", peak_slip_rate=1e-6)
+    run = SimpleNamespace(outcome=outcome, metrics=SimpleNamespace(max_slip_error=1e-7), pressure=None)
+    worst = SimpleNamespace(slip_error=1e-6, slip_rate_error=2e-6)
+    answer = SimpleNamespace(
+        worst=worst if found else None,
+        compensation=compensation,
+        lines=lambda: [f"none: the reason of {label}"],
+        limit_lines=lambda: ["no controller does better"],
+    )
+    design = SimpleNamespace(
+        title=label.split(" ")[0], other_step=None, verdict="undecided", premises=(), conditions=(), details={}
+    )
+    named = {"label": label, "origin": origin, "guaranteed": found or None, "answer": answer, "run": run}
+    return SimpleNamespace(**named, design=design, held=None, growth_per_step=None, peaks={})
+
+
+def compared(monkeypatch, *entries, natural="earthquake"):
+    monkeypatch.setattr("quakedesign.report.summary.pressure_extremes", lambda run: (-1e6, 2e6))
+    outcome = SimpleNamespace(kind=natural, peak_slip_rate=0.01)
+    return SimpleNamespace(
+        fault=SimpleNamespace(name="mine", source="a paper", assumed=("a well",)),
+        uncontrolled=SimpleNamespace(outcome=outcome),
+        of=lambda origin: tuple(e for e in entries if e.origin == origin),
+        left_out={},
+    )
+
+
+def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthquake(monkeypatch):
+    said = summary(
+        compared(monkeypatch, entry("A (designed)", "3e-4", "1e-5"), entry("B (designed)", "1/7000", "2e-5"))
+    )
+    assert said.answer == (
+        "mine: guaranteed. With the B (designed) the slip rate never exceeds 143 µm/s (1.5 % of the natural "
+        "earthquake's 10 mm/s), and the slip stays within 20 µm of the reference"
+    )
+    assert said.conditions == "B (designed), proved: the sentence of B (designed)"
+    assert said.notes == ("assumed: a well", "no controller does better")
+    stable = summary(compared(monkeypatch, entry("A (designed)", 3e-4, 1e-5), natural="creep"))
+    assert "earthquake" not in stable.answer
+
+
+def test_without_a_guarantee_each_reason_is_given(monkeypatch):
+    said = summary(compared(monkeypatch, entry("A (designed)"), entry("B (designed)")))
+    assert said.answer == "mine: no guarantee for any designed controller"
+    assert said.conditions.split("; ") == [
+        "A (designed): none: the reason of A (designed)",
+        "B (designed): none: the reason of B (designed)",
+    ]
+
+
+def test_a_design_without_a_guarantee_beside_one_that_has_it_is_named(monkeypatch):
+    said = summary(compared(monkeypatch, entry("A (designed)", 3e-4, 1e-5), entry("B (designed)")))
+    assert "B (designed): undecided" in said.notes
+
+
+def test_two_sliding_modes_with_the_same_bounds_say_why(monkeypatch):
+    one, other = (entry(f"{name} (designed)", 3e-4, 1e-5, compensation="c") for name in ("2-CTA", "2-DIA"))
+    other.guaranteed.claims = one.guaranteed.claims
+    assert any("2-CTA and 2-DIA coincide" in note for note in summary(compared(monkeypatch, one, other)).notes)
+    other.guaranteed.claims = SimpleNamespace(slip_error=UpperBound(1))
+    assert not any("coincide" in note for note in summary(compared(monkeypatch, one, other)).notes)
+
+
+@pytest.mark.slow
+def test_the_summary_of_a_fault_fits_a_screen():
+    comparison = qd.compare(qd.load_fault("lab-fault"), [qd.design(qd.load_fault("lab-fault"), "elqr")])
+    lines = summary_lines(summary(comparison))
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= 80
