@@ -4,6 +4,7 @@ from dataclasses import replace
 from fractions import Fraction as F
 
 import numpy as np
+import pytest
 
 import quakedesign as qd
 from quakedesign.laws import published
@@ -16,6 +17,7 @@ LAB = qd.load_fault("lab-fault")
 GOOD = published("lab-fault")["elqr"]
 
 
+@pytest.mark.slow
 def test_good_gains_have_every_certificate():
     found = analysis(LAB, GOOD)
     assert found.verdict is Verdict.PROVED

@@ -407,6 +407,7 @@ def is_law(node):
     return re.fullmatch(r".*fault\.friction(\.exact\(\))?", ast.unparse(node)) is not None
 
 
+@pytest.mark.slow
 def test_proofs_use_confirmed_bounds_of_friction_only():
     """What a law declares is checked against its expression by `friction_bounds`; no proof reads it elsewhere."""
     files = [path for path in SOURCES if room(module_name(path)) in PROVING]

@@ -423,7 +423,7 @@ identify {none.csv;short.toml}
 """
 
 
-@pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.slow)])
 def test_each_command_of_a_long_process_prints_one_document_or_one_line(count, workplace):
     """Commands that are answered and refused, in turn: none leaves a stream or a handler to the next."""
     (workplace / "broken.toml").write_bytes(b"[material\n\xff")

@@ -49,6 +49,7 @@ def test_a_scheme_is_refused_for_laws_of_samples_which_run_as_they_were_designed
     assert "--scheme needs --continuous" in err
 
 
+@pytest.mark.slow
 def test_designs_are_compared_in_the_scheme_asked_for(short, capsys):
     asked = ("--continuous", "--scheme", "compensated")
     code, out, _ = run(capsys, "compare", str(short), "--controller", "elqr", *asked, "--json")

@@ -43,6 +43,7 @@ def call(capsys):
     return run
 
 
+@pytest.mark.slow
 def test_a_designed_loop_with_its_file(call, tmp_path):
     path = tmp_path / "loop.json"
     code, out, _ = call("real-fault", "--json", "--out", str(path))

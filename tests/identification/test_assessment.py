@@ -131,6 +131,7 @@ def estimate_between(low, high):
     return ParameterEstimate(name="a - b", unit="", value=value, low=low, high=high, least=low, most=high)
 
 
+@pytest.mark.slow
 def test_a_law_that_leaves_a_peak_is_said_not_to_explain():
     """Friction with a second, slower and negative effect, of which the fit knows nothing."""
     plain = step()

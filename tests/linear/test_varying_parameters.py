@@ -181,6 +181,7 @@ def test_one_v_proves_and_breaks_when_a_number_changes():
     assert delay_proof(LAB_PROBLEM, LAB_GAINS, 2 * STEP) is None
 
 
+@pytest.mark.slow
 def test_a_v_that_depends_on_the_clock_proves_and_breaks_when_a_number_changes():
     found = clock_proof(LAB_PROBLEM, LAB_GAINS, (STEP, F("0.6e-3")), degree=4)
     assert found.holds(LAB_PROBLEM, LAB_GAINS)

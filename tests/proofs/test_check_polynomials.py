@@ -818,7 +818,7 @@ def test_a_changed_monomial_is_refused_or_changes_the_statement(make, most):
     assert False in outcomes
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=settings.default.max_examples, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_any_change_of_any_entry_is_refused_or_visible_and_true(data):
     make = data.draw(st.sampled_from(ALL))

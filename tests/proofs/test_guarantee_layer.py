@@ -76,6 +76,7 @@ def test_both_have_the_same_loop_in_every_part_of_a_slow_gain(monkeypatch):
     assert asked == expected
 
 
+@pytest.mark.slow
 def test_both_prove_a_loop_through_rock_and_refuse_what_does_not_follow(monkeypatch):
     """Gains are found once for all claims: they depend on none."""
     kept, find = [], checker.slow_gains

@@ -53,6 +53,7 @@ def package_refuses(document):
     return claim.check() is not Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_both_prove_the_stored_file_and_say_the_same_entries():
     found = CHECK.check(PATH.read_text())
     claim = read_guarantee(stored())

@@ -45,6 +45,7 @@ def test_answers_are_told_in_lines_and_numbers():
     assert answer.to_dict()["blocks"][0]["verdict"] == "undecided"
 
 
+@pytest.mark.slow
 def test_the_balance_of_blocks_under_one_well_stays_within_its_bounds():
     """Balances of random piecewise linear friction laws of the box, by Newton's method, beside what is derived."""
     blocks = 3

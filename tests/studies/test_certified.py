@@ -52,6 +52,7 @@ def test_the_largest_range_is_told_as_a_range(maximize):
     assert answer.certificate.loop.uncertain["beta"] == (low, high)
 
 
+@pytest.mark.slow
 def test_the_decay_comes_with_a_settling_time():
     answer = certified("super-twisting", ("1.5", "1.1"), lipschitz="0.5", maximize="decay")
     told = answer.facts["settling"]

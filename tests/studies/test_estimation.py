@@ -84,6 +84,7 @@ def test_the_acceleration_is_the_larger_of_both_plants_and_the_divergence_the_fi
     assert largest_acceleration(LAB, LAW, scheme="explicit", step=1e-4) == (4.5, 2.0)
 
 
+@pytest.mark.slow
 def test_the_premise_is_the_joint_condition_with_that_acceleration():
     seen = sensor(1e-4, Measurement(slip_noise=1e-7), 100.0, 0)
     found = differentiator_premise(LAB, LAW, seen)

@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.report.plain import export_lines
@@ -11,6 +13,7 @@ LAB = load_fault("lab-fault")
 LAW = published("lab-fault")["cta"]
 
 
+@pytest.mark.slow
 def test_files_facts_and_the_premise_of_the_differentiator_are_told(tmp_path):
     answer = export_answer(LAB, LAW, tmp_path / "c", scheme="implicit", differentiator_bound=1e4)
     assert answer["measurement"] == {"slip": "m"}

@@ -109,6 +109,7 @@ def test_the_natural_earthquake_takes_the_printed_time_with_the_printed_numbers_
     assert replace(PRINTED, critical_slip=8e-3).response() == (0, 0)
 
 
+@pytest.mark.slow
 def test_what_is_printed_ends_in_an_earthquake_within_seconds():
     problem = PRINTED.problem(published("lab-fault")["cta"], 0, duration=4.0)
     run = problem.trajectory(problem.sample(1), 200)

@@ -26,12 +26,14 @@ def report(kept):
     return sampling_report(OWN, LINEAR, schemes=("implicit", "explicit"), duration=0.2)
 
 
+@pytest.mark.slow
 def test_every_scheme_has_a_row_and_every_question_a_study(report):
     assert [row.scheme for row in report.rows] == ["implicit", "explicit"]
     assert list(report.studies) == ["slip_noise", "rate_noise", "input_gain"]
     assert {len(row_cells(row)) for row in report.rows} == {len(COLUMNS)}
 
 
+@pytest.mark.slow
 def test_json_holds_all_of_it(report):
     found = json.loads(json.dumps(report.to_dict(), allow_nan=False))
     assert set(found) == {"fault", "schemes", "orders", "slip_noise", "rate_noise", "input_gain"}
@@ -43,6 +45,7 @@ def test_json_holds_all_of_it(report):
     assert len(found["input_gain"]["levels"]) == 3
 
 
+@pytest.mark.slow
 def test_the_folder_and_the_terminal_show_it(report, tmp_path):
     from quakedesign.cli.app import console as terminal
 

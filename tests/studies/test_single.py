@@ -86,6 +86,7 @@ def test_the_natural_earthquake_takes_no_options(more, named):
         told(None, **more)
 
 
+@pytest.mark.slow
 def test_a_differentiator_comes_with_its_premise():
     law = chosen_controller(LAB, "cta", ("published",))
     found = {}
@@ -135,6 +136,7 @@ def test_the_bound_of_a_proved_design_is_that_of_its_certificate():
     assert certified_bound(SimpleNamespace(controller=law, certificate="any", verdict=Verdict.UNDECIDED)) is None
 
 
+@pytest.mark.slow
 def test_a_scheme_is_tuned_as_its_guarantee_says():
     """Weight and B0 change the run as they do in a scheme that is set by hand."""
     law = published("lab-fault")["cta"]

@@ -59,7 +59,7 @@ def exact(expression, at):
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=2 * settings.default.max_examples, deadline=None)
 @given(expressions, intervals, intervals, shares, shares)
 def test_an_enclosure_contains_every_value(expression, first, second, along, across):
     box = {x: first, y: second}

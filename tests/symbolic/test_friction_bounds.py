@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import pytest
 import sympy as sp
+from thinned import few
 
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import FrictionLaw, friction_laws, load_fault
@@ -129,7 +130,7 @@ UNPROVED = {
 }
 
 
-@pytest.mark.parametrize(("function", "message"), UNPROVED.values(), ids=UNPROVED)
+@few(("function", "message"), UNPROVED.values(), ids=UNPROVED, every=3)
 def test_what_cannot_be_enclosed_is_not_proved(function, message):
     with pytest.raises((UnsupportedError, ParameterError), match=message):
         friction_bounds(shape((0.3, 0.6, 150, 0))(function)())
@@ -215,6 +216,7 @@ def test_a_state_adds_its_own_slope_to_that_of_slip(declared):
         assert found.weakens
 
 
+@pytest.mark.slow
 def test_an_arsinh_of_a_state_is_taken_by_its_logarithm():
     """Of arsinh(v·e^{1000m})/1000, m′ = −v·m with m from 1/4 to 1/2: between m and m + log(6)/1000, slope at most m."""
 

@@ -9,6 +9,7 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from thinned import few
 
 from quakedesign.errors import UnsupportedError
 from quakedesign.symbolic import AbsolutePower, SignedPower
@@ -99,7 +100,7 @@ ends = st.tuples(st.fractions(-3, 3, max_denominator=5), st.fractions(0, 3, max_
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=2 * settings.default.max_examples, deadline=None)
 @given(expressions, ends, st.booleans(), st.integers(0, 12), st.integers(0, 12))
 def test_an_interval_contains_every_value(expression, first, unbounded, i, j):
     """The oracle evaluates at points, 40 digits long; on a half-line far out too."""
@@ -198,7 +199,7 @@ def test_functions_that_run_one_way_on_each_side_of_zero_have_their_hull(express
         assert is_hull(interval(expression, {x: box}), hull(FUNCTIONS[expression], box))
 
 
-@pytest.mark.parametrize(
+@few(
     ("expression", "function"),
     [
         (x + y, lambda a, b: a + b),
@@ -208,6 +209,7 @@ def test_functions_that_run_one_way_on_each_side_of_zero_have_their_hull(express
         (x * y + x, lambda a, b: a * b + a),
     ],
     ids=("sum", "product", "larger", "smaller", "both"),
+    every=3,
 )
 def test_pairs_of_intervals_have_their_hull(expression, function):
     """For x·y + x the enclosure is that of the sum of two hulls."""

@@ -2,6 +2,7 @@
 
 import json
 
+import pytest
 import sympy as sp
 
 from quakedesign.symbolic import plant
@@ -9,6 +10,7 @@ from quakedesign.symbolic import plant as kept
 from quakedesign.symbolic import rate_and_state_plant as state_plant
 
 
+@pytest.mark.slow
 def test_every_entry_is_derived_again():
     assert kept.derived_again() == kept.FILE.read_text(encoding="utf-8")
 

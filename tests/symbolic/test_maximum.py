@@ -55,6 +55,7 @@ def test_what_is_not_defined_has_no_limit(expression, ends):
     assert isinstance(found, Excess | Undecided)
 
 
+@pytest.mark.slow
 def test_a_half_line_without_an_enclosure_is_left_undecided():
     found = upper_limit(sp.sin(x) * x - x, {x: (F(0), inf)}, F(0), F(0))
     assert isinstance(found, Undecided)

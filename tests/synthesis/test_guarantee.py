@@ -12,6 +12,15 @@ REAL = qd.load_fault("real-fault")
 GAINS = ("6.96e8", "2.53e8", "6.02e8", "2.16e8")
 
 
+def test_texts_with_units_are_the_exact_numbers_of_a_setup():
+    told = {"step": "100 ms", "lag": "8 ms", "slip_noise": "0.1 um", "rate_noise": 1e-7}
+    setup = LoopSetup(saturation="20 MPa", withdrawal="15e6", **told)
+    same = {"step": F(1, 10), "lag": F(1, 125), "slip_noise": F(1, 10**7), "rate_noise": F(1, 10**7)}
+    assert setup == LoopSetup(saturation=2 * 10**7, withdrawal=F(15 * 10**6), **same)
+    assert (setup.pump.least, setup.pump.largest) == (-15 * 10**6, 20 * 10**6)
+
+
+@pytest.mark.slow
 def test_texts_with_units_are_the_exact_numbers_of_an_answer():
     told = {"step": "100 ms", "lag": "8 ms", "slip_noise": "0.1 um", "rate_noise": 1e-7}
     found = qd.guarantee(REAL, gains=GAINS, saturation="20 MPa", withdrawal="15e6", **told).found

@@ -13,6 +13,7 @@ import control
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.checking import check_files
@@ -87,7 +88,7 @@ def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
     assert found.to_dict()["notes"] == list(LAW.notes)
 
 
-@pytest.mark.parametrize("name", ["found", "referred"])
+@few("name", ["found", "referred"], every=2)
 def test_both_checkers_decide_the_file_and_refuse_a_tighter_claim(name, request, tmp_path):
     claim = request.getfixturevalue(name).found
     path = tmp_path / "law.json"
@@ -114,6 +115,7 @@ def leaves(value, way=()):
         yield way
 
 
+@pytest.mark.slow
 def test_every_number_of_the_law_is_bound_by_what_is_printed(referred, proof_check):
     """A law of another digit is refused or stated otherwise: the entries that are printed tell them apart."""
     document = guarantee_document(referred.found)
@@ -215,6 +217,7 @@ def test_an_independent_run_with_adverse_disturbances_stays_inside(found):
     assert reached[1] > 0.5 * float(claims.slip_rate_error)  # the runs are no idle ones
 
 
+@pytest.mark.slow
 def test_none_names_what_fails():
     weak = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([1e8, 1e8, 1e7], step="0.184"))
     assert not weak.proved
@@ -258,6 +261,7 @@ def test_friction_with_a_state_has_no_guarantee_of_a_user_s_law():
         qd.guarantee(qd.load_fault("crustal-patch"), law=LAW)
 
 
+@pytest.mark.slow
 def test_a_law_is_compared_and_assessed_in_its_setup():
     designed = qd.assess(REAL, LAW, qd.LoopSetup(delay="20 ms"))
     assert str(designed.verdict) == "proved"
@@ -284,6 +288,7 @@ def test_the_command_line_takes_the_file_of_a_law(tmp_path, capsys):
     assert run("guarantee", "real-fault", "--law", tmp_path / "none.json") == 2
 
 
+@pytest.mark.slow
 def test_every_snippet_of_the_page_runs(tmp_path, monkeypatch, capsys):
     page = (Path(__file__).parents[2] / "docs" / "howto" / "own_controller.md").read_text(encoding="utf-8")
     assert len(page.split()) < 600

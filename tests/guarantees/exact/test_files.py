@@ -312,9 +312,7 @@ WORSE += [
 ]
 
 
-@pytest.mark.parametrize(
-    ("loop", "place", "factor"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else ""
-)
+@few(("loop", "place", "factor"), WORSE, ids=lambda v: "-".join(map(str, v)) if isinstance(v, tuple) else "", every=3)
 def test_worse_data_under_the_same_claims_are_refused_by_both(loop, place, factor):
     raw = json.loads(guarantee_text(claim(loop)))
     holder = raw

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.checking import check_files
@@ -170,6 +171,7 @@ def test_an_independent_run_with_adverse_disturbances_stays_inside(proved):
     assert largest[0] >= 0.2 * claims[0]  # the runs are no idle ones
 
 
+@pytest.mark.slow
 def test_norms_are_those_of_another_discretisation():
     """Sums of |impulse responses| by matrix exponentials in steps of a 64th of a period, from below."""
     _, _, _, found = None, None, None, qd.guarantee(bearing()[0], gains=bearing()[1], step="0.001", delay="0.0003")
@@ -265,7 +267,7 @@ def broken(document, way, value):
     document[way[-1]] = value
 
 
-@pytest.mark.parametrize(
+@few(
     ("way", "value"),
     [
         (("pieces",), 0),
@@ -285,6 +287,7 @@ def broken(document, way, value):
         (("claims", "output_3"), "1"),
         (("more",), "1"),
     ],
+    every=3,
 )
 def test_a_file_that_breaks_a_rule_is_refused_by_both(way, value, checker):
     plant, K = bearing()
@@ -446,7 +449,7 @@ def friction_run(found, law, blocks, one, seed):
     return largest
 
 
-@pytest.mark.parametrize("wells", ["each", "one"])
+@few("wells", ["each", "one"], every=2)
 def test_several_blocks_stay_inside_and_both_checkers_decide(wells, checker):
     plant = qd.UncertainPlant.from_blocks(REAL, 2, wells=wells)
     found = qd.guarantee(plant, step="0.184")

@@ -246,6 +246,7 @@ def test_each_map_is_decided(proof, kind, reason):
     assert reason in stick_slip_guarantee(proof.task, proof.held, replace(proof.reach, **{kind: lines})).reason
 
 
+@pytest.mark.slow
 def test_a_vertex_of_dependent_constraints_is_left_out(proof, bounds):
     more = tuple((*line, (0, 0, 0)) for line in proof.reach.sliding)
     assert stick_slip_bounds(proof.task, proof.held, replace(proof.reach, sliding=more)) == bounds

@@ -48,6 +48,7 @@ def premises(design):
     return {p.name: p for p in design.premises}
 
 
+@pytest.mark.slow
 def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     design = designed("real")
     found = design.guarantee

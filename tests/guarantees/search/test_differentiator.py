@@ -69,6 +69,7 @@ def test_no_course_leaves_what_is_proved_nor_what_the_differentiator_can_follow(
     assert np.abs(np.diff(slips, 3, axis=0)).max() + 8 * float(row[1]) <= most
 
 
+@pytest.mark.slow
 def test_the_acceleration_is_what_all_claims_allow_at_once():
     claim = designed(("peak", NOISE))
     held, claims, task = attacker.numbers(claim), claim.claims, claim.task

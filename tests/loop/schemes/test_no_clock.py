@@ -112,6 +112,7 @@ def test_grains_never_reach_beyond_the_longest_interval():
     assert F("1.2963") - F(1, 100) < F(drawn.longest, drawn.shortest) <= F("1.2963")
 
 
+@pytest.mark.slow
 def test_a_run_says_its_intervals_and_what_is_exported_that_a_clock_calls_it():
     assert [seen().provenance[f"{end}_interval"] for end in ("shortest", "longest")] == [0.001, 0.002]
     assert any("to be called by a clock, once every 0.001 s" in line for line in remarks_of(claim().controller))

@@ -75,6 +75,7 @@ def verdicts(text, standalone):
 NUMBER = re.compile(r'(?<=")-?\d+(?:/\d+)?(?=")|(?<=[\[,:])-?\d+(?=[\],}])')
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_changed_number_is_refused_or_a_changed_true_claim(texts, standalone, data):

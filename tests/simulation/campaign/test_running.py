@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.errors import OutputError, ParameterError, SimulationError
 from quakedesign.fault import load_fault
@@ -287,7 +288,7 @@ def test_a_batch_that_fails_leaves_the_others(tmp_path):
     assert (nothing.results, nothing.search) == ((None,), None)
 
 
-@pytest.mark.parametrize("wanted", ["max_slip_error", "peak_slip_rate"])
+@few("wanted", ["max_slip_error", "peak_slip_rate"], every=2)
 def test_a_search_begins_at_the_worst_sample_and_passes_over_failures(tmp_path, monkeypatch, wanted):
     calm = replace(PROBLEM, setting=replace(PROBLEM.setting, steps=20, settled_from=0.0))
     asked, lost = [], calm.sample(30)
