@@ -318,7 +318,7 @@ def hold(folder: Path, *, make: bool = False) -> bool:
 
 
 def release(folder: Path | None = None) -> None:
-    """Let others write a folder; every one, unless told."""
+    """Let others write a folder; every one, by default."""
     for place in list(_held) if folder is None else {Path(os.path.realpath(folder))} & _held.keys():
         unlock(*_held.pop(place))
 

@@ -120,7 +120,7 @@ def _hanging(text: str) -> str:
 
 
 def console(**options: Any) -> Console:
-    """Console for people, on stdout unless told; every string is one line of text, a long one several."""
+    """Console for people, on stdout by default; every string is one line of text, a long one several."""
     return _Screen(quiet=_quiet.get(), markup=False, emoji=False, highlight=False, soft_wrap=True, **options)
 
 

@@ -45,7 +45,7 @@ _IDEAL = SetupOptions()
 def guarantee(
     fault: FaultName,
     /,
-    *more: Annotated[FaultName, Parameter(help="Further faults, of which the same is asked.")],
+    *more: Annotated[FaultName, Parameter(help="Further faults with the same options.")],
     controller: str = "elqr",
     objective: Literal["tracking", "peak"] = "tracking",
     gains: Gains = (),

@@ -777,7 +777,7 @@ class SpreadOptions:
 
 
 def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
-    """Spread and stress of a campaign with the law of a certificate: all that it is proved for unless told.
+    """Spread and stress of a campaign with the law of a certificate: all that it is proved for by default.
 
     Raises
     ------
@@ -798,7 +798,7 @@ def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
 
 
 def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """The law of a certificate around its fault, under a sine of all the stress that it is proved for unless told.
+    """The law of a certificate around its fault, under a sine of all the stress that it is proved for by default.
 
     The reading is off by at most the noise of the certificate: the nearest multiple of twice that.
     """

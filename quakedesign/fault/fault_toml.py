@@ -316,7 +316,7 @@ def _target(fault: Fault, assumed: list[str]) -> float:
     if not slip > 0:
         why = "friction with a state has none" if math.isnan(slip) else _why_stable(fault)
         raise ScenarioError(
-            f"task.target_slip must be given, because it is the next rest slip unless told, and {why}. "
+            f"task.target_slip must be given, because its default is the next rest slip, and {why}. "
             "Received nothing. Add [task] with target_slip."
         )
     target = _cut(slip)
@@ -332,7 +332,7 @@ def _step(fault: Fault, task: Reference, assumed: list[str]) -> float:
     pace = max(fault.natural_frequency, _growth(fault))
     step = _cut(min(1 / (SAMPLES * pace), task.operation_time / _SHARE), digits=2)
     assumed.append(
-        f"{_STEP} {step:g} s, at least {SAMPLES:g} samples while an error grows e-fold or it swings by 1 rad"
+        f"{_STEP} {step:g} s, at least {SAMPLES:g} samples while an error grows e-fold or oscillates by 1 rad"
     )
     return step
 

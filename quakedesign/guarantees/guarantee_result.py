@@ -159,8 +159,8 @@ class LoopAnswer:
         if bound is None:
             return []
         return [
-            "told by the implicit differentiator of the slip error, n_d = 2 with any n_f, from rest: with lambda_d of "
-            f"{bound:.3g} m/s^3 or more it is (3x - 4x_1 + x_2)/(2 T_s) of the last three readings, for ever"
+            "slip rate by the implicit differentiator of the slip error, n_d = 2 with any n_f, from rest: for lambda_d "
+            f"of {bound:.3g} m/s^3 or more it is (3x - 4x_1 + x_2)/(2 T_s) of the last three readings, for all t >= 0"
         ]
 
     def _at_rest(self) -> list[str]:

@@ -67,7 +67,7 @@ class Experiment(ABC):
         """Derivatives of `friction`, shape (samples, coordinates)."""
 
     def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
-        """What a noise of friction [-] means for what was taken for granted; nothing unless told."""
+        """What a noise of friction [-] means for what was taken for granted; nothing by default."""
         return ()
 
     def best_law(self, fitted: "np.ndarray") -> FrictionLaw:

@@ -206,7 +206,7 @@ def fit(
     seed : int
         Of the draw of the starts.
     counts : ndarray, optional
-        Of how many measurements every sample is the mean; of one unless told.
+        Of how many measurements every sample is the mean; of one by default.
     near : ndarray, optional
         Where to start first.
     search : FitSearch, optional

@@ -300,7 +300,7 @@ def identify(
         raise RecordError(f"states must be 1 or 2. Received {states}. Take 2 where one does not explain the record.")
     if isinstance(record, Record):
         if normal_stress is not None:
-            raise RecordError("normal_stress goes with a file. Received it beside a Record. Put it into the record.")
+            raise RecordError("normal_stress is for a file. Received it with a Record. Put it into the record.")
         found = record
     else:
         found = read_record(record, normal_stress=normal_stress)

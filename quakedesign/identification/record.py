@@ -78,7 +78,7 @@ class Record:
     normal_unit : str
         ``"Pa"``, ``"N"`` or nothing.
     counts : ndarray or None
-        Of how many measurements every sample is the mean; of one unless told.
+        Of how many measurements every sample is the mean; of one by default.
     load_rates : ndarray or None
         Rates of the load point from each sample on [m/s], where these were recorded in place of its displacement.
     remarks : tuple of str

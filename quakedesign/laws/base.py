@@ -34,7 +34,7 @@ class Signals:
     integrals : tuple of Expr
         The law's own states ξ.
     reference_acceleration : Expr
-        r'' [m/s²]; zero unless told, as for a reference at rest.
+        r'' [m/s²]; zero by default, as for a reference at rest.
     """
 
     slip: sp.Expr
@@ -59,7 +59,7 @@ class Sampling:
         Numbers of the scheme by name, in its own units.
     delay, lag, diffusion : Fraction
         From measurement to valve, time constant of the pump and L²/D of the rock [s] for which it is meant: between law
-        and fault in every run, and in `loop_transfer`, unless told.
+        and fault in every run, and in `loop_transfer`, by default.
     longest : Fraction
         By no clock: each sample comes T_s to this after the last [s], in `simulate`; 0 where a clock tells.
     """

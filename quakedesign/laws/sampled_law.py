@@ -28,7 +28,7 @@ MOST_STATES = 12
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class LinearLaw:
-    """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z from 0 unless told.
+    """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z from 0 by default.
 
     With an implicit root the law is linear but for w, the end of an implicit step from e1 and e2, and y = (e1, e2, w).
 

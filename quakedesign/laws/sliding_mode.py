@@ -38,7 +38,7 @@ class SlidingMode(Controller):
     divisor : Fraction
         μ0N̂0 of eq. ps [m²/kg].
     feedforward : FeedForward
-        What is added to ν from what is known of the plant; nothing unless told.
+        What is added to ν from what is known of the plant; nothing by default.
     sampling : Sampling, optional
         How it runs as a law of samples; None for the law in continuous time, which any scheme runs.
     """

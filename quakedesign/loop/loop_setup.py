@@ -74,8 +74,8 @@ class Pump:
         if self.limits is None or (self.limits[0] <= low and high <= self.limits[1]):
             return ""
         return (
-            f"pressures from {low.quantity('Pa')} to {high.quantity('Pa')} may be asked for, which a pump of "
-            f"{self._range()} cannot all hold"
+            f"pressures from {low.quantity('Pa')} to {high.quantity('Pa')} may be commanded, which a pump of "
+            f"{self._range()} cannot all supply"
         )
 
     def too_slow(self, step: UpperBound | None, time: Fraction) -> str:
@@ -84,7 +84,7 @@ class Pump:
             return ""
         most = "of any size" if step is None else f"of {step.quantity('Pa')}"
         return (
-            f"changes {most} from one sample to the next may be asked for, which a pump of "
+            f"changes {most} from one sample to the next may be commanded, which a pump of "
             f"{LowerBound(self.rate).quantity('Pa/s')} does not make in {LowerBound(time).quantity('s')}"
         )
 

@@ -64,7 +64,7 @@ def bar_look(entry: "Entry") -> dict[str, Any]:
 
 
 def figure(rows: int, height: float, columns: int = 1, *, sharex: Any = None, **more: Any) -> tuple[Any, Any]:
-    """Figure at printing size and its axes, shape (rows, columns); x is shared in a single column unless told."""
+    """Figure at printing size and its axes, shape (rows, columns); x is shared in a single column by default."""
     from matplotlib.figure import Figure
 
     drawing = Figure(figsize=(WIDTH, height), layout="constrained", dpi=200)

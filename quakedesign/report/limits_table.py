@@ -21,10 +21,10 @@ def limits_lines(limits: Limits) -> list[str]:
     """For people, within 80 columns."""
     task = limits.fault
     head = [
-        f"{task.name}: what no controller can do, beside what is proved of designs",
+        f"{task.name}: performance limits, and what designs are proved to reach",
         f"(box {task.box.name}, {limits.against}, T_s = {task.sampling_time:g} s)",
         "",
-        f"{'':24}{'impossible':>20}{'proved':>16}",
+        f"{'':24}{'infeasible':>20}{'proved':>16}",
     ]
     rows = [
         f"{limit.title:24}{_beyond(limit.impossible_beyond, limit.unit):>20}"
@@ -43,9 +43,9 @@ def _meaning(limits: Limits) -> list[str]:
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
     known = "even with slip, slip rate and disturbance known"
     if limits.told.noisy:
-        known = f"told no more than {limits.told.words()}"
+        known = f"measuring no more than {limits.told.words()}"
     told = [
-        "impossible for every controller, linear or not, for some friction of the box and some disturbance of the "
+        "infeasible for every controller, linear or not, for some friction of the box and some disturbance of the "
         "class amplitude, which may jump",
         f"slip-rate error: {known} up to the sample, if the slip error stays "
         f"{within}; slip rates may be negative, as in the guarantees",
@@ -57,22 +57,25 @@ def _meaning(limits: Limits) -> list[str]:
     return [
         *told,
         f"the others: withdrawal of at most {UpperBound(limits.withdrawal).quantity('Pa', 4)}, "
-        f"D = {float(limits.diffusivity):g} m^2/s; a constant push that begins after a sample makes the fault slip "
-        "until its friction is lost, even if the controller knows everything from the next sample on",
+        f"D = {float(limits.diffusivity):g} m^2/s; a constant disturbance that begins after a sample makes the fault "
+        "slip until its friction is lost, even if the controller knows everything from the next sample on",
     ]
 
 
 def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
     told = [
-        "impossible for every controller, linear or not, with the nominal fault linearised about slow sliding along "
+        "infeasible for every controller, linear or not, with the nominal fault linearised about slow sliding along "
         "its task, without inertia; of the fault itself it is true as far as that is",
         "slip-rate error: even with slip, slip rate, state and stress known up to the sample; the stress may jump",
     ]
     if limits.rock:
-        holds = "IMPOSSIBLE for every controller, in the same sense" if limits.beyond else "not shown to be impossible"
-        told.append(f"the well that was asked about, L^2/D = {float(limits.rock):.4g} s: {holds}")
+        holds = "INFEASIBLE for every controller, in the same sense" if limits.beyond else "not shown to be infeasible"
+        told.append(f"the given well, L^2/D = {float(limits.rock):.4g} s: {holds}")
     if limits.largest_step.impossible_beyond is None:
-        return [*told, "the others: none is known, since errors of this fault swing while they grow, or do not grow"]
+        return [
+            *told,
+            "the others: none is known, since errors of this fault oscillate while they grow, or do not grow",
+        ]
     return [
         *told,
         f"the others: pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference needs, "
@@ -97,7 +100,9 @@ def _undecided(limits: Limits) -> list[str]:
     proved = step.proved_up_to is not None and own <= step.proved_up_to
     if proved or step.impossible_beyond is None or own > step.impossible_beyond:
         return []
-    return [f"T_s = {limits.fault.sampling_time:g} s of this fault: neither proved of a design nor impossible"]
+    return [
+        f"T_s = {limits.fault.sampling_time:g} s of this fault: neither proved for a design nor shown to be infeasible"
+    ]
 
 
 def _beyond(bound: Bound | None, unit: str) -> str:
@@ -124,23 +129,23 @@ def limits_figure(limits: Limits) -> Any:
     if len(steps):
         top = 3 * max(natural or 0.0, *peaks)
         last = limits.largest_step.impossible_beyond
-        axis.fill_between(steps, peaks[0] / 3, peaks, color=_FORBIDDEN, lw=0, label="impossible for every controller")
+        axis.fill_between(steps, peaks[0] / 3, peaks, color=_FORBIDDEN, lw=0, label="infeasible for every controller")
         if last is not None:
             axis.axvspan(float(last), 2 * steps[-1], color=_FORBIDDEN, lw=0)
         if limits.told.noisy:
             exact = [float(peak) for _, peak in limits.smallest_peaks(told=False)]
             axis.fill_between(
-                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"and for those told {limits.told.words()}"
+                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"and with measurements of {limits.told.words()}"
             )
         axis.set(xlim=(steps[0], (1 if last is None else 2) * steps[-1]), ylim=(peaks[0] / 3, top))
     if limits.achieved:
         proved = [(float(step), float(error)) for step, error in limits.achieved]
-        axis.plot(*zip(*proved, strict=True), "o", color=_PROVED, label="proved of a designed controller")
+        axis.plot(*zip(*proved, strict=True), "o", color=_PROVED, label="proved for a designed controller")
     if natural:
         axis.axhline(natural, color=NATURAL, linestyle="--", linewidth=1, label="natural earthquake (slip rate)")
     axis.axvline(limits.fault.sampling_time, color="#777777", linewidth=0.8, linestyle=":", label="T_s of the fault")
     note = f"{limits.against.replace('^2', '²')}, box {limits.fault.box.name}"
-    return finish(drawing, f"{limits.fault.name}: what a held pressure can do", [], note, legend=axis)
+    return finish(drawing, f"{limits.fault.name}: limits with zero-order hold", [], note, legend=axis)
 
 
 def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:

@@ -327,8 +327,8 @@ CAPTIONS = {
     "sliding-errors": "How far slip and slip rate are from their references in that run.",
     "states": "Closed loop: slip and its reference on top, then the band that the slip rate of every law fills. The "
     "scale is linear near the reference rate and logarithmic beyond; dashed: the peak of the natural earthquake.",
-    "pressure": "Fluid pressure that every law asks for; below zero fluid is withdrawn.",
-    "errors": "How far slip and slip rate are from their references, the largest of every 40 kept samples. Lower is "
+    "pressure": "Fluid pressure that every law commands; below zero fluid is withdrawn.",
+    "errors": "How far slip and slip rate are from their references, the largest of every 40 stored samples. Lower is "
     "better.",
     "metrics": "Largest errors, root mean square and total variation of the pressure after a quarter of the task. "
     "Hatched: published gains.",
@@ -354,14 +354,14 @@ MODEL_LIMITS = (
 )
 REST_LIMITS = (
     "proofs are about the plant without stick, the linear continuation to negative slip rates; the worst case found "
-    "with stick is a lower bound that a search found on the stick–slip plant",
+    "on the stick–slip plant is a lower bound by falsification",
 )
 _WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "rock of L^2/D ="}
 SLIDING_LIMITS = (
     "the fault slides at the rate of its task from the start, and its far end rests: how it came to slide is not part "
     "of the run nor of the proof",
     "the stress disturbance of the run is a sine with the period of the largest tide, or a quarter of a short run, "
-    "which need not be the worst; what a search found stands beside the guarantee",
+    "which need not be the worst; the worst case found is reported with the guarantee",
 )
 
 

@@ -551,7 +551,7 @@ def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
         f"held over {answer['step']:.4g} s{path}{shaken}, for {lasting(answer['duration'])}; without control errors "
         f"grow by {answer['growth_rate']:.3g} 1/s",
         f"|ln(V/V_r)| at most {found['max_log_rate']:.3g}, slip error at most {found['max_slip_error']:.3g} m",
-        f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law asks for at most "
+        f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law commands at most "
         f"{found['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
         proved_line((answer["guarantee"] or {}).get("sentence"), answer["outside"])
         or "no guarantee: what is said was seen in this run",

@@ -78,7 +78,7 @@ def _whole(entry: "Entry") -> list[str]:
 
 _OF_SLIDING = (
     "; pressure over the measured slip error (k1) and slip rate (k2: not used), and over what the law predicts, "
-    "scaled: slip error, state of friction, modes of the rock's pressure, and the level of all that it does not know"
+    "scaled: slip error, state of friction, diffusion modes, and the level of the unknown disturbance"
 )
 
 
@@ -126,7 +126,7 @@ def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", 
         console.print(f"  {sentence}")
     if "longest_interval" in run.provenance:
         soonest, latest = (run.provenance[f"{end}_interval"] for end in ("shortest", "longest"))
-        console.print(f"  by no clock: each sample {soonest:.4g} s to {latest:.4g} s after the last, drawn anew")
+        console.print(f"  aperiodic sampling: each sample {soonest:.4g} s to {latest:.4g} s after the last, drawn anew")
     elif run.provenance["controller"] != "none" and run.provenance["step"] != fault.sampling_time:
         console.print(f"  steps of {run.provenance['step']:.4g} s, not the fault's T_s = {fault.sampling_time:g} s")
     numbers = run.metrics.to_dict()

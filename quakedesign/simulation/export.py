@@ -415,10 +415,10 @@ def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
     own = controller.sampling
     path = {"a delay of": own.delay, "a lag of": own.lag, "rock of L^2/D =": own.diffusion} if own else {}
     between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
-    behind = f"designed for {between} between its answer and the fault: the pressure is that to ask of the valve"
+    behind = f"designed for {between} between controller and fault: the pressure is that commanded at the valve"
     by_a_clock = (
-        f"to be called by a clock, once every {float(own.step):.6g} s, since the reference counts the calls: a case of "
-        "what is proved of samples by no clock"
+        f"to be called periodically, once every {float(own.step):.6g} s, since the reference counts the calls; "
+        "aperiodic sampling, for which it is proved, includes this"
         if own and own.longest
         else ""
     )

@@ -207,7 +207,7 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
     if ca.depends_on(later, unknown):  # r'', what r and r' will be, or B0
         raise UnsupportedError(
             "a system without a fault knows neither its input gain nor what comes next. Received a law for the scheme "
-            f"{sampling}, which asks for them. Use simulate, or export it."
+            f"{sampling}, which needs them. Use simulate, or export it."
         )
     used = [i for i in range(len(names)) if ca.depends_on(later, state[i]) and not ca.is_equal(later[i], state[i])]
     fixed = [i for i in range(len(names)) if i not in used]

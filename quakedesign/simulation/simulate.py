@@ -47,7 +47,7 @@ def simulate(
     initial_slip_rate: float = 0.0,
     tide: Tide | None = None,
 ) -> Trajectory:
-    """Simulate a fault under a controller, from rest unless told, with the fault's own disturbance and reference.
+    """Simulate a fault under a controller, from rest by default, with the fault's own disturbance and reference.
 
     A fault whose friction has a state starts in steady sliding at the mean rate of its task and is held there by a law
     of samples that is told the slip alone, as `design` gives it, in its own scheme and step; of what stands below it

@@ -144,7 +144,7 @@ class SpringSlider:
         return ca.Function("readings", [y, pressure], [friction, driving - (self.normal_stress - pressure) * friction])
 
     def start(self, at_rate: float, states: tuple[float, ...] | None = None, pressure: float = 0.0) -> list[float]:
-        """Vector y with the forces in balance at a rate [m/s] and a pressure [Pa], in its steady state unless told.
+        """Vector y with the forces in balance at a rate [m/s] and a pressure [Pa], in its steady state by default.
 
         Raises
         ------

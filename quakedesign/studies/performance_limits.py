@@ -42,8 +42,8 @@ from quakedesign.simulation.natural import natural_peak
 _POINTS = 24  # of the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
-TOLD = "all controllers, linear or not, that know the fault and are told up to the sample no more than {}"
-WAITING = "all controllers, linear or not, all-knowing from the first sample after the disturbance begins"
+TOLD = "all controllers, linear or not, that know the fault and measure, up to the sample, no more than {}"
+WAITING = "all controllers, linear or not, that know everything from the first sample after the disturbance begins"
 QUANTITIES = {
     "peak_slip_rate_error": ("slip-rate error", "m/s"),
     "largest_step": ("T_s", "s"),
@@ -467,8 +467,8 @@ def _sliding_limits(
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
         raise ParameterError(
-            "limits of slow sliding need a shear stress above 0 that pushes the fault. Received none, and no design "
-            f"was found that stands any{_why(answer)}. Give --stress, such as '25 kPa'."
+            "limits of slow sliding need a shear stress disturbance above 0. Received none, and no design was "
+            f"found that withstands any{_why(answer)}. Give --stress, such as '25 kPa'."
         )
     push = SlidingPush(model=model, amplitude=amplitude)
     farthest, rock = longest_diffusion(push, withdrawal, step), (told or IDEAL).diffusion

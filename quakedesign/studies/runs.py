@@ -856,7 +856,7 @@ def _natural(fault: Fault, settings: dict[str, Any], around: dict[str, Any]) -> 
     given += list(around)
     if given:
         raise ParameterError(
-            f"the natural earthquake is run as the fault asks for. Received {', '.join(given)}. "
+            f"the natural earthquake runs with the settings of the fault. Received {', '.join(given)}. "
             "Choose a controller, or give a duration."
         )
     return natural_earthquake(fault, plant=settings["plant"])

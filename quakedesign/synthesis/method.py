@@ -46,7 +46,7 @@ from quakedesign.plant import FaultPlant, uncertain_plant
 # What is asked of every family of laws, and what is answered of a law that belongs to none.
 
 Designed = TypeVar("Designed")
-MEMORYLESS = "laws of one's own are designed for friction of slip and slip rate alone"
+MEMORYLESS = "user-defined laws are designed for friction of slip and slip rate alone"
 L = TypeVar("L", bound=Controller)
 
 

@@ -116,7 +116,7 @@ def test_where_no_design_stands_a_stress_the_reason_is_told(capsys, monkeypatch)
     answer = SlidingAnswer(found=none, task=None, held=None)
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch") == 2
-    assert "no design was found that stands any: T_s near 0.51 s suits. Give --stress" in capsys.readouterr().err
+    assert "no design was found that withstands any: T_s near 0.51 s suits. Give --stress" in capsys.readouterr().err
 
 
 def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, monkeypatch, tmp_path):
@@ -128,7 +128,7 @@ def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, m
     answer = SlidingAnswer(found=known, task=known.task, held=known.held)
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run(str(file)) == 0
-    assert "errors of this fault swing while they grow, or do not grow" in " ".join(capsys.readouterr().out.split())
+    assert "errors of this fault oscillate while they grow, or do not grow" in " ".join(capsys.readouterr().out.split())
 
 
 def test_both_sides_are_of_the_stress_that_the_design_behind_the_well_stands(monkeypatch, capsys):
@@ -174,12 +174,12 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     near = {"diffusion": asked[0]["diffusion"]}
     assert near["diffusion"] == pytest.approx(800)  # D_c/(10 V)
     assert asked == [near, {"lag": 5, "diffusion": 800}, near, {"diffusion": 9}, near]
-    assert "L^2/D = 9 s: not shown to be impossible" in " ".join(capsys.readouterr().out.split())
+    assert "L^2/D = 9 s: not shown to be infeasible" in " ".join(capsys.readouterr().out.split())
     asked.clear()
     assert run(*patch, "--well", "100 km") == 0
     assert asked == [near]  # no design is looked for behind what is impossible
     told = " ".join(capsys.readouterr().out.split())
-    assert "L^2/D = 1e+10 s: IMPOSSIBLE for every controller" in told
+    assert "L^2/D = 1e+10 s: INFEASIBLE for every controller" in told
     assert f"proved: one design behind rock of L^2/D = {float(known.held.diffusion):.4g} s" in told
     assert set(spreads) == {0}
     assert run(*patch, "--diffusion", "9 s", "--spread", "0.01") == 0

@@ -109,7 +109,7 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     print_comparison(comparison, terminal(file=told, width=200))
     gains = next(line for line in told.getvalue().splitlines() if "gains: " in line)
     assert re.search(r"k1 = \S+ Pa/m, k2 = 0 Pa s/m, slip = \S+ Pa, ", gains)
-    assert "slip error, state of friction, modes of the rock's pressure" in " ".join(told.getvalue().split())
+    assert "slip error, state of friction, diffusion modes" in " ".join(told.getvalue().split())
 
 
 def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(comparison, monkeypatch):

@@ -96,7 +96,7 @@ def test_what_is_proved_of_the_slip_rate_is_the_better_of_both_objectives(design
 @pytest.mark.parametrize(("step", "said"), [(0.184, False), (5.0, True), (40.0, False)])
 def test_between_both_sides_it_says_that_neither_is_known(designs, step, said):
     lines = limits_lines(study(dataclasses.replace(REAL, sampling_time=step)))
-    assert (f"T_s = {step:g} s of this fault: neither proved of a design nor impossible" in lines) is said
+    assert (f"T_s = {step:g} s of this fault: neither proved for a design nor shown to be infeasible" in lines) is said
 
 
 def test_what_is_proved_of_t_s_delay_and_rock_is_what_the_searches_of_designs_find(designs):

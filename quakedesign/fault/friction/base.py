@@ -62,7 +62,7 @@ class FrictionLaw(ABC):
 
     @property
     def working_rates(self) -> tuple[float, float]:
-        """Slip rates [m/s] between which the bounds hold for `coefficient` itself; all of them unless told."""
+        """Slip rates [m/s] between which the bounds hold for `coefficient` itself; all of them by default."""
         return -math.inf, math.inf
 
     @property

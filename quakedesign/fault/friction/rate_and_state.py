@@ -48,7 +48,7 @@ class RateAndState(FrictionLaw):
         v_s and v_f [m/s], ends of the working range, 0 < v_s ≤ v_0 ≤ v_f.
     stress_sensitivity : float
         α [-], not negative: a change of the effective normal stress σ adds −(αθ/(bσ))σ' to θ' (Linker and Dieterich
-        1992, J. Geophys. Res. 97(B4), 4923); 0 unless told. The bounds below are for a constant σ.
+        1992, J. Geophys. Res. 97(B4), 4923); 0 by default. The bounds below are for a constant σ.
 
     Raises
     ------

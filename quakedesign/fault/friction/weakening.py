@@ -50,12 +50,12 @@ class Weakening(FrictionLaw):
 
     @property
     def slip_slope(self) -> float:
-        """Zero unless told: the law does not depend on the slip [1/m]."""
+        """Zero by default: the law does not depend on the slip [1/m]."""
         return 0
 
     @property
     def rate_slope(self) -> float:
-        """Zero unless told: the law does not depend on the slip rate [s/m]."""
+        """Zero by default: the law does not depend on the slip rate [s/m]."""
         return 0
 
 

@@ -345,7 +345,7 @@ def _sliding_task(raw: dict[str, Any]) -> SlidingPlant:
     swings = ("swing",) if isinstance(raw["reference"], dict) and "swing" in raw["reference"] else ()
     more |= {name: read_rational(fault[name]) for name in _ROCK}
     more |= read_exactly(raw["reference"], (*_SLIDING_REFERENCE, *swings))
-    need(not swings or more["swing"] > 0, "swing must be positive where it is told")
+    need(not swings or more["swing"] > 0, "swing must be positive where it is given")
     ranges = {name: read_ends(fault[name], name) for name in AXES}
     return SlidingPlant(name=_name(fault), ranges=ranges, stress=read_rational(raw["stress"]), **more)
 

@@ -323,7 +323,7 @@ def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from 
         kind = "without disturbance"
     pressures = [f"between {low.quantity('Pa')} and {high.quantity('Pa')}" for low, high in claims.pressures]
     largest = claims.largest_step
-    step = "" if largest is None else f", that asked for changes by at most {largest.quantity('Pa')} a sample"
+    step = "" if largest is None else f", commanded changes of at most {largest.quantity('Pa')} a sample"
     return (
         f"on the plant without stick, {start}, {when}, {kind}, for all friction and constant parameters of the box: "
         f"the slip rate never exceeds {claims.peak_slip_rate.quantity('m/s')}, the slip stays within "

@@ -353,7 +353,7 @@ class Sampled(Scheme, Decided):
         return ()
 
     def nominal(self, loop: Stepped) -> float:
-        """B0 [m²/kg] unless told: the smallest μN̂ of the fault's uncertainty box."""
+        """B0 [m²/kg] by default: the smallest μN̂ of the fault's uncertainty box."""
         return loop.fault.authority_range[0]
 
     def memory(self, loop: Stepped, step: float) -> dict[str, float]:

@@ -38,7 +38,7 @@ class Compensated(Sampled):
     weight : float
         a [-], in (0, 1].
     rest_width : float, optional
-        Of `RestLimit` [Pa]; no limit unless told.
+        Of `RestLimit` [Pa]; no limit by default.
     rest_per_slip, rest_resolution : float
         Of the same [Pa/m], [m].
     rest_least, rest_largest : float, optional
@@ -46,7 +46,7 @@ class Compensated(Sampled):
     rest_fastest : float
         Of the same [m].
     substeps, actuator, measurement, authority
-        As in `Sampled`; B0 is the geometric middle of the box unless told, so that β/β0 is as far from both limits.
+        As in `Sampled`; B0 is the geometric middle of the box by default, so that β/β0 is as far from both limits.
 
     Raises
     ------

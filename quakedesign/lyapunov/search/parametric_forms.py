@@ -83,7 +83,7 @@ def values_of(loop: Loop) -> dict[str, float]:
 
 
 def rows_of(loop: Loop, monomials: Sequence[Term], *, beside: bool = False) -> tuple[FormRow, ...]:
-    """Every different form of V, then of −V̇; two that differ in the V beside them alone are one unless told.
+    """Every different form of V, then of −V̇; two that differ in the V beside them alone are one by default.
 
     Raises
     ------

@@ -21,7 +21,7 @@ _left: ContextVar[int | None] = ContextVar("steps left", default=None)
 
 @contextmanager
 def limited(steps: int | None = None) -> Iterator[None]:
-    """Count the work inside, and refuse what is more than so many steps, `STEPS` unless told.
+    """Count the work inside, and refuse what is more than so many steps, `STEPS` by default.
 
     Raises
     ------

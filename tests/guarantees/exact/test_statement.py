@@ -153,7 +153,7 @@ def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     assert said.startswith(f"{where}, 0.02 s late, through a lag of 0.03 s, for every disturbance")
     assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith(f"{where}, for every")
     assert "never exceeds 286 mm/s, the slip stays within 334 mm of the reference" in said
-    assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa, that asked" in said
+    assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa, commanded" in said
 
 
 def test_a_law_runs_once_a_step_without_delay_and_lag_unless_it_has_an_implicit_root():
@@ -260,7 +260,7 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
     told = "hold over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s of when"
     assert told in said
-    assert "5.67 Pa, that asked for changes by at most 1.67 Pa a sample" in said
+    assert "5.67 Pa, commanded changes of at most 1.67 Pa a sample" in said
     late = Guarantee(task=TASK, held=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
     assert "with zero-order hold over 0.1 s, each pressure within 0.00666666 s of when it is due, for every" in late
     assert (held.noise, HELD.noise) == ({"slip_noise": 0, "rate_noise": 0}, {})

@@ -176,7 +176,7 @@ def test_campaigns_exports_and_python_control_run_it_as_simulate_does():
 def test_python_control_has_no_fault_to_take_an_input_gain_from():
     law = designed().controller
     bare = replace(law, gains=dict(law.gains), sampling=Sampling(step=STEP, scheme="compensated"))
-    with pytest.raises(UnsupportedError, match="asks for them"):
+    with pytest.raises(UnsupportedError, match="which needs them"):
         to_iosystem(bare)
 
 
