@@ -25,10 +25,11 @@ POLYNOMIALS = [p for p in FILES if p.stem.startswith("motzkin")]
 GUARANTEES = [p for p in FILES if p.stem.startswith("guarantee")]
 SLIDING = [p for p in FILES if p.stem.startswith("sliding")]
 STICKING = [p for p in FILES if p.stem.startswith("stick_slip")]
-LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES, *SLIDING, *STICKING)]
+PLANTS = [p for p in FILES if p.stem.startswith("uncertain_plant")]
+LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES, *SLIDING, *STICKING, *PLANTS)]
 each = pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 # a proof of each kind is checked by both elsewhere
-LONG = {"sliding_crustal-patch", "cta3_1_2_2_0.05_0.02_0.01", "stick_slip_real-fault"}
+LONG = {"sliding_crustal-patch", "cta3_1_2_2_0.05_0.02_0.01", "stick_slip_real-fault", "uncertain_plant_pendulum"}
 each_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda p: p.stem)
 
 # L̄ and [b_m, b_M] of every file; four 2-CTA sets are those of Torres-González et al. (2017) for L̄ = 1, the fifth and
@@ -60,6 +61,7 @@ def test_the_catalogue_is_complete():
     assert {p.stem for p in GUARANTEES} == {f"guarantee_{loop}" for loop in loops}
     assert {p.stem for p in SLIDING} == {"sliding_crustal-patch"}
     assert {p.stem for p in STICKING} == {"stick_slip_real-fault"}
+    assert {p.stem for p in PLANTS} == {"uncertain_plant_pendulum", "uncertain_plant_real-fault-2-blocks"}
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
 
 
@@ -78,7 +80,7 @@ def test_the_library_writes_the_same_bytes(path):
         assert polynomial_files.text(*polynomial_files.load(text)) == text
     elif path in GUARANTEES:
         assert guarantee_text(parse_guarantee(text)) == text
-    elif path in (*SLIDING, *STICKING):
+    elif path in (*SLIDING, *STICKING, *PLANTS):
         assert guarantee_text(parse_guarantee(text)) == text
     else:
         assert certificate_text(load_certificate(path)) == text

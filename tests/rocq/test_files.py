@@ -230,6 +230,7 @@ KINDS = {
     "guarantee_lab-fault": "a guarantee",
     "sliding_crustal-patch": "a slow_sliding",
     "stick_slip_real-fault": "a stick_slip",
+    "uncertain_plant_pendulum": "a uncertain_plant",
 }
 
 

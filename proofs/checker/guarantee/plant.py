@@ -17,6 +17,7 @@ from .reading import Row, entries, keys, lower, matrix, need, number, row, upper
 MOST, MOST_LAW, MOST_LOOP, MOST_PIECES, MOST_PERIODS = 40, 48, 96, 64, 8
 AT_ONCE, LEFT, FAINT = 8, 1024, 60  # periods in columns, share that is left of sums, bits by which none is 0
 MOST_WORK = 12 * 10**8
+BEYOND = 64  # times as many periods as may be followed, within which the map of one that forgets is small
 SWEEPS = 8  # in which units are chosen
 COARSE, PLACE, HALF = 58, 128, 64  # bits of entries that are multiplied at once, and of the places of their products
 
@@ -379,6 +380,7 @@ class Sums:
         for _ in range(AT_ONCE.bit_length() - 1):
             leap = leap * leap
         known, height, done, until = rows, len(rows.rows), 0, AT_ONCE
+        require_fading(leap, height * self.size * (len(now.rows[0]) + self.size))
         totals, free = [[0] * len(widths) for _ in rows.rows], [0] * height
         while True:
             work = until * height * self.size * (len(now.rows[0]) + self.size)
@@ -512,6 +514,15 @@ def raised(part: list[int]) -> list[int]:
     """Bounds of which none is 0."""
     faint = (max(part) >> FAINT) + 1
     return [v + faint for v in part]
+
+
+def require_fading(leap: Fixed, work: int) -> None:
+    """Refuse a map of some periods none of whose powers is small, far beyond those that are followed."""
+    power, periods = leap, AT_ONCE
+    while max(map(max, power.size().rows)) >> BITS:
+        need(periods * work <= BEYOND * MOST_WORK, "the nominal loop must be stable, and forget its past soon")
+        need(max(map(max, power.size().rows)) >> BITS + 80 == 0, "the nominal loop must be stable")
+        power, periods = power * power, 2 * periods
 
 
 def fades(far: Fixed, part: list[int]) -> bool:

@@ -4,6 +4,7 @@ Chapters: the loop in exact matrices; L1 norms of all outputs for all inputs at 
 """
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
@@ -193,9 +194,10 @@ def solved(rows: Sequence[Sequence[Fraction]], unknowns: int) -> Row:
 # rows: with P_k = rows·Ψᵏ the sums of |P_k·columns| over k < K are formed, and what is left is bounded by x with
 # y + |Ψᴷ|x ≤ x, y those sums for unit rows.
 
-_BITS = 256
+_BITS = (128, 256)  # of the balls; more where fewer do not show that the loop forgets
 _AT_ONCE = 8  # periods
 _MOST_WORK = 12 * 10**8
+_BEYOND = 64  # times as many periods as may be followed, within which the map of one that forgets is small
 _LEFT = Fraction(1, 1024)
 _ROOM = Fraction((1 << 20) + 1, 1 << 20)
 _FAINT = Fraction(1, 1 << 60)
@@ -218,7 +220,11 @@ def response_bounds(loop: PlantLoop, pieces: int) -> ResponseBounds:
     ParameterError
         When the loop is not found to be stable, or takes too long.
     """
-    with ctx.workprec(_BITS):
+    *few, most = _BITS
+    for bits in few:
+        with ctx.workprec(bits), suppress(ParameterError):
+            return _AllResponses(loop, pieces).bounds()
+    with ctx.workprec(most):
         return _AllResponses(loop, pieces).bounds()
 
 
@@ -324,6 +330,7 @@ class _AllResponses:
         for _ in range(_AT_ONCE - 1):
             turned.append(period * turned[-1])
         leap, check, done = period**_AT_ONCE, _AT_ONCE, 0
+        _require_fading(leap, height * size * (width + size))
         while True:
             if check * height * size * (width + size) > _MOST_WORK:
                 raise _unstable()
@@ -426,6 +433,15 @@ def _bounded(far: Any, part: list[Any]) -> list[Any]:
     if not all(a + b <= x for a, b, x in zip(part, later, found, strict=True)):
         raise _unstable()
     return found
+
+
+def _require_fading(leap: Any, work: int) -> None:
+    """Reject a map of some periods none of whose powers is small, far beyond those that are followed."""
+    power, periods = leap, _AT_ONCE
+    while not all(v < 1 for v in absolute(power).entries()):
+        if periods * work > _BEYOND * _MOST_WORK or not all(v < 1 << 80 for v in absolute(power).entries()):
+            raise _unstable()
+        power, periods = power * power, 2 * periods
 
 
 def _unstable() -> ParameterError:
