@@ -60,3 +60,13 @@ const follow = () => { const part = location.hash && document.getElementById(loc
 addEventListener("hashchange", follow);
 addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
 follow();
+// Text to copy.
+for (const text of document.querySelectorAll("pre.copied")) {
+  const button = document.createElement("button");
+  button.textContent = "Copy";
+  button.onclick = async () => {
+    try { await navigator.clipboard.writeText(text.textContent); } catch { getSelection().selectAllChildren(text); document.execCommand("copy"); }
+    button.textContent = "Copied";
+  };
+  text.before(button);
+}

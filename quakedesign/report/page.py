@@ -9,7 +9,7 @@ import platform
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.resources import files
@@ -21,6 +21,7 @@ from markupsafe import Markup, escape
 from quakedesign.fault import Fault, fault_toml
 from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, WIDTHS
 from quakedesign.guarantees import SlidingGuarantee
+from quakedesign.laws import LinearLaw
 from quakedesign.lyapunov import Verdict
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
@@ -90,6 +91,7 @@ def mathml(latex: str, *, display: str = "block") -> Markup:
 # ----------------------------------------------------------------------
 # What the page tells of every controller: guarantee, run, limits, proof, each in sentences and rows.
 
+_SHOWN_STATES = 4  # of a law whose matrices are shown
 ASKED = {
     "sampling_time": "the pressure is renewed at least this often",
     "delay": "no more time passes from the measurement to the pressure",
@@ -119,6 +121,8 @@ class Account:
         Sentences without a full stop.
     law : list of Markup
         Equations with the numbers of the design.
+    python : list of str
+        Lines of the sampled linear law for python-control; none for others.
     gains : list of (str, str, Markup)
         Name, value, unit.
     premises, base_premises, known : list of tuple
@@ -135,6 +139,7 @@ class Account:
     verdict: list[str]
     proof: list[str]
     law: list[Markup]
+    python: list[str]
     gains: list[tuple[str, str, Markup]]
     premises: list[tuple[str, ...]]
     base_premises: list[tuple[str, ...]]
@@ -144,6 +149,17 @@ class Account:
 def accounts(comparison: "Compared") -> list[Account]:
     """Of all controllers, designed ones first."""
     return [_account(entry) for origin in ("designed", "published") for entry in comparison.of(origin)]
+
+
+def _cards(told: Iterable[Account]) -> list[Account]:
+    """Accounts; controllers of which everything is the same share one."""
+    cards: dict[tuple[Any, ...], Account] = {}
+    for one in told:
+        key = (tuple(one.guarantee), tuple(one.run), tuple(one.verdict))
+        known = cards.get(key) if one.guarantee else None
+        label = one.label if known is None else f"{known.label.removesuffix(' (designed)')}, {one.label}"
+        cards[key if one.guarantee else (one.label,)] = replace(one, label=label)
+    return list(cards.values())
 
 
 def _account(entry: "Entry") -> Account:
@@ -161,7 +177,8 @@ def _account(entry: "Entry") -> Account:
         limits=limits,
         verdict=beside_guarantee([sentence for sentence in sentences(entry) if sentence not in run], entry),
         proof=[*compensated, *_stepping(design.controller), *_slowly(entry), *domain],
-        law=[mathml(equation) for equation in law_latex(design.controller)],
+        law=[mathml(equation) for equation in law_latex(design.controller)] + _difference(entry),
+        python=_python(entry),
         gains=_gains(entry),
         premises=[_row(p) for p in design.conditions],
         base_premises=[_row(p) for p in design.premises if p not in design.conditions],
@@ -187,6 +204,47 @@ def _slowly(entry: "Entry") -> list[str]:
         "which stand in sectors on |y| ≤ Y, for inertia, whose fast mode is bounded, and for modes of the rock that "
         "the loop leaves out, bounded too; peaks of the responses of the linear loop bound all errors, and claims that "
         f"follow from themselves hold {found.lasts}; the box of constants falls into {cells}",
+    ]
+
+
+def _linear_law(entry: "Entry") -> "LinearLaw | None":
+    """The sampled linear law of a guarantee; None for laws with an implicit step, and without a guarantee."""
+    law = getattr(getattr(entry.guaranteed, "held", None), "law", None)
+    return law if isinstance(law, LinearLaw) and law.root is None else None
+
+
+def _difference(entry: "Entry") -> list[Markup]:
+    """A sampled linear law as a difference equation, four digits."""
+    law = _linear_law(entry)
+    if law is None or len(law.states) > _SHOWN_STATES:
+        return []
+
+    def matrix(rows: Iterable[Iterable[Any]]) -> str:
+        inner = r" \\ ".join(" & ".join(f"{float(v):.4g}" for v in row) for row in rows)
+        return rf"\begin{{bmatrix}} {inner} \end{{bmatrix}}"
+
+    return [
+        mathml(rf"z_{{k+1}} = {matrix(law.update)} z_k + {matrix(law.measured)} y_k"),
+        mathml(rf"p_k = {matrix([law.output])} z_k + {matrix([law.feedback])} y_k"),
+    ]
+
+
+def _python(entry: "Entry") -> list[str]:
+    """Lines for python-control."""
+    law = _linear_law(entry)
+    if law is None or entry.guaranteed is None:
+        return []
+    floats = [
+        [[float(v) for v in row] for row in rows] for rows in (law.update, law.measured, [law.output], [law.feedback])
+    ]
+    step = float(entry.guaranteed.held.step)
+    return [
+        "import control",
+        "",
+        f"law = control.ss(  # states: {', '.join(law.states)}",
+        *(f"    {matrix}," for matrix in floats),
+        f"    {step!r},",
+        ")",
     ]
 
 
@@ -386,6 +444,7 @@ def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Repro
             plant=[mathml(equation) for equation in plant_latex(comparison.fault)],
             **_tables(comparison),
             accounts=told,
+            cards=_cards(told),
             schemes=scheme_sentence(comparison),
             limits=_limits(comparison, told),
             known_columns=FEEDFORWARD_COLUMNS,

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
+import control
 import numpy as np
 import pytest
 import sympy as sp
@@ -18,6 +19,7 @@ import sympy as sp
 import quakedesign as qd
 from quakedesign.cli.app import command_line, typed
 from quakedesign.fault import parse_fault
+from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.report import page
 from quakedesign.report.drawing import FORMATS, figure, figure_bytes, inline_svg
 from quakedesign.report.page import ASKED, CAPTIONS, mathml, parameter_rows, reproduction, typeset, unit_html
@@ -25,6 +27,7 @@ from quakedesign.report.paper_figures import PAPER
 from quakedesign.studies.facts import law_latex, plant_latex
 
 FAULT = qd.load_fault("real-fault")
+PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
 
 
 @pytest.mark.parametrize(
@@ -192,3 +195,40 @@ def test_the_report_says_behind_what_its_runs_are():
     assert page._way(compared()) == page._way(compared(lag=F(0))) == "in these runs the pressure acts at once"
     found = page._way(compared(delay=F("0.15"), lag=F("0.03"), diffusion=F(2)))
     assert found == "in these runs the pressure comes behind a delay of 0.15 s, a lag of 0.03 s, rock of L^2/D = 2 s"
+
+
+def test_a_linear_law_is_shown_as_difference_equation_and_for_python_control():
+    """The text for python-control builds the law of the certificate, matrix by matrix."""
+    found = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
+    entry = SimpleNamespace(guaranteed=found)
+    names = {}
+    exec("\n".join(page._python(entry)), names)
+    law, own = names["law"], found.held.law
+    assert law.dt == float(found.held.step) == 0.184
+    for matrix, rows in ((law.A, own.update), (law.B, own.measured), (law.C, [own.output]), (law.D, [own.feedback])):
+        assert matrix.tolist() == [[float(v) for v in row] for row in rows]
+    assert isinstance(law, control.StateSpace)
+    equations = page._difference(entry)
+    assert len(equations) == 2
+    assert f"{float(own.feedback[0]):.4g}".split("e")[0].lstrip("-") in equations[1]
+    sliding = parse_guarantee((PROOFS / "guarantee_cta_real-fault.json").read_text())
+    implicit = SimpleNamespace(guaranteed=sliding)
+    assert page._python(implicit) == page._difference(implicit) == []
+    assert page._python(SimpleNamespace(guaranteed=None)) == []
+
+
+def test_controllers_of_which_everything_is_the_same_share_a_card():
+    empty = {"badge": "b", "good": True, "limits": [], "proof": [], "law": [], "python": [], "gains": []}
+    empty |= {"premises": [], "base_premises": [], "known": []}
+    made = [
+        page.Account(label=label, guarantee=guarantee, run=["r"], verdict=["v"], **empty)
+        for label, guarantee in [
+            ("A (designed)", ["g"]),
+            ("B (designed)", ["g"]),
+            ("C (designed)", ["h"]),
+            ("D (published)", []),
+            ("E (published)", []),
+        ]
+    ]
+    labels = ["A, B (designed)", "C (designed)", "D (published)", "E (published)"]
+    assert [card.label for card in page._cards(made)] == labels
