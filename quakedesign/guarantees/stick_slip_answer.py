@@ -69,6 +69,7 @@ class StickSlipAnswer:
             "worst_found": worst
             and {"slip_rate": worst.slip_rate, "slip_behind": worst.behind, "slip_ahead": worst.ahead},
             "step": str(self.found.held.step),
+            **{name: str(size) for name, size in self.found.held.noise.items()},
             "law": {name: str(getattr(law, name)) for name in GAIN_UNITS},
         }
 
@@ -87,7 +88,7 @@ def answer_stick_slip(
     fault : Fault
         Its friction depends on slip and slip rate alone.
     setup : LoopSetup
-        Only its sampling time may be given.
+        Only its sampling time and noise of the slip may be given.
     objective : str
         ``tracking`` or ``peak``.
     progress : callable, optional
@@ -96,11 +97,13 @@ def answer_stick_slip(
     Raises
     ------
     ParameterError
-        For a quantity of the setup other than the sampling time.
+        For another quantity of the setup.
     """
-    if unknown := setup.given().keys() - {"step"}:
+    if unknown := setup.given().keys() - {"step", "slip_noise"}:
         raise ParameterError(
-            f"a guarantee on the stick-slip plant is proved for exact measurements and a pressure that acts at once. "
+            "a guarantee on the stick-slip plant is proved for an exact slip rate, bounded noise of the slip and a "
+            "pressure that acts at once. "
+            f""
             f"Received {', '.join(sorted(unknown))}. Omit the quantity, or omit plant."
         )
     task = uncertain_plant(fault)
@@ -110,5 +113,5 @@ def answer_stick_slip(
         if progress is not None:
             progress(said, done)
 
-    found = design_stick_slip(task, step, objective=objective, tell=tell)
+    found = design_stick_slip(task, step, objective=objective, slip_noise=setup.slip_noise, tell=tell)
     return StickSlipAnswer(fault=fault, found=found, worst=worst_stick_slip(found) if found.proved else None)

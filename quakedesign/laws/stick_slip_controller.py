@@ -65,7 +65,8 @@ class StickSlipController(Controller):
         level, predicted, last_rate, last_slip = signals.integrals
         slip, rate = signals.slip, signals.slip_rate
         innovation = slip - last_slip - period * (last_rate + predicted) / 2
-        stopped = sp.Piecewise((sp.Max(innovation, -period * predicted / 2), rate <= 0), (innovation, True))
+        lowest = -period * predicted / 2 - to_sympy(law.rest_slip)
+        stopped = sp.Piecewise((sp.Max(innovation, lowest), rate <= 0), (innovation, True))
         level += to_sympy(law.level_gain) * (rate - predicted) + to_sympy(law.slip_gain) * stopped
         target = rate - signals.slip_rate_error - to_sympy(law.return_rate) * signals.slip_error
         pressure = -to_sympy(law.rate_gain) * rate + to_sympy(law.target_gain) * target - level

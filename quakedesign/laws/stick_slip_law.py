@@ -12,6 +12,7 @@ GAIN_UNITS = {
     "return_rate": "1/s",
     "level_gain": "Pa s/m",
     "slip_gain": "Pa/m",
+    "rest_slip": "m",
 }
 
 
@@ -23,13 +24,14 @@ class StickSlipLaw:
     measurements and the predicted slip rate of the sample before. Then
 
         i = x − x⁻ − T(y⁻ + v⁺⁻)/2,   D ← D + level_gain·(y − v⁺⁻) + slip_gain·i,
-        but max(i, −T·v⁺⁻/2) in place of i where y = 0,
+        but max(i, −T·v⁺⁻/2 − rest_slip) in place of i where y = 0,
         v = r′ − return_rate·e,   v⁺ = max(v, 0),
         p = −rate_gain·y + target_gain·v − D.
 
     v is the slip rate that the law wants at the next sample. The plant cannot slip backward, so v⁺ is the slip rate
     that it expects there. The innovation of the slip prevents that disturbances which turn within a period move the
     fault between samples at which it rests. At rest that innovation is cut off below: an early stop must not lower D.
+    Noise of the slip would add up in D at rest if rest_slip were less than twice its bound.
 
     Attributes
     ----------
@@ -41,6 +43,8 @@ class StickSlipLaw:
         [Pa·s/m], 0 or more.
     slip_gain : Fraction
         [Pa/m], 0 or more.
+    rest_slip : Fraction
+        [m], 0 or more: measured slips of a fault at rest may be as far apart; 0 for exact ones.
 
     Raises
     ------
@@ -53,6 +57,7 @@ class StickSlipLaw:
     return_rate: Fraction
     level_gain: Fraction
     slip_gain: Fraction
+    rest_slip: Fraction = Fraction(0)
 
     def __post_init__(self) -> None:
         for part in fields(self):

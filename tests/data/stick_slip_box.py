@@ -26,12 +26,15 @@ MULTIPLIERS = [
 ]
 
 
+NOISE = {False: {"rest_slip": "0", "slip_noise": "0"}, True: {"rest_slip": "1/40", "slip_noise": "1/90"}}
+
+
 def bases(cuts, more=()):
     """Vertices of a box of three sides: of e1 the two numbers in `cuts`."""
     return [[a, b, d, *more] for a in cuts for b in (1, len(FACETS)) for d in (2, 4)]
 
 
-def box():
+def box(noisy=False):
     """The file; its constraints are 11 facets, y >= 0, the ends of the slice, then at rest slip >= 0 and others."""
     many = len(FACETS)
     cuts = ((3, many + 1), (many + 1, many + 2), (0, many + 1))
@@ -54,7 +57,7 @@ def box():
             "reference": {"shape": ["0", "0", "3", "-2"], "target_slip": "3/2", "operation_time": "9"},
             "disturbance": {"amplitude": "1/8", "growths": {"slip": "1/60", "rate": "-1/90"}},
             "loop": {"step": "1/2", "rate_gain": "2", "target_gain": "3", "return_rate": "9/5",
-                     "level_gain": "5/4", "slip_gain": "3/2"},
+                     "level_gain": "5/4", "slip_gain": "3/2", **NOISE[noisy]},
             "set": {
                 "facets": FACETS,
                 "multipliers": MULTIPLIERS,

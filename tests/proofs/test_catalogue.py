@@ -60,7 +60,7 @@ def test_the_catalogue_is_complete():
     loops = {"real-fault", "lab-fault", "cta_real-fault", "late_real-fault", "no-clock_lab-fault"}
     assert {p.stem for p in GUARANTEES} == {f"guarantee_{loop}" for loop in loops}
     assert {p.stem for p in SLIDING} == {"sliding_crustal-patch"}
-    assert {p.stem for p in STICKING} == {"stick_slip_real-fault"}
+    assert {p.stem for p in STICKING} == {"stick_slip_real-fault", "stick_slip_noise_real-fault"}
     assert {p.stem for p in PLANTS} == {"uncertain_plant_pendulum", "uncertain_plant_real-fault-2-blocks"}
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}
 

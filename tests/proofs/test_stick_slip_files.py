@@ -54,6 +54,23 @@ def package_refuses(document):
 
 
 @pytest.mark.slow
+def test_both_prove_the_file_with_noise_and_refuse_more_of_it():
+    path = PATH.with_name("stick_slip_noise_real-fault.json")
+    found, document = CHECK.check(path.read_text()), json.loads(path.read_text())
+    assert found.verdict == "proved"
+    said = "\n".join(found.statement)
+    assert "slip measured within 1e-06 m, slip rate exactly" in said
+    assert "never exceeds 0.000192" in said
+    more = changed(document, *((("loop", name), times("3/2")) for name in ("slip_noise", "rest_slip")))
+    assert refused(more, "facet")
+    assert package_refuses(more)
+    other = changed(document, (("loop", "rest_slip"), times("11/10")))  # another law, which is told to be another
+    assert CHECK.check(json.dumps(other)).statement != found.statement
+    for name in CLAIMS:
+        assert refused(changed(document, (("claims", name), times("99/100"))), f"claim {name} must follow")
+
+
+@pytest.mark.slow
 def test_both_prove_the_stored_file_and_say_the_same_entries():
     found = CHECK.check(PATH.read_text())
     claim = read_guarantee(stored())
@@ -183,6 +200,9 @@ FORMS = [
     ((("loop", "return_rate"), "-1"), "step, rate, target and return gains must be > 0"),
     ((("loop", "level_gain"), "-1"), "level_gain and slip_gain must be >= 0"),
     ((("loop", "slip_gain"), "-1"), "level_gain and slip_gain must be >= 0"),
+    ((("loop", "rest_slip"), "-1"), "slip_noise must be from 0 to half of rest_slip"),
+    ((("loop",), lambda old: old | {"slip_noise": "51/100", "rest_slip": "1"}), "slip_noise must be from 0"),
+    ((("loop",), lambda old: old | {"slip_noise": "-1/9", "rest_slip": "1"}), "slip_noise must be from 0"),
 ]
 
 
@@ -246,6 +266,19 @@ def test_the_disturbance_must_outweigh_the_range_of_the_input_gain():
     period.verify()
     period.push = period.push[0], F(10**9)
     with pytest.raises(CHECK.Refused, match="outweigh the range of the input gain"):
+        period.verify()
+
+
+@pytest.mark.parametrize(("sign", "noise", "holds"), [(1, 49, True), (1, 51, False), (-1, 99, True), (-1, 101, False)])
+def test_the_set_must_hold_the_loop_at_first(sign, noise, holds):
+    """Facets (e1 + d/m)·10^4, which e1 = N and d = mN raise to 2·10^4·N, and (e1 - d/m)·10^4, which d = 0 leaves."""
+    period = period_of(stored())
+    period.sliding, period.resting = lambda *_: iter(()), list
+    period.law.slip_noise = F(noise, 10**6)
+    period.reach.facets, period.reach.multipliers = [[F(10**4), F(0), sign * 10**4 / period.law.slip]], [[F(0)] * 5]
+    if holds:
+        return period.verify()
+    with pytest.raises(CHECK.Refused, match="hold the loop at first"):
         period.verify()
 
 

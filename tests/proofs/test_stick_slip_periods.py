@@ -16,9 +16,12 @@ ONE = float(STICK.ONE)
 COURSES, STEPS = 3000, 400
 
 
+NOISY = pytest.mark.parametrize("noisy", [False, True], ids=["exact", "noisy"])
+
+
 @cache
-def period():
-    return period_of(box())
+def period(noisy=False):
+    return period_of(box(noisy))
 
 
 def switching(random, low, high, often):
@@ -28,28 +31,37 @@ def switching(random, low, high, often):
     return low + (high - low) * at
 
 
+def noise(random, size):
+    """Errors within a bound, many of them as large as it."""
+    share = np.where(random.random(COURSES) < 0.7, random.choice([-1, 1], COURSES), random.uniform(-1, 1, COURSES))
+    return size * share
+
+
 @cache
-def courses(seed):
+def courses(seed, noisy=False):
     """One period each of many plants: state, slice and target rate before, state after, slip, and how it ended."""
-    p, random = period(), np.random.default_rng(seed)
-    law = {name: float(getattr(p.law, name)) for name in ("step", "rate", "target", "back", "level", "slip")}
+    p, random = period(noisy), np.random.default_rng(seed)
+    names = ("step", "rate", "target", "back", "level", "slip", "rest_slip", "slip_noise")
+    law = {name: float(getattr(p.law, name)) for name in names}
     b, beta1, force = float(p.task.b), float(p.task.beta[1]), float(p.force)
     corner = random.integers(0, 2, (3, COURSES)) + 0.0
     share = np.where(random.random((3, COURSES)) < 0.5, corner, random.random((3, COURSES)))
     e1 = -float(p.behind) + share[0] * float(p.behind + p.ahead)
     e1 = np.where(random.random(COURSES) < 0.2, random.uniform(0, 0.15, COURSES), e1)
     y, d = share[1] * float(p.peak), (2 * share[2] - 1) * float(p.level)
-    turn, rate = float(p.rate / p.law.back), float(p.rate)
+    off, later = (noise(random, law["slip_noise"]) for _ in range(2))
+    turn, rate = float(p.rate / p.law.back), float(p.task.reference_rate)
     place = np.where(e1 <= 0, 0, np.where(e1 <= turn, 1, 2))
     # r' at an end of its range, where v changes its sign, and where the reference may just have come to rest
     way = random.integers(0, 4, COURSES)
-    r = np.select([way == 0, way == 1, (way == 2) & (place == 1)], [0.0, rate, law["back"] * e1], 0.0)
+    r = np.select([way == 0, way == 1, (way == 2) & (place == 1)], [0.0, rate, np.clip(law["back"] * e1, 0, rate)], 0.0)
     kink = (way == 3) & (law["step"] * float(p.bend) / 2 <= rate)
     r = np.where(kink, law["step"] * float(p.bend) / 2, r)
     late = float(p.bend) * law["step"] ** 2 / 2 * random.choice([-1, 1], COURSES)
     moved = np.maximum(law["step"] * r + np.where(kink, -abs(late), late), 0)
-    v = r - law["back"] * e1
-    push = d + law["rate"] * y - law["target"] * v
+    v = r - law["back"] * (e1 - law["slip_noise"] + off)
+    level = d + law["slip"] * off
+    push = level + law["rate"] * y - law["target"] * v
     beta = np.where(random.random(COURSES) < 0.7, random.choice([1, beta1], COURSES), random.uniform(1, beta1, COURSES))
     chord = random.choice([float(c) for c in p.chord], COURSES)
     slope = switching(random, *map(float, p.slope), 1.0)
@@ -63,13 +75,15 @@ def courses(seed):
         slip, pull, rate_now = slip + step, pull + slope[k] * step, after
     rests = (rate_now == 0) & (pull < -force)
     predicted = np.maximum(v, 0)
-    innovation = slip - law["step"] * (y + predicted) / 2
-    innovation = np.where(rate_now == 0, np.maximum(innovation, -law["step"] * predicted / 2), innovation)
+    innovation = slip + later - off - law["step"] * (y + predicted) / 2
+    lowest = -law["step"] * predicted / 2 - law["rest_slip"]
+    innovation = np.where(rate_now == 0, np.maximum(innovation, lowest), innovation)
+    level = level + law["level"] * (rate_now - predicted) + law["slip"] * innovation
     sigma = chord / b / beta
     after = np.array([
         e1 + slip - moved,
         rate_now,
-        d + law["level"] * (rate_now - predicted) + law["slip"] * innovation - sigma * slip,
+        level - law["slip"] * later - sigma * slip,
     ])  # fmt: skip
     return np.array([e1, y, d]), place, v, after, slip, rests
 
@@ -92,8 +106,9 @@ SLACK = 2e-4  # of the integration, in units of a facet
 
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("facet", range(11))
-def test_no_plant_that_slides_is_beyond_its_bound(facet, seed):
-    p, (before, place, _, after, _, rests) = period(), courses(seed)
+@NOISY
+def test_no_plant_that_slides_is_beyond_its_bound(facet, seed, noisy):
+    p, (before, place, _, after, _, rests) = period(noisy), courses(seed, noisy)
     row, given = p.reach.facets[facet], p.reach.multipliers[facet]
     reached = np.array([float(n) for n in row]) @ after
     nearest = []
@@ -109,12 +124,13 @@ def test_no_plant_that_slides_is_beyond_its_bound(facet, seed):
         over = (reached - bound)[mine]
         assert over.max() <= SLACK
         nearest.append(over.max())
-    assert max(nearest) > -0.04  # as sharp as that
+    assert max(nearest) > (-0.2 if noisy else -0.04)  # as sharp as that
 
 
 @pytest.mark.parametrize("facet", range(11))
-def test_no_plant_that_ends_at_rest_is_beyond_its_bound(facet):
-    p, (before, place, v, after, slip, rests) = period(), courses(3)
+@NOISY
+def test_no_plant_that_ends_at_rest_is_beyond_its_bound(facet, noisy):
+    p, (before, place, v, after, slip, rests) = period(noisy), courses(3, noisy)
     row, given = p.reach.facets[facet], p.reach.multipliers[facet]
     reached = np.array([float(n) for n in row]) @ after
     points = np.vstack([before, slip])
@@ -134,10 +150,10 @@ def test_no_plant_that_ends_at_rest_is_beyond_its_bound(facet):
 
 
 @cache
-def packages():
+def packages(noisy=False):
     """What every facet becomes by the package's functions, by slice or combination and whether the cut-off counts."""
-    claim = read_guarantee(box())
-    task, held, reach, own = claim.task, claim.held, claim.reach, period()
+    claim = read_guarantee(box(noisy))
+    task, held, reach, own = claim.task, claim.held, claim.reach, period(noisy)
     found = package.ranges(task, reach.box[0] + task.reference_rates[0] * held.step, own.push, reach.box[1] * held.step)
     given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
     functions = defaultdict(list)
@@ -156,10 +172,11 @@ def most(listed, points):
 
 
 @pytest.mark.parametrize("facet", range(11))
-def test_no_plant_is_beyond_the_bounds_of_the_package(facet):
-    functions, row = packages(), period().reach.facets[facet]
+@NOISY
+def test_no_plant_is_beyond_the_bounds_of_the_package(facet, noisy):
+    functions, row = packages(noisy), period(noisy).reach.facets[facet]
     for seed in (1, 2, 3):
-        before, place, v, after, slip, rests = courses(seed)
+        before, place, v, after, slip, rests = courses(seed, noisy)
         reached = np.array([float(n) for n in row]) @ after
         for one in range(3):
             bound = most(functions[one, facet, False], before)
@@ -173,9 +190,8 @@ def test_no_plant_is_beyond_the_bounds_of_the_package(facet):
             assert (reached - bound)[mine].max(initial=-1.0) <= SLACK
 
 
-def by_formula(facet, given, chord, beta, pair):
-    """F, what multiplies y and what multiplies H, without a cut-off, as FORMAT.md writes them, in floats."""
-    p = period()
+def by_formula(p, facet, given, chord, beta, pair):
+    """F, what multiplies y, what multiplies H and what noise adds, without a cut-off, as FORMAT.md writes them."""
     step, level, slip = (float(v) for v in (p.law.step, p.law.level, p.law.slip))
     (s, ds), (w, dw) = ((float(low + high) / 2, float(high - low) / 2) for low, high in (p.slope, p.damping))
     steep = float(p.slope[1])
@@ -204,36 +220,37 @@ def by_formula(facet, given, chord, beta, pair):
     whole = [np.trapezoid(v, times) for v in (x_of, y_of)]
     pushed = -b * beta * (m1 * whole[0] + m2 * whole[1] + of_force)
     by_rate = m1 * x_of[-1] + m2 * y_of[-1] - n3 * slip * step / 2 + of_y + off * (x_of[-1] + lone_y)
-    return pushed, by_rate, area + of_force + off * (whole[0] + lone_force)
+    noise = abs(pushed) * slip * float(p.law.slip_noise)
+    return pushed, by_rate, area + of_force + off * (whole[0] + lone_force), noise
 
 
 @pytest.mark.parametrize("facet", range(11))
-def test_bounds_of_a_slide_are_those_that_are_written(facet):
+@NOISY
+def test_bounds_of_a_slide_are_those_that_are_written(facet, noisy):
     """In the slice where the fault is behind, at r' = 0, where v is -return_rate times the slip error."""
-    p = period()
+    p = period(noisy)
     row, given = p.reach.facets[facet], p.reach.multipliers[facet]
     found = [function for place, function in p.sliding(row, given, cut=False) if place == 0][::2]
     pair = [float(beta) for beta in p.task.beta]
-    wanted = [by_formula(row, given, float(chord), beta, pair) for chord in p.chord for beta in pair]
-    for function, (pushed, by_rate, by_force) in zip(found, wanted, strict=True):
+    wanted = [by_formula(p, row, given, float(chord), beta, pair) for chord in p.chord for beta in pair]
+    for function, (pushed, by_rate, by_force, noise) in zip(found, wanted, strict=True):
         values_of = [number(v) for v in function.more]
         size = 1e-3 * (abs(pushed) + abs(by_rate) + 0.01)
         assert values_of[2] == pytest.approx(pushed, abs=size)
         assert values_of[1] == pytest.approx(by_rate + pushed * float(p.law.rate), abs=3 * size)
-        still = (
-            float(p.law.step * p.bend)
-            / 2
-            * max(0, -float(p.law.target) * pushed - float(row[2] * (p.law.level + p.law.slip * p.law.step / 2)))
+        still = float(p.law.step * p.bend / 2 + 2 * p.law.back * p.law.slip_noise) * max(
+            0, -float(p.law.target) * pushed - float(row[2] * (p.law.level + p.law.slip * p.law.step / 2))
         )
         late = 0 if row[0] <= 0 else still
-        assert number(function.beside) == pytest.approx(by_force * float(p.force) + late, abs=size)
+        assert number(function.beside) == pytest.approx(by_force * float(p.force) + noise + late, abs=size)
 
 
 @pytest.mark.parametrize("cut", [False, True])
 @pytest.mark.parametrize("facet", range(11))
-def test_both_checkers_bound_a_slide_alike(facet, cut):
+@NOISY
+def test_both_checkers_bound_a_slide_alike(facet, cut, noisy):
     """The same functions on every slice: two programs, written apart, with the numbers of one format."""
-    p = period()
+    p = period(noisy)
     own = [
         (
             [float(v) + number(m) for v, m in zip(f.row, f.more, strict=True)],
@@ -244,10 +261,24 @@ def test_both_checkers_bound_a_slide_alike(facet, cut):
     ]
     for place in range(3):
         mine = [(row, constant) for row, constant, at in own if at == place]
-        theirs = packages()[place, facet, cut]
+        theirs = packages(noisy)[place, facet, cut]
         if not theirs:  # the innovation is cut off only where that raises the facet
             assert cut
             assert p.reach.facets[facet][2] <= 0
             continue
         for (row, constant), (other, rest) in zip(sorted(mine), sorted(theirs), strict=True):
             assert [*row, constant] == pytest.approx([*other, rest], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("facet", range(11))
+@NOISY
+def test_both_checkers_bound_a_period_that_ends_at_rest_alike(facet, noisy):
+    """At corners of their variables, where the largest of all functions of a combination must agree."""
+    p, random = period(noisy), np.random.default_rng(5)
+    points = random.uniform(-1, 1, (4, 40))
+    points[[1, 3]] = abs(points[[1, 3]])
+    for least, (_, ends) in zip((0, 2, 4, 5), p.resting(), strict=True):
+        row, given = p.reach.facets[facet], p.reach.multipliers[facet]
+        own = values([f for end in ends for f in p.stopped(row, given, end)], points)
+        theirs = most(packages(noisy)[package.SLICES + least, facet, False], points)
+        assert own == pytest.approx(theirs, rel=1e-9, abs=1e-12)

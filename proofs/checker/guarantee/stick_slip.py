@@ -19,7 +19,7 @@ MAX_FACETS, MAX_BASES = 400, 40_000
 PIECES = 16  # of a period, for integrals of impulse responses
 LINES = 5  # bounds of the slip until a stop, less one
 AXES = ((0, 1), (1, 1), (2, 1), (0, -1), (2, -1))
-LAW = ("rate_gain", "target_gain", "return_rate", "level_gain", "slip_gain")
+LAW = ("rate_gain", "target_gain", "return_rate", "level_gain", "slip_gain", "rest_slip")
 CLAIMS = ("slip_behind", "slip_ahead", "peak_slip_rate", "least_pressure", "largest_pressure")
 
 Range = tuple[Fraction, Fraction]
@@ -42,7 +42,7 @@ class End:
 
 @dataclass
 class Law:
-    """Gains of the law and its period."""
+    """Gains of the law, its period, what it takes for rest, and noise of its measurements."""
 
     step: Fraction
     rate: Fraction
@@ -50,6 +50,13 @@ class Law:
     back: Fraction
     level: Fraction
     slip: Fraction
+    rest_slip: Fraction
+    slip_noise: Fraction
+
+    @property
+    def told(self) -> Fraction:
+        """By how much the law's r' may be larger than the reference's."""
+        return 2 * self.back * self.slip_noise
 
 
 @dataclass
@@ -67,10 +74,11 @@ class Reach:
 
 def read_law(value: Any) -> Law:
     """Gains and period."""
-    given = keys(value, "loop", "step", *LAW)
-    law = Law(*(number(given[name], name) for name in ("step", *LAW)))
+    given = keys(value, "loop", "step", *LAW, "slip_noise")
+    law = Law(*(number(given[name], name) for name in ("step", *LAW, "slip_noise")))
     need(min(law.step, law.rate, law.target, law.back) > 0, "step, rate, target and return gains must be > 0")
     need(min(law.level, law.slip) >= 0, "level_gain and slip_gain must be >= 0")
+    need(0 <= 2 * law.slip_noise <= law.rest_slip, "slip_noise must be from 0 to half of rest_slip")
     return law
 
 
@@ -114,7 +122,9 @@ class Period:
 
     def __init__(self, rock: Rock, task: Task, target: Fraction, growths: Row, law: Law, reach: Reach) -> None:
         self.task, self.law, self.reach = task, law, reach
-        self.rate, self.bend, self.force = task.reference_rate, task.reference_acceleration, task.amplitude
+        self.bend, self.force = task.reference_acceleration, task.amplitude
+        self.rate = task.reference_rate + law.told  # as the law is told it
+        self.still = self.bend * law.step / 2 + law.told  # r' up to which the reference may stand still
         ahead, self.peak, up, behind, down = (1 / abs(sum(row)) for row in reach.facets[:5])
         self.ahead, self.behind, self.level = ahead, behind, max(up, down)
         zero, one = Fraction(0), Fraction(1)
@@ -146,12 +156,13 @@ class Period:
         high = max(p.largest(Function(row, Fraction(0), [NOTHING] * 3)) for p in self.flat)
         turned = Function([-v for v in row], law.target * self.rate, [NOTHING] * 3)
         low = max(p.largest(turned) for p in self.flat)
-        return -Fraction(low, ONE), Fraction(high, ONE)
+        noise = law.slip * law.slip_noise
+        return -Fraction(low, ONE) - noise, Fraction(high, ONE) + noise
 
     def find_ranges(self, rock: Rock, target: Fraction, growths: Row) -> None:
         """Ranges of slopes and damping, and what must hold of them."""
         task, law = self.task, self.law
-        slip = target + self.ahead + self.rate * law.step
+        slip = target + self.ahead + task.reference_rate * law.step
         still = rock.stress(slip, growths[0])
         stress = still[0] + self.push[0], still[1] + self.push[1]
         need(stress[0] > 0, "the fault must not open")
@@ -225,7 +236,8 @@ class Period:
         constant = -n1 * law.step * end.constant - predicted * sign * end.constant
         if n1 > 0 and end.still:  # the reference never falls
             return of_error, constant, -predicted * sign
-        return of_error, constant + abs(n1) * self.bend * law.step**2 / 2, Fraction(0)
+        constant += abs(n1) * self.bend * law.step**2 / 2 + max(n1, Fraction(0)) * law.told * law.step
+        return of_error, constant, Fraction(0)
 
     def sliding(self, facet: Row, given: Row, cut: bool) -> Iterator[tuple[int, Function]]:
         """Bounds of a facet after a period of the sliding map, as functions of (e1, y, d) on a slice."""
@@ -250,6 +262,7 @@ class Period:
                 if not cut:
                     by_rate += Near.of(-n3 * law.slip * law.step / 2)
                 by_force = (area[0] + beside[1] + bent[1]).times(self.force)
+                by_force += abs(by_push).times(law.slip * law.slip_noise)
                 for end in self.ends:
                     row, push = self.pushed(end)
                     of_error, constant, late = self.carried(facet, end)
@@ -258,7 +271,7 @@ class Period:
                     total = by_push.times(push) + by_force
                     if n1 > 0 and end.still:
                         moved = (by_push.times(-law.target) + Near.of(late)).above()
-                        total += moved.times(self.bend * law.step / 2)
+                        total += moved.times(self.still)
                     yield end.place, Function([of_error, Fraction(0), n3], constant, more, total)
 
     def stops(self) -> list[Range]:
@@ -288,7 +301,8 @@ class Period:
             row, push = self.pushed(least)
             lines = [([*line, zero], end) for line, end in self.slices[least.place]]
             lines += [([zero, zero, zero, Fraction(-1)], zero)]
-            lines += [([*(-most * v for v in row), self.slope[0]], most * push - self.force)]
+            room = most * (push + self.law.slip * self.law.slip_noise) - self.force
+            lines += [([*(-most * v for v in row), self.slope[0]], room)]
             lines += [([zero, -g, zero, Fraction(1)], h) for g, h in stops]
             bases = self.reach.resting[first] + (self.reach.resting[second] if second == first + 1 else [])
             sizes, signs = [*self.sizes[least.place], self.longest], [*self.signs[least.place], 1]
@@ -301,16 +315,20 @@ class Period:
         """Bounds of a facet after a period that ends at rest, functions of (e1, y, d) and the slip until a stop."""
         law, (n1, _, n3) = self.law, facet
         of_error, constant, late = self.carried(facet, end)
-        constant += max(late, Fraction(0)) * self.bend * law.step / 2
+        constant += max(late, Fraction(0)) * self.still
         for chord in self.chord:
             for share in (Fraction(0), Fraction(1)) if n3 > 0 else (given[4],):
                 part = n3 * law.slip * share
+                less = Fraction(0) if n3 > 0 else (part - n3 * law.slip) * (law.rest_slip + 2 * law.slip_noise)
                 row = [of_error, -part * law.step / 2, n3, n1 - n3 * chord / self.task.b + part]
-                yield Function(row, constant, [NOTHING] * 4)
+                yield Function(row, constant + less, [NOTHING] * 4)
 
     def verify(self) -> None:
         """Refuse the set unless no facet exceeds 1 after a period."""
         given = list(enumerate(zip(self.reach.facets, self.reach.multipliers, strict=True)))
+        at_first = self.law.slip_noise, self.law.slip * self.law.slip_noise
+        inside = all(n1 * at_first[0] + max(n3, 0) * at_first[1] <= 1 for n1, _, n3 in self.reach.facets)
+        need(inside, "the set must hold the loop at first, with noise of its first measurement")
         for which, (facet, multipliers) in given:
             for cut in (False, True) if facet[2] > 0 else (False,):
                 for place, function in self.sliding(facet, multipliers, cut):
@@ -329,9 +347,11 @@ class Period:
 
     def bounds(self) -> dict[str, Fraction]:
         """What the set gives, by claims."""
-        moved = self.rate * self.law.step
+        noise, moved = self.law.slip_noise, self.task.reference_rate * self.law.step
         pressure = self.rest[0] - self.push[1], self.rest[1] - self.push[0]
-        return dict(zip(CLAIMS, (self.behind + moved, self.ahead + moved, self.peak, *pressure), strict=True))
+        return dict(
+            zip(CLAIMS, (self.behind + noise + moved, self.ahead - noise + moved, self.peak, *pressure), strict=True)
+        )
 
 
 def weights() -> list[list[int]]:
@@ -378,7 +398,10 @@ def verify(document: dict[str, Any]) -> list[str]:
 
 def statement(document: dict[str, Any], period: Period, claims: dict[str, Fraction]) -> list[str]:
     """What was verified, in ASCII; bounds on their outer side, those of the disturbances on their inner one."""
-    task = period.task
+    task, law = period.task, period.law
+    measured = "slip and slip rate measured exactly"
+    if law.slip_noise:
+        measured = f"slip measured within {lower(law.slip_noise)} m, slip rate exactly"
     kind = f"any acceleration of at most {lower(task.amplitude)} m/s^2" if task.amplitude else "none (amplitude 0)"
     return [
         f'fault "{ascii(task.name)[1:-1]}" (a name; the data in the file are what counts), friction any function of '
@@ -387,8 +410,8 @@ def statement(document: dict[str, Any], period: Period, claims: dict[str, Fracti
         f"derived accelerations: of a slip within a period [{lower(period.slope[0])}, {upper(period.slope[1])}] 1/s^2, "
         f"of a slip rate less [{lower(period.damping[0])}, {upper(period.damping[1])}] 1/s, of a pressure "
         f"{upper(task.b)} m^2/kg times [1, {upper(task.beta[1])}]",
-        f"law for friction that sticks, every {document['loop']['step']} s, its pressure held, slip and slip rate "
-        f"measured exactly; a set of {len(period.reach.facets)} facets",
+        f"law for friction that sticks, every {document['loop']['step']} s, its pressure held, {measured}; a set of "
+        f"{len(period.reach.facets)} facets",
         f"disturbance: {kind}; from rest, along the reference, for all t >= 0",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",
         f"the slip is at most {upper(claims['slip_behind'])} m behind and {upper(claims['slip_ahead'])} m ahead of the "

@@ -18,13 +18,15 @@ from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
 from quakedesign.plant.ranges import FaultPlant
 from quakedesign.sos.exact.strict import listed, need, read_exactly, read_row, texts, with_keys
 
+_OF_LOOP = ("step", "slip_noise")
+
 
 def stick_slip_document(claim: StickSlipGuarantee) -> dict[str, Any]:
     """Loop and set."""
     reach = claim.reach
     return {
         "loop": {
-            "step": exact_text(claim.held.step),
+            **{name: exact_text(getattr(claim.held, name)) for name in _OF_LOOP},
             **{name: exact_text(getattr(claim.held.law, name)) for name in GAIN_UNITS},
         },
         "set": {
@@ -45,7 +47,8 @@ def read_stick_slip(raw: Any, task: FaultPlant, claims: Callable[[type], Any]) -
         When the file breaks a rule of FORMAT.md.
     """
     need(task.change is None, "a bounded change of the disturbance is not used where the fault sticks")
-    step, *gains = read_exactly(raw["loop"], ("step", *GAIN_UNITS)).values()
+    loop = read_exactly(raw["loop"], (*_OF_LOOP, *GAIN_UNITS))
+    law = StickSlipLaw(**{name: loop[name] for name in GAIN_UNITS})
     given = with_keys(raw["set"], {"facets", "multipliers", "sliding", "resting"})
     facets, multipliers = (
         tuple(read_row(row, name, length=length) for row in listed(given[name], name, MOST_FACETS))
@@ -57,7 +60,7 @@ def read_stick_slip(raw: Any, task: FaultPlant, claims: Callable[[type], Any]) -
     )
     return StickSlipGuarantee(
         task=task,
-        held=SampledStickSlip(law=StickSlipLaw(**dict(zip(GAIN_UNITS, gains, strict=True))), step=step),
+        held=SampledStickSlip(law=law, **{name: loop[name] for name in _OF_LOOP}),
         reach=StickSlipPolytope(facets=facets, multipliers=multipliers, sliding=sliding, resting=resting),
         claims=claims(StickSlipClaims),
     )

@@ -104,13 +104,18 @@ class StickSlipGuarantee:
         behind, ahead = claims.slip_behind.quantity("m"), claims.slip_ahead.quantity("m")
         pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
         return (
-            f"from rest, with zero-order hold over {UpperBound(held.step):.6g} s and exact measurements of slip and "
-            "slip rate, "
+            f"from rest, with zero-order hold over {UpperBound(held.step):.6g} s and {self._measured()}, "
             f"for every disturbance of at most {size}, for all friction and constant parameters of the box: "
             f"the slip rate never exceeds {claims.peak_slip_rate.quantity('m/s')}, whether the fault slides or sticks, "
             f"the slip stays between {behind} behind and {ahead} ahead of the reference, the pressure between "
             f"{pressures}, for all t >= 0"
         )
+
+    def _measured(self) -> str:
+        """Sentence part about measurements; what they may be off is rounded inward."""
+        if not self.held.slip_noise:
+            return "exact measurements of slip and slip rate"
+        return f"slip measured within {LowerBound(self.held.slip_noise).quantity('m')} and slip rate measured exactly"
 
 
 def stick_slip_guarantee(

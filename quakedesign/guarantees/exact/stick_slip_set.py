@@ -41,6 +41,12 @@ alone.
 (e1, y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet exceeds 1 after either map; each is the largest
 value of a linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
 
+**Noise.** Measured is the slip x + n, |n| ≤ N, rest_slip ≥ 2N. Let e1 stand for the slip less the reference plus N,
+and d be less m·n of its own sample, m and c the slip and return gains. Then this noise counts in one period alone: v is
+that of a reference at the rate r′ + c(N − n), in [0, max r′ + 2cN], which moves up to 2cNT less than that, and U is m·n
+larger. Where the innovation is cut off, d gains from −mTv⁺/2 − m(rest_slip + 2N) to −mTv⁺/2 of it; otherwise noise
+leaves d. At first e1 = N, and d is from 0 to m·N.
+
 **Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ =
 −wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
 """
@@ -158,31 +164,49 @@ class StickSlipPolytope:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledStickSlip:
-    """The law as it runs: once every T_s, its pressure held, from exact measurements.
+    """The law as it runs: once every T_s, its pressure held.
 
     Attributes
     ----------
     law : StickSlipLaw
     step : Fraction
         T_s [s].
+    slip_noise : Fraction
+        Bound of the measurement error of the slip [m], at most half of the law's rest_slip. The slip rate is exact.
 
     Raises
     ------
     ParameterError
-        For a step that is not positive.
+        For a step that is not positive, or noise out of its range.
     """
 
     law: StickSlipLaw
     step: Fraction
+    slip_noise: Fraction = _ZERO
 
     def __post_init__(self) -> None:
         if self.step <= 0:
             raise ParameterError(f"T_s must be positive, got {shortly(self.step)} s")
+        if not 0 <= 2 * self.slip_noise <= self.law.rest_slip:
+            raise ParameterError(
+                f"slip_noise must be from 0 to half of rest_slip, {shortly(self.law.rest_slip)} m, "
+                f"got {shortly(self.slip_noise)} m"
+            )
 
     @property
     def noise(self) -> dict[str, Fraction]:
-        """Bounds of measurement errors, as `Held.noise`: none."""
-        return {}
+        """Bounds of measurement errors, as `Held.noise`."""
+        return {"slip_noise": self.slip_noise} if self.slip_noise else {}
+
+    @property
+    def told(self) -> Fraction:
+        """What noise adds to the rate of the reference that the law is told, at most [m/s]."""
+        return 2 * self.law.return_rate * self.slip_noise
+
+    @property
+    def push_noise(self) -> Fraction:
+        """What noise adds to U at most [Pa]."""
+        return self.law.slip_gain * self.slip_noise
 
     @property
     def path(self) -> dict[str, Fraction]:
@@ -512,17 +536,19 @@ def _carried(
 ) -> Iterator[_Carried]:
     number, law, step = back.number, held.law, held.step
     n1, _, n3 = facets.T
-    fastest, bend = task.reference_rates
+    (fastest, bend), told = task.reference_rates, held.told
     predicted = n3 * number(law.level_gain + law.slip_gain * step / 2)
     for place, combination in ends:
-        push, push0, (q1, q0) = push_row(held, fastest, combination)
+        push, push0, (q1, q0) = push_row(held, fastest + told, combination)
         p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
-        # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative: it may be 0 for r' up to max|r''|T/2
+        # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative: it may be 0 for r' up to max|r''|T/2.
+        # As the law is told r', it may be `told` less.
         moves = np.where(back.middle(n1) > 0, float(bool(q1 or q0)), 1.0)
-        late = back.array(moves.tolist()) * abs(n1) * number(bend * step**2 / 2)
+        late = abs(n1) * number(bend * step**2 / 2) + (abs(n1) + n1) * number(told * step / 2)
+        late = back.array(moves.tolist()) * late
         of_error = n1 - n1 * number(step * q1) - predicted * number(p1)
         constant = late - n1 * number(step * q0) - predicted * number(p0)
-        kept = back.array((1 - moves).tolist()) * number(bend * step / 2)
+        kept = back.array((1 - moves).tolist()) * number(bend * step / 2 + told)
         yield _Carried(place, push, push0, of_error, constant, -predicted * int(combination[1]), kept)
 
 
@@ -570,6 +596,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
                 of_y = of_y + curved * gaps[0] + of_slip * period.of_rate[0] + of_rate * period.of_rate[1]
                 of_y = of_y if cut else of_y - a3 * slip * half
                 force = bound * (whole[0] + of_force + curved * gaps[1])
+                force = force + abs(pushed) * number(held.push_noise)
                 for part in carried:
                     factors = [pushed * number(v) for v in part.push]
                     columns = [part.of_error[which] + factors[0], of_y + factors[1], a3 + factors[2]]
@@ -600,8 +627,11 @@ def resting_rows(
                     continue
                 a1, a3 = n1[which], n3[which]
                 cut_off = a3 * slip * (multipliers[which][:, 4] if share is None else share)
+                constants = part.constant[which] + part.moved(0, which)
+                if share is None:  # n3 <= 0: what is cut off may be as much less
+                    constants = constants + (cut_off - a3 * slip) * number(held.law.rest_slip + 2 * held.slip_noise)
                 factors = np.column_stack([part.of_error[which], -cut_off * half, a3, a1 - a3 * chord + cut_off])
-                yield Rows(SLICES + part.place, which, factors, part.constant[which] + part.moved(0, which))
+                yield Rows(SLICES + part.place, which, factors, constants)
 
 
 # ----------------------------------------------------------------------
@@ -612,7 +642,7 @@ Constraint = tuple[tuple[Fraction, ...], Fraction]
 
 def slices(task: FaultPlant, held: SampledStickSlip) -> tuple[tuple[Constraint, ...], ...]:
     """Ends of the three slices: e1 up to 0, from there to max r′/c, and above."""
-    threshold, one = task.reference_rates[0] / held.law.return_rate, Fraction(1)
+    threshold, one = (task.reference_rates[0] + held.told) / held.law.return_rate, Fraction(1)
     up, down = (one, _ZERO, _ZERO), (-one, _ZERO, _ZERO)
     return ((up, _ZERO),), ((down, _ZERO), (up, threshold)), ((down, -threshold),)
 
@@ -635,9 +665,9 @@ def polytopes(
     lines = stop_bounds(task, held, found)
     most = task.beta[1] * task.authority
     for combination in (COMBINATIONS[place] for place in LEAST):
-        push, push0, _ = push_row(held, task.reference_rates[0], combination)
+        push, push0, _ = push_row(held, task.reference_rates[0] + held.told, combination)
         larger = (*(-most * v for v in push), found.slope[0])
-        room = most * push0 - task.amplitude
+        room = most * (push0 + held.push_noise) - task.amplitude
         tall: list[Constraint] = [((*row, _ZERO), b) for row, b in flat[combination[0]]]
         tall += [((_ZERO, _ZERO, _ZERO, -one), _ZERO), (larger, room)]
         tall += [((_ZERO, -g, _ZERO, one), h) for g, h in lines]
@@ -743,6 +773,8 @@ def stick_slip_bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlip
 
 def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
     ahead, rate, up, lag, down = reach.box
+    if any(row[0] * held.slip_noise + max(row[2], _ZERO) * held.push_noise > 1 for row in reach.facets):
+        raise ParameterError("noise of the first measurement may put the loop outside of the polytope")
     fastest = task.reference_rates[0]
     sizes = [max(ahead, lag), rate, max(up, down)]
     push = _push(task, held, reach, sizes)
@@ -772,8 +804,8 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
         raise ParameterError("the disturbance is too small against what the range of the input gain makes of U")
     moved = fastest * held.step
     return StickSlipClaims(
-        slip_behind=UpperBound(lag + moved),
-        slip_ahead=UpperBound(ahead + moved),
+        slip_behind=UpperBound(lag + held.slip_noise + moved),
+        slip_ahead=UpperBound(ahead - held.slip_noise + moved),
         peak_slip_rate=UpperBound(rate),
         least_pressure=LowerBound(found.rest_pressure[0] - push[1]),
         largest_pressure=UpperBound(found.rest_pressure[1] - push[0]),
@@ -794,7 +826,7 @@ def _bracket(task: FaultPlant, held: SampledStickSlip, found: Ranges, push: Frac
 
 def _push(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, sizes: Sequence[Fraction]) -> Range:
     """Least and largest U = p* − p at a sample [Pa]."""
-    law, fastest = held.law, task.reference_rates[0]
+    law, fastest = held.law, task.reference_rates[0] + held.told
     row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)
     factors = _exact_array([list(row), [-v for v in row]])
     constants = _exact_array([_ZERO, law.target_gain * fastest])
@@ -805,4 +837,4 @@ def _push(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, si
         )
     ]
     high, low = (max(line[i] for line in tops) for i in (0, 1))
-    return -low, high
+    return -low - held.push_noise, high + held.push_noise

@@ -76,7 +76,9 @@ FLOATS = Numbers(
 )
 
 
-def tuned(task: FaultPlant, step: Fraction, tuning: Sequence[float]) -> StickSlipLaw:
+def tuned(
+    task: FaultPlant, step: Fraction, tuning: Sequence[float], slip_noise: Fraction = Fraction(0)
+) -> SampledStickSlip:
     """Deadbeat feedback for the middle of the damping, with the shares of a tuning.
 
     Parameters
@@ -86,31 +88,45 @@ def tuned(task: FaultPlant, step: Fraction, tuning: Sequence[float]) -> StickSli
         T_s [s].
     tuning : sequence of float
         As in `TUNINGS`.
+    slip_noise : Fraction
+        Bound of the measurement error of the slip [m].
     """
     level, slip, back, gain = tuning
     damping, period = float(sum(task.rate_chord)) / 2, float(step)
     decay = np.exp(-damping * period)
     held = -np.expm1(-damping * period) / damping if damping else period
     per_rate = 1 / (gain * held * float(task.authority))
-    return StickSlipLaw(
+    law = StickSlipLaw(
         rate_gain=short(decay * per_rate, _DIGITS),
         target_gain=short(per_rate, _DIGITS),
         return_rate=short(back / period, _DIGITS),
         level_gain=short(level * per_rate, _DIGITS),
         slip_gain=short(slip * per_rate / period, _DIGITS),
+        rest_slip=2 * slip_noise,
     )
+    return SampledStickSlip(law=law, step=step, slip_noise=slip_noise)
 
 
 # ----------------------------------------------------------------------
 # States that disturbances reach: their convex hull, grown from sample to sample.
 
 
+def _noises(held: SampledStickSlip) -> list[float]:
+    """Errors of the measured slip of the largest size [m]."""
+    size = float(held.slip_noise)
+    return [-size, size] if size else [0.0]
+
+
 @dataclass(frozen=True)
 class _Start:
-    """States at a sample, one a row, and choices of reference, input gain and slope of friction, one a column."""
+    """States at a sample, one a row, and choices of reference, input gain and slope of friction, one a column.
+
+    The state's slip error is that of `stick_slip_set`, larger by the bound of the slip noise.
+    """
 
     task: FaultPlant
     held: SampledStickSlip
+    noise: float
     slip: np.ndarray
     rate: np.ndarray
     level: np.ndarray
@@ -122,22 +138,27 @@ class _Start:
     force: np.ndarray
 
     @classmethod
-    def of(cls, task: FaultPlant, held: SampledStickSlip, found: Ranges, states: np.ndarray) -> "_Start":
+    def of(cls, task: FaultPlant, held: SampledStickSlip, found: Ranges, states: np.ndarray, noise: float) -> "_Start":
         """With the ends of all ranges; the input gain changes slowest."""
         law = held.law
         slip, rate, level = (column[:, None] for column in states.T)
         kinds = product(task.beta, (Fraction(0), task.reference_rates[0]), found.slope)
         beta, reference, slope = np.array(list(kinds), dtype=float).T
-        target = reference - float(law.return_rate) * slip
-        push = float(law.rate_gain) * rate - float(law.target_gain) * target + level
+        target = reference - float(law.return_rate) * (slip + noise - float(held.slip_noise))
+        push = float(law.rate_gain) * rate - float(law.target_gain) * target + level + float(law.slip_gain) * noise
         force, scaled = beta * float(task.authority) * push, float(task.authority * task.beta[0]) * push
-        return cls(task, held, slip, rate, level, reference, beta, slope, np.maximum(target, 0), scaled, force)
+        predicted = np.maximum(target, 0)
+        return cls(task, held, noise, slip, rate, level, reference, beta, slope, predicted, scaled, force)
 
-    def ended(self, moved: np.ndarray, end: np.ndarray, rests: np.ndarray) -> np.ndarray:
-        """States after a period, of the slip in it, the slip rate at its end, and whether the fault rests then."""
-        law, half = self.held.law, float(self.held.step) / 2
-        innovation = moved - half * (self.rate + self.predicted)
-        innovation = np.where(rests, np.maximum(innovation, -half * self.predicted), innovation)
+    def ended(self, moved: np.ndarray, end: np.ndarray, rests: np.ndarray, later: float | None = None) -> np.ndarray:
+        """States after a period, of the slip in it, the slip rate at its end, and whether the fault rests then.
+
+        Noise of the next sample is the opposite one unless given.
+        """
+        law, half, later = self.held.law, float(self.held.step) / 2, -self.noise if later is None else later
+        innovation = moved + later - self.noise - half * (self.rate + self.predicted)
+        lowest = -half * self.predicted - float(law.rest_slip)
+        innovation = np.where(rests, np.maximum(innovation, lowest), innovation) + self.noise - later
         lifted = -moved * self.slope / (self.beta * float(self.task.authority))
         level = self.level + float(law.level_gain) * (end - self.predicted) + float(law.slip_gain) * innovation + lifted
         return np.stack([self.slip + moved - 2 * half * self.reference, end + 0 * level, level], axis=-1)
@@ -159,14 +180,16 @@ class _Reach:
 
     def after(self, states: np.ndarray) -> np.ndarray:
         """States a period later: those of runs, and extremes of both maps."""
-        start = _Start.of(self.task, self.held, self.found, states)
-        found = [self.simulated(states).reshape(-1, 3), *self._resting(start), *self._sliding(start)]
+        found = list[np.ndarray]()
+        for noise in _noises(self.held):
+            start = _Start.of(self.task, self.held, self.found, states, noise)
+            found += [self.simulated(states, noise).reshape(-1, 3), *self._resting(start), *self._sliding(start)]
         return np.vstack(found)
 
-    def simulated(self, states: np.ndarray) -> np.ndarray:
+    def simulated(self, states: np.ndarray, noise: float, later: float | None = None) -> np.ndarray:
         """States after a period of the plant that sticks, (states, choices, 3); the input gain changes slowest."""
-        start = _Start.of(self.task, self.held, self.found, states)
-        runs = [start.ended(*self._run(start, sign, turn)) for sign in (1, -1) for turn in (0, 3, 6, 9)]
+        start = _Start.of(self.task, self.held, self.found, states, noise)
+        runs = [start.ended(*self._run(start, sign, turn), later) for sign in (1, -1) for turn in (0, 3, 6, 9)]
         return np.stack(runs, axis=2).reshape(len(states), -1, 3)
 
     def _resting(self, start: "_Start") -> Iterator[np.ndarray]:
@@ -218,7 +241,7 @@ class _Reach:
 
     def hull(self, most: int, tell: Tell) -> np.ndarray | None:
         """Vertices of the hull of all states that are reached from rest; None where it grows without bound."""
-        points = np.zeros((1, 3))
+        points = _at_first(self.held)
         directions = np.random.default_rng(0).standard_normal((1500, 3))
         first, before = None, np.zeros(6)
         for turn in range(_ROUNDS):
@@ -242,6 +265,12 @@ class _Reach:
             before = extent
             tell("states that disturbances reach", turn / _ROUNDS)
         return points
+
+
+def _at_first(held: SampledStickSlip) -> np.ndarray:
+    """The state at the start from rest, with either sign of the first error."""
+    noise = float(held.slip_noise)
+    return np.array([[noise, 0, 0], [noise, 0, noise * float(held.law.slip_gain)]])
 
 
 def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarray:
@@ -366,8 +395,8 @@ class _Growing:
     def exact_ranges(self) -> Ranges:
         """Of the plant, a little wide."""
         law, size = self.held.law, [short(float(v), 4) for v in self.size]
-        most = law.target_gain * (law.return_rate * size[0] + self.task.reference_rates[0])
-        most = _ROOM * (most + law.rate_gain * size[1] + size[2])
+        most = law.target_gain * (law.return_rate * size[0] + self.task.reference_rates[0] + self.held.told)
+        most = _ROOM * (most + law.rate_gain * size[1] + size[2]) + self.held.push_noise
         return ranges(self.task, _ROOM * size[0], (-most, most), _ROOM * size[1] * self.held.step)
 
     def images(self) -> "_Images | None":
@@ -453,7 +482,8 @@ class _Growing:
         if rows.factors.shape[1] > 3:
             left[:, 1] += np.maximum(rows.factors[chosen, 3], 0) * steps[-1, 0]
         slice_number = rows.place if rows.place < SLICES else COMBINATIONS[rows.place - SLICES][0]
-        end = float(self.task.reference_rates[0] / self.held.law.return_rate) if slice_number == 1 else np.inf
+        fastest = self.task.reference_rates[0] + self.held.told
+        end = float(fastest / self.held.law.return_rate) if slice_number == 1 else np.inf
         constants = rows.constants[chosen] + (np.maximum(left[:, 0], 0) * end if slice_number == 1 else 0)
         small = _TINY * self.heights[rows.which[chosen]]
         of_error = (left[:, 0] * (-1 if slice_number == 0 else 1) * sizes[0] <= small) | (slice_number == 1)
@@ -613,6 +643,7 @@ def design_stick_slip(
     step: Fraction,
     *,
     objective: str = "tracking",
+    slip_noise: Fraction = Fraction(0),
     tell: Tell = lambda said, done: None,
 ) -> StickSlipGuarantee | NoGuarantee:
     """Gains with a guarantee on the stick–slip plant.
@@ -626,6 +657,8 @@ def design_stick_slip(
         T_s [s].
     objective : str
         ``tracking``: smallest slip error; ``peak``: smallest slip rate.
+    slip_noise : Fraction
+        Bound of the measurement error of the slip [m].
     tell : callable
         Called with what is done, and the fraction done [-].
     """
@@ -633,8 +666,7 @@ def design_stick_slip(
         return NoGuarantee(reason="the stick-slip theorem needs a disturbance above 0 m/s^2", small_gain=None)
     candidates = []
     for tuning in TUNINGS:
-        law = tuned(task, step, tuning)
-        held = SampledStickSlip(law=law, step=step)
+        held = tuned(task, step, tuning, slip_noise)
         try:
             points = _Reach.of(task, held).hull(_FEW, tell)
         except (ParameterError, LinAlgError, QhullError) as error:
@@ -681,16 +713,23 @@ def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstSt
     course, as it is nearly in a fault; the slope of friction is either end of its range in each period, and the
     disturbance changes its sign at most once in each.
     """
-    reach = _Reach.of(found.task, found.held)
+    reach, noises = _Reach.of(found.task, found.held), _noises(found.held)
     facets, extremes = np.array(found.reach.facets, dtype=float), np.zeros(3)
     for high in (False, True):  # which end of β
-        states = np.zeros((1, 3))
+        first = _at_first(found.held)
+        states = {noise: first[[int(noise < 0)]] for noise in noises}  # by the errors of their sample
         for _ in range(periods):
-            after = reach.simulated(states)
-            half = after.shape[1] // 2  # β is the slower half of the choices
-            own = after[:, half:] if high else after[:, :half]
-            states = np.vstack([states, own.reshape(-1, 3)])
-            states = states[np.unique((facets @ states.T).argmax(axis=1))]
-        extremes = np.maximum(extremes, [-states[:, 0].min(), states[:, 0].max(), states[:, 1].max()])
+            known = dict(states)
+            for later in noises:
+                ends = [states[later]]
+                for noise, starts in known.items():
+                    after = reach.simulated(starts, noise, later)
+                    half = after.shape[1] // 2  # β is the slower half of the choices
+                    ends.append((after[:, half:] if high else after[:, :half]).reshape(-1, 3))
+                points = np.vstack(ends)
+                states[later] = points[np.unique((facets @ points.T).argmax(axis=1))]
+        points = np.vstack(list(states.values()))
+        points[:, 0] -= float(found.held.slip_noise)
+        extremes = np.maximum(extremes, [-points[:, 0].min(), points[:, 0].max(), points[:, 1].max()])
     behind, ahead, rate = (float(v) for v in extremes)
     return WorstStickSlip(behind=behind, ahead=ahead, slip_rate=rate)

@@ -18,14 +18,16 @@ from quakedesign.laws.stick_slip_controller import StickSlipController
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.symbolic import plant
 
-FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "stick_slip_real-fault.json"
+FOLDER = Path(__file__).parents[3] / "proofs" / "certificates"
+FILE, NOISY_FILE = FOLDER / "stick_slip_real-fault.json", FOLDER / "stick_slip_noise_real-fault.json"
+NOISY = pytest.mark.parametrize("noisy", [False, True], ids=["exact", "noisy"])
 ROUNDING = 1e-9  # of n·z, which is 1 exactly where the fault rests on the boundary
 
 
 @cache
-def case():
-    """Numbers of the file, in floating point, read without the package."""
-    data = json.loads(FILE.read_text())
+def case(noisy=False):
+    """Numbers of a file, in floating point, read without the package; both are about one fault."""
+    data = json.loads((NOISY_FILE if noisy else FILE).read_text())
     fault, loop = (
         {k: float(F(v)) for k, v in data[name].items() if isinstance(v, str) and k != "name"}
         for name in ("fault", "loop")
@@ -141,9 +143,9 @@ def worst_signs(facets, slip_gain, level_gain, left):
 
 
 @cache
-def vertices():
+def vertices(noisy=False):
     """Of P with y ≥ 0, slightly drawn in so that rounding leaves them in P."""
-    facets = case().facets
+    facets = case(noisy).facets
     sizes = 1 / np.abs(facets).max(axis=0)
     rows = np.vstack([np.c_[facets * sizes, -np.ones(len(facets))], [0, -1, 0, 0]])
     inner = np.array([0, 0.1, 0])
@@ -154,25 +156,27 @@ def vertices():
     return found / np.maximum((found @ facets.T).max(axis=1), 1)[:, None]
 
 
-def one_period(random, count, pieces, amplitude=1.0, healing=0.0):
+def one_period(random, count, pieces, amplitude=1.0, healing=0.0, noisy=False):
     """States in P before and after a period, the slip in it and the slip rate that it reached."""
-    at, corners = case(), vertices()
+    at, corners = case(noisy), vertices(noisy)
+    off, later = (at.slip_noise * random.choice([-1.0, -0.3, 1.0], count) for _ in range(2))
     weights = random.dirichlet([0.3] * 4, count)
     weights[: count // 2] = [1, 0, 0, 0]
     state = np.einsum("nk,nkc->nc", weights, corners[random.integers(0, len(corners), (count, 4))])
-    error, rate, level = state.T
+    error, rate, level = state.T  # the slip error plus the bound of the noise; the level without its own noise
+    error, level = error - at.slip_noise, level + at.slip_gain * off
     reference = random.random(count) * at.fastest
     choice = random.integers(0, 4, count)
     reference = np.select(
         [choice == 0, choice == 1, choice == 2],
-        [0, at.fastest, np.clip(at.return_rate * error, 0, at.fastest)],
+        [0, at.fastest, np.clip(at.return_rate * (error + off), 0, at.fastest)],
         reference,
     )
     slip = random.random(count) * at.target_slip
     least = np.maximum(at.least, at.static - at.weakening * slip)
     friction = least + np.select([choice == 1, choice == 3], [0, 1], random.random(count)) * (at.static - least)
     blocks, before = Blocks(slip, friction, rate, healing), rest_pressure(slip, friction)
-    wanted = reference - at.return_rate * error
+    wanted = reference - at.return_rate * (error + off)
     expected = np.maximum(wanted, 0)
     blocks.push(before - (level + at.rate_gain * rate - at.target_gain * wanted))
     facets = at.facets[random.integers(0, len(at.facets), count)]
@@ -188,38 +192,40 @@ def one_period(random, count, pieces, amplitude=1.0, healing=0.0):
         way = np.where(aimed, best, turned)
         blocks.advance(amplitude * at.amplitude * way, way > 0, at.step / pieces)
     moved = blocks.slip - slip
-    innovation = moved - at.step * (rate + expected) / 2
-    innovation = np.where(blocks.rate == 0, np.maximum(innovation, -at.step * expected / 2), innovation)
+    innovation = moved + later - off - at.step * (rate + expected) / 2
+    innovation = np.where(blocks.rate == 0, np.maximum(innovation, -at.step * expected / 2 - at.rest_slip), innovation)
     change = rest_pressure(blocks.slip, blocks.friction) - before
     late = random.choice([-1, 0, 1], count) * at.bend * at.step**2 / 2
     after = np.column_stack(
         [
-            error + moved - np.maximum(at.step * reference + late, 0),
+            error + at.slip_noise + moved - np.maximum(at.step * reference + late, 0),
             blocks.rate,
-            level + change + at.level_gain * (blocks.rate - expected) + at.slip_gain * innovation,
+            level + change + at.level_gain * (blocks.rate - expected) + at.slip_gain * (innovation - later),
         ]
     )
     assert blocks.friction.min() >= at.least
     return state, after, moved, blocks.peak
 
 
-def test_vertices_are_those_of_the_file():
-    tops = vertices() @ case().facets.T
+@NOISY
+def test_vertices_are_those_of_the_file(noisy):
+    tops = vertices(noisy) @ case(noisy).facets.T
     assert tops.max() <= 1 + ROUNDING
-    assert ((tops > 1 - 1e-6).sum(axis=1) + (vertices()[:, 1] < 1e-12) >= 3).all()
+    assert ((tops > 1 - 1e-6).sum(axis=1) + (vertices(noisy)[:, 1] < 1e-12) >= 3).all()
 
 
+@NOISY
 @pytest.mark.parametrize("trials", [2_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
-def test_one_period_from_anywhere_in_the_polytope_ends_in_it(trials):
-    at, random, slid = case(), np.random.default_rng(7), 0.0
+def test_one_period_from_anywhere_in_the_polytope_ends_in_it(trials, noisy):
+    at, random, slid = case(noisy), np.random.default_rng(7), 0.0
     for _ in range(trials // 2_000):
-        before, after, moved, peak = one_period(random, 2_000, 30)
+        before, after, moved, peak = one_period(random, 2_000, 30, noisy=noisy)
         tops = (after @ at.facets.T).max(axis=1)
         assert (before @ at.facets.T).max() <= 1 + ROUNDING
         assert tops.max() <= 1 + ROUNDING
         assert peak.max() <= at.claims["peak_slip_rate"]
         slid = max(slid, tops[moved > 1e-8].max())
-    assert slid > 0.99  # the trials come near
+    assert slid > (0.97 if noisy else 0.99)  # the trials come near
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5])
@@ -240,9 +246,10 @@ def test_friction_that_heals_at_rest_takes_the_place_of_a_part_of_the_disturbanc
     assert slid > 0.8
 
 
-def test_a_larger_disturbance_drives_states_out():
-    _, after, _, _ = one_period(np.random.default_rng(7), 2_000, 30, amplitude=1.5)
-    assert (after @ case().facets.T).max() > 1.01
+@NOISY
+def test_a_larger_disturbance_drives_states_out(noisy):
+    _, after, _, _ = one_period(np.random.default_rng(7), 2_000, 30, amplitude=1.5, noisy=noisy)
+    assert (after @ case(noisy).facets.T).max() > 1.01
 
 
 # ----------------------------------------------------------------------
@@ -255,16 +262,16 @@ def recursion(law, period, states, measured):
     slip, rate, reference, reference_rate = measured
     innovation = slip - last_slip - period * (last_rate + predicted) / 2
     if rate == 0:
-        innovation = max(innovation, -period * predicted / 2)
+        innovation = max(innovation, -period * predicted / 2 - law.rest_slip)
     level = level + law.level_gain * (rate - predicted) + law.slip_gain * innovation
     wanted = reference_rate - law.return_rate * (slip - reference)
     pressure = -law.rate_gain * rate + law.target_gain * wanted - level
     return pressure, (level, max(wanted, 0), rate, slip)
 
 
-def long_runs(periods, start, seed):
+def long_runs(periods, start, seed, noisy=False):
     """Largest shares of the claims (behind, ahead, slip rate, least and largest pressure) of 50 runs, and of n·z."""
-    at, random = case(), np.random.default_rng(seed)
+    at, random = case(noisy), np.random.default_rng(seed)
     facets = at.facets[np.linspace(0, len(at.facets) - 1, 50).round().astype(int)]
     count, pieces = len(facets), 6
     slip = np.full(count, start)
@@ -280,11 +287,14 @@ def long_runs(periods, start, seed):
             rates = random.choice([0.0, at.fastest], count)
         if k % 7 == 0:
             hold = random.choice([-1.0, 1.0], count)
-        told = zip(blocks.slip.tolist(), blocks.rate.tolist(), reference.tolist(), rates.tolist(), strict=True)
+        off = at.slip_noise * random.choice([-1.0, 1.0], count)
+        told = zip((blocks.slip + off).tolist(), blocks.rate.tolist(), reference.tolist(), rates.tolist(), strict=True)
         made = [recursion(at, at.step, state, seen) for state, seen in zip(states, told, strict=True)]
         states, pressure = [state for _, state in made], np.array([p for p, _ in made])
         level = np.array([state[0] for state in states]) + rest_pressure(blocks.slip, blocks.friction)
-        tops = max(tops, (np.column_stack([blocks.slip - reference, blocks.rate, level]) @ at.facets.T).max())
+        error = blocks.slip - reference + at.slip_noise
+        now = np.column_stack([error, blocks.rate, level - at.slip_gain * off])
+        tops = max(tops, (now @ at.facets.T).max())
         blocks.push(pressure)
         follows = np.where(random.random(count) < 0.15, hold, 1)
         for i in range(pieces):
@@ -300,9 +310,16 @@ def long_runs(periods, start, seed):
 @pytest.mark.parametrize(
     ("periods", "start"), [(100, 0.2), *(pytest.param(10_000, x, marks=pytest.mark.slow) for x in (0.0, 0.5))]
 )
-def test_long_runs_stay_within_the_claims(periods, start):
-    assert list(case().claims) == ["slip_behind", "slip_ahead", "peak_slip_rate", "least_pressure", "largest_pressure"]
-    shares, tops = long_runs(periods, start, 7)
+@NOISY
+def test_long_runs_stay_within_the_claims(periods, start, noisy):
+    assert list(case(noisy).claims) == [
+        "slip_behind",
+        "slip_ahead",
+        "peak_slip_rate",
+        "least_pressure",
+        "largest_pressure",
+    ]
+    shares, tops = long_runs(periods, start, 7, noisy)
     assert shares.max() <= 1
     assert tops <= 1
     assert shares[2] > 0.3  # the disturbances are not idle
@@ -312,8 +329,10 @@ def test_long_runs_stay_within_the_claims(periods, start):
 # The exported law.
 
 
-def test_the_controller_of_the_file_has_the_gains_of_the_file():
-    controller, loop = load_guarantee(FILE).controller, json.loads(FILE.read_text())["loop"]
+@NOISY
+def test_the_controller_of_the_file_has_the_gains_of_the_file(noisy):
+    file = NOISY_FILE if noisy else FILE
+    controller, loop = load_guarantee(file).controller, json.loads(file.read_text())["loop"]
     assert controller.step == F(loop["step"])
     assert {name: F(loop[name]) for name in controller.gains} == controller.gains
 
@@ -332,11 +351,12 @@ def test_the_exported_law_is_the_recursion(case_of_sample, seed):
         return_rate=number(1, 9),
         level_gain=number(1, 9),
         slip_gain=number(1, 9),
+        rest_slip=number(0, 9),
     )
     controller = StickSlipController(law=law, step=number(1, 9))
     states = level, predicted, last_rate, last_slip = number(-9, 9), number(1, 9), number(1, 9), number(-9, 9)
     early = case_of_sample == "rests after an early stop"
-    lowest = -controller.step * predicted / 2  # of the innovation at rest
+    lowest = -controller.step * predicted / 2 - law.rest_slip  # of the innovation at rest
     innovation = lowest + (-number(1, 9) if early else number(1, 9))
     slip = last_slip + controller.step * (last_rate + predicted) / 2 + innovation
     measured = slip, number(1, 9) if case_of_sample == "slides" else F(0), number(-9, 9), number(0, 9)
