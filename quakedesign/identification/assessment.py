@@ -96,30 +96,15 @@ def checks_of(
     noise, known = _noise(raw, first)
     whole = float(np.sqrt(np.mean(np.sort(residuals**2)[: max(int(0.995 * len(residuals)), 1)]))) / noise
     checks = [] if loading is None else [_beginning(values, loading)]
-    checks.append(
-        Check(
-            name="residuals",
-            passed=whole <= SEVERAL,
-            value=whole,
-            limit=SEVERAL,
-            sentence=f"residuals are {whole:.2g} times the noise {known}",
-        )
-    )
+    checks.append(_within("residuals", whole, SEVERAL, f"residuals are {whole:.2g} times the noise {known}"))
     factor = whole
     if len(begins):
         peak = _after_steps(fit, time, begins, record, used, values)
         factor = max(factor, peak)
         told = "is explained" if peak <= SEVERAL else "is not explained"
-        checks.append(
-            Check(
-                name="peak",
-                passed=peak <= SEVERAL,
-                value=peak,
-                limit=SEVERAL,
-                sentence=f"what follows changes of rate {told}: residuals there are {peak:.2g} times the noise",
-            )
-        )
-        checks += _halves(fit, time, float(begins[-1]), record, used)
+        said = f"what follows changes of rate {told}: residuals there are {peak:.2g} times the noise"
+        checks.append(_within("peak", peak, SEVERAL, said))
+        checks.append(_halves(fit, time, float(begins[-1]), record, used))
     return tuple(checks), factor
 
 
@@ -168,6 +153,10 @@ def unsteady_beginning(difference: Any, values: Mapping[str, float], loading: Lo
     return f"{began} is off steady sliding by {moved:.2g} of friction"
 
 
+def _within(name: str, value: float, limit: float, sentence: str) -> Check:
+    return Check(name=name, passed=value <= limit, value=value, limit=limit, sentence=sentence)
+
+
 def _noise(raw: Record, first: float) -> tuple[float, str]:
     """Noise of friction, from sample to sample and about a line before the first change of rate."""
     least = max(scatter(raw.time, raw.friction), 1e-12)
@@ -188,7 +177,7 @@ def _beginning(values: Mapping[str, float], loading: Loading) -> Check:
         told = f"does not begin in steady sliding: the state is {older:.3g} times as old, which is fitted"
     if TREND in values:
         told += f", on a trend of {values[TREND]:.3g} 1/m"
-    return Check(name="beginning", passed=not off, value=off, limit=0.0, sentence=f"the record {told}")
+    return _within("beginning", off, 0.0, f"the record {told}")
 
 
 def _after_steps(
@@ -208,7 +197,7 @@ def _after_steps(
     return worst
 
 
-def _halves(fit: Fit, time: "np.ndarray", last: float, record: Record, used: "np.ndarray") -> list[Check]:
+def _halves(fit: Fit, time: "np.ndarray", last: float, record: Record, used: "np.ndarray") -> Check:
     """Whether the trend is the same before and after the last change of rate, and the noise as large in both halves."""
     assert record.load_point is not None
     path = record.load_point[used]
@@ -220,13 +209,8 @@ def _halves(fit: Fit, time: "np.ndarray", last: float, record: Record, used: "np
     score = 0.0 if size <= 1e-6 * np.linalg.norm(extra) else float(across @ fit.whitened) / size / fit.noise
     early, late = (float(np.mean(part**2)) for part in np.array_split(fit.whitened, 2))
     ratio = float(np.sqrt(max(late / max(early, 1e-300), early / max(late, 1e-300))))
-    return [
-        Check(
-            name="halves",
-            passed=abs(score) <= _DRIFT and ratio <= SEVERAL,
-            value=max(abs(score) / _DRIFT, ratio / SEVERAL),
-            limit=1.0,
-            sentence=f"early and late residuals differ by a factor {ratio:.2g}; a change of the trend at the last "
-            f"change of rate is {abs(score):.2g} of its deviations",
-        )
-    ]
+    said = (
+        f"early and late residuals differ by a factor {ratio:.2g}; a change of the trend at the last change of rate is "
+        f"{abs(score):.2g} of its deviations"
+    )
+    return _within("halves", max(abs(score) / _DRIFT, ratio / SEVERAL), 1.0, said)

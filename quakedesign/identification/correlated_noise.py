@@ -36,6 +36,8 @@ class CorrelatedNoise:
         Measurements in every sample.
     of_time : bool
         Whether `along` is time.
+    common : ndarray or None
+        What one deviation of each unknown of the load moves in all samples, a column each; None for none.
     """
 
     share: float
@@ -43,9 +45,12 @@ class CorrelatedNoise:
     along: "np.ndarray"
     counts: "np.ndarray"
     of_time: bool
+    common: "np.ndarray | None" = None
 
-    def to_dict(self, noise: float) -> dict[str, Any]:
-        """Size and length with their units, of the white noise [-] of one measurement."""
+    def to_dict(self, noise: float) -> dict[str, Any] | None:
+        """Size and length with their units, of the white noise [-] of one measurement; None where nothing fades."""
+        if not self.share:
+            return None
         size = noise * self.share**0.5
         return {"size": size, "size_unit": "", "length": self.length, "length_unit": "s" if self.of_time else "m"}
 
@@ -55,7 +60,7 @@ class CorrelatedNoise:
         apart = np.abs(self.along[:, None] - self.along[None, :]) / self.length
         whole: np.ndarray = self.share * np.exp(-apart)
         whole[np.diag_indices(len(self.along))] += 1 / self.counts
-        return whole
+        return whole if self.common is None else whole + self.common @ self.common.T
 
     def own_part(self, residuals: "np.ndarray", kept: "np.ndarray") -> "np.ndarray":
         """Residuals without what their neighbours tell of them; those that are not kept tell nothing."""

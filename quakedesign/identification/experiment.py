@@ -14,19 +14,9 @@ from quakedesign.fault import FrictionLaw
 
 @dataclass(frozen=True, kw_only=True)
 class Coordinate:
-    """One number that is fitted.
+    """One number that is fitted: sought from `low` to `high` [`unit`, SI], by searches that start between `start`.
 
-    Attributes
-    ----------
-    name : str
-    unit : str
-        SI.
-    low, high : float
-        Between which it is sought.
-    start : tuple of float
-        Between which searches start.
-    logarithmic : bool
-        Whether its logarithm is fitted; it is positive then.
+    Where it is `logarithmic`, it is positive and its logarithm is fitted.
     """
 
     name: str
@@ -48,11 +38,7 @@ class Coordinate:
 class Experiment(ABC):
     """A simulated experiment: what the record's friction would be without noise, for given coordinates.
 
-    Attributes
-    ----------
-    law : FrictionLaw
-        With any values for what is fitted.
-    coordinates : tuple of Coordinate
+    Its law has any values for what is fitted.
     """
 
     law: FrictionLaw
@@ -225,16 +211,7 @@ def trended(whole: Experiment, path: "np.ndarray", size: float) -> Trended:
 
 @dataclass(frozen=True, kw_only=True)
 class Difference(Experiment):
-    """An experiment in which the difference of coordinates stands for the first of them.
-
-    Attributes
-    ----------
-    whole : Experiment
-    first : int
-        Place of the one from which others are taken.
-    seconds : tuple of int
-        Places of the others.
-    """
+    """An experiment in which a coordinate less others, by their places, stands for the first of them."""
 
     whole: Experiment
     first: int

@@ -26,31 +26,15 @@ _SHARE_OF_EXCESS = 2e-3  # by which a search may still get better when it ends
 
 @dataclass(frozen=True, kw_only=True)
 class FitSearch:
-    """How the best fit is sought.
+    """How the best fit is sought: from the best candidates, until two searches end in it and it tells everything."""
 
-    Attributes
-    ----------
-    candidates : int
-        Drawn between the ends of every coordinate and simulated once.
-    least, most : int
-        Searches, from the best of them on: until two end in the best fit.
-    coarse : int
-        Steps of a search before it is compared with the others.
-    agreement : float
-        Two searches agree when their sums of squares differ by less than this share.
-    rounds : int
-        In which outliers are left out and steps are made finer.
-    longest_outlier : int
-        Samples in a row; more are no accident, and stay.
-    """
-
-    candidates: int = 64
-    least: int = 4
+    candidates: int = 64  # drawn between the ends of every coordinate and simulated once
+    least: int = 4  # searches
     most: int = 16
-    coarse: int = 40
-    agreement: float = 1e-3
-    rounds: int = 6
-    longest_outlier: int = 2
+    coarse: int = 40  # steps of a search before it is compared with the others
+    agreement: float = 1e-3  # share by which sums of squares of searches that agree differ at most
+    rounds: int = 6  # in which outliers are left out and steps are made finer
+    longest_outlier: int = 2  # samples in a row; more are no accident, and stay
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,21 +214,22 @@ def fit(
     roots = np.sqrt(counts)
     experiment, starts = _starts(experiment, measured, roots, seed, how, near)
     minima: list[tuple[np.ndarray, float]] = []
+    low, high = experiment.bounds
     for start in starts:
         minima.append(minimised(experiment, measured, roots, start, steps=how.coarse))
         best_q, best = min(minima, key=lambda pair: pair[1])
         agreeing = sum(squares <= best * (1 + how.agreement) for _, squares in minima)
-        if len(minima) >= how.least and agreeing > 1:
+        fit = Fit(
+            experiment=experiment,
+            fitted=best_q,
+            measured=measured,
+            counts=counts,
+            kept=np.ones(len(measured), dtype=bool),
+            agreeing=agreeing,
+            starts=len(minima),
+        )
+        if len(minima) >= how.least and agreeing > 1 and np.all(fit.deviations < high - low):
             break
-    fit = Fit(
-        experiment=experiment,
-        fitted=best_q,
-        measured=measured,
-        counts=counts,
-        kept=np.ones(len(measured), dtype=bool),
-        agreeing=agreeing,
-        starts=len(minima),
-    )
     return settled(fit, how)
 
 
@@ -327,10 +312,16 @@ def _finite(slopes: "np.ndarray") -> "np.ndarray":
 
 
 def settled(fit: Fit, how: FitSearch) -> Fit:
-    """A fit on a finer simulation and without outliers, until neither changes."""
+    """A fit on a finer simulation and without outliers, until neither changes.
+
+    Steps that suit coordinates a deviation away suit these.
+    """
+    made_for = np.full_like(fit.fitted, np.inf)
     for _ in range(how.rounds):
         kept = ~outliers(fit.scaled, how.longest_outlier)
-        finer = fit.experiment.resolved(fit.fitted, fit.accuracy)
+        finer = fit.experiment
+        if not np.all(np.abs(fit.fitted - made_for) <= fit.deviations):
+            finer, made_for = finer.resolved(fit.fitted, fit.accuracy), fit.fitted
         fitted, _ = minimised(finer, fit.measured, replace(fit, kept=kept).weights, fit.fitted)
         unchanged = finer is fit.experiment and np.array_equal(kept, fit.kept)
         fit = replace(fit, experiment=finer, fitted=fitted, kept=kept)
@@ -392,19 +383,6 @@ class BetterFit(Exception):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interval:
-    """Ends of a profile as they are fitted; infinite where the record sets none.
-
-    Attributes
-    ----------
-    low, high : float
-    """
-
-    low: float
-    high: float
-
-
-@dataclass(frozen=True, kw_only=True)
 class _ProfilePlace:
     """Coordinates on a profile, and the experiment there with the coordinates that its steps are made for."""
 
@@ -413,24 +391,18 @@ class _ProfilePlace:
     fitted: "np.ndarray"
 
 
-def interval(fit: Fit, place: int, threshold: float, *, inside: Interval | None = None) -> Interval:
-    """Where the profile of one coordinate passes a threshold of `Fit.excess` on either side.
+def interval(
+    fit: Fit, place: int, threshold: float, inside: tuple[float, float] = (math.nan, math.nan)
+) -> tuple[float, float]:
+    """Where the profile of the coordinate at a `place` passes a threshold of `Fit.excess` on either side.
 
-    Parameters
-    ----------
-    fit : Fit
-    place : int
-        Of the coordinate.
-    threshold : float
-    inside : Interval, optional
-        That of a lower threshold.
+    As it is fitted; infinite where the record sets no end. The interval of a lower threshold may be known (`inside`).
 
     Raises
     ------
     BetterFit
     """
-    known = inside or Interval(low=math.nan, high=math.nan)
-    return Interval(low=_end(fit, place, threshold, -1, known.low), high=_end(fit, place, threshold, 1, known.high))
+    return _end(fit, place, threshold, -1, inside[0]), _end(fit, place, threshold, 1, inside[1])
 
 
 def _end(fit: Fit, place: int, threshold: float, side: int, inside: float) -> float:

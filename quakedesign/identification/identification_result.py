@@ -15,6 +15,7 @@ from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT, Assess
 from quakedesign.identification.fitting import CONFIDENCE, Fit
 from quakedesign.identification.record import Record
 
+_BESIDE = "delay", "start_rate"  # which may stay open: nothing else hangs on them then
 _DECISIVE = 10.0  # of AIC: odds of about 150 to 1
 
 
@@ -138,7 +139,7 @@ class Identification:
     @property
     def determined(self) -> bool:
         """Whether every parameter has an interval with both ends."""
-        return all(e.identified for e in self.estimates.values() if not e.name.startswith("delay"))
+        return all(e.identified for e in self.estimates.values() if not e.name.startswith(_BESIDE))
 
     @property
     def identified(self) -> bool:
@@ -210,7 +211,7 @@ class Identification:
 
     def untold(self) -> list[str]:
         """Sentences about what the record cannot tell; none where it tells everything."""
-        open_ = [e for e in self.estimates.values() if not (e.identified or e.name.startswith("delay"))]
+        open_ = [e for e in self.estimates.values() if not (e.identified or e.name.startswith(_BESIDE))]
         names = {estimate.name for estimate in open_}
         told = []
         if self.difference is not None and self.difference.identified:

@@ -22,7 +22,7 @@ from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, advant
 from quakedesign.identification.identification_result import Identification, ParameterEstimate, Rival, estimate
 from quakedesign.identification.loading import Loading, prepared
 from quakedesign.identification.record import FAR_OFF, Record, read_record, scatter
-from quakedesign.identification.sliding_experiment import START_STATE, STIFFNESS, SlidingExperiment
+from quakedesign.identification.sliding_experiment import START_RATE, START_STATE, STIFFNESS, SlidingExperiment
 from quakedesign.identification.two_states import SECOND_EFFECT, with_two_states
 from quakedesign.identification.weakening_experiment import START, Drawn, MeasuredSlip
 
@@ -33,21 +33,15 @@ _EFFECTS = {"low": 1e-5, "high": 1.0, "start": (2e-3, 3e-2)}
 _SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}
 _MODERATE = 1e3
 _NUISANCE = {TREND, START_STATE}
-_START = Coordinate(name=START_STATE, unit="", low=-5.0, high=5.0, start=(-1e-3, 1e-3), logarithmic=False)
+_START = tuple(
+    Coordinate(name=name, unit="", low=-most, high=most, start=(-1e-3, 1e-3), logarithmic=False)
+    for name, most in ((START_STATE, 5.0), (START_RATE, 2.0))
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """An experiment with the samples that it is about.
-
-    Attributes
-    ----------
-    experiment : Experiment
-    used : ndarray of bool
-        Samples of the record that it simulates.
-    notes : tuple of str
-        What was taken for granted.
-    """
+    """An experiment with the samples of the record that it simulates (`used`), and notes on what it assumes."""
 
     experiment: Experiment
     used: "np.ndarray"
@@ -63,14 +57,7 @@ def set_up(
 ) -> Setup:
     """The experiment of a record as `prepared` gives it, by what its law depends on and what was measured.
 
-    Parameters
-    ----------
-    record : Record
-    law : type of FrictionLaw
-    stiffness : float or None
-    loading : Loading, optional
-    nuisance : collection of str
-        What is fitted besides law and stiffness: `TREND`, `START_STATE`.
+    `nuisance` is what is fitted besides law and stiffness: `TREND`, `START_STATE` (with `START_RATE`).
 
     Raises
     ------
@@ -145,7 +132,7 @@ def _sliding(
         coordinates.append(_stiffness(record, path))
     template = law(**dict.fromkeys(names, 1.0), **chosen)
     if unsteady:
-        coordinates.append(_START)
+        coordinates += _START
     experiment = SlidingExperiment(
         law=template,
         drive=drive,
@@ -180,11 +167,7 @@ def _stiffness(record: Record, path: float) -> Coordinate:
     """Stiffness [as the record's], about that at which the whole friction takes between all and 1e-4 of the path."""
     whole = float(np.max(record.normal) * np.max(np.abs(record.friction))) / path
     return Coordinate(
-        name=STIFFNESS,
-        unit=record.stiffness_unit,
-        low=whole * 1e-2,
-        high=whole * 1e6,
-        start=(whole, whole * 1e3),
+        name=STIFFNESS, unit=record.stiffness_unit, low=whole * 1e-2, high=whole * 1e6, start=(whole, whole * 1e3)
     )
 
 
@@ -241,6 +224,9 @@ AGEING, SLIP = "rate-and-state-aging", "rate-and-state-slip"
 _LEAST_NEAR = 2  # searches, where the first begins near the fit of a similar law
 _EFFECTS_OF = ("direct_effect", "evolution_effect", SECOND_EFFECT)
 _MOST_BETTER = 10
+_MOST_MOVES = 4  # of the times of changes of rate, which a delay moves to first order
+_STAYS = 0.5  # deviations: a delay as small needs no move
+_UNFELT = 0.1  # deviations of the whole record by which an error of a rate moves friction unseen
 _UNSEEN = 1e-5  # of the range of friction
 
 
@@ -353,20 +339,27 @@ class _Choice:
             except RecordError:  # which no spring holds without a jump
                 if not fits:
                     raise
-        better = min(fits, key=lambda fitted: fitted.best.squares)
-        if moved := self._moved(better):
-            return moved._chosen([moved._fitted(each.kind, {TREND}, each.best, start=False) for each in fits])
-        return self._chosen(fits)
+        choice = self
+        for _ in range(_MOST_MOVES):
+            better = choice._extended(min(fits, key=lambda fitted: fitted.best.squares))
+            moved = choice._moved(better)
+            if moved is None:
+                break
+            choice = moved
+            fits = [choice._fitted(each.kind, _nuisance(better), better.best, start=False) for each in fits]
+        return choice._chosen(fits)
 
     def _moved(self, fitted: _Fitted) -> "_Choice | None":
-        """The same with changes of rate at the times that friction shows; nothing where these are known."""
-        values = fitted.best.experiment.outward(fitted.best.fitted)
-        delays = [value for name, value in values.items() if name.startswith(DELAY)]
-        if not delays or self.loading is None:
+        """The same with changes of rate at the times that friction shows; nothing where they are there already."""
+        names = [c.name for c in fitted.best.experiment.coordinates]
+        places = [place for place, name in enumerate(names) if name.startswith(DELAY)]
+        delays, errors = fitted.best.fitted[places], fitted.best.deviations[places]
+        errors = np.where(errors < np.array([c.high for c in fitted.best.experiment.coordinates])[places], errors, 0)
+        if self.loading is None or not np.any(np.abs(delays) > _STAYS * errors):
             return None
         pieces, (after, _) = self.loading.pieces, self.loading.delays(self.record)
         begins = pieces.begins.copy()
-        for delay, samples in zip(delays, after.T, strict=True):
+        for delay, samples in zip(delays.tolist(), after.T, strict=True):
             first = self.record.time[np.flatnonzero(samples)[0]]
             begins[np.searchsorted(begins, first, side="right") - 1] += delay
         pieces = replace(pieces, begins=np.maximum.accumulate(np.clip(begins, self.raw.time[0], None)))
@@ -451,8 +444,41 @@ class _Choice:
         best, used = fitted.best, fitted.setup.used
         path = self.record.load_point if self.record.load_point is not None else self.record.slip
         slopes = np.nan_to_num(best.experiment.slopes(best.fitted), posinf=0, neginf=0)
-        where = None if path is None else path[used]
-        return noise_of(best.residuals, slopes, best.counts, self.record.time[used], where, best.kept)
+        where, time = None if path is None else path[used], self.record.time[used]
+        moved = self._moved_by_rates(fitted)
+        found = noise_of(best.residuals, np.hstack([slopes, moved]), best.counts, time, where, best.kept)
+        if not moved.size:
+            return found
+        found = found or CorrelatedNoise(0.0, 1.0, time, best.counts, True)
+        return replace(found, common=moved / best.noise)
+
+    def _moved_by_rates(self, fitted: _Fitted) -> "np.ndarray":
+        """By how much friction moves with one deviation of each rate of the load point, where that is felt.
+
+        Rates that are taken from noisy displacements are unknowns with a known spread. As part of the covariance of
+        the samples they widen the regions of a and b by as much as they would if they were fitted with that spread.
+        """
+        best, loading = fitted.best, self.loading
+        columns: list[np.ndarray] = []
+        if loading is not None and not loading.pieces.rough and loading.pieces.errors is not None:
+            values = best.experiment.outward(best.fitted)
+            effects = [values.get(name, 0.0) for name in _EFFECTS_OF]
+            size, strengthens = max(map(abs, effects)), effects[0] - sum(effects[1:])
+            felt = best.noise * _UNFELT / float(np.sqrt(np.sum(best.counts)))
+            before = best.experiment.friction(best.fitted)
+            for place, error in enumerate(loading.pieces.errors.tolist()):
+                if not felt < size * error < size:
+                    continue
+                rates = loading.pieces.rates.copy()
+                rates[place] *= 1 + error
+                other = replace(loading, pieces=replace(loading.pieces, rates=rates))
+                setup = set_up(self.record, fitted.kind, self.stiffness, other, _nuisance(fitted))
+                if len(setup.experiment.coordinates) == len(best.fitted):
+                    moved = setup.experiment.resolved(best.fitted, best.accuracy).friction(best.fitted) - before
+                    moved += strengthens * np.log1p(error) * (place == 0)  # at the reference rate that stays
+                    columns += [moved] * bool(np.all(np.isfinite(moved)))
+        columns = [each for each in columns if np.linalg.norm(each * np.sqrt(best.counts)) > _UNFELT * best.noise]
+        return np.array(columns).T.reshape(len(best.measured), len(columns))
 
     def _extended(self, fitted: _Fitted) -> _Fitted:
         """With a beginning off steady sliding, where that is likelier."""
@@ -584,5 +610,5 @@ def _open(told: ParameterEstimate) -> ParameterEstimate:
 
 def _estimate(best: Fit, place: int, jointly: bool = True) -> ParameterEstimate:
     alone = interval(best, place, best.threshold(1))
-    of_all = interval(best, place, best.threshold(len(best.fitted)), inside=alone) if jointly else alone
-    return estimate(best, place, (alone.low, alone.high), (of_all.low, of_all.high))
+    of_all = interval(best, place, best.threshold(len(best.fitted)), alone) if jointly else alone
+    return estimate(best, place, alone, of_all)

@@ -43,6 +43,8 @@ class Pieces:
         Whether the rates were given.
     rough : bool
         Whether the motion is not made of a few such pieces.
+    errors : ndarray or None
+        Standard deviations of the logarithms of the rates [-]; None where they are known.
     """
 
     begins: "np.ndarray"
@@ -50,6 +52,7 @@ class Pieces:
     noise: float
     given: bool = False
     rough: bool = False
+    errors: "np.ndarray | None" = None
 
     @property
     def large_changes(self) -> "np.ndarray":
@@ -106,7 +109,8 @@ def straight_pieces(time: "np.ndarray", position: "np.ndarray", scatter: float, 
     nearest = time[np.clip(np.searchsorted(time, begins - 1e-6 * span / len(time)), 0, len(time) - 1)]
     begins = np.where(np.abs(begins - nearest) < 1e-4 * span / len(time), nearest, begins)
     rates = np.where(np.abs(rates) < 1e-9 * np.max(np.abs(rates)), 0.0, rates)
-    found = Pieces(begins=begins, rates=rates * size / span, noise=0.0, rough=bool(rough))
+    errors = _rate_errors(u, y - line, knots) / np.maximum(np.abs(rates), 1e-300)
+    found = Pieces(begins=begins, rates=rates * size / span, noise=0.0, rough=bool(rough), errors=errors)
     return replace(found, noise=float(np.std(position - found.position(time))))
 
 
@@ -315,7 +319,7 @@ def _hinges(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray") -> "tuple[np.
 def _refined(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray") -> "np.ndarray":
     """Knots moved to where broken lines fit best (Muggeo 2003, Stat. Med. 22, 3055)."""
     best, least = knots, np.inf
-    for _ in range(8):
+    for _ in range(8 if len(knots) else 0):
         _, line = _hinges(u, y, knots)
         squares = float(np.sum((y - line) ** 2))
         if squares < least:
@@ -341,14 +345,26 @@ def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float)
         rates, line = _hinges(u, y, knots)
         squares = float(np.sum((y - line) ** 2))
         changes = np.abs(np.diff(rates)) / np.maximum(np.maximum(np.abs(rates[1:]), np.abs(rates[:-1])), 1e-300)
-        losses = np.array([float(np.sum((y - _hinges(u, y, np.delete(knots, i))[1]) ** 2)) for i in range(len(knots))])
+        fewer = [_refined(u, y, np.delete(knots, i)) for i in range(len(knots))]
+        losses = np.array([float(np.sum((y - _hinges(u, y, others)[1]) ** 2)) for others in fewer])
         losses = np.where(changes < _LEAST_CHANGE, -1.0, losses - squares)
         least = int(np.argmin(losses))
         if losses[least] >= allowed:
             break
-        knots = np.delete(knots, least)
-        knots = _refined(u, y, knots) if len(knots) else knots
+        knots = fewer[least]
     return knots
+
+
+def _rate_errors(u: "np.ndarray", left: "np.ndarray", knots: "np.ndarray") -> "np.ndarray":
+    """Standard deviation of the slope of each piece: of a line of its own, as the knots are free.
+
+    By the long-run variance of what is left: that of AR(1) noise is `_spread` times its variance.
+    """
+    ends = np.concatenate([u[:1], knots, u[-1:]])
+    inside = np.maximum(np.histogram(u, ends)[0], 1)
+    noise = np.std(left) * np.sqrt(_spread(left))
+    errors: np.ndarray = noise * np.sqrt(12 / inside) / np.maximum(np.diff(ends), 1e-300)
+    return errors
 
 
 def _spread(residuals: "np.ndarray") -> float:

@@ -38,23 +38,12 @@ _MOST_NUMBERS = 16 * MOST_SAMPLES
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """One column as the file has it.
+    """One column as the file has it."""
 
-    Attributes
-    ----------
-    heading : str
-        Name and unit as they are written.
-    name : str
-    unit : str or None
-        None where the file gives none.
-    values : ndarray
-        Numbers; not a number where the file has none.
-    """
-
-    heading: str
+    heading: str  # name and unit as they are written
     name: str
     unit: str | None
-    values: "np.ndarray"
+    values: "np.ndarray"  # not a number where the file has none
 
 
 def read_columns(path: str | Path) -> list[Column]:

@@ -65,35 +65,24 @@ def step(field: Callable[[Any], Any], y: Any, length: Any) -> tuple[Any, Any]:
 
 _MOST_STEPS = 30  # a sample on average; what needs more runs away, or is far too sparse for its law
 _SAFETY = 0.9
+_WILD = 1e3  # error of friction, or none at all, that says nothing of the next length
 _SHORTEST = 1e-8  # of the time between two samples
 STIFFNESS = "stiffness"
 START_STATE = "start_state"
 """Logarithm of the state at the first sample over that of steady sliding."""
+START_RATE = "start_rate"
+"""Logarithm of the slip rate at the first sample over that of the load point."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """What an experiment is driven with, between neighbouring samples.
+    """What an experiment is driven with, between neighbouring samples."""
 
-    Attributes
-    ----------
-    lengths : ndarray
-        [s].
-    rates : ndarray
-        Of the load point [m/s].
-    growth : ndarray
-        d(log σ')/dt [1/s].
-    compliance : ndarray
-        1/σ' half-way [1/Pa, 1/N, or 1].
-    first_rate : float
-        At which it slides steadily before the first sample [m/s].
-    """
-
-    lengths: "np.ndarray"
-    rates: "np.ndarray"
-    growth: "np.ndarray"
-    compliance: "np.ndarray"
-    first_rate: float
+    lengths: "np.ndarray"  # [s]
+    rates: "np.ndarray"  # of the load point [m/s]
+    growth: "np.ndarray"  # d(log σ')/dt [1/s]
+    compliance: "np.ndarray"  # 1/σ' half-way [1/Pa, 1/N, or 1]
+    first_rate: float  # at which it slides steadily before the first sample [m/s]
 
     @cached_property
     def inputs(self) -> "np.ndarray":
@@ -103,32 +92,15 @@ class Drive:
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingExperiment(Experiment):
-    """Simulated friction of a law with state.
-
-    Attributes
-    ----------
-    law : FrictionLaw
-        With any values for what is fitted.
-    drive : Drive
-    coordinates : tuple of Coordinate
-        The quantities that are fitted, and the stiffness where it is.
-    stiffness : float, optional
-        Where it is given, in units of normal stress, or of normal force, per m.
-    normal_unit : str
-        ``"Pa"``, ``"N"`` or nothing.
-    steps : tuple of tuple of float
-        Lengths [s] of the steps that are taken between neighbouring instants.
-    measured : ndarray of bool
-        Instants that are samples; the others are changes of rate between them.
-    """
+    """Simulated friction of a law with state."""
 
     law: FrictionLaw
     drive: Drive
     coordinates: tuple[Coordinate, ...]
-    stiffness: float | None
-    normal_unit: str
-    steps: tuple[tuple[float, ...], ...]
-    measured: "np.ndarray"
+    stiffness: float | None  # where it is given, in units of the normal load per m
+    normal_unit: str  # Pa, N or nothing
+    steps: tuple[tuple[float, ...], ...]  # lengths [s] of those between neighbouring instants
+    measured: "np.ndarray"  # instants that are samples; the others are changes of rate between them
 
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
         """Friction coefficient [-] at every sample, sliding steadily at the first."""
@@ -172,10 +144,7 @@ class SlidingExperiment(Experiment):
     def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
         """The law with a working range, where it has one, about twice as wide as the slip rates of the experiment."""
         law, rates = Experiment.best_law(self, fitted), self.rates(fitted)
-        ends = {
-            "slowest_rate": float(f"{np.min(rates) / 2:.2g}"),
-            "fastest_rate": float(f"{2 * np.max(rates):.2g}"),
-        }
+        ends = {"slowest_rate": float(f"{np.min(rates) / 2:.2g}"), "fastest_rate": float(f"{2 * np.max(rates):.2g}")}
         effect = {"evolution_effect": getattr(law, "evolution_effect", 1.0)}
         return holding(law, {n: end for n, end in (ends | effect).items() if n in law.quantities()})
 
@@ -185,17 +154,24 @@ class SlidingExperiment(Experiment):
         By the embedded estimate; the same steps are then taken at other coordinates too, so that friction is smooth in
         them. Where no number of steps suffices, because the block runs away, nothing changes.
         """
-        taken = _Course(
-            self._build["trial"], np.asarray(fitted), accuracy, self.drive, self._build["start"](fitted)
-        ).steps()
+        q = np.asarray(fitted)
+        taken = _steps(self._build["trial"], q, accuracy, self.drive, self._build["start"](q))
         return self if taken is None else replace(self, steps=taken)
 
     def _states(self, fitted: "np.ndarray") -> "np.ndarray":
         """Logarithms of rate and states [SI] after every step, the first before all of them."""
         q = np.asarray(fitted)
-        start = self._build["start"](q).full()
-        found = self._accumulated[0](start, self._inputs, np.tile(q[:, None], self._inputs.shape[1])).full()
-        return np.hstack([start, found])
+        if q.tobytes() not in self._latest:
+            start = self._build["start"](q).full()
+            found = self._accumulated[0](start, self._inputs, np.tile(q[:, None], self._inputs.shape[1])).full()
+            self._latest.clear()
+            self._latest[q.tobytes()] = np.hstack([start, found])
+        return self._latest[q.tobytes()]
+
+    @cached_property
+    def _latest(self) -> "dict[bytes, np.ndarray]":
+        """The states that were asked for last: friction, its growth and its slopes ask in turn."""
+        return {}
 
     @cached_property
     def _sampled(self) -> "np.ndarray":
@@ -229,40 +205,27 @@ class SlidingExperiment(Experiment):
         return _built(self.law, tuple(c.name for c in self.coordinates), self.stiffness, self.drive.first_rate, linear)
 
 
-@dataclass(frozen=True)
-class _Course:
-    """One simulation with steps of its own choice."""
-
-    trial: Any
-    fitted: "np.ndarray"
-    accuracy: float
-    drive: Drive
-    start: Any
-
-    def steps(self) -> tuple[tuple[float, ...], ...] | None:
-        """Lengths of the steps between all samples; None where they become too many or too short."""
-        y, length, found, left = self.start, float("inf"), [], _MOST_STEPS * len(self.drive.lengths)
-        for whole, between in zip(self.drive.lengths.tolist(), self.drive.inputs.T.tolist(), strict=True):
-            taken: list[float] = []
-            rest = whole
-            while rest > 0:
-                length, left = (length if length < _SAFETY * rest else rest), left - 1
-                if left < 0 or length < _SHORTEST * whole:
-                    return None
-                after, error = self.trial(y, [length, *between], self.fitted)
-                factor = self._factor(float(error))
-                if factor >= 1:
-                    taken.append(length)
-                    y, rest = after, (0.0 if length == rest else rest - length)
-                length *= _SAFETY * factor if factor < 1 else max(_SAFETY * factor, 1.0)
-            found.append(tuple(taken))
-        return tuple(found)
-
-    def _factor(self, error: float) -> float:
-        """How much longer a step with the accuracy wanted would be, within limits."""
-        if not error <= 1e3:
-            return 0.1
-        return float(min(max((self.accuracy / max(error, 1e-300)) ** (1 / ORDER), 0.1), 5.0))
+def _steps(
+    trial: Any, fitted: "np.ndarray", accuracy: float, drive: Drive, start: Any
+) -> tuple[tuple[float, ...], ...] | None:
+    """Lengths of the steps between all samples that one simulation chooses; None where too many, or too short ones."""
+    y, length, found, left = start, float("inf"), [], _MOST_STEPS * len(drive.lengths)
+    for whole, between in zip(drive.lengths.tolist(), drive.inputs.T.tolist(), strict=True):
+        taken: list[float] = []
+        rest = whole
+        while rest > 0:
+            length, left = (length if length < _SAFETY * rest else rest), left - 1
+            if left < 0 or length < _SHORTEST * whole:
+                return None
+            after, error = trial(y, [length, *between], fitted)
+            off = float(error)
+            factor = min(max((accuracy / max(off, 1e-300)) ** (1 / ORDER), 0.1), 5.0) if off <= _WILD else 0.1
+            if factor >= 1:
+                taken.append(length)
+                y, rest = after, (0.0 if length == rest else rest - length)
+            length *= _SAFETY * factor if factor < 1 else max(_SAFETY * factor, 1.0)
+        found.append(tuple(taken))
+    return tuple(found)
 
 
 @lru_cache(maxsize=8)
@@ -318,12 +281,12 @@ class _Model:
         return ca.vertcat(drawn / (v * mu_rate), *(others[size + i] / ca.exp(y[1 + i]) for i in range(size)))
 
     def start(self, first_rate: float, q: Any) -> Any:
-        """Steady sliding, but for a state that is off by what is fitted."""
+        """Steady sliding, but for a state and a rate that are off by what is fitted."""
         steady = self.law.symbolic().steady_state(rate)
         values = fitted_quantities(self.law, self.names, q, self.linear) | {rate: ca.SX(first_rate)}
         states = ca.log(ca.vertcat(*to_casadi(steady, values)))
-        off = q[self.names.index(START_STATE)] if START_STATE in self.names else 0
-        return ca.vertcat(np.log(first_rate), states + off)
+        older, faster = (q[self.names.index(n)] if n in self.names else 0 for n in (START_STATE, START_RATE))
+        return ca.vertcat(np.log(first_rate) + faster, states + older)
 
     @property
     def _states(self) -> tuple[Any, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from scipy.optimize.elementwise import find_root
 
 from quakedesign.fault import FrictionLaw
 from quakedesign.identification.experiment import Coordinate, Experiment
@@ -21,14 +22,7 @@ from quakedesign.symbolic.plant import x1
 
 @dataclass(frozen=True)
 class Curve:
-    """Friction of a law over slip, in NumPy, for logarithms of what is fitted.
-
-    Attributes
-    ----------
-    law : FrictionLaw
-    names : tuple of str
-        What is fitted, in its order.
-    """
+    """Friction of a law over slip, in NumPy, for logarithms of what is fitted: quantities by `names`."""
 
     law: FrictionLaw
     names: tuple[str, ...]
@@ -62,26 +56,12 @@ class Curve:
 # Friction that weakens with slip: at a measured slip, or on a block that a stiff spring draws.
 
 START = "start_friction"
-_MOST_ITERATIONS = 100
-_SMALL = 1e-13
 _SMALL_SHARE = 0.3  # of the noise of friction, that adds 4 % to it
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredSlip(Experiment):
-    """Friction of a law at the slip that was measured.
-
-    Attributes
-    ----------
-    law : FrictionLaw
-        With any values for what is fitted.
-    slip : ndarray
-        [m], not negative.
-    slip_noise : float
-        Its standard deviation [m].
-    coordinates : tuple of Coordinate
-        Logarithmic.
-    """
+    """Friction of a law at the slip [m] that was measured, not negative; `slip_noise` is its deviation [m]."""
 
     law: FrictionLaw
     slip: "np.ndarray"
@@ -115,19 +95,8 @@ class Drawn(Experiment):
     """A block that sticks until its strength is reached and then slips as far as the spring and friction balance.
 
     Slip never falls. A spring so soft that friction falls faster than it makes the block jump, which no balance
-    describes: there is no such experiment then.
-
-    Attributes
-    ----------
-    law : FrictionLaw
-    load_point : ndarray
-        Displacement since the first sample [m].
-    normal : ndarray
-        Normal stress or force [Pa, N, or 1].
-    coordinates : tuple of Coordinate
-        Quantities of the law, the stiffness where it is fitted, and `START` (not logarithmic) last.
-    stiffness : float, optional
-        Where it is given.
+    describes: there is no such experiment then. The load point is the displacement since the first sample [m], the
+    normal load in Pa, N or 1. Coordinates are those of the law, the stiffness where it is not given, and `START` last.
     """
 
     law: FrictionLaw
@@ -185,17 +154,14 @@ class Drawn(Experiment):
         strength, weakening = self._curve.friction(np.zeros(1), fitted)
         if np.min(softness + weakening) <= 0:
             return np.full(len(held), np.nan), np.arange(len(held))
-        low, high = np.zeros(len(held)), np.where(held > strength, held / softness, 0)
-        slip = np.zeros(len(held))
-        for _ in range(_MOST_ITERATIONS):
-            friction, per_slip = self._curve.friction(slip, fitted)
-            excess = held - softness * slip - friction
-            low, high = np.where(excess >= 0, slip, low), np.where(excess <= 0, slip, high)
-            after = slip + excess / (softness + per_slip)
-            after = np.where((after >= low) & (after <= high), after, (low + high) / 2)
-            change, slip = np.max(np.abs(after - slip)), after
-            if change <= _SMALL * high.max():
-                break
+        slip, slips = np.zeros(len(held)), held > strength
+
+        def excess(slip: "np.ndarray", held: "np.ndarray", softness: "np.ndarray") -> "np.ndarray":
+            return held - softness * slip - self._curve.friction(slip, fitted)[0]  # type: ignore[no-any-return]
+
+        if np.any(slips):
+            told = held[slips], softness[slips]
+            slip[slips] = find_root(excess, (0.0, told[0] / told[1]), args=told).x
         largest = np.maximum.accumulate(slip)
         new = np.where(slip == largest, np.arange(len(held)), 0)
         return largest, np.maximum.accumulate(new)

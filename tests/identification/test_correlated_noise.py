@@ -57,6 +57,18 @@ def test_whitened_noise_is_independent_with_the_variance_of_one_measurement():
     np.testing.assert_allclose(weights @ known.covariance @ weights.T, np.eye(NUMBER - 1), atol=1e-9)
 
 
+def test_what_all_samples_share_is_part_of_the_covariance():
+    """An unknown with a known spread widens what is fitted as much as if it were fitted with that spread."""
+    common = SLOPES[:, 2:] * 0.3
+    known = CorrelatedNoise(0.0, 1.0, ALONG, COUNTS, True, common)
+    np.testing.assert_allclose(known.covariance, np.diag(1 / COUNTS) + common @ common.T)
+    assert known.to_dict(1e-3) is None
+    weights = known.whitener(np.ones(NUMBER, dtype=bool))
+    marginal = np.linalg.inv((weights @ SLOPES[:, :2]).T @ (weights @ SLOPES[:, :2]))
+    fitted = np.vstack([np.sqrt(COUNTS)[:, None] * SLOPES, [0.0, 0.0, 1 / 0.3]])
+    np.testing.assert_allclose(marginal, np.linalg.inv(fitted.T @ fitted)[:2, :2], rtol=1e-9)
+
+
 def test_what_neighbours_tell_is_taken_away():
     known, kept = CorrelatedNoise(0.5, 50.0, ALONG, COUNTS, True), np.ones(NUMBER, dtype=bool)
     slow = np.sin(ALONG / 60)

@@ -12,7 +12,7 @@ from quakedesign.fault import friction_law
 from quakedesign.identification.experiment import TREND, Difference
 from quakedesign.identification.identify import set_up
 from quakedesign.identification.loading import prepared
-from quakedesign.identification.sliding_experiment import START_STATE, step
+from quakedesign.identification.sliding_experiment import START_RATE, START_STATE, step
 from quakedesign.identification.two_states import with_two_states
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))
@@ -113,7 +113,7 @@ def test_slopes_by_trend_and_unsteady_beginning_are_those_of_differences(kind):
     law = friction_law(made.law)
     plain, wide = (set_up(record, law, made.stiffness, loading, more).experiment for more in ((), (TREND, START_STATE)))
     values = made.true_at(plain.law.reference_rate)
-    at = wide.inward([(values | {TREND: 30.0, START_STATE: 0.3})[c.name] for c in wide.coordinates])
+    at = wide.inward([(values | {TREND: 30.0, START_STATE: 0.3, START_RATE: 0.2})[c.name] for c in wide.coordinates])
     wide = wide.resolved(at, 1e-5)
     slopes = wide.slopes(at)
     for i, coordinate in enumerate(wide.coordinates):
@@ -122,11 +122,11 @@ def test_slopes_by_trend_and_unsteady_beginning_are_those_of_differences(kind):
         difference = (wide.friction(at + moved) - wide.friction(at - moved)) / (2 * moved[i])
         np.testing.assert_allclose(difference, slopes[:, i], atol=1e-6 * np.max(np.abs(slopes[:, i])))
     steady = at.copy()
-    steady[-1], steady[-2] = 0, 0
+    steady[[-1, -2, -3]] = 0
     same = plain.resolved(plain.near(wide.outward(steady)), 1e-7).friction(plain.near(wide.outward(steady)))
     np.testing.assert_allclose(wide.resolved(steady, 1e-7).friction(steady), same, atol=1e-6)
     first = wide.friction(at)[0] - same[0]
-    assert first == pytest.approx(0.3 * values["evolution_effect"])
+    assert first == pytest.approx(0.3 * values["evolution_effect"] + 0.2 * values["direct_effect"])
     steady[-1] = 30.0
     path = record.load_point - record.load_point[0]
     np.testing.assert_allclose(wide.resolved(steady, 1e-7).friction(steady) - same, 30 * path, atol=2e-6)

@@ -47,6 +47,21 @@ def test_rates_and_times_come_back(noise):
     np.testing.assert_allclose(pieces.position(TIME), moved(), atol=8e-7)
 
 
+@pytest.mark.parametrize("fading", [0.0, 0.9])
+def test_errors_of_rates_are_as_large_as_rates_scatter(fading):
+    """Over 40 noises, against the scatter of the rates that are found; none of them makes a change of rate."""
+    time, found, told = np.arange(0.0, 55.0, 0.05), [], []
+    for seed in range(40):
+        noise = shared(4.5e-7, fading, seed)[: len(time)]
+        x = moved(((0.0, 1e-6), (30.0, 1e-5)), time) + noise
+        pieces = straight_pieces(time, x, scatter(time, x), reading_step(x))
+        assert len(pieces.rates) == 2
+        found.append(np.log(pieces.rates))
+        told.append(pieces.errors)
+    np.testing.assert_allclose(np.mean(told, axis=0), np.std(found, axis=0), rtol=0.35)
+    assert staircase(time, np.full(len(time), 1e-6)).errors is None
+
+
 def test_readings_in_steps_leave_no_more_pieces():
     x = np.round(moved() / 1e-7) * 1e-7
     pieces = straight_pieces(TIME, x, scatter(TIME, x), reading_step(x))
