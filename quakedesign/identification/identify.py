@@ -335,7 +335,10 @@ class _Choice:
         fits: list[_Fitted] = []
         for kind in kinds:
             try:
-                fits.append(self._fitted(kind, {TREND}, fits[0].best if fits else None))
+                near = fits[0].best if fits else None
+                if len(kind.state_names) > 1:  # which a trend helps to stand for each other
+                    near = self._fitted(kind, (), None).best
+                fits.append(self._fitted(kind, {TREND}, near))
             except RecordError:  # which no spring holds without a jump
                 if not fits:
                     raise
