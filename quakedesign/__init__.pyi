@@ -1,10 +1,12 @@
 from .checking import check_files as check_files
+from .fault import BlockChain as BlockChain
 from .fault import Disturbance as Disturbance
 from .fault import Fault as Fault
 from .fault import FrictionLaw as FrictionLaw
 from .fault import Reference as Reference
 from .fault import Scales as Scales
 from .fault import UncertaintyBox as UncertaintyBox
+from .fault import load_chain as load_chain
 from .fault import load_fault as load_fault
 from .fault import scaled_fault as scaled_fault
 from .guarantees import load_guarantee as load_guarantee

@@ -177,8 +177,13 @@ def design(
     verbose
         Also print the fault, gains, verdicts with premises, certified domains and all metrics, as in the report.
     """
+    given = dict(locals())
+    from quakedesign.cli.block_commands import run_chain, several_blocks
     from quakedesign.report.folder import prepare
 
+    known = ("out", "format", "verbose")
+    if (chain := several_blocks(fault, globals()["design"], given, known, options.box)) is not None:
+        return run_chain(chain, None, out or Path(f"quakedesign-{chain.name}"), force, output, format)
     loaded, asked = options.asked(fault)
     folder = out or Path(f"quakedesign-{loaded.name}")
     prepare(folder, force=force)

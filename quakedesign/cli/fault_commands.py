@@ -19,9 +19,13 @@ from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Gains, Output,
 @app.command
 def fault(fault: FaultName, /, *, box: Box = None, output: Output = PLAIN) -> int:
     """Show derived quantities of a fault and why it is unstable."""
+    options, name = dict(locals()), fault
+    from quakedesign.cli.block_commands import several_blocks, show_chain
     from quakedesign.fault import load_fault
     from quakedesign.studies.facts import fault_dict, fault_sentences
 
+    if (chain := several_blocks(name, globals()["fault"], options, box=box)) is not None:
+        return show_chain(chain, output)
     loaded = load_fault(fault, box=box)
     if output.json:
         print_json(fault_dict(loaded))

@@ -108,10 +108,14 @@ def guarantee(
     out
         Certificate file to write; for several faults a folder.
     """
+    options = dict(locals())
+    from quakedesign.cli.block_commands import guarantee_chain, several_blocks
     from quakedesign.fault import load_fault, with_accepted_fit
     from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
 
+    if (chain := several_blocks(fault, globals()["guarantee"], options, ("step", "out"), box)) is not None:
+        return guarantee_chain(chain, step, out, force, output)
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)
@@ -289,8 +293,12 @@ def limits(
     out
         Folder for a figure and results.json; by default nothing is written.
     """
+    options = dict(locals())
+    from quakedesign.cli.block_commands import chain_limits, several_blocks
     from quakedesign.fault import load_fault
 
+    if (chain := several_blocks(fault, globals()["limits"], options, box=box)) is not None:
+        return chain_limits(chain, output)
     loaded = load_fault(fault, box=box, disturbance=disturbance)
     if out is not None:
         from quakedesign.report.folder import prepare

@@ -85,11 +85,14 @@ def simulate(
         NetCDF file to write.
     """
     options = dict(locals())
+    from quakedesign.cli.block_commands import run_chain, several_blocks
     from quakedesign.fault import load_fault
     from quakedesign.report.sentences import proved_line
     from quakedesign.simulation import Load
     from quakedesign.studies.runs import run_single
 
+    if (blocks := several_blocks(fault, simulate, options, ("duration", "out"))) is not None:
+        return run_chain(blocks, run.duration, out, force, output)
     new_file(out, "output file", force=force)
     loaded = load_fault(fault)
     if loaded.friction.state_names:

@@ -1,3 +1,6 @@
+from .block_chain import BlockChain as BlockChain
+from .block_chain import FaultBlock as FaultBlock
+from .block_chain import load_chain as load_chain
 from .fault_toml import fault_toml as fault_toml
 from .fault_toml import load_fault as load_fault
 from .fault_toml import parse_fault as parse_fault

@@ -419,13 +419,18 @@ def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
         raw = parse_toml(text)
     except ValueError as error:
         raise ScenarioError(f"{name} is not valid TOML: {error}. Compare with a preset.") from None
+    if {"block", "well"} & set(raw):
+        raise ScenarioError(
+            f"{name} must have no [[block]] and [[well]] tables here. Received a fault of several blocks. Use the "
+            "commands fault, design, guarantee, simulate or limits (Python: quakedesign.load_chain)."
+        )
     problems = Problems()
-    fault: Fault = _fault(Table(raw, problems), problems, allow_code)
+    fault: Fault = fault_of_tables(Table(raw, problems), problems, allow_code)
     problems.refuse(name)
     return fault
 
 
-def _fault(table: Table, problems: Problems, allow_code: bool) -> Any:
+def fault_of_tables(table: Table, problems: Problems, allow_code: bool) -> Any:
     """Fault of a whole file; there are problems where it is None."""
     parts: dict[str, Any] = {"name": table.text("name"), "source": _NO_SOURCE}
     if "source" in table.entries:
@@ -434,7 +439,7 @@ def _fault(table: Table, problems: Problems, allow_code: bool) -> Any:
         parts["poor_fit"] = table.text("poor_fit")
     for key, unit in PLANT.items():
         parts |= table.quantities({key: unit}, optional=key in OPTIONAL)
-    parts["friction"] = _friction(table.table("friction"), problems, allow_code)
+    parts["friction"] = read_friction(table.table("friction"), problems, allow_code)
     task = _task(table.table("task", optional=True), problems)
     parts["disturbance"] = _disturbance(table.table("disturbance", optional=True), problems, _authority(parts))
     parts["box"] = _box(table, problems)
@@ -451,7 +456,8 @@ def _fault(table: Table, problems: Problems, allow_code: bool) -> Any:
     return None
 
 
-def _friction(table: Table | None, problems: Problems, allow_code: bool) -> Any:
+def read_friction(table: Table | None, problems: Problems, allow_code: bool) -> Any:
+    """Friction law of a table; None for one that is wrong."""
     name = table.text("law") if table else None
     if table is None or name is None:
         if table:
@@ -743,6 +749,13 @@ def fault_schema() -> dict[str, Any]:
         "task": _table(_quantities(TASK, _task_described()), ()),
         "disturbance": _table(_quantities(DISTURBANCE, _described(Disturbance)), ()),
     }
+    own = {key: properties[key] for key in ("length", "effective_normal_stress", "friction")}
+    place = {"type": "string", "description": "along the fault", "examples": ["1 km"]}
+    for key, items, needed, text in (
+        ("block", own, "length", "tables [[block]], in a row; friction and stress are the fault's unless given"),
+        ("well", {"position": place}, "position", "tables [[well]], from one end of the row"),
+    ):
+        properties[key] = {"type": "array", "description": text, "items": _table(items, (needed,))}
     required = ("name", *(key for key in PLANT if key not in OPTIONAL), "friction")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

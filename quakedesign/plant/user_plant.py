@@ -5,7 +5,7 @@ its argument or for those within a bound; a load v(t) changes slowly; a disturba
 bounded size. The law measures Cx at every sample, and noise.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from fractions import Fraction
 from math import ceil
@@ -17,7 +17,7 @@ from flint import fmpq, fmpq_mat
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import rational, shortly
-from quakedesign.fault import Fault
+from quakedesign.fault import BlockChain, Fault
 from quakedesign.fault.units import exact_value
 from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad, unit
@@ -189,7 +189,9 @@ class UncertainPlant:
         return cls(**({"A": system.A, "B": system.B, "C": system.C, "name": system.name} | labels | more))
 
     @classmethod
-    def from_blocks(cls, fault: Fault, blocks: int, *, wells: str = "each", coupling: Any = None) -> Self:
+    def from_blocks(
+        cls, fault: Fault | BlockChain, blocks: int | None = None, *, wells: str = "each", coupling: Any = None
+    ) -> Self:
         """Strips of a fault with springs between neighbours, each with its own friction of the box and disturbance.
 
         States: slip errors [m], then slip-rate errors [m/s] of all blocks; controls: pressures of the wells [Pa].
@@ -199,7 +201,8 @@ class UncertainPlant:
 
         Parameters
         ----------
-        fault : Fault
+        fault : Fault or BlockChain
+            Of the second the blocks, springs and wells are its own, and no other argument is given.
         blocks : int
             2 to 20.
         wells : str
@@ -288,68 +291,106 @@ _TURNS = 6
 _GRID = 10**4
 
 
-def block_parts(fault: Fault, blocks: int, wells: str, coupling: Any) -> dict[str, Any]:
+def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupling: Any) -> dict[str, Any]:
     """Fields of the plant of several blocks."""
+    if isinstance(fault, BlockChain):
+        if blocks is not None or coupling is not None or wells != "each":
+            raise ParameterError(
+                "blocks, wells and coupling of a fault of several blocks are its own. Received values. Omit these."
+            )
+        return _chain_parts(fault)
     require_known(wells, ("each", "one"), "wells")
-    if not 2 <= blocks <= MOST // 2:
+    if blocks is None or not 2 <= blocks <= MOST // 2:
         raise ParameterError(f"blocks must be 2 to {MOST // 2}. Received {blocks}.")
-    task, N, zero = uncertain_plant(fault), blocks, Fraction(0)
-    elastic = task.shear_modulus * N**2 / (task.density * task.length**2)
+    task, N = uncertain_plant(fault), blocks
+    elastic = task.shear_modulus * N**2 / (task.density * rational(fault.length) ** 2)
     K = elastic if coupling is None else exact_value(coupling, "1/s^2", "coupling")
     if K <= 0:
         raise ParameterError(f"coupling of blocks must be positive. Received {shortly(K)} 1/s^2.")
-    one = wells == "one"
-    slope, damping, differ = task.slip_chord, task.rate_chord, zero
-    if one:
-        if any(task.spreads):
-            raise ParameterError(
-                f"one well for several blocks needs blocks whose constants are known, box paper. Received {task.name} "
-                "with spreads. Use fault.with_box('paper')."
-            )
-        slope, damping, differ = _balanced(task, N, K)
-    moving = max(map(abs, slope)) * (1 + differ) * task.reference_rates[0]
-    first, second = task.reference_rates
-    size, middle = 2 * N, (damping[0] + damping[1]) / 2
-    A = [unit(size, N + i) for i in range(N)]
-    for i in range(N):
-        row = [zero] * size
-        for j in (i - 1, i + 1):
-            if 0 <= j < N:
-                row[j], row[i] = K, row[i] - K
-        row[N + i] = -middle
-        A.append(tuple(row))
-    share = [[Fraction(1)] if one else [Fraction(i == j) for j in range(N)] for i in range(N)]
-    B = [(zero,) * len(share[0])] * N + [tuple(task.authority * v for v in row) for row in share]
+    springs = [(a, b, K) for i in range(N - 1) for a, b in ((i, i + 1), (i + 1, i))]
+    if wells == "each":
+        return _parts([task] * N, springs, [unit(N, i) for i in range(N)], f"{N} blocks of {task.name}, {N} wells")
+    if any(task.spreads):
+        raise ParameterError(
+            f"one well for several blocks needs blocks whose constants are known, box paper. Received {task.name} "
+            "with spreads. Use fault.with_box('paper')."
+        )
+    balanced = _balanced(task, N, K)
+    return _parts([task] * N, springs, [(Fraction(1),)] * N, f"{N} blocks of {task.name}, one well", balanced)
+
+
+def _chain_parts(chain: BlockChain) -> dict[str, Any]:
+    """The same of blocks that differ, with as many wells, or of blocks that are alike under one well."""
+    N, m = len(chain.blocks), len(chain.wells)
+    if m == 1 and chain.alike:
+        return block_parts(chain.faults[0], N, "one", chain.springs[0][2]) | {"name": f"{chain.name}, one well"}
+    shares = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in chain.shares])
+    if m < N or shares.det() == 0:
+        raise ParameterError(
+            f"a guarantee of {N} blocks needs a well for each block whose pressures are independent, or one well for "
+            f"blocks that are alike. Received {m} wells{'' if m < N else ' that act on fewer blocks'}"
+            f"{', and blocks that differ' if m == 1 else ''}. Add wells, or simulate this fault."
+        )
+    tasks = [uncertain_plant(fault) for fault in chain.faults]
+    return _parts(tasks, chain.springs, chain.shares, f"{chain.name}, {N} blocks, {m} wells")
+
+
+def _parts(
+    tasks: Sequence[FaultPlant],
+    springs: Iterable[tuple[int, int, Fraction]],
+    share: Sequence[Row],
+    name: str,
+    balanced: tuple[tuple[Fraction, Fraction], Any, Fraction] | None = None,
+) -> dict[str, Any]:
+    """Fields of a plant of blocks and wells; with one well, ranges of slope and damping and X about the balance."""
+    N, m, zero, differ = len(tasks), len(share[0]), Fraction(0), Fraction(0) if balanced is None else balanced[2]
+    size = 2 * N
+    slopes = [task.slip_chord if balanced is None else balanced[0] for task in tasks]
+    dampings = [task.rate_chord if balanced is None else balanced[1] for task in tasks]
+    pulls = [[zero] * size for _ in range(N)]
+    for i, j, K in springs:
+        pulls[i][j], pulls[i][i] = pulls[i][j] + K, pulls[i][i] - K
+    for i, damping in enumerate(dampings):
+        pulls[i][N + i] = -(damping[0] + damping[1]) / 2
     rate = [unit(size, N + i) for i in range(N)]
-    sectors = {f"slope of block {i + 1}": Sector(entry=rate[i], row=unit(size, i), slopes=slope) for i in range(N)}
-    if damping[0] < damping[1]:
-        half = (damping[1] - damping[0]) / 2
-        for i in range(N):
-            sectors[f"damping of block {i + 1}"] = Sector(entry=rate[i], row=rate[i], slopes=(-half, half))
-    for i in range(N):
+    sectors, disturbances, moving = {}, {}, []
+    loads: dict[str, Any] = {}
+    for i, task in enumerate(tasks):
+        half, place = (dampings[i][1] - dampings[i][0]) / 2, i + 1
+        sectors[f"slope of block {place}"] = Sector(entry=rate[i], row=unit(size, i), slopes=slopes[i])
+        if half:
+            sectors[f"damping of block {place}"] = Sector(entry=rate[i], row=rate[i], slopes=(-half, half))
         acts = (*[zero] * size, *(task.authority * v for v in share[i]))
-        sectors[f"input gain of block {i + 1}"] = Sector(entry=rate[i], row=acts, slopes=(0, task.beta[1] - 1))
-    force = max(map(abs, damping)) * first + second + task.amplitude
-    disturbances = {f"force on block {i + 1}": (rate[i], force) for i in range(N)}
-    if one and differ:
-        disturbances |= {f"balance of block {i + 1}": (unit(size, i), first * differ) for i in range(N)}
-    mean = Fraction(1, N)
-    means = [[mean] * N + [zero] * N, [zero] * N + [mean] * N]
+        sectors[f"input gain of block {place}"] = Sector(entry=rate[i], row=acts, slopes=(0, task.beta[1] - 1))
+        first, second = task.reference_rates
+        force = max(map(abs, dampings[i])) * first + second + task.amplitude
+        disturbances[f"force on block {place}"] = (rate[i], force)
+        moving.append(max(map(abs, slopes[i])) * (1 + differ) * first / task.authority)
+    if differ:
+        for i, task in enumerate(tasks):
+            disturbances[f"balance of block {i + 1}"] = (unit(size, i), task.reference_rates[0] * differ)
+    if m == 1:
+        loads["pressure 1"] = ((Fraction(1),), None, moving[0])
+    else:  # pressures of the wells that hold block i against a pressure of 1
+        inverse = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in share]).inv().tolist()
+        for i in range(N):
+            held = tuple(Fraction(int(row[i].p), int(row[i].q)) for row in inverse)
+            loads[f"pressure {i + 1}"] = (held, None, moving[i])
+    mean, acting = Fraction(1, N), zip(tasks, share, strict=True)
+    order = ("slope", "damping", "input")
     return {
-        "A": A,
-        "B": B,
-        "C": means if one else None,
-        "sectors": sectors,
+        "A": [*rate, *pulls],
+        "B": [(zero,) * m] * N + [tuple(task.authority * v for v in row) for task, row in acting],
+        "C": [[mean] * N + [zero] * N, [zero] * N + [mean] * N] if m == 1 else None,
+        "sectors": dict(sorted(sectors.items(), key=lambda item: order.index(item[0].split()[0]))),
         "disturbances": disturbances,
-        "loads": {
-            f"pressure {k + 1}": (unit(len(share[0]), k), None, moving / task.authority) for k in range(len(share[0]))
-        },
+        "loads": loads,
         "outputs": {
             **{f"slip error {i + 1}": unit(size, i) for i in range(N)},
             **{f"slip-rate error {i + 1}": rate[i] for i in range(N)},
         },
-        "controls": tuple(f"pressure {k + 1}" for k in range(len(share[0]))),
-        "name": f"{N} blocks of {task.name}, {'one well' if one else f'{N} wells'}",
+        "controls": tuple(f"pressure {k + 1}" for k in range(m)),
+        "name": name,
     }
 
 

@@ -1,3 +1,5 @@
+from .block_run import BlockRun as BlockRun
+from .block_run import simulate_blocks as simulate_blocks
 from .closed_loop import EnergyBudget as EnergyBudget
 from .closed_loop import Load as Load
 from .closed_loop import Variation as Variation

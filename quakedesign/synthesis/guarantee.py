@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.exact import exact_text, rational
-from quakedesign.fault import Fault, with_accepted_fit
+from quakedesign.fault import BlockChain, Fault, with_accepted_fit
 from quakedesign.fault.units import exact_value
 from quakedesign.guarantees import CLASSES, OBJECTIVES, LoopAnswer, NoGuarantee
 from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
@@ -76,7 +76,7 @@ _OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise
 
 
 def guarantee(
-    fault: Fault | UncertainPlant,
+    fault: Fault | BlockChain | UncertainPlant,
     controller: str | type[Controller] | Controller = "elqr",
     setup: LoopSetup = IDEAL,
     *,
@@ -98,9 +98,9 @@ def guarantee(
 
     Parameters
     ----------
-    fault : Fault or UncertainPlant
-        Of the latter, peaks of its outputs for a law or gains; law, gains, step, delay and lag apply. Several blocks of
-        a fault (`UncertainPlant.from_blocks`) have a law that is designed unless one is given.
+    fault : Fault, BlockChain or UncertainPlant
+        Of the second and third, peaks of its outputs for a law or gains; law, gains, step, delay and lag apply.
+        Several blocks (`UncertainPlant.from_blocks`, `load_chain`) have a law that is designed unless one is given.
     controller : str, type of Controller, or SampledLaw
         ``elqr``, or a sliding mode, ``cta`` or ``dia``; or a user's law.
     setup : LoopSetup
@@ -150,6 +150,9 @@ def guarantee(
     """
     setup = setup.with_given(**given)
     require_known(plant, PLANTS, "plant")
+    if isinstance(fault, BlockChain):
+        setup = setup if law is not None or setup.step else setup.with_given(step=rational(fault.fault.sampling_time))
+        fault = UncertainPlant.from_blocks(fault)
     if isinstance(fault, UncertainPlant):
         usual = (plant, objective, scheme, disturbance_class) == (PLANTS[0], OBJECTIVES[0], None, CLASSES[0])
         if not usual or controller != "elqr" or stress is not None or exact_value(spread, "", "spread"):

@@ -7,13 +7,14 @@ innovation of its slip rate. One well: a law of the means, as for one block.
 from fractions import Fraction
 
 import numpy as np
+from flint import fmpq, fmpq_mat
 from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import minimize
 
 from quakedesign.exact import rational
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
 from quakedesign.guarantees.search.plant_search import linear_part, pieces_of
-from quakedesign.plant.plant_values import Row, unit
+from quakedesign.plant.plant_values import Matrix, Row, unit
 from quakedesign.plant.user_plant import UncertainPlant
 
 _START = (0.0325, 1.6e-4, 0.13, 0.88, 1.2)
@@ -77,16 +78,15 @@ def _feedback(A: np.ndarray, G: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _for_every_well(part: LinearPart, step: Fraction, x: np.ndarray) -> MatrixLaw:
-    """Feedback of all errors, in exact numbers: π⁺ = Pe, d⁺ = d + M(e2 − π), p = −Ke/g − d⁺/g."""
+    """Feedback of all errors, in exact numbers: π⁺ = Pe, d⁺ = d + M(e2 − π), p = −g⁻¹(Ke + d⁺)."""
     count = len(part.A) // 2
     A, B = _middle(part)
-    gain = float(B[count, 0] * x[3])
     phi, reach = _held(A, np.vstack([np.zeros((count, count)), np.eye(count)]), float(step))
     K = _feedback(phi, reach, x)
-    g, feedback = rational(f"{gain:.8g}"), _rounded(K)
+    feedback = _rounded(K)
     learned = _rounded(float(x[2]) * np.linalg.inv(reach[count:]))
     expected = _rounded(phi[count:] - reach[count:] @ np.array(feedback, dtype=float))
-    return _law(step, g, feedback, learned, expected)
+    return _law(step, _rounded(B[count:] * x[3]), feedback, learned, expected)
 
 
 def _for_one_well(part: LinearPart, step: Fraction, x: np.ndarray) -> MatrixLaw:
@@ -95,33 +95,44 @@ def _for_one_well(part: LinearPart, step: Fraction, x: np.ndarray) -> MatrixLaw:
     A, B = _middle(part)
     mean = np.kron(np.eye(2), np.ones((1, count)) / count)
     own = mean @ A @ np.kron(np.eye(2), np.ones((count, 1)))
-    gain = float(B[count:].mean() * x[3])
+    gain = B[count:].mean(keepdims=True) * x[3]
     phi, reach = _held(own, np.array([[0.0], [1.0]]), float(step))
     K = _feedback(phi, reach, x)
-    g, feedback = rational(f"{gain:.8g}"), _rounded(K)
+    feedback = _rounded(K)
     learned = _rounded(float(x[2]) / reach[1:])
     expected = _rounded(phi[1:] - reach[1:] @ np.array(feedback, dtype=float))
-    return _law(step, g, feedback, learned, expected)
+    return _law(step, _rounded(gain), feedback, learned, expected)
 
 
 def _law(
-    step: Fraction, gain: Fraction, feedback: tuple[Row, ...], learned: tuple[Row, ...], expected: tuple[Row, ...]
+    step: Fraction, gains: Matrix, feedback: tuple[Row, ...], learned: tuple[Row, ...], expected: tuple[Row, ...]
 ) -> MatrixLaw:
-    """States π [m/s] and d [m/s²]; a constant d is balanced by p = −d/g exactly."""
+    """States π [m/s] and d [m/s²]; a constant d is balanced by p = −g⁻¹d exactly."""
     size, zero = len(feedback), Fraction(0)
     still = (zero,) * size
+    inverse = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in gains]).inv().tolist()
+    asked = [[-Fraction(int(v.p), int(v.q)) for v in row] for row in inverse]
+
+    def acting(rows: list[Row]) -> Matrix:
+        return tuple(
+            tuple(
+                sum((a * v for a, v in zip(line, column, strict=True) if a), zero) for column in zip(*rows, strict=True)
+            )
+            for line in asked
+        )
+
+    learned_by = [(*(-v for v in row), *unit(size, i)) for i, row in enumerate(learned)]  # d⁺ of π and d
     return MatrixLaw(
         step=step,
         delay=zero,
-        update=(
-            *[(*still, *still)] * size,
-            *((*(-v for v in row), *unit(size, i)) for i, row in enumerate(learned)),
-        ),
+        update=(*[(*still, *still)] * size, *learned_by),
         measured=(*expected, *((*still, *row) for row in learned)),
-        output=tuple((*(v / gain for v in row), *(-v / gain for v in unit(size, i))) for i, row in enumerate(learned)),
-        feedback=tuple(
-            tuple(-(a + b) / gain for a, b in zip(row, (*still, *more), strict=True))
-            for row, more in zip(feedback, learned, strict=True)
+        output=acting(learned_by),
+        feedback=acting(
+            [
+                tuple(a + b for a, b in zip(row, (*still, *more), strict=True))
+                for row, more in zip(feedback, learned, strict=True)
+            ]
         ),
     )
 

@@ -1,0 +1,196 @@
+"""Runs of a fault of several blocks under a sampled law, on the stick–slip plant: friction holds each block at rest."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import sympy as sp
+
+from quakedesign.arguments import checked_dataclass
+from quakedesign.errors import ParameterError
+from quakedesign.fault import BlockChain
+from quakedesign.symbolic.casadi_printer import to_casadi
+
+SUBSTEPS = 8
+"""Steps of one period; halving them moves errors in proportion."""
+_POINTS = 1000
+_MOST_PERIODS = 5 * 10**7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockRun:
+    """A run of several blocks. Arrays of instants × blocks, or wells for the pressure.
+
+    Attributes
+    ----------
+    times : ndarray
+        Ends of intervals [s].
+    slip, slip_rate, pressure : ndarray
+        Slip [m] and pressure of the wells [Pa] at these, largest slip rate in the intervals [m/s].
+    reference : ndarray
+        r [m].
+    slip_error, slip_rate_error : ndarray
+        Largest |slip − r| [m] and |slip rate − r'| [m/s] of every block over the run.
+    rest : ndarray
+        Share of the time that every block rests [-].
+    reversed, opened : bool
+        Whether a block would have slipped backward, or lost its effective normal stress.
+    """
+
+    times: np.ndarray
+    slip: np.ndarray
+    slip_rate: np.ndarray
+    pressure: np.ndarray
+    reference: np.ndarray
+    slip_error: np.ndarray
+    slip_rate_error: np.ndarray
+    rest: np.ndarray
+    reversed: bool
+    opened: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures of the run, SI."""
+        return {
+            "max_slip_error": self.slip_error.tolist(),
+            "max_slip_rate_error": self.slip_rate_error.tolist(),
+            "peak_slip_rate": self.slip_rate.max(axis=0).tolist(),
+            "time_at_rest_fraction": self.rest.tolist(),
+            "least_pressure": self.pressure.min(axis=0).tolist(),
+            "largest_pressure": self.pressure.max(axis=0).tolist(),
+            "load_reversed": self.reversed,
+            "opened": self.opened,
+            "duration": float(self.times[-1]),
+        }
+
+
+@checked_dataclass(frozen=True, kw_only=True)
+class _Period:
+    """One period of a chain under a law as a CasADi function of what is carried."""
+
+    chain: BlockChain
+    law: Any
+    substeps: int
+
+    def function(self) -> Any:
+        """What is carried from period to period: see `sizes`."""
+        slip, speed = sp.Symbol("slip", real=True), sp.Symbol("speed", real=True)
+        chain, fault, law = self.chain, self.chain.fault, self.law
+        N, q = len(chain.blocks), len(law.update)
+        told = len(law.measured[0]) if law.measured else len(law.feedback[0])
+        parts = [ca.SX.sym(name, size) for name, size in self.sizes]
+        x, v, z, _, count, worst, rate, peak, rest, room = parts
+        step, h = float(law.step), float(law.step) / self.substeps
+        shares = np.array(chain.shares, dtype=float)
+        share = fault.reference
+        pulls = np.zeros((N, N))
+        for i, j, K in chain.springs:
+            pulls[i, j] += float(K)
+            pulls[i, i] -= float(K)
+        stress = np.array([b.effective_normal_stress for b in chain.blocks])
+        kicked = fault.disturbance
+        phases = 2 * np.pi * np.arange(N) / N
+
+        def friction(slips: Any, rates: Any) -> Any:
+            laws = [block.friction.extended(slip, speed) for block in chain.blocks]
+            values = [to_casadi([mu], {slip: slips[i], speed: rates[i]})[0] for i, mu in enumerate(laws)]
+            return ca.vertcat(*values)
+
+        def reference(time: Any) -> tuple[Any, Any]:
+            stage = ca.fmin(time / share.operation_time, 1)
+            mean = share.target_slip / share.operation_time
+            return share.target_slip * share.shape(stage), mean * 30 * stage**2 * (1 - stage) ** 2
+
+        began = count * step
+        r, moved = reference(began)
+        errors = ca.vertcat(x - r, v - moved)
+        seen = errors if told == 2 * N else ca.vertcat(ca.sum1(x) / N - r, ca.sum1(v) / N - moved)
+        F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
+        p = (ca.mtimes(H, z) if q else 0) + ca.mtimes(D, seen)
+        z = ca.mtimes(F, z) + ca.mtimes(G, seen) if q else z
+        acting = ca.mtimes(shares, p)
+        static = friction(ca.SX.zeros(N), ca.SX.zeros(N))
+        for k in range(self.substeps):
+            time = began + k * h
+            pushed = kicked.constant + kicked.amplitude * ca.sin(kicked.frequency * time + phases)
+            strength = fault.authority * friction(x, v) * (stress - acting)
+            drive = fault.authority * static * stress - fault.specific_stiffness * x + ca.mtimes(pulls, x)
+            drive += pushed + kicked.slip_growth * x + (kicked.rate_growth - fault.specific_damping) * v
+            v = ca.fmax(v + h * (drive - strength), 0)
+            x = x + h * v
+            r, moved = reference(time + h)
+            worst, rate = ca.fmax(worst, ca.fabs(x - r)), ca.fmax(rate, ca.fabs(v - moved))
+            peak, rest = ca.fmax(peak, v), rest + (v <= 0) / self.substeps
+            room = ca.fmin(room, ca.vertcat(ca.mmin(drive + strength), ca.mmin(stress - acting)))
+        after = [x, v, z, p, count + 1, worst, rate, peak, rest, room]
+        return ca.Function("period", [ca.vertcat(*parts)], [ca.vertcat(*after)])
+
+    @property
+    def sizes(self) -> tuple[tuple[str, int], ...]:
+        """What is carried from period to period."""
+        N, m, q = len(self.chain.blocks), len(self.chain.wells), len(self.law.update)
+        of_blocks = tuple((name, N) for name in ("worst", "rate", "peak", "rest"))
+        return (("x", N), ("v", N), ("z", q), ("p", m), ("count", 1), *of_blocks, ("room", 2))
+
+
+def simulate_blocks(
+    chain: BlockChain, law: Any, *, duration: float | None = None, substeps: int = SUBSTEPS
+) -> BlockRun:
+    """Run blocks under a sampled law from rest; each has the fault's disturbance, shifted by its share of a turn.
+
+    Parameters
+    ----------
+    chain : BlockChain
+    law : MatrixLaw
+        Of errors of all blocks, or of the means of slip and slip rate; without delay.
+    duration : float, optional
+        [s]; the operation time unless given.
+    substeps : int
+        Of a period, 1 to 1000: slip rates by a projected Euler step, v = max(v + h·a, 0), then slips.
+
+    Returns
+    -------
+    BlockRun
+
+    Raises
+    ------
+    ParameterError
+    """
+    step = float(law.step)
+    whole = chain.fault.reference.operation_time if duration is None else duration
+    if not step <= whole <= _MOST_PERIODS * step or not 1 <= substeps <= 1000:
+        raise ParameterError(
+            f"duration must be {step:g} s to {_MOST_PERIODS * step:g} s, substeps 1 to 1000. Received {whole:g} s and "
+            f"{substeps}."
+        )
+    period = _Period(chain=chain, law=law, substeps=substeps)
+    once = period.function()
+    periods = int(whole / step)
+    at_once = max(periods // _POINTS, 1)
+    many, ends = once.fold(at_once), np.cumsum([0, *(size for _, size in period.sizes)])
+    place = {name: slice(*ends[i : i + 2]) for i, (name, _) in enumerate(period.sizes)}
+    now = np.zeros(ends[-1])
+    now[place["room"]] = np.inf
+    seen = []
+    for _ in range(periods // at_once):
+        now[place["peak"]] = 0
+        now = np.array(many(now)).ravel()
+        seen.append(now.copy())
+        if not np.isfinite(now[place["x"]]).all():
+            raise ParameterError("a run must stay finite. Received one that overflows. Change the law.")
+    kept = np.array(seen)
+    times = kept[:, place["count"]].ravel() * step
+    task = chain.fault.reference
+    least = kept[-1, place["room"]]
+    return BlockRun(
+        times=times,
+        slip=kept[:, place["x"]],
+        slip_rate=kept[:, place["peak"]],
+        pressure=kept[:, place["p"]],
+        reference=task.target_slip * task.shape(np.minimum(times / task.operation_time, 1)),
+        slip_error=kept[-1, place["worst"]],
+        slip_rate_error=kept[-1, place["rate"]],
+        rest=kept[-1, place["rest"]] / kept[-1, place["count"]],
+        reversed=bool(least[0] < 0),
+        opened=bool(least[1] <= 0),
+    )

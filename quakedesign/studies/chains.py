@@ -1,0 +1,162 @@
+"""Faults of several blocks: what is proved of them, how they run, and which modes no well holds.
+
+**Limit.** Let every block weaken at its steepest slope, with its least damping, and let ℓ be a left eigenvector of an
+unstable pole p of this linear plant: z = ℓ·(x, x′) obeys z′ = pz + ℓ·(φ + βbS(P − P*)). With constant φ of size H whose
+signs are those of ℓ, z grows from 0, as long as friction weakens so, unless Σ_j|ℓ·βb_j||P_j − P*_j| reaches HΣ|ℓ_i|: a
+controller of any kind needs pressures that far from balance, with the largest β. A mode that no well reaches grows.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault import BlockChain
+from quakedesign.plant import uncertain_plant
+
+_SAME = 1e-6  # poles that are one, relative to the largest
+_UNREACHED = 1e-9  # of a mode's vectors
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnstableMode:
+    """An unstable mode of a fault of several blocks.
+
+    Attributes
+    ----------
+    pole : float
+        p [1/s].
+    shape : tuple of float
+        Slips of the blocks, the largest 1 [-].
+    pressure : float
+        Least size [Pa] of pressures less their balance that a controller of any kind needs; infinite where no well
+        reaches the mode.
+    """
+
+    pole: float
+    shape: tuple[float, ...]
+    pressure: float
+
+    @property
+    def reached(self) -> bool:
+        """Whether a well reaches it."""
+        return bool(np.isfinite(self.pressure))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChainLimits:
+    """Unstable modes of a fault of several blocks under its wells, the fastest first; in floating point."""
+
+    chain: BlockChain
+    modes: tuple[UnstableMode, ...]
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the wells reach every unstable mode."""
+        return all(mode.reached for mode in self.modes)
+
+    def lines(self) -> list[str]:
+        """For people, within 80 columns."""
+        blocks, wells = len(self.chain.blocks), len(self.chain.wells)
+        said = [
+            f"{self.chain.name}: limits of every controller, {blocks} blocks, {wells} well{'s' * (wells > 1)}",
+            f"(box {self.chain.fault.box.name}, every block at its steepest friction, for constant disturbances)",
+            "",
+            f"{'mode':>4}{'pole [1/s]':>12}{'pressure less balance':>26}  slips of the blocks",
+        ]
+        for place, mode in enumerate(self.modes, 1):
+            needed = f"at least {mode.pressure:.3g} Pa" if mode.reached else "no well reaches it"
+            said.append(f"{place:4}{mode.pole:12.4g}{needed:>26}  {', '.join(f'{v:.2g}' for v in mode.shape)}")
+        escaping = sum(not mode.reached for mode in self.modes)
+        if escaping:
+            said += [
+                "",
+                f"infeasible for every controller: {escaping} unstable mode{'s' * (escaping > 1)} out of reach",
+            ]
+        elif not self.modes:
+            said += ["", "no mode is unstable"]
+        return said
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; pressure null where no well reaches a mode."""
+        modes = [
+            {
+                "pole": m.pole,
+                "shape": list(m.shape),
+                "reached": m.reached,
+                "pressure": m.pressure if m.reached else None,
+            }
+            for m in self.modes
+        ]
+        return {"fault": self.chain.name, "feasible": self.feasible, "modes": modes}
+
+
+def chain_limits(chain: BlockChain) -> ChainLimits:
+    """Unstable modes of blocks with springs, and the pressures that every controller needs for them."""
+    tasks, N = [uncertain_plant(fault) for fault in chain.faults], len(chain.blocks)
+    stiff = np.diag([float(task.slip_chord[1]) for task in tasks])
+    for i, j, K in chain.springs:
+        stiff[i, j] += float(K)
+        stiff[i, i] -= float(K)
+    damping = np.diag([-float(task.rate_chord[0]) for task in tasks])
+    A = np.block([[np.zeros((N, N)), np.eye(N)], [stiff, damping]])
+    authority = np.array([[float(task.authority * task.beta[1])] for task in tasks])
+    B = np.vstack([np.zeros((N, len(chain.wells))), authority * np.array(chain.shares, dtype=float)])
+    size = float(tasks[0].amplitude)
+    poles, right = np.linalg.eig(A)
+    if max(abs(poles[poles.real > 0].imag), default=0) > _SAME * max(abs(poles)):
+        raise ParameterError(
+            "limits of blocks need unstable poles that are real. Received complex ones. Simulate this fault."
+        )
+    left = np.linalg.inv(right)
+    order = [i for i in np.argsort(-poles.real) if poles[i].real > _SAME * max(abs(poles))]
+    groups: list[list[int]] = []
+    for i in order:
+        if groups and poles[groups[-1][0]].real - poles[i].real <= _SAME * max(abs(poles)):
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    modes = []
+    for group in groups:  # of one pole: combinations that the wells reach, and those that none does
+        rows = np.real(left[group])
+        turned = np.linalg.svd(rows @ B)[0].T
+        shapes = np.real(right[:N, group]) @ np.linalg.inv(turned)
+        for row, shape in zip(turned @ rows, shapes.T, strict=True):
+            reach = np.abs(row @ B).sum()
+            out = reach <= _UNREACHED * np.linalg.norm(row) * np.linalg.norm(B)
+            modes.append(
+                UnstableMode(
+                    pole=float(poles[group[0]].real),
+                    shape=tuple((shape / shape[np.argmax(np.abs(shape))]).tolist()),
+                    pressure=np.inf if out else size * float(np.abs(row[N:]).sum() / reach),
+                )
+            )
+    return ChainLimits(chain=chain, modes=tuple(modes))
+
+
+def chain_lines(chain: BlockChain) -> list[str]:
+    """What a file of several blocks says, within 80 columns."""
+    said = [
+        f"{chain.name}: {len(chain.blocks)} blocks, {len(chain.wells)} wells (box {chain.fault.box.name}, task "
+        f"{chain.fault.reference.target_slip:g} m in {chain.fault.reference.operation_time:g} s)",
+        "",
+        f"{'block':>5}{'length [m]':>12}{'stress [Pa]':>13}  {'share of each well':24}friction",
+    ]
+    for place, (block, row) in enumerate(zip(chain.blocks, chain.shares, strict=True), 1):
+        shares = ", ".join(f"{float(v):.3g}" for v in row)
+        stress = block.effective_normal_stress
+        said.append(f"{place:5}{block.length:12g}{stress:13.4g}  {shares:24}{block.friction.name}")
+    springs = ", ".join(f"{float(K):.4g}" for i, j, K in chain.springs if i < j)
+    return [*said, "", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
+
+
+def chain_dict(chain: BlockChain) -> dict[str, Any]:
+    """The same as plain values, SI."""
+    blocks = [
+        {"length": b.length, "effective_normal_stress": b.effective_normal_stress, "friction": b.friction.name}
+        for b in chain.blocks
+    ]
+    springs = [{"block": i + 1, "pulled_by": j + 1, "stiffness_over_mass": float(K)} for i, j, K in chain.springs]
+    shares = [[float(v) for v in row] for row in chain.shares]
+    return {"fault": chain.name, "blocks": blocks, "wells": list(chain.wells), "shares": shares, "springs": springs}

@@ -1,0 +1,126 @@
+"""Files of several blocks: lengths, shares and springs by hand, and what is refused in one line."""
+
+from dataclasses import replace
+from fractions import Fraction as F
+from pathlib import Path
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.errors import ParameterError, QuakedesignError, ScenarioError
+from quakedesign.fault import load_chain, parse_fault
+
+PATH = Path(__file__).parents[1] / "data" / "three_blocks.toml"
+TEXT = PATH.read_text()
+CHAIN = load_chain(PATH)
+
+
+def test_a_file_gives_blocks_wells_and_what_they_share():
+    assert CHAIN.name == "three-blocks"
+    assert CHAIN.lengths == (2000, 1500, 1500)
+    assert CHAIN.middles == (1000, 2750, 4250)
+    assert [b.effective_normal_stress for b in CHAIN.blocks] == [50e6, 45e6, 50e6]
+    assert [b.friction.name for b in CHAIN.blocks] == ["exponential-slip-weakening"] * 2 + ["linear-slip-weakening"]
+    assert CHAIN.blocks[1].friction == CHAIN.fault.friction
+    assert not CHAIN.alike
+    assert load_chain("real-fault") is None
+
+
+def test_pressure_is_linear_between_wells_and_constant_beyond_them():
+    # the middle of block 2 lies 250 m of 1750 m behind the second well
+    assert CHAIN.shares == ((1, 0, 0), (0, F(6, 7), F(1, 7)), (0, 0, 1))
+    beyond = replace(CHAIN, wells=(1500.0, 2000.0))
+    assert beyond.shares == ((1, 0), (0, 1), (0, 1))
+
+
+def test_springs_are_those_of_elastic_strips():
+    """Stiffness G·h·h over the distance of the middles, mass ρ·h·h·length, h the side of the fault."""
+    side, found = 5000, {(i, j): K for i, j, K in CHAIN.springs}
+    for (i, j), distance in {(0, 1): 1750, (1, 2): 1500}.items():
+        stiffness = F(30 * 10**9) * side * side / distance
+        for a, b in ((i, j), (j, i)):
+            assert found[a, b] == stiffness / (2500 * side * side * CHAIN.lengths[a])
+    assert len(found) == 4
+
+
+def test_equal_strips_are_those_of_a_fault_that_is_cut():
+    blocks = tuple(replace(CHAIN.blocks[0], length=1000.0) for _ in range(5))
+    cut = replace(CHAIN, blocks=blocks, wells=tuple(500.0 + 1000 * i for i in range(5)))
+    one = qd.UncertainPlant.from_blocks(CHAIN.fault, 5)
+    same = qd.UncertainPlant.from_blocks(cut)
+    assert (same.A, same.B, same.sectors) == (one.A, one.B, one.sectors)
+    assert (same.disturbances, same.loads) == (one.disturbances, one.loads)
+    under_one = qd.UncertainPlant.from_blocks(replace(cut, wells=(2500.0,)))
+    assert under_one.disturbances == qd.UncertainPlant.from_blocks(CHAIN.fault, 5, wells="one").disturbances
+
+
+def test_a_load_is_held_by_the_pressures_that_hold_its_block_alone():
+    plant = qd.UncertainPlant.from_blocks(CHAIN)
+    for i, load in enumerate(plant.loads.values()):
+        held = [sum(s * p for s, p in zip(row, load.control, strict=True)) for row in CHAIN.shares]
+        assert held == [int(i == j) for j in range(3)]
+
+
+def without(text, start):
+    """The text without the lines from one on, up to an empty line."""
+    before, _, after = text.partition(start)
+    return before + after.partition("\n\n")[2]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (TEXT.replace('length = "2 km"', 'length = "1 km"'), "must add up to the length of the fault, 5000 m"),
+        (TEXT.replace('position = "2.5 km"', 'position = "0.5 km"'), "positions of wells must increase"),
+        (TEXT.replace('position = "4.25 km"', 'position = "6 km"'), "positions of wells must increase, from 0 to 5000"),
+        (TEXT.split("[[well]]")[0], "1 well to one well a block. Received 3 blocks and 0 wells"),
+        (TEXT.replace('length = "2 km"', 'size = "2 km"'), "block 1.size is not a known key"),
+        (TEXT.replace('length = "2 km"', 'length = "2 MPa"'), "block 1.length"),
+        (TEXT.replace('position = "1 km"', "position = 1"), "well 1.position"),
+        (TEXT.replace('critical_slip = "300 mm"', 'critical_slip = "-300 mm"'), "critical_slip must be positive"),
+        (TEXT.replace('"45 MPa"', '"-45 MPa"'), "effective_normal_stress must be positive"),
+        (TEXT.replace('law = "linear-slip-weakening"', 'law = "linear"'), "friction law"),
+        (TEXT.replace('density = "2500 kg/m^3"', ""), "density"),
+        (TEXT.split("[[block]]")[0] + "[block]\nlength = 1\n", r"block must be tables \[\[block\]\]"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_one_line(text, said, tmp_path):
+    path = tmp_path / "blocks.toml"
+    path.write_text(text)
+    with pytest.raises(QuakedesignError, match=said) as refused:
+        load_chain(path)
+    assert "\n" not in str(refused.value)
+
+
+def test_friction_with_a_state_is_refused(tmp_path):
+    state = (
+        'law = "rate-and-state-aging"\nreference_coefficient = 0.6\ndirect_effect = 0.01\nevolution_effect = 0.015\n'
+        'critical_slip = "1 mm"\nreference_rate = "1 um/s"\nslowest_rate = "1e-12 m/s"\nfastest_rate = "1 m/s"\n'
+    )
+    path = tmp_path / "blocks.toml"
+    path.write_text(TEXT.split('law = "linear')[0] + state + "\n" + TEXT.split('"300 mm"\n')[1])
+    with pytest.raises(QuakedesignError, match="a fault of several blocks needs a friction law of slip"):
+        load_chain(path)
+
+
+def test_what_takes_one_block_refuses_the_file_and_says_what_takes_it():
+    with pytest.raises(ScenarioError, match="Use the commands fault, design, guarantee, simulate or limits"):
+        qd.load_fault(PATH)
+    with pytest.raises(ScenarioError, match="no \\[\\[block\\]\\]"):
+        parse_fault(TEXT, "text")
+
+
+@pytest.mark.parametrize(
+    ("chain", "given", "said"),
+    [
+        (replace(CHAIN, wells=(1000.0,)), {}, "Received 1 wells, and blocks that differ"),
+        (replace(CHAIN, wells=(1000.0, 4000.0)), {}, "Received 2 wells"),
+        (replace(CHAIN, wells=(100.0, 200.0, 300.0)), {}, "3 wells that act on fewer blocks"),
+        (CHAIN, {"blocks": 3}, "are its own"),
+        (CHAIN, {"wells": "one"}, "are its own"),
+        (CHAIN, {"coupling": 12}, "are its own"),
+    ],
+)
+def test_wells_that_a_guarantee_does_not_cover_are_refused(chain, given, said):
+    with pytest.raises(ParameterError, match=said):
+        qd.UncertainPlant.from_blocks(chain, **given)

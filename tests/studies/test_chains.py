@@ -1,0 +1,137 @@
+"""Limits of several blocks beside closed forms and a run of a mode, and the commands that take such a file."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import quakedesign as qd
+from quakedesign.cli import main
+from quakedesign.plant import uncertain_plant
+from quakedesign.studies import chain_limits
+
+PATH = Path(__file__).parents[1] / "data" / "three_blocks.toml"
+CHAIN = qd.load_chain(PATH)
+
+
+def alike(lengths, wells, modulus=None):
+    """Blocks of one friction; a softer rock has softer springs."""
+    blocks = tuple(replace(CHAIN.blocks[0], length=float(v)) for v in lengths)
+    return replace(CHAIN, blocks=blocks, wells=wells)
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as stop:
+        main([*map(str, arguments)])
+    return stop.value.code
+
+
+def test_modes_of_equal_blocks_are_those_of_a_chain():
+    """Poles p² + wp = s − 2K(1 − cos πk/N), of which one well in the middle reaches every second mode."""
+    long = replace(CHAIN.fault, length=80e3, width=5e3)
+    blocks = tuple(replace(CHAIN.blocks[0], length=20e3) for _ in range(4))
+    chain = replace(CHAIN, fault=long, blocks=blocks, wells=(40e3,))
+    assert {row[0] for row in chain.shares} == {1}
+    task = uncertain_plant(chain.faults[0])
+    s, w, K = float(task.slip_chord[1]), float(task.rate_chord[0]), float(chain.springs[0][2])
+    wanted = [s - 2 * K * (1 - np.cos(np.pi * k / 4)) for k in range(4)]
+    wanted = sorted(((np.sqrt(w**2 + 4 * v) - w) / 2 for v in wanted if v > 0), reverse=True)
+    found = chain_limits(chain)
+    assert len(wanted) > 1
+    assert [mode.pole for mode in found.modes] == pytest.approx(wanted, rel=1e-9)
+    assert found.modes[0].shape == pytest.approx([1] * 4)
+    # a common pressure moves the common mode alone: H over the largest βb
+    assert [mode.reached for mode in found.modes] == [True] + [False] * (len(wanted) - 1)
+    assert found.modes[0].pressure == pytest.approx(float(task.amplitude / (task.authority * task.beta[1])), rel=1e-9)
+    assert not found.feasible
+    assert f"{len(wanted) - 1} unstable modes out of reach" in found.lines()[-1]
+    every = chain_limits(replace(chain, wells=(10e3, 30e3, 50e3, 70e3)))
+    assert every.feasible
+    assert [mode.pole for mode in every.modes] == pytest.approx(wanted, rel=1e-9)
+
+
+def test_blocks_that_hardly_pull_each_other_need_a_well_each():
+    """Of blocks with one pole each, m wells reach as many combinations as the wells are independent."""
+    long = replace(CHAIN.fault, length=5e7, width=5e3)
+    blocks = tuple(replace(CHAIN.blocks[0], length=1e7) for _ in range(5))
+    for wells, reached in (((5e6,), 1), ((5e6, 4.5e7), 2), ((5e6, 1.5e7, 2.5e7, 3.5e7, 4.5e7), 5)):
+        found = chain_limits(replace(CHAIN, fault=long, blocks=blocks, wells=wells))
+        assert len(found.modes) == 5
+        assert sum(mode.reached for mode in found.modes) == reached
+
+
+def test_a_pressure_below_the_limit_lets_the_mode_grow_and_one_above_can_hold_it():
+    found = chain_limits(CHAIN)
+    (mode,) = found.modes
+    tasks, N = [uncertain_plant(fault) for fault in CHAIN.faults], 3
+    A = np.zeros((6, 6))
+    A[:3, 3:] = np.eye(3)
+    A[3:, 3:] = -np.diag([float(task.rate_chord[0]) for task in tasks])
+    A[3:, :3] = np.diag([float(task.slip_chord[1]) for task in tasks])
+    for i, j, K in CHAIN.springs:
+        A[3 + i, j] += float(K)
+        A[3 + i, i] -= float(K)
+    B = np.array(
+        [[float(t.authority * t.beta[1] * v) for v in row] for t, row in zip(tasks, CHAIN.shares, strict=True)]
+    )
+    values, vectors = np.linalg.eig(A.T)
+    left = np.real(vectors[:, np.argmax(values.real)])
+    assert mode.pole == pytest.approx(values.real.max(), rel=1e-9)
+    pushed = 3.2e-4 * np.sign(left[3:])
+    for share, grows in ((0.99, True), (1.01, False)):
+        pressure = -share * mode.pressure * np.sign(left[3:] @ B) * np.sign(left[3:] @ pushed)
+        force = np.r_[np.zeros(N), pushed + B @ pressure]
+        state = expm(np.block([[A, force[:, None]], [np.zeros((1, 7))]]) * 20)[:6, 6]
+        assert (left @ state * np.sign(left[3:] @ pushed) > 0) is np.bool_(grows)
+
+
+def test_commands_take_the_file(capsys):
+    assert run("fault", PATH) == 0
+    assert "0, 0.857, 0.143" in capsys.readouterr().out
+    assert run("fault", PATH, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["shares"][2] == [0, 0, 1]
+    assert run("limits", PATH, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["feasible"] is True
+
+
+@pytest.mark.slow
+def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
+    file, out = tmp_path / "proved.json", tmp_path / "run"
+    assert run("guarantee", PATH, "--out", file) == 0
+    assert "|slip-rate error 3| <=" in capsys.readouterr().out.replace("\n", " ")
+    assert run("check", file) == 0
+    assert run("simulate", PATH, "--duration", "1 hour", "--out", out) == 0
+    told = capsys.readouterr().out
+    assert "what is proved is of that without stick" in told
+    assert (out / "blocks.png").stat().st_size > 20_000
+    facts = json.loads((out / "results.json").read_text())
+    assert facts["guarantee"]["verdict"] == "proved"
+    assert len(facts["run"]["max_slip_error"]) == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("guarantee", PATH, "--delay", "20 ms"), "Received --delay. Omit these."),
+        (("limits", PATH, "--pressure", "1 MPa"), "Received --pressure"),
+        (("simulate", PATH, "--controller", "cta"), "Received --controller"),
+        (("design", PATH, "--controller", "cta"), "Received --controller"),
+        (("compare", PATH), "Use the commands fault, design, guarantee, simulate or limits"),
+        (("export", PATH), "Use the commands fault, design, guarantee, simulate or limits"),
+        (("derive", PATH), "Use the commands fault, design, guarantee, simulate or limits"),
+    ],
+)
+def test_what_does_not_take_it_says_so_in_one_line(arguments, said, capsys):
+    assert run(*arguments) == 2
+    error = capsys.readouterr().err
+    assert said in " ".join(error.split())
+
+
+def test_two_wells_for_three_blocks_are_refused_with_a_remedy(tmp_path, capsys):
+    path = tmp_path / "blocks.toml"
+    path.write_text(PATH.read_text().replace('[[well]]\nposition = "2.5 km"\n', ""))
+    assert run("guarantee", path) == 2
+    assert "Add wells, or simulate this fault" in " ".join(capsys.readouterr().err.split())
