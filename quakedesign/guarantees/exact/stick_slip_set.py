@@ -59,10 +59,10 @@ from math import comb
 from typing import Any
 
 import numpy as np
-from flint import arb, ctx
+from flint import arb, ctx, fmpq
 
 from quakedesign.errors import ParameterError
-from quakedesign.exact import LowerBound, UpperBound, end_of, shortly
+from quakedesign.exact import LowerBound, UpperBound, fraction_of, shortly
 from quakedesign.guarantees.exact.norms import absolute, ball, majorant, matrix
 from quakedesign.guarantees.exact.statement import above
 from quakedesign.laws.stick_slip_law import StickSlipLaw
@@ -306,12 +306,19 @@ def _ball_middle(values: np.ndarray) -> np.ndarray:
     return np.asarray(np.vectorize(float, otypes=[float])(values))
 
 
+def _exact(value: Any) -> fmpq:
+    if isinstance(value, fmpq):
+        return value
+    number = Fraction(value)
+    return fmpq(number.numerator, number.denominator)
+
+
 def _exact_array(values: Any) -> np.ndarray:
-    return np.asarray(np.vectorize(Fraction, otypes=[object])(np.array(values, dtype=object)))
+    return np.asarray(np.vectorize(_exact, otypes=[object])(np.array(values, dtype=object)))
 
 
 BALLS = Numbers(ball, _ball_exponential, curvature, _ball_array, _ball_middle)
-EXACT = Numbers(Fraction, _ball_exponential, curvature, _exact_array, _ball_middle)
+EXACT = Numbers(_exact, _ball_exponential, curvature, _exact_array, _ball_middle)
 """Of rationals; only for what needs no exponential."""
 
 
@@ -749,7 +756,7 @@ def _middles(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Middles and radii of balls, exact; of rationals themselves and 0."""
     if not isinstance(values.flat[0], arb):
         return values, 0 * values
-    ends = [(end_of(value.mid()), end_of(value.rad())) for value in values.flat]
+    ends = [(value.mid().fmpq(), value.rad().fmpq()) for value in values.flat]
     middles, radii = (np.array(column, dtype=object).reshape(values.shape) for column in zip(*ends, strict=True))
     return middles, radii
 
@@ -836,5 +843,5 @@ def _push(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, si
             zip(polytopes(task, held, reach.facets, None), reach.sliding, strict=True)
         )
     ]
-    high, low = (max(line[i] for line in tops) for i in (0, 1))
+    high, low = (fraction_of(max(line[i] for line in tops)) for i in (0, 1))
     return -low - held.push_noise, high + held.push_noise

@@ -37,9 +37,16 @@ from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.ranges import FaultPlant
 
 Tell = Callable[[str, float], None]
-TUNINGS = tuple((level, slip, back, 1.3) for level, slip in ((0.5, 0.5), (0.7, 0.5), (0.3, 0.3)) for back in (0.3, 0.1))
+TUNINGS = tuple(
+    (level, slip, back, 1.3)
+    for level, slip, back in (
+        *((0.5, 0.5, back) for back in (0.3, 0.5, 0.1)),
+        (0.7, 0.5, 0.3),
+        *((0.3, 0.3, back) for back in (0.3, 0.1)),
+    )
+)
 """Shares of the innovations that the estimate takes, of the slip error that a period takes back, and the input gain."""
-_SETTLED, _FEW, _MANY = 1e-4, 150, 250  # change of extents, vertices kept in comparisons and for a polytope
+_FEW, _MANY = (150, 1e-3), (250, 1e-4)  # vertices kept, and change of extents, in comparisons and for a polytope
 _ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of one: they only propose
 _FACETS = 130  # of the first polytope
 _PERIODS, _TURNS, _REFINED = 4, 110, (8, 15, 22, 29)  # in which a policy is followed; turns; those that add facets
@@ -52,7 +59,7 @@ _KEPT, _FOLLOWED = (
     0.6,
     14,
 )  # share of the growth kept where facets are added; turns after the last before heights only grow
-_MARGINS = 2e-7, 2e-6, 2e-5  # by which the last polytope is larger than the images that it must hold
+_MARGINS = 2e-6, 2e-5  # by which the last polytope is larger than the images that it must hold
 _FAR = 30  # times the first extents, from where on a set counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried: of a size, and of the present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
@@ -239,9 +246,9 @@ class _Reach:
             now = np.maximum(end, 0)
         return moved, now, now <= 0
 
-    def hull(self, most: int, tell: Tell) -> np.ndarray | None:
+    def hull(self, kept: tuple[int, float], tell: Tell) -> np.ndarray | None:
         """Vertices of the hull of all states that are reached from rest; None where it grows without bound."""
-        points = _at_first(self.held)
+        (most, settled), points = kept, _at_first(self.held)
         directions = np.random.default_rng(0).standard_normal((1500, 3))
         first, before = None, np.zeros(6)
         for turn in range(_ROUNDS):
@@ -260,7 +267,7 @@ class _Reach:
             if len(points) > most:
                 points = _extreme(points, directions, most)
             extent = np.concatenate([points.max(axis=0), -points.min(axis=0)])
-            if np.all(np.abs(extent - before) <= _SETTLED * np.tile(size, 2)):
+            if np.all(np.abs(extent - before) <= settled * np.tile(size, 2)):
                 break
             before = extent
             tell("states that disturbances reach", turn / _ROUNDS)

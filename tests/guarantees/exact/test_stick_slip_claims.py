@@ -300,7 +300,7 @@ def test_a_period_that_ends_at_rest_is_bounded_for_every_reference_rate(proof):
     """n·z after the period, written out, for r' at both ends of each slice and sign of the target rate."""
     task, held, facets = proof.task, proof.held, proof.reach.facets
     found = ranges(task, F(1, 1000), (F(0), F(0)), F(0))
-    given = [np.array(rows, dtype=object) for rows in (facets, proof.reach.multipliers)]
+    given = [stick_slip_set._exact_array([list(row) for row in rows]) for rows in (facets, proof.reach.multipliers)]
     rows = list(stick_slip_set.resting_rows(stick_slip_set.EXACT, task, held, found, *given))
     law, step, fastest = held.law, held.step, task.reference_rates[0]
     turn, rng = fastest / law.return_rate, np.random.default_rng(4)
@@ -320,7 +320,7 @@ def test_a_period_that_ends_at_rest_is_bounded_for_every_reference_rate(proof):
             )
             tops = np.full(len(facets), -np.inf)
             for row in (row for row in rows if row.place == stick_slip_set.SLICES + place):
-                values = row.factors @ np.array([e1, y, d, slip], dtype=object) + row.constants
+                values = row.factors @ stick_slip_set._exact_array([e1, y, d, slip]) + row.constants
                 tops[row.which] = np.maximum(tops[row.which], values.astype(float))
             for rate in ends(e1):
                 predicted = max(rate - law.return_rate * e1, F(0))
