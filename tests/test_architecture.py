@@ -460,7 +460,7 @@ BUDGETS = {
     "simulation": 10000,
     "identification": 4200,
     "studies": 3720,
-    "report": 3860,
+    "report": 3870,
     "cli": 3270,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

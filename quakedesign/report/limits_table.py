@@ -52,6 +52,13 @@ def _meaning(limits: Limits) -> list[str]:
         "proved: of two designs, the one with the smaller slip-rate error; design prefers a smaller slip error unless "
         "its objective is peak",
     ]
+    if (least := limits.stick_slip_rate) is not None:
+        told.insert(
+            2,
+            f"on the stick-slip plant: no controller that makes the fault follow a reference keeps its slip rate below "
+            f"{least.quantity('m/s')} for every disturbance, even with friction that does not change; while the "
+            "reference rests no limit is known",
+        )
     if limits.largest_step.impossible_beyond is None:
         return [*told, "the others: none is known, since friction's weakening alone does not make this fault unstable"]
     return [

@@ -28,6 +28,7 @@ from quakedesign.guarantees.exact.impossibility import (
     longest_reaction,
     nearest_proved_well,
     smallest_peak,
+    smallest_stick_slip_rate,
     smallest_withdrawal,
 )
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
@@ -210,6 +211,11 @@ class Limits:
         return {name: getattr(self, name) for name in QUANTITIES}
 
     @property
+    def stick_slip_rate(self) -> LowerBound | None:
+        """Slip rate [m/s] that a fault that sticks reaches at its T_s under every controller that moves it."""
+        return smallest_stick_slip_rate(uncertain_plant(self.fault), rational(self.fault.sampling_time))
+
+    @property
     def natural_peak(self) -> float | None:
         """Slip rate [m/s] of the natural earthquake, which is simulated; None where there is none."""
         return natural_peak(self.fault)
@@ -228,6 +234,7 @@ class Limits:
             "slip_noise": str(self.told.slip_noise),
             "rate_noise": str(self.told.rate_noise),
             "slip_error": None if self.slip_error is None else str(self.slip_error),
+            "stick_slip_rate": None if (least := self.stick_slip_rate) is None else str(least),
             **{name: limit.to_dict() for name, limit in self.named().items()},
         }
 
@@ -279,6 +286,10 @@ class SlidingLimits(Limits):
         """T_s [s] and proved slip-rate error [m/s] of the guarantee."""
         found = self.guarantee
         return [] if found is None else [(found.held.step, above_the_reference(found))]
+
+    @property
+    def stick_slip_rate(self) -> None:
+        """None: the fault never rests."""
 
     @property
     def natural_peak(self) -> float | None:

@@ -175,6 +175,16 @@ class SlidingPush:
 # grows to H(e^{λT} − 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 for ever: ζ grows exponentially. x1′ = z − (λ + w)x1
 # with
 # z ≥ ζ > 0 keeps x1 positive, so the premise x1 ≥ 0 lasts, and takes x1 beyond E. ∎
+#
+# **Theorem 3 (a fault that sticks).** Let a fault rest at slip 0 and p = 0, held by friction, and never slip backward.
+# Let the pressure be decided at samples T apart and stay for T. No controller that moves it at all keeps its slip rate
+# below 2H·h(T), h as in theorem 1 with σ = −κ, κT² ≤ 1, for every φ, with friction that does not change.
+# *Proof.* Let φ = −H for ever. While the fault rests, the force on it changes with the pressure alone, so that it first
+# moves in a period of some pressure p with N̂μ*p ≥ H. Turn φ to H as that pressure begins to act. Until then both are
+# the same course, so p is the same, and it stays for T. The fault starts from rest with the force N̂μ*p + H ≥ 2H, and
+# y = x2 has y′ = N̂μ*p + H − κx1 − wy, whose solution is that many times h and positive up to T. ∎
+# So what is left of theorem 1 needs no negative slip rate: a reference that goes on makes the controller move it. At a
+# rest of the reference nothing is left: friction holds the fault under any pressure that is low enough.
 
 _SHARE = Fraction(1, 20)  # E of theorem 1: of the slip over which friction falls, and of the target
 _BISECTIONS = 14
@@ -305,6 +315,23 @@ def smallest_peak(
         ]
     best = max(peaks, key=lambda one: one.slip_rate_error)
     return best if best.slip_rate_error > 0 else None
+
+
+def smallest_stick_slip_rate(task: FaultPlant, step: Fraction) -> LowerBound | None:
+    """Theorem 3: slip rate [m/s] that a fault that sticks reaches under every controller; None without a disturbance.
+
+    Parameters
+    ----------
+    task : FaultPlant
+    step : Fraction
+        T, positive [s].
+    """
+    _require(step > 0, "a step above 0", step)
+    plants = [_Surprised(-kappa, w, _IMPOSSIBILITY_ZERO, task.friction.static, None) for kappa, w, _ in _corners(task)]
+    with ctx.workprec(_BITS):
+        told = _Told(_IMPOSSIBILITY_ZERO, _IMPOSSIBILITY_ZERO)
+        found = max(_surprise(plant, step, _IMPOSSIBILITY_ZERO, told, task.amplitude) for plant in plants)
+    return LowerBound(found) if found > 0 else None
 
 
 def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> UpperBound | None:

@@ -22,6 +22,7 @@ from quakedesign.guarantees.exact.impossibility import (
     longest_diffusion,
     longest_reaction,
     smallest_peak,
+    smallest_stick_slip_rate,
     smallest_withdrawal,
 )
 from quakedesign.laws import Prediction, disturbance_estimate
@@ -55,6 +56,31 @@ def steep(task):
     m = float(law.weakening)
     s = area * m * stress / float(middle) - kappa
     return s, float(task.specific_damping[0]), area, float(middle), m, float(reach)
+
+
+@pytest.mark.parametrize(("step", "held"), [(0.184, 0.184), (0.05, 0.05), (2.0, 1.0)])
+def test_a_fault_that_sticks_reaches_what_a_turned_push_makes_of_it(step, held):
+    """y = 2H(e^{r1 T} - e^{r2 T})/(r1 - r2), r² + wr + κ = 0; what holds for 2 s holds for 1 s, as κT² > 1 there."""
+    w, kappa = 1.6, 0.48 - 3.2e-6
+    fast, slow = (-w / 2 + sign * sqrt(w * w / 4 - kappa) for sign in (1, -1))
+    peak = 2 * 3.2e-4 * (exp(fast * held) - exp(slow * held)) / (fast - slow)
+    found = smallest_stick_slip_rate(REAL, F(str(step)))
+    assert found <= peak * (1 + 1e-12)
+    assert float(found) == pytest.approx(peak, rel=1e-9)
+
+
+def test_the_least_slip_rate_of_a_fault_that_sticks_without_a_spring_is_that_of_a_first_order_lag():
+    assert float(smallest_stick_slip_rate(STEADY, STEP)) == pytest.approx(2 * 3.2e-4 * (1 - exp(-1.6 * 0.184)) / 1.6)
+    assert smallest_stick_slip_rate(replace(REAL, amplitude=F(0)), STEP) is None
+    with pytest.raises(ParameterError, match="a step above 0"):
+        smallest_stick_slip_rate(REAL, F(0))
+
+
+def test_the_least_slip_rate_of_a_box_is_that_of_its_worst_corner():
+    wide = uncertain_plant(load_fault("real-fault", box="ten-percent"))
+    low, high = wide.specific_damping
+    assert low < high
+    assert smallest_stick_slip_rate(REAL, STEP) < smallest_stick_slip_rate(wide, STEP)
 
 
 def test_a_sampled_first_order_plant_has_the_known_smallest_peak():

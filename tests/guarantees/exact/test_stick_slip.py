@@ -12,10 +12,13 @@ import pytest
 import sympy as sp
 from scipy.spatial import HalfspaceIntersection
 
+import quakedesign as qd
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
+from quakedesign.guarantees.exact.impossibility import smallest_stick_slip_rate
 from quakedesign.laws.sampled_controller import integral_symbols, law_expressions, r, r_rate
 from quakedesign.laws.stick_slip_controller import StickSlipController
 from quakedesign.laws.stick_slip_law import StickSlipLaw
+from quakedesign.plant import uncertain_plant
 from quakedesign.symbolic import plant
 
 FOLDER = Path(__file__).parents[3] / "proofs" / "certificates"
@@ -323,6 +326,31 @@ def test_long_runs_stay_within_the_claims(periods, start, noisy):
     assert shares.max() <= 1
     assert tops <= 1
     assert shares[2] > 0.3  # the disturbances are not idle
+
+
+@NOISY
+def test_a_push_that_turns_as_the_fault_first_moves_beats_every_law(noisy):
+    """Under -H until the law first moves the fault, then under H: at least 2H h(T), whatever the law does."""
+    at, weakens = case(noisy), np.array([False])
+
+    def run(turned, periods):
+        blocks = Blocks(np.zeros(1), np.array([at.static]), np.zeros(1))
+        state, reference = (0.0, 0.0, 0.0, 0.0), 0.0
+        for k in range(periods):
+            seen = float(blocks.slip[0]), float(blocks.rate[0]), reference, at.fastest
+            pressure, state = recursion(at, at.step, state, seen)
+            blocks.push(np.array([pressure]))
+            for _ in range(30):
+                blocks.advance(np.array([at.amplitude if k >= turned else -at.amplitude]), weakens, at.step / 30)
+            reference += at.fastest * at.step
+            if turned > k and blocks.slip[0] > 0:
+                return k
+        return blocks.peak[0]
+
+    first = run(10_000, 10_000)
+    peak = run(first, first + 1)
+    assert float(smallest_stick_slip_rate(uncertain_plant(qd.load_fault("real-fault")), F(23, 125))) <= peak
+    assert peak <= at.claims["peak_slip_rate"]
 
 
 # ----------------------------------------------------------------------
