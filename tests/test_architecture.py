@@ -452,7 +452,7 @@ BUDGETS = {
     "laws": 3300,
     "loop": 4400,
     "plant": 1200,
-    "guarantees": 12000,
+    "guarantees": 12050,
     "lyapunov": 9000,
     "linear": 4000,
     "synthesis": 1800,
