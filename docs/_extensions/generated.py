@@ -88,7 +88,8 @@ def _write_commands(_app):
     from quakedesign.cli.app import app
 
     told = app.generate_docs(output_format="markdown", usage_name="quakedesign")
-    (DOCS / "reference" / "_commands.md").write_text(told[told.index("**Commands**") :], encoding="utf-8")
+    told = told[told.index("**Commands**") :].replace(" -m sphinx ", " ")  # how this process was started
+    (DOCS / "reference" / "_commands.md").write_text(told, encoding="utf-8")
 
 
 def _keep_bars(_app, _what, _name, _item, _options, lines):

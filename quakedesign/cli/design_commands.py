@@ -74,7 +74,7 @@ class DesignOptions(WellOptions):
         Rate-and-state faults: simulate the whole task instead of 500 D_c/V of it. The proof covers the whole task in
         either case.
     accept_poor_fit
-        Go on for a fault whose friction its record does not explain, or does not tell; the result is named so.
+        Continue although the record of the fault does not explain its friction or leaves it open; results are labelled.
     """
 
     controller: str = "all"

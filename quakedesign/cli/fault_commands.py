@@ -1,9 +1,11 @@
 """Commands about a fault, its records and the shell.
 
-`fault`, `derive`, `scale`, `errata`, `init`, `identify` and `completion`.
+`fault`, `derive`, `scale`, `errata`, `init`, `identify`, `schema` and `completion`.
 """
 
+import json
 import sys
+from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,6 +13,7 @@ from cyclopts import Parameter
 
 from quakedesign.cli.app import app, console, new_file, print_json, progress, require_different
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Gains, Output, Pascals, Whole, in_unit
+from quakedesign.errors import UnknownNameError, require_known
 
 # ----------------------------------------------------------------------
 # Commands about the fault itself: what it is, its equations, its scaling, the paper's errata.
@@ -287,7 +290,25 @@ def identify(
 
 
 # ----------------------------------------------------------------------
-# Names of commands and options for the shell.
+# For scripts and shells: JSON Schema of every output, and names of commands and options.
+
+
+@app.command
+def schema(command: str, /, *, output: Output = PLAIN) -> int:
+    """Print the JSON Schema (draft 2020-12) of what a command prints with --json.
+
+    Required keys are always there; further keys may come with options. Units are in the table of keys
+    (docs/reference/json.md).
+
+    Parameters
+    ----------
+    command
+        Name of the command, such as design.
+    """
+    known = json.loads(resources.files("quakedesign.cli").joinpath("output_schemas.json").read_text(encoding="utf-8"))
+    require_known(command, known, "command with a schema", UnknownNameError)
+    output.show(known[command], lambda: print_json(known[command]))
+    return 0
 
 
 @app.command

@@ -102,7 +102,7 @@ def guarantee(
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     accept_poor_fit
-        Go on for a fault whose friction its record does not explain, or does not tell; the result is named so.
+        Continue although the record of the fault does not explain its friction or leaves it open; results are labelled.
     workers
         Number of processes for several faults.
     out

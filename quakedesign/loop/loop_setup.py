@@ -170,7 +170,7 @@ class LoopSetup:
         "Bound of the measurement error of the slip at any time, such as '1 um'; q/2 for readings in steps of q. "
         "--slip-noise-deviation of simulate is a standard deviation.",
     )
-    rate_noise: Fraction = quantity("m/s", "The same of the slip rate.")
+    rate_noise: Fraction = quantity("m/s", "Bound of the measurement error of the slip rate at any time.")
     initial_slip: Fraction = quantity(
         "m",
         "Bound of the initial slip, of either sign, such as '0.01 mm'; the law starts as from rest.",
