@@ -683,9 +683,10 @@ def design_stick_slip(
     if not candidates:
         return NoGuarantee(reason="no tuning of the law keeps the states bounded", small_gain=None)
     slips, rates = (np.array([entry[i] for entry in candidates]) for i in (0, 1))
-    score = slips / slips.min() + 2 * rates / rates.min() if objective == "tracking" else rates
+    tracking = np.argsort(slips / slips.min() + 2 * rates / rates.min(), kind="stable")
+    best = tracking if objective == "tracking" else [*np.argsort(rates, kind="stable")[: _TRIED - 1], tracking[0]]
     result: StickSlipGuarantee | NoGuarantee = NoGuarantee(reason="no law was tried", small_gain=None)
-    for place in np.argsort(score, kind="stable")[:_TRIED]:
+    for place in best[:_TRIED]:
         result = proved(task, candidates[place][2], tell)
         if result.proved:
             break

@@ -447,3 +447,22 @@ def test_a_run_with_noise_stays_within_the_claims():
     assert run.metrics.peak_slip_rate <= claims.peak_slip_rate
     assert run.metrics.max_slip_error <= max(claims.slip_behind, claims.slip_ahead)
     assert claims.least_pressure <= run.metrics.min_pressure <= run.metrics.max_pressure <= claims.largest_pressure
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "given", "rate", "slip"),
+    [
+        ("real-fault", {"objective": "peak"}, F("1.6e-4"), F("8e-5")),
+        ("real-fault", {"slip_noise": "1 um"}, F("3e-4"), F("6e-5")),
+        ("lab-fault", {"step": "1 ms"}, F(1), F(1)),  # asked for: any guarantee
+        ("lab-fault", {"step": "2 ms"}, F(1), F(1)),
+    ],
+)
+def test_further_loops_are_designed_and_proved_to_reach_what_was_asked(name, given, rate, slip):
+    answer = qd.guarantee(qd.load_fault(name), plant="stick-slip", **given)
+    claims = answer.found.claims
+    assert answer.proved
+    assert claims.peak_slip_rate < rate
+    assert max(claims.slip_behind, claims.slip_ahead) < slip
+    assert 0.65 * claims.peak_slip_rate < answer.worst.slip_rate < claims.peak_slip_rate
