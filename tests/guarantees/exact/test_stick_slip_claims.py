@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from fractions import Fraction as F
+from importlib import import_module
 from math import exp
 from pathlib import Path
 
@@ -397,12 +398,21 @@ def test_claims_are_rounded_outward(bounds):
     assert claims.peak_slip_rate <= bounds.peak_slip_rate * F(1001, 1000)
 
 
-@pytest.mark.parametrize(
-    "given", [{"delay": "20 ms"}, {"rate_noise": "1 um/s"}, {"controller": "cta"}, {"disturbance_class": "rate"}]
-)
+@pytest.mark.parametrize("given", [{"delay": "20 ms"}, {"rate_noise": "1 um/s"}, {"controller": "cta"}])
 def test_what_the_theorem_does_not_know_is_refused(given):
     with pytest.raises(ParameterError, match=r"stick-slip plant"):
         qd.guarantee(qd.load_fault("real-fault"), plant="stick-slip", **given)
+
+
+@pytest.mark.parametrize("disturbance_class", ["amplitude", "rate"])
+def test_a_disturbance_of_bounded_rate_is_one_of_bounded_amplitude(disturbance_class, proof, monkeypatch):
+    module = import_module("quakedesign.synthesis.guarantee")
+    monkeypatch.setattr(module, "answer_stick_slip", lambda fault, *_, **__: StickSlipAnswer(fault=fault, found=proof))
+    fault = qd.load_fault("real-fault")
+    answer = qd.guarantee(fault, plant="stick-slip", disturbance_class=disturbance_class)
+    assert "for every disturbance of at most 0.00032 m/s^2" in answer.lines()[0]
+    with pytest.raises(ParameterError, match="class must be one of amplitude, rate"):
+        qd.guarantee(fault, plant="stick-slip", disturbance_class="other")
 
 
 def test_the_worst_case_found_lies_within_the_claims_and_not_far_below(proof):
