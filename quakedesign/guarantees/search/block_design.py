@@ -21,7 +21,7 @@ _START = (0.0325, 1.6e-4, 0.13, 0.88, 1.2)
 """Weight of the slip rates, of the pressures, share of an innovation, gain of the model over the middle, and how much
 more differences of neighbours weigh than means."""
 _STEPS = (0.5, 0.7, 0.5, 0.1, 0.5)
-_EVALUATIONS = (200, 4000)  # at most, and times the number of blocks squared
+_EVALUATIONS = (300, 40000)  # at most, and times the number of blocks cubed
 _DIGITS = 8
 _SLOWEST = 0.92  # eigenvalue of a period: a loop that forgets later takes longer to prove
 _FORGET, _LEFT = 400, 1e-4  # periods that an estimate follows at most, share that is left
@@ -41,7 +41,7 @@ def block_law(plant: UncertainPlant, step: Fraction) -> MatrixLaw:
 
     blocks = len(part.A) // 2
     simplex = np.vstack([np.zeros(len(_STEPS)), np.diag(_STEPS)])
-    most = min(_EVALUATIONS[0], _EVALUATIONS[1] // blocks**2)
+    most = min(_EVALUATIONS[0], _EVALUATIONS[1] // blocks**3)
     options = {"maxfev": most, "xatol": 1e-2, "fatol": 1e-3, "initial_simplex": simplex}
     best = minimize(cost, np.zeros(len(_STEPS)), method="Nelder-Mead", options=options)
     return made(part, step, scale * np.exp(best.x))

@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from time import process_time
 
 import control
 import numpy as np
@@ -477,4 +478,70 @@ def test_blocks_that_one_well_does_not_hold_name_the_mode_that_escapes():
 def test_five_blocks_of_the_real_fault(wells, most, checker):
     found = qd.guarantee(qd.UncertainPlant.from_blocks(REAL, 5, wells=wells), step="0.184")
     assert max(found.claims.outputs[5:]) <= Fraction(most)
+    claims = np.array([float(v) for v in found.claims.outputs])
+    for seed in range(4):
+        assert (friction_run(found, found.law, 5, wells == "one", seed) < claims).all()
     assert checker.check(json.dumps(guarantee_document(found))).verdict == "proved"
+
+
+def exact_peaks(A, B, entry, K, step, delay, fine=20, periods=400):
+    """Largest |x| and |v| that a disturbance of size 1 gives one linear plant: sums of |response| at all phases."""
+    n, h = len(A), step / fine
+    flow = np.zeros((n + 2, n + 2))  # states, control that acts, control on its way
+    flow[:n, :n], flow[:n, n] = A, np.ravel(B)
+    move, sample, arrive = expm(flow * h), np.eye(n + 2), np.eye(n + 2)
+    sample[n + 1, :], arrive[n, :] = [*-np.ravel(K), 0, 0], np.eye(n + 2)[n + 1]
+    late, entered = round(delay / h), np.array([*entry, 0, 0], dtype=float)
+    maps = []
+    for j in range(fine):
+        before = np.eye(n + 2) if j else sample
+        maps.append(move @ (arrive @ before if j == late else before))
+    largest = np.zeros(2)
+    for end in range(fine):
+        now, total = np.eye(n + 2)[:2], np.zeros(2)
+        for back in range(periods * fine):
+            total += np.abs(now @ entered) * h
+            now = now @ maps[(end - back) % fine]
+        largest = np.maximum(largest, total)
+    return largest
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bearing", "converter"])
+def test_peaks_are_near_the_exact_ones_of_the_worst_constant_plant(name):
+    """A lower bound that some course reaches: the L1 norm of the worst vertex, by exponentials."""
+    (plant, K), setup = PLANTS[name][0](), PLANTS[name][1]
+    step, delay = float(Fraction(setup["step"])), float(Fraction(setup.get("delay", "0")))
+    if name == "bearing":
+        vertices = [([[0, 1], [2000 + 200 * a, 0]], [[0], [10 + b]], [0, 5]) for a in (-1, 1) for b in (-1, 1)]
+    else:
+        loads, sources = (1 / 20, 1 / 5), (0.9, 1.1)
+        vertices = [
+            ([[0, -1e3], [1e4, -1e4 * load]], [[12e3 * share], [0]], [0, 500]) for load in loads for share in sources
+        ]
+    least = np.max([exact_peaks(*vertex, K, step, delay) for vertex in vertices], axis=0)
+    claims = np.array([float(v) for v in qd.guarantee(plant, gains=K, **setup).claims.outputs])
+    assert (least <= claims * (1 + 1e-3)).all()
+    assert (claims <= 1.6 * least).all(), claims / least
+
+
+@pytest.mark.slow
+def test_springs_of_three_let_a_mode_of_five_blocks_escape_one_well():
+    none = qd.guarantee(qd.UncertainPlant.from_blocks(REAL, 5, wells="one", coupling=3), step="0.184")
+    assert "a mode escapes, which is not measured" in none.reason
+    slow = -np.cos(np.pi * (np.arange(5) + 0.5) / 5)  # the slowest mode of a chain that differs
+    shape = [float(v) for v in re.search(r"states \((.*?)\)", none.reason)[1].split(",")]
+    assert np.abs(shape / np.max(np.abs(shape))) == pytest.approx(np.abs(slow / slow[-1]), abs=0.01)
+
+
+@pytest.mark.slow
+def test_ten_blocks_are_designed_proved_and_checked_within_their_time(checker):
+    began = process_time()
+    found = qd.guarantee(qd.UncertainPlant.from_blocks(REAL, 10), step="0.184")
+    assert process_time() - began <= 60
+    text, began = json.dumps(guarantee_document(found)), process_time()
+    assert checker.check(text).verdict == "proved"
+    assert process_time() - began <= 30
+    claims = np.array([float(v) for v in found.claims.outputs])
+    for seed in range(2):
+        assert (friction_run(found, found.law, 10, False, seed) < claims).all()
