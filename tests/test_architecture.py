@@ -459,9 +459,9 @@ BUDGETS = {
     "rocq": 800,
     "simulation": 10000,
     "identification": 4200,
-    "studies": 3720,
+    "studies": 3750,
     "report": 3870,
-    "cli": 3270,
+    "cli": 3330,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 
