@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
 from time import process_time
@@ -154,3 +155,34 @@ def test_a_load_that_the_law_does_not_hold_is_refused_by_both():
         read_guarantee(document)
     with pytest.raises(CHECK.Refused, match=re.escape("balance every load")):
         CHECK.check(json.dumps(document))
+
+
+@pytest.mark.parametrize(
+    ("way", "value", "said"),
+    [
+        (("plant", "loads", 0, "shift"), ["1", "0"], "a shift that is not measured"),
+        (("plant", "loads", 0, "rate"), "-1", "a rate of 0 or more"),
+        (("plant", "loads", 0, "more"), "1", "exactly the keys control, rate, shift"),
+        (("plant", "B"), [["0", "1"], ["1"]], "A and B must fit"),
+        (("plant", "B"), [[], []], "a control"),
+        (("plant", "A", 1), ["1"], "A and B must fit"),
+        (("plant", "sectors", 0, "within"), "0", "a bound of a sector must be positive"),
+    ],
+)
+def test_the_package_names_the_rule_that_a_file_breaks(way, value, said):
+    document = copy.deepcopy(STORED)
+    holder = document
+    for key in way[:-1]:
+        holder = holder[key]
+    holder[way[-1]] = value
+    with pytest.raises(CertificateError, match=said):
+        read_guarantee(document)
+    with pytest.raises(CHECK.Refused):
+        CHECK.check(json.dumps(document))
+
+
+def test_a_load_that_does_not_move_is_read_and_one_negative_number_closes_nothing():
+    still = read_guarantee(edited(("plant", "loads", 0, "rate"), "0"))
+    assert still.part.loads[0].rate == 0
+    mixed = replace(still, inputs=(F(-1), *still.inputs[1:]))
+    assert str(mixed.check()) == "undecided"
