@@ -1,6 +1,7 @@
 """Bounds of a period of the stick-slip plant in both checkers, against courses of such plants."""
 
 from collections import defaultdict
+from fractions import Fraction
 from functools import cache
 from itertools import chain
 
@@ -282,3 +283,19 @@ def test_both_checkers_bound_a_period_that_ends_at_rest_alike(facet, noisy):
         own = values([f for end in ends for f in p.stopped(row, given, end)], points)
         theirs = most(packages(noisy)[package.SLICES + least, facet, False], points)
         assert own == pytest.approx(theirs, rel=1e-9, abs=1e-12)
+
+
+def test_noise_of_the_slip_may_put_a_fault_at_rest_in_both_checkers():
+    """U is up to m·N larger than the state tells, so that the condition of rest gives way by b·β1·m·N."""
+    quiet, noisy = period(), period(noisy=True)
+    more = quiet.task.b * quiet.task.beta[1] * quiet.law.slip / 90
+    ends = [[polytope.lines[-7][1] for polytope, _ in p.resting()] for p in (quiet, noisy)]
+    assert [after - before for before, after in zip(*ends, strict=True)] == [more] * 4
+    found = []
+    for with_noise in (False, True):
+        claim = read_guarantee(box(with_noise))
+        nothing = (Fraction(0), Fraction(0))
+        known = package.ranges(claim.task, Fraction(1), nothing, Fraction(1))
+        lines = package.polytopes(claim.task, claim.held, claim.reach.facets, known)[package.SLICES :]
+        found.append([line[-7][1] for line in lines])
+    assert [after - before for before, after in zip(*found, strict=True)] == [more] * 7
