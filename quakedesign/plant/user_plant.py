@@ -329,7 +329,7 @@ def _chain_parts(chain: BlockChain) -> dict[str, Any]:
         raise ParameterError(
             f"a guarantee of {N} blocks needs a well for each block whose pressures are independent, or one well for "
             f"blocks that are alike. Received {m} wells{'' if m < N else ' that act on fewer blocks'}"
-            f"{', and blocks that differ' if m == 1 else ''}. Add wells, or simulate this fault."
+            f"{', and blocks that differ' if m == 1 else ''}. Add wells, or make all blocks alike."
         )
     tasks = [uncertain_plant(fault) for fault in chain.faults]
     return _parts(tasks, chain.springs, chain.shares, f"{chain.name}, {N} blocks, {m} wells")

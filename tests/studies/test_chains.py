@@ -134,4 +134,4 @@ def test_two_wells_for_three_blocks_are_refused_with_a_remedy(tmp_path, capsys):
     path = tmp_path / "blocks.toml"
     path.write_text(PATH.read_text().replace('[[well]]\nposition = "2.5 km"\n', ""))
     assert run("guarantee", path) == 2
-    assert "Add wells, or simulate this fault" in " ".join(capsys.readouterr().err.split())
+    assert "Add wells, or make all blocks alike" in " ".join(capsys.readouterr().err.split())
