@@ -167,7 +167,18 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
     yield from (f"{', '.join(names)} (published): {said}" for said, names in published.items())
     yield from left_out_lines(comparison)
     if best is not None and best.answer is not None:
+        yield from _with_stick(best.answer, fault.name)
         yield from best.answer.limit_lines()
+
+
+def _with_stick(answer: object, fault: str) -> Iterator[str]:
+    """Worst case found where friction holds the fault at rest, and which command proves bounds there."""
+    seen = getattr(answer, "worst_with_stick", None)
+    if seen is not None:
+        yield (
+            f"worst case found on the stick-slip plant: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
+            f"{quantity(seen.slip_rate_error, 'm/s')}; a law and a proof for it: guarantee {fault} --plant stick-slip"
+        )
 
 
 def _published(said: str) -> str:

@@ -122,6 +122,16 @@ def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthqu
     assert "earthquake" not in stable.answer
 
 
+def test_the_worst_case_on_the_stick_slip_plant_is_reported_with_the_command_that_proves_it(monkeypatch):
+    one = entry("A (designed)", "3e-4", "1e-5")
+    one.answer.worst_with_stick = SimpleNamespace(slip_error=1.2e-6, slip_rate_error=3e-5)
+    (note,) = (note for note in summary(compared(monkeypatch, one)).notes if "stick-slip" in note)
+    assert note == (
+        "worst case found on the stick-slip plant: slip error 1.2 µm, slip-rate error 30 µm/s; a law and a proof for "
+        "it: guarantee mine --plant stick-slip"
+    )
+
+
 def test_without_a_guarantee_each_reason_is_given(monkeypatch):
     said = summary(compared(monkeypatch, entry("A (designed)"), entry("B (designed)")))
     assert said.answer == "mine: no guarantee for any designed controller"
