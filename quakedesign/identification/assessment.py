@@ -26,45 +26,23 @@ EXPLAINS, EXPLAINS_NOT, CANNOT_TELL = "explains the record", "does not explain t
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """One test of an assumption.
-
-    Attributes
-    ----------
-    name : str
-    passed : bool
-    value : float
-        What is compared [-].
-    limit : float
-        With what.
-    sentence : str
-    """
+    """One test of an assumption."""
 
     name: str
     passed: bool
-    value: float
-    limit: float
+    value: float  # what is compared [-]
+    limit: float  # with what
     sentence: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Assessment:
-    """Tests of a fit, with the verdict on it.
-
-    Attributes
-    ----------
-    checks : tuple of Check
-    factor : float
-        Residuals over the noise [-]: the largest of the whole record and of what follows changes of rate.
-    open : tuple of str
-        What the record cannot tell, in sentences.
-    experiments : tuple of str
-        Which would.
-    """
+    """Tests of a fit, with the verdict on it."""
 
     checks: tuple[Check, ...]
-    factor: float
-    open: tuple[str, ...] = ()
-    experiments: tuple[str, ...] = ()
+    factor: float  # residuals over the noise [-]: the largest of the whole record and of what follows changes of rate
+    open: tuple[str, ...] = ()  # what the record cannot tell, in sentences
+    experiments: tuple[str, ...] = ()  # which would
 
     @property
     def verdict(self) -> str:

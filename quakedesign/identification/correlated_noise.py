@@ -22,30 +22,16 @@ _LARGEST = 9.0  # natural logarithm of the share
 
 @dataclass(frozen=True)
 class CorrelatedNoise:
-    """Covariance of samples, in variances of the white noise of one measurement.
+    """Covariance of samples, in variances of the white noise of one measurement."""
 
-    Attributes
-    ----------
-    share : float
-        Variance of the process that fades.
-    length : float
-        Over which it fades, in units of `along`.
-    along : ndarray
-        Where every sample lies: time [s] or displacement [m].
-    counts : ndarray
-        Measurements in every sample.
-    of_time : bool
-        Whether `along` is time.
-    common : ndarray or None
-        What one deviation of each unknown of the load moves in all samples, a column each; None for none.
-    """
-
-    share: float
-    length: float
-    along: "np.ndarray"
-    counts: "np.ndarray"
-    of_time: bool
-    common: "np.ndarray | None" = None
+    share: float  # variance of the process that fades
+    length: float  # over which it fades, in units of `along`
+    along: "np.ndarray"  # where every sample lies: time [s] or displacement [m]
+    counts: "np.ndarray"  # measurements in every sample
+    of_time: bool  # whether `along` is time
+    common: "np.ndarray | None" = (
+        None  # what one deviation of each unknown of the load moves in all samples, by columns
+    )
 
     def to_dict(self, noise: float) -> dict[str, Any] | None:
         """Size and length with their units, of the white noise [-] of one measurement; None where nothing fades."""
@@ -62,12 +48,18 @@ class CorrelatedNoise:
         whole[np.diag_indices(len(self.along))] += 1 / self.counts
         return whole if self.common is None else whole + self.common @ self.common.T
 
-    def own_part(self, residuals: "np.ndarray", kept: "np.ndarray") -> "np.ndarray":
-        """Residuals without what their neighbours tell of them; those that are not kept tell nothing."""
-        shared = self.covariance[:, kept] - np.diag(1 / self.counts)[:, kept]
-        told = shared @ np.linalg.solve(self.covariance[np.ix_(kept, kept)], residuals[kept])
-        own: np.ndarray = residuals - told
-        return own
+    def deletion(self, residuals: "np.ndarray", kept: "np.ndarray") -> "np.ndarray":
+        """Residuals less what the others tell of them, in their deviations then; those that are not kept tell nothing.
+
+        The inverse of the covariance has both (Martin 1992, Commun. Stat. Theory Methods 21, 1183).
+        """
+        inverse, beside = np.linalg.inv(self.covariance[np.ix_(kept, kept)]), self.covariance[:, kept]
+        told = beside @ inverse
+        off = residuals - told @ residuals[kept]
+        variance = np.diag(self.covariance) - np.sum(told * beside, axis=1)
+        off[kept], variance[kept] = (inverse @ residuals[kept]) / np.diag(inverse), 1 / np.diag(inverse)
+        standardised: np.ndarray = off / np.sqrt(variance)
+        return standardised
 
     def whitener(self, kept: "np.ndarray") -> "np.ndarray":
         """Matrix that makes residuals independent with the variance of one measurement, without what is not kept."""

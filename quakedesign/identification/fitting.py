@@ -39,33 +39,16 @@ class FitSearch:
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """The best fit of an experiment to measured friction.
-
-    Attributes
-    ----------
-    experiment : Experiment
-    fitted : ndarray
-        Coordinates as they are fitted.
-    measured : ndarray
-        Friction [-].
-    counts : ndarray
-        Of how many measurements every sample is the mean.
-    kept : ndarray of bool
-        Samples that count.
-    agreeing, starts : int
-        Searches that end in the best fit, of how many.
-    correlated : CorrelatedNoise, optional
-        Noise that samples share with their neighbours.
-    """
+    """The best fit of an experiment to measured friction."""
 
     experiment: Experiment
-    fitted: "np.ndarray"
-    measured: "np.ndarray"
-    counts: "np.ndarray"
-    kept: "np.ndarray"
-    agreeing: int
-    starts: int
-    correlated: CorrelatedNoise | None = None
+    fitted: "np.ndarray"  # coordinates as they are fitted
+    measured: "np.ndarray"  # friction [-]
+    counts: "np.ndarray"  # of how many measurements every sample is the mean
+    kept: "np.ndarray"  # samples that count
+    agreeing: int  # searches that end in the best fit
+    starts: int  # searches
+    correlated: CorrelatedNoise | None = None  # noise that samples share with their neighbours
 
     @cached_property
     def residuals(self) -> "np.ndarray":
@@ -75,12 +58,13 @@ class Fit:
 
     @property
     def scaled(self) -> "np.ndarray":
-        """Residuals [-] in units of one measurement, without the part that samples share with their neighbours.
+        """Residuals [-] in deviations of one measurement, less what their neighbours tell of them.
 
         The noise of a mean of n falls with the root of n.
         """
-        own = self.residuals if self.correlated is None else self.correlated.own_part(self.residuals, self.kept)
-        scaled: np.ndarray = own * np.sqrt(self.counts)
+        if self.correlated is not None:
+            return self.correlated.deletion(self.residuals, self.kept)
+        scaled: np.ndarray = self.residuals * np.sqrt(self.counts)
         return scaled
 
     @cached_property

@@ -57,37 +57,19 @@ class ParameterEstimate:
 
 @dataclass(frozen=True, kw_only=True)
 class Outlier:
-    """A sample that noise does not explain, left out of the fit.
+    """A sample that noise does not explain, left out of the fit."""
 
-    Attributes
-    ----------
-    time : float
-        As in the record [s], since its first sample.
-    size : float
-        Measured less simulated friction [-].
-    """
-
-    time: float
-    size: float
+    time: float  # as in the record [s], since its first sample
+    size: float  # measured less simulated friction [-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rival:
-    """Another law with as many parameters, which explains the record less well.
+    """Another law with as many parameters, which explains the record less well."""
 
-    Attributes
-    ----------
-    law : str
-        Its name.
-    squares : float
-        How many times as large the weighted sum of squares is that it leaves.
-    excess : float
-        By how much its AIC is higher, twice the fall of the logarithm of the likelihood.
-    """
-
-    law: str
-    squares: float
-    excess: float
+    law: str  # its name
+    squares: float  # how many times as large the weighted sum of squares is that it leaves
+    excess: float  # by how much its AIC is higher, twice the fall of the logarithm of the likelihood
 
     def __str__(self) -> str:
         told = f"{self.law} fits worse: squares {self.squares:.4g} times as large, AIC higher by {self.excess:.3g}"

@@ -317,6 +317,7 @@ class _Choice:
     loading: Loading | None
     stiffness: float | None
     seed: int
+    told: "np.ndarray | None" = None  # when pieces begin by the load point alone [s]
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
         """Profiles about the best fit, and tests of it."""
@@ -360,14 +361,15 @@ class _Choice:
         errors = np.where(errors < np.array([c.high for c in fitted.best.experiment.coordinates])[places], errors, 0)
         if self.loading is None or not np.any(np.abs(delays) > _STAYS * errors):
             return None
-        pieces, (after, _) = self.loading.pieces, self.loading.delays(self.record)
-        begins = pieces.begins.copy()
-        for delay, samples in zip(delays.tolist(), after.T, strict=True):
+        pieces, (after, most) = self.loading.pieces, self.loading.delays(self.record)
+        begins, told = pieces.begins.copy(), self.told if self.told is not None else pieces.begins
+        for delay, samples, end in zip(delays.tolist(), after.T, most.tolist(), strict=True):
             first = self.record.time[np.flatnonzero(samples)[0]]
-            begins[np.searchsorted(begins, first, side="right") - 1] += delay
+            place = int(np.searchsorted(begins, first, side="right")) - 1
+            begins[place] = np.clip(begins[place] + delay, told[place] - end, told[place] + end)
         pieces = replace(pieces, begins=np.maximum.accumulate(np.clip(begins, self.raw.time[0], None)))
         record, loading = prepared(self.raw, (), pieces)
-        return replace(self, record=record, loading=loading)
+        return replace(self, record=record, loading=loading, told=told)
 
     def _chosen(self, fits: "list[_Fitted]") -> "tuple[_Choice, _Fitted, Rival | None, _Fitted | None, float]":
         better = min(fits, key=lambda fitted: fitted.best.squares)
@@ -380,7 +382,7 @@ class _Choice:
             rival = Rival(law=fits[1].kind.name, squares=squares, excess=excess)
         better = self._extended(better)
         better = replace(better, best=_settled(better.best, self._noise(better)))
-        better = self._without(better, START_STATE)
+        better = self._without_start(better)
         better, other, excess = self._trend(better)
         return self, replace(better, best=_settled(better.best, self._noise(better))), rival, other, excess
 
@@ -489,14 +491,14 @@ class _Choice:
             return fitted
         wider, _ = self._among(fitted, {*_nuisance(fitted), START_STATE})
         told = replace(wider, best=replace(wider.best, kept=fitted.best.kept))
-        return _again(wider) if _needed(told.best, fitted.best.squares) else fitted
+        return _again(wider) if _needed(told.best, fitted.best.squares, len(_START)) else fitted
 
-    def _without(self, fitted: _Fitted, name: str) -> _Fitted:
-        """Without a nuisance parameter, where its interval at 95 % holds 0."""
-        if name not in _nuisance(fitted):
+    def _without_start(self, fitted: _Fitted) -> _Fitted:
+        """Without an unsteady beginning, where a region of 95 % holds a steady one."""
+        if START_STATE not in _nuisance(fitted):
             return fitted
-        narrower, squares = self._among(fitted, _nuisance(fitted) - {name})
-        return fitted if _needed(fitted.best, squares) else _again(narrower)
+        narrower, squares = self._among(fitted, _nuisance(fitted) - {START_STATE})
+        return fitted if _needed(fitted.best, squares, len(_START)) else _again(narrower)
 
     def _among(self, fitted: _Fitted, nuisance: Collection[str]) -> tuple[_Fitted, float]:
         """Fit with other nuisance parameters at the same samples with the same noise, and its sum of squares."""
@@ -536,11 +538,11 @@ class _Choice:
         )
 
 
-def _needed(best: Fit, squares: float) -> bool:
-    """Whether a fit is likelier than one with a parameter less, at 95 %, and by more than any machine measures."""
+def _needed(best: Fit, squares: float, fewer: int = 1) -> bool:
+    """Whether a fit is likelier than one with so many parameters fewer, at 95 %, and by more than machines measure."""
     floor = _UNSEEN * float(np.ptp(best.measured))
     seen = squares - best.squares > floor**2 * best.freedom
-    return seen and best.excess(squares) > best.threshold(1)
+    return seen and best.excess(squares) > best.threshold(fewer)
 
 
 def _nuisance(fitted: _Fitted) -> set[str]:

@@ -29,30 +29,14 @@ _SLIGHT = 0.01  # of the whole path
 
 @dataclass(frozen=True, kw_only=True)
 class Pieces:
-    """A load point that moves at a constant rate in every piece.
+    """A load point that moves at a constant rate in every piece."""
 
-    Attributes
-    ----------
-    begins : ndarray
-        Times at which pieces begin [s], the first the first time of the record.
-    rates : ndarray
-        [m/s].
-    noise : float
-        Standard deviation of the displacement from the pieces [m].
-    given : bool
-        Whether the rates were given.
-    rough : bool
-        Whether the motion is not made of a few such pieces.
-    errors : ndarray or None
-        Standard deviations of the logarithms of the rates [-]; None where they are known.
-    """
-
-    begins: "np.ndarray"
-    rates: "np.ndarray"
-    noise: float
-    given: bool = False
-    rough: bool = False
-    errors: "np.ndarray | None" = None
+    begins: "np.ndarray"  # times at which pieces begin [s], the first the first time of the record
+    rates: "np.ndarray"  # [m/s]
+    noise: float  # standard deviation of the displacement from the pieces [m]
+    given: bool = False  # whether the rates were given
+    rough: bool = False  # whether the motion is not made of a few such pieces
+    errors: "np.ndarray | None" = None  # deviations of the logarithms of the rates [-]; None where they are known
 
     @property
     def large_changes(self) -> "np.ndarray":
@@ -150,23 +134,12 @@ def given_pieces(time: "np.ndarray", position: "np.ndarray", rates: "np.ndarray"
 
 @dataclass(frozen=True, kw_only=True)
 class Loading:
-    """How the load point of a record moves, and what presses on the fault.
-
-    Attributes
-    ----------
-    pieces : Pieces
-    normal : Pieces or None
-        Of the normal load, in its unit for displacement; None where it is constant or followed sample by sample.
-    level : float or None
-        Normal load at the first sample, or its constant value; None where it is followed sample by sample.
-    notes : tuple of str
-        What was taken for granted.
-    """
+    """How the load point of a record moves, and what presses on the fault."""
 
     pieces: Pieces
-    normal: Pieces | None
-    level: float | None
-    notes: tuple[str, ...]
+    normal: Pieces | None  # of the normal load, in its unit for displacement; None where constant or as measured
+    level: float | None  # normal load at the first sample, or its constant value; None where as measured
+    notes: tuple[str, ...]  # what was taken for granted
 
     @property
     def first_rate(self) -> float:

@@ -63,14 +63,24 @@ def bar_look(entry: "Entry") -> dict[str, Any]:
     return {"color": colour(entry.design.name), "edgecolor": "black", **pale}
 
 
-def figure(rows: int, height: float, columns: int = 1, *, sharex: Any = None, **more: Any) -> tuple[Any, Any]:
-    """Figure at printing size and its axes, shape (rows, columns); x is shared in a single column by default."""
+def figure(
+    rows: int, height: float, columns: int = 1, *, sharex: Any = None, mosaic: Any = None, **more: Any
+) -> tuple[Any, Any]:
+    """Figure at printing size and its axes, shape (rows, columns), or by name in a mosaic.
+
+    x is shared in a single column by default.
+    """
     from matplotlib.figure import Figure
 
     drawing = Figure(figsize=(WIDTH, height), layout="constrained", dpi=200)
-    shared = columns == 1 if sharex is None else sharex
-    axes = drawing.subplots(rows, columns, sharex=shared, squeeze=False, **more)
-    for axis in axes.ravel():
+    if mosaic is not None:
+        axes = drawing.subplot_mosaic(mosaic, **more)
+        dressed = list(axes.values())
+    else:
+        shared = columns == 1 if sharex is None else sharex
+        axes = drawing.subplots(rows, columns, sharex=shared, squeeze=False, **more)
+        dressed = axes.ravel()
+    for axis in dressed:
         axis.grid(visible=True, alpha=0.3, linewidth=0.5)
         axis.tick_params(which="both", labelsize=SMALL)
         for text in (axis.xaxis.label, axis.yaxis.label):

@@ -1,4 +1,4 @@
-"""An identified law on a terminal and as a figure of the residuals."""
+"""An identified law on a terminal and as a figure."""
 
 import math
 from pathlib import Path
@@ -10,11 +10,16 @@ import numpy as np
 from quakedesign.errors import OutputError
 from quakedesign.files import write_whole
 from quakedesign.identification.assessment import CANNOT_TELL, EXPLAINS_NOT
+from quakedesign.identification.experiment import TREND
+from quakedesign.identification.fitting import Fit, weighed
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
-from quakedesign.report.drawing import FORMATS, NATURAL, SMALL, clock, figure, figure_bytes, finish
+from quakedesign.report.drawing import FORMATS, NATURAL, SMALL, figure, figure_bytes, finish
 
 _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _MOST_OUTLIERS = 8
+_MOST_PANELS = 4
+_SHOWN = 12.0  # critical slips after a step
+_LAGS = 40
 _SHORT, _LONG = 2e-7, 0.01  # D_c [m] that no gouge of a laboratory has
 
 
@@ -95,32 +100,123 @@ def _outliers(identification: Identification) -> list[str]:
 
 
 def identification_figure(identification: Identification) -> Any:
-    """Measured and simulated friction, and what is left of the noise, over time.
+    """Friction with fit and trend, rate of the load point, every step, residuals, their correlation, a joint region.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    drawing, ((above,), (below,)) = figure(2, 4.6, gridspec_kw={"height_ratios": (2, 1)})
-    size, unit = clock(float(identification.record.time[-1]))
-    time, fit = identification.record.time[identification.used] / size, identification.fit
-    above.plot(time, fit.measured, ".", color=_MEASURED, markersize=2, label="measured")
-    above.plot(
-        time, fit.measured - fit.residuals, color=_FITTED, linewidth=1.2, label=f"fitted: {identification.law.name}"
-    )
-    above.set_ylabel("friction [-]", fontsize=SMALL)
-    below.plot(time[fit.kept], fit.residuals[fit.kept], ".", color=_MEASURED, markersize=2)
+    record, used, fit = identification.record, identification.used, identification.fit
+    along = record.load_point if record.load_point is not None else record.slip
+    way = record.time[used] if along is None else along[used] * 1e6
+    label = "time [s]" if along is None else "displacement of the load point [um]"
+    label = label if record.load_point is not None or along is None else "slip [um]"
+    rates = None if record.load_point is None else np.gradient(record.load_point[used], record.time[used])
+    steps = [] if rates is None else _steps(rates)[:_MOST_PANELS]
+    names = ["friction", *(["rate"] if rates is not None else []), "residual"]
+    columns = math.lcm(2, max(len(steps), 1))
+    rows = [[name] * columns for name in names]
+    if steps:
+        rows.append([f"step {i}" for i in range(len(steps)) for _ in range(columns // len(steps))])
+    rows.append(["correlation"] * (columns // 2) + ["region"] * (columns // 2))
+    heights = [2.0 if row[0] == "friction" else 0.8 if row[0] in ("rate", "residual") else 1.4 for row in rows]
+    drawing, axes = figure(0, 1.1 * sum(heights) + 1.0, mosaic=rows, height_ratios=heights)
+    _friction(axes["friction"], identification, way, slice(None))
+    if rates is not None:
+        axes["rate"].plot(way, rates * 1e6, color=_FITTED, linewidth=1.0, drawstyle="steps-mid")
+        axes["rate"].set_ylabel("rate [um/s]", fontsize=SMALL)
+        if steps and np.min(rates) > 0:
+            axes["rate"].set_yscale("log")
+        else:
+            axes["rate"].set_ylim(0, 1.2e6 * np.max(rates))
+    below = axes["residual"]
+    below.plot(way[fit.kept], fit.residuals[fit.kept], ".", color=_MEASURED, markersize=2)
     for level in (-2 * fit.noise, 0.0, 2 * fit.noise):
         below.axhline(level, color=NATURAL, linewidth=0.6, linestyle="solid" if level == 0 else (0, (4, 2)))
-    if identification.outliers:
-        places = np.flatnonzero(~fit.kept)
-        above.plot(time[places], fit.measured[places], "x", color=_OUTLIER, markersize=5, label="left out")
-        inside = 8 * fit.noise
-        below.plot(time[places], np.clip(fit.residuals[places], -inside, inside), "x", color=_OUTLIER, markersize=5)
+    inside = 8 * fit.noise
+    below.plot(way[~fit.kept], np.clip(fit.residuals[~fit.kept], -inside, inside), "x", color=_OUTLIER, markersize=5)
     below.set_ylabel("residual [-]", fontsize=SMALL)
-    below.set_xlabel(f"time [{unit}]", fontsize=SMALL)
+    below.set_xlabel(label, fontsize=SMALL)
+    for name in names[1:]:
+        axes[name].sharex(axes["friction"])
+    critical = 1e6 * fit.experiment.outward(fit.fitted).get("critical_slip", 0.0)
+    for i, place in enumerate(steps):
+        far = min(max(_SHOWN * critical, 0.01 * float(np.ptp(way))), 0.5 * float(np.ptp(way)))
+        far = min(far, way[steps[i + 1]] - way[place]) if i + 1 < len(steps) else far
+        near = np.flatnonzero((way >= way[place] - 0.2 * far) & (way <= way[place] + far))
+        _friction(axes[f"step {i}"], identification, way, slice(int(near[0]), int(near[-1]) + 1))
+        axes[f"step {i}"].set_title(f"step at {way[place]:.4g} um", fontsize=SMALL)
+    _correlation(axes["correlation"], fit)
+    _region(axes["region"], identification)
     note = f"dashed: twice the noise, {fit.noise:.3g}; crosses beyond eight times it stand at its edge"
-    return finish(drawing, f"{identification.record.name}: friction and residuals", [], note, legend=above)
+    title = f"{record.name}: {identification.law.name} {identification.assessment}"
+    return finish(drawing, title, [], note, legend=axes["friction"])
+
+
+def _steps(rates: "np.ndarray") -> list[int]:
+    """Samples at which the rate of the load point begins to change by more than a quarter."""
+    size = np.log(np.maximum(rates, 1e-3 * np.max(rates)))
+    changed = np.flatnonzero(np.abs(size[2:] - size[:-2]) > np.log(1.25)) + 1
+    return [int(part[0]) for part in np.split(changed, np.flatnonzero(np.diff(changed) > 2) + 1) if len(part)]
+
+
+def _friction(axis: Any, identification: Identification, way: "np.ndarray", part: slice) -> None:
+    fit, values = identification.fit, identification.fit.experiment.outward(identification.fit.fitted)
+    simulated = fit.measured - fit.residuals
+    axis.plot(way[part], fit.measured[part], ".", color=_MEASURED, markersize=2, label="measured")
+    axis.plot(way[part], simulated[part], color=_FITTED, linewidth=1.2, label=f"fitted: {identification.law.name}")
+    if TREND in values:
+        line = simulated[0] + values[TREND] * 1e-6 * (way - way[0])
+        axis.plot(way[part], line[part], color=NATURAL, linewidth=0.8, linestyle=(0, (4, 2)), label="trend")
+    left = np.flatnonzero(~fit.kept[part]) + (part.start or 0)
+    if len(left):
+        axis.plot(way[left], fit.measured[left], "x", color=_OUTLIER, markersize=5, label="left out")
+    axis.set_ylabel("friction [-]", fontsize=SMALL)
+
+
+def _correlation(axis: Any, fit: Fit) -> None:
+    """Autocorrelation of residuals, and of what is left of them when their neighbours are taken into account."""
+    for left, colour, label in (
+        ((fit.residuals * np.sqrt(fit.counts))[fit.kept], _MEASURED, "residuals"),
+        (fit.whitened, _FITTED, "made independent"),
+    ):
+        off = left - left.mean()
+        lags = np.arange(min(_LAGS, len(off) - 1) + 1)
+        each = [float(off[: len(off) - lag] @ off[lag:]) for lag in lags.tolist()]
+        axis.plot(lags, np.array(each) / max(each[0], 1e-300), ".-", color=colour, markersize=3, label=label)
+    for level in (-2.0, 2.0):
+        axis.axhline(level / len(fit.whitened) ** 0.5, color=NATURAL, linewidth=0.6, linestyle=(0, (4, 2)))
+    axis.set_xlabel("lag [samples]", fontsize=SMALL)
+    axis.set_ylabel("autocorrelation [-]", fontsize=SMALL)
+    axis.legend(fontsize=SMALL - 1, frameon=False)
+
+
+def _region(axis: Any, identification: Identification) -> None:
+    """Region of 95 % of two parameters by the slopes of the fit, in the box of their profiles."""
+    fit, names = identification.fit, [c.name for c in identification.fit.experiment.coordinates]
+    pair: list[str] = [name for name in ("direct_effect", "evolution_effect") if name in names]
+    pair = pair if len(pair) == 2 else names[:2]
+    places = [names.index(name) for name in pair]
+    slopes = weighed(fit.weights, np.nan_to_num(fit.experiment.slopes(fit.fitted), posinf=0, neginf=0))
+    size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+    spread = (np.linalg.pinv((slopes / size).T @ (slopes / size)) / np.outer(size, size))[np.ix_(places, places)]
+    values, turned = np.linalg.eigh(spread * fit.noise**2 * fit.correlation * fit.threshold(2))
+    turn = np.linspace(0, 2 * np.pi, 181)
+    around = turned * np.sqrt(np.maximum(values, 0)) @ np.array([np.cos(turn), np.sin(turn)])
+    x, y = (
+        np.array([fit.experiment.coordinates[place].outward(fit.fitted[place] + v) for v in row])
+        for place, row in zip(places, around.tolist(), strict=True)
+    )
+    axis.plot(x, y, color=_FITTED, linewidth=1.0)
+    axis.plot(*(identification.estimates[name].value for name in pair), "+", color=_FITTED)
+    axis.locator_params(axis="x", nbins=4)
+    boxes = [(e.low, e.high) for e in (identification.estimates[name] for name in pair)]
+    for box, line in zip(boxes, (axis.axvline, axis.axhline), strict=True):
+        for end in box:
+            if math.isfinite(end):
+                line(end, color=NATURAL, linewidth=0.6, linestyle=(0, (4, 2)))
+    for name, told in zip(pair, (axis.set_xlabel, axis.set_ylabel), strict=True):
+        told(f"{name} [{identification.estimates[name].unit or '-'}]", fontsize=SMALL)
 
 
 def require_format(path: Path) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from quakedesign.identification.correlated_noise import CorrelatedNoise, noise_of, restricted_likelihood
+from quakedesign.identification.fitting import outliers
 
 NUMBER = 400
 ALONG = np.cumsum(np.random.default_rng(0).uniform(0.2, 2.0, NUMBER))
@@ -73,6 +74,19 @@ def test_what_neighbours_tell_is_taken_away():
     known, kept = CorrelatedNoise(0.5, 50.0, ALONG, COUNTS, True), np.ones(NUMBER, dtype=bool)
     slow = np.sin(ALONG / 60)
     slow[200] += 1.0
-    own = known.own_part(slow, kept)
+    kept[[200, 300]] = False
+    own = known.deletion(slow, kept)
     assert np.argmax(np.abs(own)) == 200
-    assert own[200] > 0.3 > 1.5 * np.max(np.abs(np.delete(own, 200)))
+    assert own[200] > 5 * np.max(np.abs(np.delete(own, 200)))
+    rest = np.flatnonzero(kept & (np.arange(NUMBER) != 100))
+    for place, others in ((100, rest), (300, np.flatnonzero(kept))):
+        beside = known.covariance[place, others] @ np.linalg.inv(known.covariance[np.ix_(others, others)])
+        left = known.covariance[place, place] - beside @ known.covariance[others, place]
+        assert own[place] == pytest.approx((slow[place] - beside @ slow[others]) / left**0.5, rel=1e-6)
+
+
+def test_correlated_noise_makes_no_outliers():
+    known, everything = CorrelatedNoise(5.0, 8.0, ALONG, COUNTS, True), np.ones(NUMBER, dtype=bool)
+    each = [known.deletion(noise(5.0, 8.0, seed), everything) for seed in range(20)]
+    assert np.std(each) == pytest.approx(1, rel=0.03)
+    assert sum(outliers(one, 2).sum() for one in each) <= 4
