@@ -73,7 +73,7 @@ def _warnings(identification: Identification) -> list[str]:
             f"{'shorter' if short else 'longer'} than the some 1 to 100 um of laboratories: check the unit of the "
             "displacement"
         )
-    if (correlated := identification.fit.correlated) is not None:
+    if (correlated := identification.fit.correlated) is not None and correlated.share:
         size = identification.fit.noise * correlated.share**0.5
         length = f"{correlated.length:.2g} {'s' if correlated.of_time else 'm'}"
         told.append(f"noise that neighbours share: {size:.2g} of friction, fading over {length}; regions include it")
