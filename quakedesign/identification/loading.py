@@ -178,8 +178,9 @@ class Loading:
         ]
         hidden = sorted(sorted(hidden, key=lambda i: -abs(rates[i + 1] - rates[i]))[:_MOST_DELAYS])
         after = [(record.time >= begins[i + 1]) & (record.time < ends[i + 1]) for i in hidden]
-        table = np.array(after).T.reshape(len(record.time), len(hidden)).astype(float)
-        return table, np.array([3 * off[i] + period for i in hidden])
+        told = [(samples, 3 * off[i] + period) for samples, i in zip(after, hidden, strict=True) if samples.any()]
+        table = np.array([samples for samples, _ in told]).T.reshape(len(record.time), len(told)).astype(float)
+        return table, np.array([most for _, most in told])
 
     def drive(self, record: Record) -> "tuple[Drive, np.ndarray]":
         """Drive between all samples and changes of rate, and which of these instants are samples."""

@@ -62,6 +62,18 @@ def test_errors_of_rates_are_as_large_as_rates_scatter(fading):
     assert staircase(time, np.full(len(time), 1e-6)).errors is None
 
 
+def test_a_piece_between_two_samples_has_no_delay():
+    record, loading = prepared(made(moved(((0.0, 1e-6), (10.02, 1e-5), (10.03, 3e-6))) + NOISES["white, 0.3 um"]))
+    pieces = replace(
+        loading.pieces, begins=np.array([0.0, 10.02, 10.03]), rates=np.array([1e-6, 1e-5, 3e-6]), noise=3e-7
+    )
+    plain = replace(record, time=TIME, counts=np.ones(len(TIME)))
+    after, most = replace(loading, pieces=replace(pieces, rough=False)).delays(plain)
+    assert after.shape == (len(TIME), 1)
+    assert np.flatnonzero(after[:, 0])[0] == np.searchsorted(TIME, 10.03)
+    assert len(most) == 1
+
+
 def test_readings_in_steps_leave_no_more_pieces():
     x = np.round(moved() / 1e-7) * 1e-7
     pieces = straight_pieces(TIME, x, scatter(TIME, x), reading_step(x))
