@@ -181,7 +181,7 @@ class LoopAnswer:
         held = self.found.held
         step = f"{float(max(held.step, held.longest_step)):.6g} s"
         step += " with that noise" if held.noise else ""
-        both = "" if limit.slip_error is None else f" and the slip error below {limit.slip_error.quantity('m')} as well"
+        both = "" if limit.slip_error is None else f" while the slip error stays below {limit.slip_error.quantity('m')}"
         rate = limit.slip_rate_error.quantity("m/s")
         return [f"no controller with zero-order hold over T_s = {step} keeps the slip-rate error below {rate}{both}"]
 

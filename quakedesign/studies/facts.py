@@ -404,8 +404,8 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
     longest = LowerBound(Fraction(adequacy.adequate_step)).quantity("s")
     judged = "is adequate" if adequacy.adequate else "is LONGER than a rule of thumb for the instability allows"
     return (
-        f"T_s = {adequacy.step:.4g} s {judged}: times the unstable pole, {pole} 1/s {where}, it is "
-        f"{adequacy.pole_times_step:.3g}; up to {LARGEST_PRODUCT:g}, T_s = {longest}, is adequate"
+        f"T_s = {adequacy.step:.4g} s {judged}: T_s times the unstable pole, {pole} 1/s {where}, is "
+        f"{adequacy.pole_times_step:.3g}, and adequate up to {LARGEST_PRODUCT:g} (T_s = {longest})"
         f"{'' if adequacy.adequate else '; guarantee says whether something is proved at this T_s all the same'}"
     )
 
@@ -475,5 +475,5 @@ def _event(fault: Fault) -> list[str]:
     moment = f"seismic moment {fault.seismic_moment:.4g} N·m, magnitude {fault.magnitude:.2f}"
     return [
         moment if fault.seismic_moment > 0 else "no earthquake, so no seismic moment and no magnitude",
-        f"next rest slip {fault.rest_slip:.4g} m, {task}{beyond_rest(fault)}",
+        f"the uncontrolled earthquake slips {fault.rest_slip:.4g} m (next rest slip), {task}{beyond_rest(fault)}",
     ]

@@ -276,7 +276,7 @@ def test_a_target_beyond_the_rest_slip_is_said(target, said):
     from quakedesign.studies.facts import fault_sentences
 
     told = " ".join(fault_sentences(parse_fault(edited("785 mm", target), "own.toml")))
-    assert "next rest slip 0.7846 m" in told
+    assert "the uncontrolled earthquake slips 0.7846 m (next rest slip)" in told
     assert ("times the rest slip" in told) is bool(said)
     assert said in told
 
