@@ -32,6 +32,7 @@ def told(capsys, *arguments):
     return stop.value.code, out, err
 
 
+@pytest.mark.slow
 def test_it_runs_with_its_step_and_rock_under_all_the_stress_that_it_is_proved_for(capsys):
     code, out, err = told(capsys, "simulate", "crustal-patch", "--certificate", FILE, *SHORT, "--json")
     answer, held, stress = json.loads(out), CLAIM.held, float(CLAIM.task.stress)

@@ -3,7 +3,7 @@
 import pytest
 
 ALL = pytest.param(None, marks=pytest.mark.slow, id="all")
-some_or_all = pytest.mark.parametrize("most", [pytest.param(24, id="some"), ALL])
+some_or_all = pytest.mark.parametrize("most", [pytest.param(12, id="some"), ALL])
 """For a test that goes through a list of its own: `spread(values, most)`."""
 
 

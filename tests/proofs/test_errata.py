@@ -90,6 +90,7 @@ def test_another_form_in_place_of_the_corrected_one_fails(number):
     assert ROWS[number].check(**WRONG[number]()).holds is False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "near"),
     [

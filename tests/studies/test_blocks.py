@@ -20,6 +20,7 @@ def run(*arguments):
     return stop.value.code
 
 
+@pytest.mark.slow
 def test_the_command_proves_two_blocks_and_its_files_are_checked(tmp_path, capsys):
     assert run("blocks", "real-fault", "--most", "2", "--out", tmp_path / "files", "--json") == 0
     (row,) = json.loads(capsys.readouterr().out)["blocks"]

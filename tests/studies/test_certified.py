@@ -27,6 +27,7 @@ def test_a_bound_is_proved():
     assert "necessary limit: from |h'| = 2 on" in answer.lines[1]
 
 
+@pytest.mark.slow
 def test_the_largest_bound_is_told_with_what_limits_it_and_the_scale_for_a_larger_one():
     answer = certified(*TWISTING, maximize="lipschitz", lipschitz=3)
     facts = answer.facts

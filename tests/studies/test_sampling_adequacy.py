@@ -94,6 +94,7 @@ def test_a_state_asks_for_a_sampling_time_of_its_own_when_that_of_the_fault_is_f
     assert (f"a guarantee of slow sliding wants sampling_time near D_c/(20 V), here {step:g} s" in lines) is said
 
 
+@pytest.mark.slow
 def test_each_pole_of_a_fault_with_a_state_is_told_with_the_rate_that_it_is_about():
     said = fault_sentences(load_fault("crustal-patch"))
     (poles,) = (line for line in said if "eigenvalues" in line)

@@ -35,6 +35,7 @@ def test_degree_five_with_weights_three_two_one():
     assert len(signed_monomials(WEIGHTS, 5, "cells")) == 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [3, 4, 5, 6, 8])
 def test_each_is_even_homogeneous_and_differentiable(degree):
     for term in signed_monomials(WEIGHTS, degree, "cells"):

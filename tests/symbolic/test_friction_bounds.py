@@ -109,6 +109,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "changes", "message"), WRONG.values(), ids=WRONG)
 def test_a_law_that_exceeds_what_it_declares_is_refused_with_the_place(kind, changes, message):
     with pytest.raises(ParameterError, match=message):

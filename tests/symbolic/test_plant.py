@@ -152,6 +152,7 @@ def test_withdrawal_can_destabilise():
     assert condition.subs(p, -1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", ["0.1", "0.9", "2.3"])
 def test_the_rate_of_h_is_its_derivative_along_a_trajectory(time):
     with mpmath.workdps(50):

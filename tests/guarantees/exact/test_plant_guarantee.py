@@ -208,6 +208,7 @@ def leaves(value, way=()):
         yield way
 
 
+@pytest.mark.slow
 def test_every_number_of_a_file_is_bound_by_what_is_printed(checker):
     plant, K = bearing()
     document = guarantee_document(qd.guarantee(plant, gains=K, step="0.001"))

@@ -183,6 +183,7 @@ def test_a_forged_set_is_refused(proof, forged, reason):
         read_guarantee(document | {"set": document["set"] | forged(document["set"])})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [("set", "facets", 0, 0), ("set", "facets", 6, 1), ("set", "multipliers", 7, 2)])
 @pytest.mark.parametrize("value", [HUGE, f"1/{HUGE}"])
 def test_numbers_that_no_float_holds_decide_nothing(proof, place, value):

@@ -20,6 +20,7 @@ SEARCH = search._of_degree.__wrapped__
 PRESETS = ("real-fault", "lab-fault")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", PROOFS, ids=lambda path: path.stem)
 def test_every_certificate_that_is_kept_proves_its_claim_in_the_place_of_its_question(path):
     certificate = load_certificate(path)
@@ -50,6 +51,7 @@ def asked(monkeypatch):
     return found
 
 
+@pytest.mark.slow
 def test_what_the_presets_ask_is_kept_and_nothing_else(monkeypatch):
     monkeypatch.setattr(search, "family_of", lambda *_: pytest.fail("a search was begun"))
     questions = asked(monkeypatch)
