@@ -1,5 +1,6 @@
 """What the commands `fault`, `guarantee`, `design`, `simulate` and `limits` do with a file of several blocks."""
 
+import os
 from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ def several_blocks(
     """
     from quakedesign.fault import load_chain
 
-    if not str(fault).endswith(".toml") or not Path(fault).is_file():
+    if not str(fault).endswith(".toml") or not os.path.isfile(fault):
         return None
     chain = load_chain(fault, box=box)
     if chain is None:

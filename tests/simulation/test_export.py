@@ -306,14 +306,14 @@ def test_an_integral_that_pushes_beyond_what_was_applied_stays_as_it_was_before(
     [
         ("", {}, None, []),
         ("another T_s", {}, None, ["another T_s"]),
-        ("", {"delay": F(1, 50)}, None, ["designed for a delay of 0.02 s between its answer"]),
+        ("", {"delay": F(1, 50)}, None, ["designed for a delay of 0.02 s between controller and fault"]),
         (
             "another T_s",
             {"delay": F(1, 50), "lag": F(2), "diffusion": F(300)},
             F(1, 2),
             ["another T_s", "a delay of 0.02 s, a lag of 2 s, rock of L^2/D = 300 s between", "once every 0.25 s"],
         ),
-        ("", {}, F(1, 2), ["to be called by a clock, once every 0.25 s"]),
+        ("", {}, F(1, 2), ["to be called periodically, once every 0.25 s"]),
         (None, None, None, []),
     ],
 )
