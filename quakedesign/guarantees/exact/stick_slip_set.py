@@ -41,11 +41,12 @@ alone.
 (e1, y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet exceeds 1 after either map; each is the largest
 value of a linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
 
-**Noise.** Measured is the slip x + n, |n| ≤ N, rest_slip ≥ 2N. Let e1 stand for the slip less the reference plus N,
-and d be less m·n of its own sample, m and c the slip and return gains. Then this noise counts in one period alone: v is
-that of a reference at the rate r′ + c(N − n), in [0, max r′ + 2cN], which moves up to 2cNT less than that, and U is m·n
-larger. Where the innovation is cut off, d gains from −mTv⁺/2 − m(rest_slip + 2N) to −mTv⁺/2 of it; otherwise noise
-leaves d. At first e1 = N, and d is from 0 to m·N.
+**Noise.** Measured is the slip x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is exact, and so is whether it is 0. Let
+e1 stand for the slip less the reference plus N, and d be less m·n of its own sample, m and c the slip and return gains.
+Then this noise counts in one period alone: v is that of a reference at the rate r′ + c(N − n), in [0, max r′ + 2cN],
+which moves up to 2cNT less than that, and U is m·n larger. Where the innovation is cut off, d gains from −mTv⁺/2 −
+m(rest_slip + 2N) to −mTv⁺/2 of it, never less than without cut-off; otherwise noise leaves d. At first e1 = N, and d =
+0 as x⁻ = 0 and the first innovation, n, is not cut off; d from 0 to m·N is checked.
 
 **Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ =
 −wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
