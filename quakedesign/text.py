@@ -123,3 +123,8 @@ def power_of(value: float) -> int:
 def plain(value: float, digits: int = 3) -> str:
     """Significant digits without a power of ten."""
     return f"{float(f'{value + 0.0:.{digits}g}'):.15g}"
+
+
+def counted(number: int, thing: str) -> str:
+    """A number of things, as ``1 well`` or ``2 wells``."""
+    return f"{number} {thing}{'s' * (number != 1)}"

@@ -9,16 +9,18 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate, pairwise
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, ScenarioError
-from quakedesign.exact import rational, shortly
+from quakedesign.exact import apart, rational, shortly
 from quakedesign.fault.fault_toml import Table, fault_of_tables, read_friction, source_text
 from quakedesign.fault.friction.base import FrictionLaw
-from quakedesign.fault.model import Fault, Problems, require_positive
+from quakedesign.fault.model import Fault, Problems, require_nonnegative, require_ordinary, require_positive
 from quakedesign.files import parse_toml
+from quakedesign.text import counted
 
 MOST_BLOCKS = 20
 
@@ -67,25 +69,32 @@ class BlockChain:
     wells: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if not 2 <= len(self.blocks) <= MOST_BLOCKS or not 1 <= len(self.wells) <= len(self.blocks):
+        blocks, wells = len(self.blocks), len(self.wells)
+        if not 2 <= blocks <= MOST_BLOCKS or not 1 <= wells <= blocks:
             raise ParameterError(
                 f"a fault of several blocks must have 2 to {MOST_BLOCKS} blocks, and 1 well to one well a block. "
-                f"Received {len(self.blocks)} blocks and {len(self.wells)} wells."
+                f"Received {counted(blocks, 'block')} and {counted(wells, 'well')}. Add or omit tables; a fault of one "
+                "block has neither."
             )
-        whole, length = sum(self.lengths), rational(self.fault.length)
+        whole, length = sum(self.lengths, Fraction(0)), rational(self.fault.length)
         if whole != length:
             raise ParameterError(
-                f"lengths of the blocks must add up to the length of the fault, {shortly(length)} m. "
-                f"Received {shortly(whole)} m."
+                "lengths of the blocks must add up to the length of the fault, {} m. Received {} m, which differs by "
+                "{} m. Change one of these lengths.".format(*apart(length, whole), shortly(abs(whole - length)))
             )
-        places = [rational(v) for v in self.wells]
+        places = [rational(v, "position of a well") for v in self.wells]
         if not all(0 <= v <= length for v in places) or any(a >= b for a, b in pairwise(places)):
+            most, *received = apart(length, *places)
             raise ParameterError(
-                f"positions of wells must increase, from 0 to {shortly(length)} m. Received "
-                f"{', '.join(map(shortly, places))}."
+                f"positions of wells must increase, from 0 to {most} m. Received {', '.join(received)} m. Sort the "
+                "wells, and place each on the fault where no other is."
             )
-        for block in self.blocks:
-            replace(self.fault, friction=block.friction).require_memoryless("a fault of several blocks")
+        for place, block in enumerate(self.blocks, 1):
+            if block.friction.state_names:
+                raise ParameterError(
+                    "a fault of several blocks needs a friction law of slip and slip rate alone. Received "
+                    f"{block.friction.name} in block {place}. Choose another law, or a fault of one block."
+                )
 
     @property
     def name(self) -> str:
@@ -165,11 +174,17 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
     problems = Problems()
     tables = {key: _tables(raw.pop(key, []), key, problems) for key in ("block", "well")}
     fault = fault_of_tables(Table(raw, problems), problems, allow_code)
-    blocks = [_block(table, problems, fault, allow_code) for table in tables["block"]]
+    blocks = [_block(table, fault, allow_code) for table in tables["block"]]
     wells = [_position(table) for table in tables["well"]]
+    for key in tables:
+        for place, table in enumerate(tables[key], 1):
+            problems.found += [type(one)(f"{key} {place}: {one}") for one in table.problems.found]
     problems.refuse(str(source))
     fault = fault.with_box(box) if box else fault
-    return BlockChain(fault=fault, blocks=tuple(blocks), wells=tuple(wells))
+    with problems.collected():
+        return BlockChain(fault=fault, blocks=tuple(blocks), wells=tuple(wells))
+    problems.refuse(str(source))
+    return None
 
 
 def _tables(given: Any, key: str, problems: Problems) -> list[Table]:
@@ -177,18 +192,19 @@ def _tables(given: Any, key: str, problems: Problems) -> list[Table]:
         with problems.collected():
             raise ScenarioError(f"{key} must be tables [[{key}]]. Received another kind of entry.")
         return []
-    return [Table(one, problems, f"{key} {place}") for place, one in enumerate(given, 1)]
+    return [Table(one, Problems()) for one in given]
 
 
-def _block(table: Table, problems: Problems, fault: Fault | None, allow_code: bool) -> Any:
+def _block(table: Table, fault: Fault | None, allow_code: bool) -> Any:
     read = table.quantities({"length": "m"})
     read |= table.quantities({"effective_normal_stress": "Pa"}, optional=True)
-    friction = table.table("friction", optional=True)
-    law = read_friction(friction, problems, allow_code) if friction is not None else getattr(fault, "friction", None)
+    own = table.table("friction", optional=True)
+    law = getattr(fault, "friction", None) if own is None else read_friction(own, table.problems, allow_code)
     table.close()
     if fault is None or law is None or None in read.values():
         return None
-    with problems.collected():
+    with table.problems.collected():
+        require_ordinary(**{key: value for key, value in read.items() if value is not None and isfinite(value)})
         return FaultBlock(**{"effective_normal_stress": fault.effective_normal_stress, "friction": law} | read)
     return None
 
@@ -196,4 +212,6 @@ def _block(table: Table, problems: Problems, fault: Fault | None, allow_code: bo
 def _position(table: Table) -> Any:
     read = table.quantities({"position": "m"})
     table.close()
+    with table.problems.collected():
+        require_nonnegative("", **{key: value for key, value in read.items() if value is not None})
     return read["position"]

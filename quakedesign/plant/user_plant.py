@@ -22,6 +22,7 @@ from quakedesign.fault.units import exact_value
 from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad, unit
 from quakedesign.plant.ranges import FaultPlant
+from quakedesign.text import counted
 
 Slopes = tuple[Any, Any] | Callable[[Fraction], tuple[Any, Any]]
 
@@ -328,7 +329,7 @@ def _chain_parts(chain: BlockChain) -> dict[str, Any]:
     if m < N or shares.det() == 0:
         raise ParameterError(
             f"a guarantee of {N} blocks needs a well for each block whose pressures are independent, or one well for "
-            f"blocks that are alike. Received {m} wells{'' if m < N else ' that act on fewer blocks'}"
+            f"blocks that are alike. Received {counted(m, 'well')}{'' if m < N else ' that act on fewer blocks'}"
             f"{', and blocks that differ' if m == 1 else ''}. Add wells, or make all blocks alike."
         )
     tasks = [uncertain_plant(fault) for fault in chain.faults]

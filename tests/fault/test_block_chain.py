@@ -74,12 +74,25 @@ def without(text, start):
         (TEXT.replace('position = "2.5 km"', 'position = "0.5 km"'), "positions of wells must increase"),
         (TEXT.replace('position = "4.25 km"', 'position = "6 km"'), "positions of wells must increase, from 0 to 5000"),
         (TEXT.split("[[well]]")[0], "1 well to one well a block. Received 3 blocks and 0 wells"),
-        (TEXT.replace('length = "2 km"', 'size = "2 km"'), "block 1.size is not a known key"),
-        (TEXT.replace('length = "2 km"', 'length = "2 MPa"'), "block 1.length"),
-        (TEXT.replace('position = "1 km"', "position = 1"), "well 1.position"),
-        (TEXT.replace('critical_slip = "300 mm"', 'critical_slip = "-300 mm"'), "critical_slip must be positive"),
-        (TEXT.replace('"45 MPa"', '"-45 MPa"'), "effective_normal_stress must be positive"),
-        (TEXT.replace('law = "linear-slip-weakening"', 'law = "linear"'), "friction law"),
+        (TEXT.replace('length = "2 km"', 'size = "2 km"'), "block 1: size is not a known key"),
+        (TEXT.replace('length = "2 km"', 'length = "2 MPa"'), "block 1: length"),
+        (TEXT.replace('position = "1 km"', "position = 1"), "well 1: position"),
+        (
+            TEXT.replace('critical_slip = "300 mm"', 'critical_slip = "-300 mm"'),
+            "block 3: critical_slip must be",
+        ),
+        (TEXT.replace('"45 MPa"', '"-45 MPa"'), "block 2: effective_normal_stress must be positive"),
+        (TEXT.replace('law = "linear-slip-weakening"', 'law = "linear"'), "block 3: friction law"),
+        (TEXT.replace('length = "2 km"', 'length = "nan m"'), "block 1: length must be positive and finite"),
+        (TEXT.replace('"45 MPa"', '"1e300 Pa"'), "block 2: effective_normal_stress must be of a size"),
+        (TEXT.replace('position = "1 km"', 'position = "inf m"'), "well 1: position must be zero or positive, and fin"),
+        (TEXT.replace('position = "1 km"', 'position = "-1 m"'), "well 1: position must be zero or positive"),
+        (TEXT.replace('position = "1 km"', 'position = "2.5 km"'), "Received 2500, 2500, 4250 m. Sort the wells"),
+        (
+            TEXT.replace('length = "2 km"', 'length = "1.9999999999999 km"'),
+            "5000 m. Received 4999.9999999999 m, which differs by 1e-10 m. Change one of these lengths",
+        ),
+        (TEXT.split("[[block]]")[0] + '[[well]]\nposition = "1 km"\n', "Received 0 blocks and 1 well. Add or omit tab"),
         (TEXT.replace('density = "2500 kg/m^3"', ""), "density"),
         (TEXT.split("[[block]]")[0] + "[block]\nlength = 1\n", r"block must be tables \[\[block\]\]"),
     ],
@@ -90,6 +103,19 @@ def test_a_wrong_file_is_refused_in_one_line(text, said, tmp_path):
     with pytest.raises(QuakedesignError, match=said) as refused:
         load_chain(path)
     assert "\n" not in str(refused.value)
+    assert str(refused.value).startswith(f"{path}: ")
+
+
+def test_every_wrong_table_is_named_at_once(tmp_path):
+    path = tmp_path / "blocks.toml"
+    path.write_text(TEXT.replace('length = "2 km"', 'length = "0 m"').replace('"45 MPa"', '"0 Pa"'))
+    with pytest.raises(ParameterError, match=r"2 errors\. \(1\) block 1: length must.* \(2\) block 2: effective"):
+        load_chain(path)
+
+
+def test_a_well_that_is_no_number_is_named_in_python():
+    with pytest.raises(ParameterError, match="position of a well must be a finite number"):
+        replace(CHAIN, wells=(float("nan"),))
 
 
 def test_friction_with_a_state_is_refused(tmp_path):
@@ -99,7 +125,7 @@ def test_friction_with_a_state_is_refused(tmp_path):
     )
     path = tmp_path / "blocks.toml"
     path.write_text(TEXT.split('law = "linear')[0] + state + "\n" + TEXT.split('"300 mm"\n')[1])
-    with pytest.raises(QuakedesignError, match="a fault of several blocks needs a friction law of slip"):
+    with pytest.raises(QuakedesignError, match=r"law of slip and slip rate alone.* in block 3. Choose another law"):
         load_chain(path)
 
 
@@ -113,7 +139,7 @@ def test_what_takes_one_block_refuses_the_file_and_says_what_takes_it():
 @pytest.mark.parametrize(
     ("chain", "given", "said"),
     [
-        (replace(CHAIN, wells=(1000.0,)), {}, "Received 1 wells, and blocks that differ"),
+        (replace(CHAIN, wells=(1000.0,)), {}, "Received 1 well, and blocks that differ"),
         (replace(CHAIN, wells=(1000.0, 4000.0)), {}, "Received 2 wells"),
         (replace(CHAIN, wells=(100.0, 200.0, 300.0)), {}, "3 wells that act on fewer blocks"),
         (CHAIN, {"blocks": 3}, "are its own"),
