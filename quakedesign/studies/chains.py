@@ -6,7 +6,9 @@ signs are those of ℓ, z grows from 0, as long as friction weakens so, unless �
 controller of any kind needs pressures that far from balance, with the largest β. A mode that no well reaches grows.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ import numpy as np
 from quakedesign.errors import ParameterError
 from quakedesign.fault import BlockChain
 from quakedesign.plant import uncertain_plant
+from quakedesign.text import counted
 
 _SAME = 1e-6  # poles that are one, relative to the largest
 _UNREACHED = 1e-9  # of a mode's vectors
@@ -60,7 +63,7 @@ class ChainLimits:
         """For people, within 80 columns."""
         blocks, wells = len(self.chain.blocks), len(self.chain.wells)
         said = [
-            f"{self.chain.name}: limits of every controller, {blocks} blocks, {wells} well{'s' * (wells > 1)}",
+            f"{self.chain.name}: limits of every controller, {blocks} blocks, {counted(wells, 'well')}",
             f"(box {self.chain.fault.box.name}, every block at its steepest friction, for constant disturbances)",
             "",
             f"{'mode':>4}{'pole [1/s]':>12}{'pressure less balance':>26}  slips of the blocks",
@@ -72,7 +75,7 @@ class ChainLimits:
         if escaping:
             said += [
                 "",
-                f"infeasible for every controller: {escaping} unstable mode{'s' * (escaping > 1)} out of reach",
+                f"infeasible for every controller: {counted(escaping, 'unstable mode')} out of reach",
             ]
         elif not self.modes:
             said += ["", "no mode is unstable"]
@@ -90,6 +93,18 @@ class ChainLimits:
             for m in self.modes
         ]
         return {"fault": self.chain.name, "feasible": self.feasible, "modes": modes}
+
+
+def _count(chain: BlockChain, slopes: Sequence[Fraction]) -> int:
+    """Unstable modes of blocks that damping never pushes, exactly: pivots above 0 of what weakens less what holds."""
+    pulls, found, before = {(i, j): K for i, j, K in chain.springs}, 0, Fraction(0)
+    for i, slope in enumerate(slopes):
+        pivot = slope - pulls.get((i, i - 1), 0) - pulls.get((i, i + 1), 0)
+        if i:
+            pivot -= pulls[i, i - 1] * pulls[i - 1, i] / before
+        before = pivot or Fraction(-1, 10**60)
+        found += before > 0
+    return found
 
 
 def chain_limits(chain: BlockChain) -> ChainLimits:
@@ -111,6 +126,11 @@ def chain_limits(chain: BlockChain) -> ChainLimits:
         )
     left = np.linalg.inv(right)
     order = [i for i in np.argsort(-poles.real) if poles[i].real > _SAME * max(abs(poles))]
+    if (np.diag(damping) <= 0).all() and len(order) != _count(chain, [task.slip_chord[1] for task in tasks]):
+        raise ParameterError(
+            "limits of blocks need modes that floating point tells apart. Received blocks of very different stiffness. "
+            "Make lengths, stresses and critical slips of the blocks more alike."
+        )
     groups: list[list[int]] = []
     for i in order:
         if groups and poles[groups[-1][0]].real - poles[i].real <= _SAME * max(abs(poles)):
@@ -138,8 +158,8 @@ def chain_limits(chain: BlockChain) -> ChainLimits:
 def chain_lines(chain: BlockChain) -> list[str]:
     """What a file of several blocks says, within 80 columns."""
     said = [
-        f"{chain.name}: {len(chain.blocks)} blocks, {len(chain.wells)} wells (box {chain.fault.box.name}, task "
-        f"{chain.fault.reference.target_slip:g} m in {chain.fault.reference.operation_time:g} s)",
+        f"{chain.name}: {len(chain.blocks)} blocks, {counted(len(chain.wells), 'well')} (box {chain.fault.box.name}, "
+        f"task {chain.fault.reference.target_slip:g} m in {chain.fault.reference.operation_time:g} s)",
         "",
         f"{'block':>5}{'length [m]':>12}{'stress [Pa]':>13}  {'share of each well':24}friction",
     ]

@@ -10,6 +10,7 @@ from scipy.linalg import expm
 
 import quakedesign as qd
 from quakedesign.cli import main
+from quakedesign.errors import ParameterError
 from quakedesign.plant import uncertain_plant
 from quakedesign.studies import chain_limits
 
@@ -86,6 +87,17 @@ def test_a_pressure_below_the_limit_lets_the_mode_grow_and_one_above_can_hold_it
         force = np.r_[np.zeros(N), pushed + B @ pressure]
         state = expm(np.block([[A, force[:, None]], [np.zeros((1, 7))]]) * 20)[:6, 6]
         assert (left @ state * np.sign(left[3:] @ pushed) > 0) is np.bool_(grows)
+
+
+def test_a_mode_that_floating_point_loses_is_no_statement():
+    """A block of 1 nm pulls its neighbour so strongly that the pole of all blocks drowns in the rounding of another."""
+    long = replace(CHAIN.fault, length=1000.000000001)
+    blocks = tuple(replace(CHAIN.blocks[0], length=v) for v in (1e-9, 1000.0))
+    long = replace(long, effective_normal_stress=1e9)
+    blocks = tuple(replace(block, effective_normal_stress=1e9) for block in blocks)
+    chain = replace(CHAIN, fault=long, blocks=blocks, wells=(500.0,))
+    with pytest.raises(ParameterError, match="modes that floating point tells apart"):
+        chain_limits(chain)
 
 
 def test_commands_take_the_file(capsys):
