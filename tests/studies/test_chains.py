@@ -100,6 +100,13 @@ def test_a_mode_that_floating_point_loses_is_no_statement():
         chain_limits(chain)
 
 
+def test_a_design_beyond_floating_point_is_refused(tmp_path, capsys):
+    path = tmp_path / "blocks.toml"
+    path.write_text(PATH.read_text().replace('critical_slip = "300 mm"', 'critical_slip = "1 nm"'))
+    assert run("guarantee", path) == 2
+    assert "Shorten the step, or check units" in " ".join(capsys.readouterr().err.split())
+
+
 def test_commands_take_the_file(capsys):
     assert run("fault", PATH) == 0
     assert "0, 0.857, 0.143" in capsys.readouterr().out

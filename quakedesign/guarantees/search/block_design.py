@@ -11,7 +11,8 @@ from flint import fmpq, fmpq_mat
 from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import minimize
 
-from quakedesign.exact import rational
+from quakedesign.errors import ParameterError
+from quakedesign.exact import rational, shortly
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
 from quakedesign.guarantees.search.plant_search import linear_part, pieces_of
 from quakedesign.plant.plant_values import Matrix, Row, unit
@@ -27,8 +28,14 @@ _SLOWEST = 0.92  # eigenvalue of a period: a loop that forgets later takes longe
 _FORGET, _LEFT = 400, 1e-4  # periods that an estimate follows at most, share that is left
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def block_law(plant: UncertainPlant, step: Fraction) -> MatrixLaw:
-    """A law for a plant of `UncertainPlant.from_blocks`, by a search with the estimate of its slip-rate errors."""
+    """A law for a plant of `UncertainPlant.from_blocks`, by a search with the estimate of its slip-rate errors.
+
+    Raises
+    ------
+    ParameterError
+    """
     part, scale = linear_part(plant, {}), np.array(_START)
     made = _for_one_well if len(plant.controls) == 1 else _for_every_well
 
@@ -36,7 +43,10 @@ def block_law(plant: UncertainPlant, step: Fraction) -> MatrixLaw:
         values = scale * np.exp(x)
         if values[2] >= 1:
             return 1e3
-        found = estimate(part, made(part, step, values))
+        try:
+            found = estimate(part, made(part, step, values))
+        except ValueError:  # a mode that grows beyond floating point, or no solution of the equation of Riccati
+            return 1e3
         return found[0] if found[0] >= 1 else float(np.log(found[1])) - 100
 
     blocks = len(part.A) // 2
@@ -44,7 +54,13 @@ def block_law(plant: UncertainPlant, step: Fraction) -> MatrixLaw:
     most = min(_EVALUATIONS[0], _EVALUATIONS[1] // blocks**3)
     options = {"maxfev": most, "xatol": 1e-2, "fatol": 1e-3, "initial_simplex": simplex}
     best = minimize(cost, np.zeros(len(_STEPS)), method="Nelder-Mead", options=options)
-    return made(part, step, scale * np.exp(best.x))
+    try:
+        return made(part, step, scale * np.exp(best.x))
+    except ValueError:
+        raise ParameterError(
+            "a law for several blocks is designed where floating point holds what grows within one step. Received a "
+            f"step of {shortly(step)} s, for which this fails. Shorten the step, or check units of blocks and friction."
+        ) from None
 
 
 def _middle(part: LinearPart) -> tuple[np.ndarray, np.ndarray]:
