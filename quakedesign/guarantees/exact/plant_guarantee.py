@@ -34,6 +34,7 @@ from quakedesign.sos.exact.strict import (
     texts,
     with_keys,
 )
+from quakedesign.text import counted
 
 MOST_PIECES = 64
 _MOST_LAW_STATES = 48
@@ -110,11 +111,12 @@ class PlantGuarantee:
     def sentence(self) -> str:
         """What is guaranteed, for people, of the plant and the law in the file; what it covers is rounded inward."""
         part, law = self.part, self.law
-        said = f"on the uncertain plant of the certificate ({len(part.A)} states, {len(part.B[0])} controls), "
+        size = f"{counted(len(part.A), 'state')}, {counted(len(part.B[0]), 'control')}"
+        said = f"on the uncertain plant of the certificate ({size}), "
         said += f"from |x_i(0)| <= {_listed(part.start)}" if any(part.start) else "from rest"
         said += f", with zero-order hold over {UpperBound(law.step):.6g} s"
         said += f", {UpperBound(law.delay):.6g} s late" if law.delay else ""
-        said += f", for all uncertain terms in {len(part.sectors)} sectors" if part.sectors else ""
+        said += f", for all uncertain terms in {counted(len(part.sectors), 'sector')}" if part.sectors else ""
         regions = [s.within for s in part.sectors if s.within is not None]
         said += f", {len(regions)} of which hold for |y| <= {_listed(regions)}" if regions else ""
         sizes = [size for _, size in part.disturbances]
