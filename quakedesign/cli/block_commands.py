@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.cli.app import new_file, progress
 from quakedesign.cli.options import Output, changed_options
 from quakedesign.errors import ParameterError
+from quakedesign.exact import rational
 from quakedesign.files import hold, made_folder, require_room
+from quakedesign.text import counted
 
 if TYPE_CHECKING:
     from quakedesign.fault import BlockChain
@@ -31,24 +33,45 @@ def several_blocks(
     chain = load_chain(fault, box=box)
     if chain is None:
         return None
-    usual = {"fault", "output", "json", "force", "box", *known}
+    usual = {"fault", "output", "json", "force", "box", "allow_code", *known}
     given = {name: value for name, value in options.items() if value != ()}
     others = [name for name in changed_options(command, given) if name not in usual]
+    if "more" in others:
+        raise ParameterError(
+            f"{command.__name__} takes one fault of several blocks at a time. Received more faults. Omit the others."
+        )
     if others:
         named = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(others))
+        has = {*known, "json"} | ({"force", "box"} & options.keys())
         raise ParameterError(
-            f"{command.__name__} of a fault of several blocks has the options "
-            f"{', '.join(f'--{name}' for name in sorted({*known, 'json'}))}. Received {named}. Omit these."
+            f"{command.__name__} has, of a fault of several blocks, the options "
+            f"{', '.join(f'--{name}' for name in sorted(has))}. Received {named}. Omit these."
         )
     return chain
 
 
-def _facts(found: Any) -> dict[str, Any]:
-    return found.to_dict() if found.proved else {"verdict": "undecided", "reason": found.reason}
+def _scope(chain: "BlockChain") -> list[str]:
+    """What a statement about blocks depends on, and its units."""
+    blocks, wells = counted(len(chain.blocks), "block"), counted(len(chain.wells), "well")
+    pushed, meant = "m/s^2", "the load of a pressure is the pressure that balances the blocks on the reference"
+    if len(chain.wells) == 1:
+        pushed += ", the second m/s"
+        meant += "; slip errors count from where each block is in balance under the one pressure"
+    return [
+        f"plant: {chain.name}, {blocks}, {wells}, any constants of box {chain.fault.box.name}, without stick (friction "
+        "continues to negative slip rates)",
+        f"units: slip m, slip rate m/s, disturbance {pushed}, pressure Pa, rate of a load Pa/s; {meant}",
+    ]
 
 
-def _lines(found: Any) -> list[str]:
-    return found.lines() if found.proved else [found.sentence()]
+def _facts(found: Any, chain: "BlockChain") -> dict[str, Any]:
+    if not found.proved:
+        return {"verdict": "undecided", "reason": found.reason}
+    return {**found.to_dict(), "notes": [*found.notes, *_scope(chain)]}
+
+
+def _lines(found: Any, chain: "BlockChain") -> list[str]:
+    return [*found.lines(), *_scope(chain)] if found.proved else [found.sentence()]
 
 
 def show_chain(chain: "BlockChain", output: Output) -> int:
@@ -81,7 +104,7 @@ def guarantee_chain(chain: "BlockChain", step: Any, out: Path | None, force: boo
             save_guarantee(found, out)
     unwritten = [f"{out} is not written, as nothing is proved"] if out is not None and not found.proved else []
     written = None if out is None or not found.proved else str(out)
-    output.show({**_facts(found), "certificate": written}, [*_lines(found), *unwritten])
+    output.show({**_facts(found, chain), "certificate": written}, [*_lines(found, chain), *unwritten])
     return 0 if found.proved else 1
 
 
@@ -90,9 +113,10 @@ def run_chain(
 ) -> int:
     """The commands `design` and `simulate`: a law, its proof, a run and, with a folder, files and a figure."""
     from quakedesign.report.folder import prepare
-    from quakedesign.simulation.block_run import simulate_blocks
+    from quakedesign.simulation.block_run import simulate_blocks, whole_periods
     from quakedesign.synthesis import guarantee
 
+    whole_periods(chain, rational(chain.fault.sampling_time), duration)  # is refused before the long search
     if out is not None:
         prepare(out, force=force)
         require_room(out)
@@ -101,18 +125,21 @@ def run_chain(
         tell("design and proof", 0.0)
         found: Any = guarantee(chain)
         if not found.proved:
-            output.show(_facts(found), [*_lines(found), "nothing is simulated, as no law is proved"])
+            output.show(_facts(found, chain), [*_lines(found, chain), "nothing is simulated, as no law is proved"])
             return 1
         tell("simulation", 0.5)
         run = simulate_blocks(chain, found.law, duration=duration)
-    facts = {"guarantee": found.to_dict(), "run": run.to_dict()}
+    facts = {"guarantee": _facts(found, chain), "run": run.to_dict()}
     said = [
-        *found.lines(),
+        *_lines(found, chain),
         "",
-        f"run over {run.times[-1]:g} s on the stick-slip plant; what is proved is of that without stick:",
+        f"run over {run.times[-1]:g} s on the stick-slip plant; what is proved is of the plant without stick, so that "
+        "here a slip, a slip rate, or a pressure less its load may pass its bound:",
     ]
     for i, (slip, rate, rest) in enumerate(zip(run.slip_error, run.slip_rate_error, run.rest, strict=True), 1):
         said.append(f"block {i}: slip error {slip:.3g} m, slip-rate error {rate:.3g} m/s, at rest {100 * rest:.3g} %")
+    for i, (least, largest) in enumerate(zip(run.pressure.min(axis=0), run.pressure.max(axis=0), strict=True), 1):
+        said.append(f"well {i}: pressure {least:.3g} Pa to {largest:.3g} Pa")
     for event, happened in (("a block would slip backward", run.reversed), ("a block opens", run.opened)):
         said += [f"{event}: the run is outside the model"] if happened else []
     if out is not None:

@@ -181,7 +181,7 @@ def design(
     from quakedesign.cli.block_commands import run_chain, several_blocks
     from quakedesign.report.folder import prepare
 
-    known = ("out", "format", "verbose")
+    known = ("out", "format", "verbose", "box")
     if (chain := several_blocks(fault, globals()["design"], given, known, options.box)) is not None:
         return run_chain(chain, None, out or Path(f"quakedesign-{chain.name}"), force, output, format)
     loaded, asked = options.asked(fault)

@@ -82,7 +82,7 @@ def simulate(
     seed
         Seed of noise and jitter.
     out
-        NetCDF file to write.
+        NetCDF file to write; of a fault of several blocks, a folder.
     """
     options = dict(locals())
     from quakedesign.cli.block_commands import run_chain, several_blocks

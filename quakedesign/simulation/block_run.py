@@ -1,6 +1,7 @@
 """Runs of a fault of several blocks under a sampled law, on the stick–slip plant: friction holds each block at rest."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import casadi as ca
@@ -9,6 +10,7 @@ import sympy as sp
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
+from quakedesign.exact import rational
 from quakedesign.fault import BlockChain
 from quakedesign.symbolic.casadi_printer import to_casadi
 
@@ -133,6 +135,22 @@ class _Period:
         return (("x", N), ("v", N), ("z", q), ("p", m), ("count", 1), *of_blocks, ("room", 2))
 
 
+def whole_periods(chain: BlockChain, step: Fraction, duration: float | None) -> int:
+    """Periods of a run [-] of a duration [s], of the operation time unless given.
+
+    Raises
+    ------
+    ParameterError
+    """
+    whole = chain.fault.reference.operation_time if duration is None else duration
+    if not step <= whole <= _MOST_PERIODS * step:
+        raise ParameterError(
+            f"duration of a run of blocks must be one step to {_MOST_PERIODS:.0e} steps, {float(step):g} s to "
+            f"{float(_MOST_PERIODS * step):g} s. Received {whole:g} s. Change the duration, or the sampling time."
+        )
+    return int(rational(whole) / step)
+
+
 def simulate_blocks(
     chain: BlockChain, law: Any, *, duration: float | None = None, substeps: int = SUBSTEPS
 ) -> BlockRun:
@@ -156,25 +174,22 @@ def simulate_blocks(
     ------
     ParameterError
     """
-    step = float(law.step)
-    whole = chain.fault.reference.operation_time if duration is None else duration
-    if not step <= whole <= _MOST_PERIODS * step or not 1 <= substeps <= 1000:
-        raise ParameterError(
-            f"duration must be {step:g} s to {_MOST_PERIODS * step:g} s, substeps 1 to 1000. Received {whole:g} s and "
-            f"{substeps}."
-        )
+    step, periods = float(law.step), whole_periods(chain, law.step, duration)
+    if not 1 <= substeps <= 1000:
+        raise ParameterError(f"substeps must be 1 to 1000. Received {substeps}.")
     period = _Period(chain=chain, law=law, substeps=substeps)
     once = period.function()
-    periods = int(whole / step)
     at_once = max(periods // _POINTS, 1)
-    many, ends = once.fold(at_once), np.cumsum([0, *(size for _, size in period.sizes)])
+    sizes = [at_once] * (periods // at_once) + [periods % at_once] * (periods % at_once > 0)
+    many = {size: once.fold(size) for size in set(sizes)}
+    ends = np.cumsum([0, *(size for _, size in period.sizes)])
     place = {name: slice(*ends[i : i + 2]) for i, (name, _) in enumerate(period.sizes)}
     now = np.zeros(ends[-1])
     now[place["room"]] = np.inf
     seen = []
-    for _ in range(periods // at_once):
+    for size in sizes:
         now[place["peak"]] = 0
-        now = np.array(many(now)).ravel()
+        now = np.array(many[size](now)).ravel()
         seen.append(now.copy())
         if not np.isfinite(now[place["x"]]).all():
             raise ParameterError("a run must stay finite. Received one that overflows. Change the law.")

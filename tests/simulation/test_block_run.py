@@ -120,7 +120,7 @@ def test_without_a_law_that_acts_the_blocks_run_away():
     assert (run.slip[-1] > 0.3).all()
 
 
-@pytest.mark.parametrize(("given", "received"), [({"duration": 0.1}, "0.1 s and 8"), ({"substeps": 0}, "and 0")])
+@pytest.mark.parametrize(("given", "received"), [({"duration": 0.1}, "0.1 s"), ({"substeps": 0}, "0")])
 def test_times_without_meaning_are_refused(given, received):
     with pytest.raises(ParameterError, match=f"Received .*{received}"):
         simulate_blocks(CHAIN, proved().law, **given)

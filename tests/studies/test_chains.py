@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from fractions import Fraction as F
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.linalg import expm
 import quakedesign as qd
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError
+from quakedesign.guarantees.exact.plant_loop import MatrixLaw
 from quakedesign.plant import uncertain_plant
 from quakedesign.studies import chain_limits
 
@@ -100,11 +102,76 @@ def test_a_mode_that_floating_point_loses_is_no_statement():
         chain_limits(chain)
 
 
+def test_friction_of_a_user_is_allowed_by_the_option_that_its_refusal_names(tmp_path, capsys):
+    path, law = tmp_path / "blocks.toml", "tests.data.own_parts:Hyperbolic"
+    path.write_text(PATH.read_text().replace('law = "linear-slip-weakening"', f'law = "{law}"'))
+    assert run("fault", path) == 2
+    assert "block 3: friction law in a file" in capsys.readouterr().err.replace("\n", " ")
+    assert run("fault", path, "--allow-code") == 0
+    assert "3 blocks" in capsys.readouterr().out
+
+
 def test_a_design_beyond_floating_point_is_refused(tmp_path, capsys):
     path = tmp_path / "blocks.toml"
     path.write_text(PATH.read_text().replace('critical_slip = "300 mm"', 'critical_slip = "1 nm"'))
     assert run("guarantee", path) == 2
     assert "Shorten the step, or check units" in " ".join(capsys.readouterr().err.split())
+
+
+def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, capsys, monkeypatch):
+    class Proved:
+        """Stands for a proof, whose search takes seconds."""
+
+        proved, notes = True, ("a note",)
+        law = MatrixLaw(
+            step=F(23, 125),
+            delay=F(0),
+            update=(),
+            measured=(),
+            output=((),) * 3,
+            feedback=tuple((*(F(0),) * 6,) for _ in range(3)),
+        )
+
+        def lines(self):
+            return [f"proved: {self.sentence()}"]
+
+        def sentence(self):
+            return "a sentence"
+
+        def to_dict(self):
+            return {"verdict": "proved", "sentence": self.sentence(), "notes": list(self.notes)}
+
+    monkeypatch.setattr("quakedesign.synthesis.guarantee", lambda *_, **__: Proved())
+    assert run("guarantee", PATH) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "plant: three-blocks, 3 blocks, 3 wells, any constants of box paper, without stick" in told
+    assert "units: slip m, slip rate m/s, disturbance m/s^2, pressure Pa, rate of a load Pa/s" in told
+    assert "one pressure" not in told
+    alone = PATH.read_text().split("[[block]]")[0] + '[[block]]\nlength = "2.5 km"\n' * 2
+    (tmp_path / "blocks.toml").write_text(alone + '[[well]]\nposition = "1 km"\n')
+    assert run("guarantee", tmp_path / "blocks.toml") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "2 blocks, 1 well," in told
+    assert "disturbance m/s^2, the second m/s," in told
+    assert "slip errors count from where each block is in balance under the one pressure" in told
+    assert run("guarantee", PATH, "--json") == 0
+    notes = json.loads(capsys.readouterr().out)["notes"]
+    assert notes[0] == "a note"
+    assert notes[1].startswith("plant: three-blocks")
+    assert run("simulate", PATH, "--duration", "2 s") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "run over 1.84 s on the stick-slip plant" in told
+    assert "of the plant without stick, so that here a slip, a slip rate, or a pressure less its load may pass" in told
+    assert "well 3: pressure 0 Pa to 0 Pa" in told
+
+
+def test_a_duration_out_of_range_is_refused_before_the_search(tmp_path, capsys):
+    for duration in ("1 ms", "1e30 s", "nan s"):
+        assert run("simulate", PATH, "--duration", duration, "--out", tmp_path / "run") == 2
+        said = " ".join(capsys.readouterr().err.split())
+        assert "substeps" not in said
+        assert "duration" in said
+    assert not list(tmp_path.iterdir())
 
 
 def test_commands_take_the_file(capsys):
@@ -135,6 +202,8 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
     ("arguments", "said"),
     [
         (("guarantee", PATH, "--delay", "20 ms"), "Received --delay. Omit these."),
+        (("guarantee", PATH, PATH), "takes one fault of several blocks at a time. Received more faults"),
+        (("guarantee", PATH, "--delay", "20 ms"), "the options --box, --force, --json, --out, --step."),
         (("limits", PATH, "--pressure", "1 MPa"), "Received --pressure"),
         (("simulate", PATH, "--controller", "cta"), "Received --controller"),
         (("design", PATH, "--controller", "cta"), "Received --controller"),
