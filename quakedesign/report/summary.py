@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from math import exp
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from quakedesign.exact import Bound, UpperBound
 from quakedesign.guarantees import Guarantee, SlidingGuarantee
+from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
 from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines
 from quakedesign.studies.comparison import pressure_extremes
 from quakedesign.studies.runs import StateRun
@@ -66,7 +68,7 @@ def summary(comparison: "Compared") -> Summary:
     """Answer, table and notes of a comparison."""
     designed = comparison.of("designed")
     proved = [entry for entry in designed if entry.guaranteed is not None]
-    best = min(proved, key=lambda entry: _rate(entry), default=None)
+    best = min(proved, key=lambda entry: (bool(entry.design.other_step), _rate(entry)), default=None)
     rows = [_uncontrolled(comparison.uncontrolled), *map(_row, (*designed, *comparison.of("published")))]
     return Summary(
         answer=_answer(comparison, best),
@@ -88,11 +90,10 @@ def _answer(comparison: "Compared", best: "Entry | None") -> str:
     found, peak = best.guaranteed, natural.outcome.peak_slip_rate
     share = ""
     if peak and natural.outcome.kind == "earthquake":
-        ratio = UpperBound(100 * found.peak_slip_rate / UpperBound(f"{peak:.3g}"))
+        ratio = UpperBound(100 * Fraction(found.peak_slip_rate) / Fraction(peak))
         share = f" ({ratio:.2g} % of the natural earthquake's {quantity(peak, 'm/s')})"
-    step = f" at {best.design.other_step_first}" if best.design.other_step else ""
     return (
-        f"{name}: guaranteed{step}. With the {best.label} the slip rate never exceeds "
+        f"{name}: {best.design.other_step_first or 'guaranteed'}. With the {best.label} the slip rate never exceeds "
         f"{found.peak_slip_rate.quantity('m/s')}{share}, and the slip stays within "
         f"{found.claims.slip_error.quantity('m')} of the reference"
     )
@@ -141,11 +142,12 @@ def _row(entry: "Entry") -> Row:
     )
 
 
-def worst_slip_rate(worst: object, found: object) -> float:
-    """Slip rate of the worst case found; of its error where no more is followed."""
-    if isinstance(found, SlidingGuarantee):
-        return float(found.task.rate) * exp(worst.log_rate)  # type: ignore[attr-defined]
-    return float(worst.slip_rate_error)  # type: ignore[attr-defined]
+def worst_slip_rate(worst: WorstFound | WorstSliding, found: Guarantee | SlidingGuarantee | None) -> float:
+    """Slip rate [m/s] of the worst case found; of its error where no more is followed."""
+    if isinstance(worst, WorstSliding):
+        assert isinstance(found, SlidingGuarantee)
+        return float(found.task.rate) * exp(worst.log_rate)
+    return worst.slip_rate_error
 
 
 def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
@@ -167,27 +169,31 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
     yield from (f"{', '.join(names)} (published): {said}" for said, names in published.items())
     yield from left_out_lines(comparison)
     if best is not None and best.answer is not None:
-        yield from _with_stick(best.answer, fault.name)
+        yield from _with_stick(best.answer)
         yield from best.answer.limit_lines()
 
 
-def _with_stick(answer: object, fault: str) -> Iterator[str]:
-    """Worst case found where friction holds the fault at rest, and which command proves bounds there."""
+def _with_stick(answer: object) -> Iterator[str]:
+    """Worst case found where friction holds the fault at rest, and which command looks for a proof there."""
     seen = getattr(answer, "worst_with_stick", None)
     if seen is not None:
         yield (
             f"worst case found on the stick-slip plant: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
-            f"{quantity(seen.slip_rate_error, 'm/s')}; a law and a proof for it: guarantee {fault} --plant stick-slip"
+            f"{quantity(seen.slip_rate_error, 'm/s')}; guarantee --plant stick-slip looks for a law with a proof there"
         )
 
 
 def _published(said: str) -> str:
-    """The verdict on published gains without the names of their premises, which the report explains."""
-    end = "; UNSTABLE if p is held over T_s"
-    if said.startswith("proved, but "):
-        held = "; unstable with zero-order hold over T_s" if said.endswith(end) else ""
-        return f"proved in continuous time only, under premises that fail here{held}"
-    return said
+    """The verdict on published gains without the names of the premises that fail, which the report explains."""
+    if not said.startswith("proved, but "):
+        return said
+    missing = said.removeprefix("proved, but ").split("; ")
+    others = [part for part in missing if " fails" not in part]
+    failing = ["under premises that fail here"] if len(others) < len(missing) else []
+    said = f"proved in continuous time only, {'; '.join([*failing, *others])}"
+    return said.replace("UNSTABLE if p is held", "unstable with zero-order hold").replace(
+        "UNSTABLE with p held", "unstable with zero-order hold"
+    )
 
 
 def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
@@ -282,17 +288,30 @@ def _scale(groups: Sequence[Sequence[Number]]) -> int:
 
 
 def _cells(group: Sequence[Number], power: int, unit: str) -> str:
-    """Three cells; where one would be too wide, its number alone, with its unit."""
-    shown = [_cell(value, power) for value in group]
-    if any(len(cell) >= width for cell, width in zip(shown, _NUMBERS, strict=True)):
-        known = [value for value in group if value is not None]
-        return f"{', '.join(quantity(float(value), unit) for value in known):>{sum(_NUMBERS)}}"
-    return "".join(f"{cell:>{width}}" for cell, width in zip(shown, _NUMBERS, strict=True))
+    """Three cells; a number that stands alone and is too wide has a unit of its own."""
+    known = [value for value in group if value is not None]
+    if len(known) == 1 and len(_cell(known[0], power)) >= _NUMBERS[-1]:
+        return f"{quantity(float(known[0]), unit):>{sum(_NUMBERS)}}"
+    return "".join(f"{_fitted(value, power, width):>{width}}" for value, width in zip(group, _NUMBERS, strict=True))
 
 
-def _cell(value: Number, power: int, *, coarse: bool = False) -> str:
+def _fitted(value: Number, power: int, width: int) -> str:
+    """Three digits, or as many as leave a blank before the number."""
+    shown = (_cell(value, power, digits) for digits in (3, 2, 1))
+    return next((cell for cell in shown if len(cell) < width), "–" if value is None else f"{_scaled(value, power):.0e}")
+
+
+def _scaled(value: Bound | float, power: int) -> Bound | float:
+    """Over a power of ten; a bound stays one."""
+    if isinstance(value, Bound):
+        return type(value)(value / Fraction(10) ** power)
+    return float(value / 10.0**power)
+
+
+def _cell(value: Number, power: int, digits: int = 3, *, coarse: bool = False) -> str:
     if value is None:
         return "–"
-    if isinstance(value, Bound):
-        return plain(float(format(type(value)(value / type(value)(10) ** power), ".3g")))
-    return plain(round(value / 10.0**power, 3) if coarse else value / 10.0**power)
+    scaled = _scaled(value, power)
+    if isinstance(scaled, Bound):
+        return plain(float(format(scaled, f".{digits}g")), digits)
+    return plain(round(scaled, 3) if coarse else scaled, digits)

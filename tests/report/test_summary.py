@@ -1,5 +1,6 @@
 """The summary of a comparison: what is said first, in 40 lines of 80 characters, with numbers on their outer side."""
 
+from dataclasses import replace
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -91,7 +92,13 @@ def entry(label, peak=None, slip=None, *, compensation=None, origin="designed"):
         limit_lines=lambda: ["no controller does better"],
     )
     design = SimpleNamespace(
-        title=label.split(" ")[0], other_step=None, verdict="undecided", premises=(), conditions=(), details={}
+        title=label.split(" ")[0],
+        other_step=None,
+        other_step_first="",
+        verdict="undecided",
+        premises=(),
+        conditions=(),
+        details={},
     )
     named = {"label": label, "origin": origin, "guaranteed": found or None, "answer": answer, "run": run}
     return SimpleNamespace(**named, design=design, held=None, growth_per_step=None, peaks={})
@@ -127,9 +134,58 @@ def test_the_worst_case_on_the_stick_slip_plant_is_reported_with_the_command_tha
     one.answer.worst_with_stick = SimpleNamespace(slip_error=1.2e-6, slip_rate_error=3e-5)
     (note,) = (note for note in summary(compared(monkeypatch, one)).notes if "stick-slip" in note)
     assert note == (
-        "worst case found on the stick-slip plant: slip error 1.2 µm, slip-rate error 30 µm/s; a law and a proof for "
-        "it: guarantee mine --plant stick-slip"
+        "worst case found on the stick-slip plant: slip error 1.2 µm, slip-rate error 30 µm/s; guarantee --plant "
+        "stick-slip looks for a law with a proof there"
     )
+
+
+def test_a_share_is_rounded_up_from_the_numbers_themselves(monkeypatch):
+    """0.109/12.4996 = 0.87203 %, which is less over 12.5, the earthquake as it is printed."""
+    one = compared(monkeypatch, entry("A (designed)", "0.000109", "1e-5"))
+    one.uncontrolled.outcome.peak_slip_rate = 0.0124996
+    assert "(0.88 % of the natural earthquake's 12.5 mm/s)" in summary(one).answer
+
+
+def test_a_design_for_another_sampling_time_is_not_said_to_be_guaranteed(monkeypatch):
+    """And one for the fault's own T_s comes first, also with a larger bound."""
+    other, own = entry("A (designed)", "1e-4", "1e-5"), entry("B (designed)", "2e-4", "1e-5")
+    other.design.other_step = 2
+    other.design.other_step_first = "not guaranteed at T_s = 0.1 s; designed for T_s = 0.05 s"
+    said = summary(compared(monkeypatch, other)).answer
+    assert said.startswith("mine: not guaranteed at T_s = 0.1 s; designed for T_s = 0.05 s. With the A (designed) the")
+    assert summary(compared(monkeypatch, other, own)).answer.startswith("mine: guaranteed. With the B (designed)")
+
+
+@pytest.mark.parametrize(
+    ("grade", "said"),
+    [
+        ("undecided", "undecided"),
+        ("proved, but along_reference fails 295-fold", "under premises that fail here"),
+        (
+            "proved, but level_set fails 2-fold; UNSTABLE with p held",
+            "under premises that fail here; unstable with zero-order hold",
+        ),
+        ("proved, but p is held, and no T_s is proved", "p is held, and no T_s is proved"),
+        (
+            "proved, but level_set fails 2-fold; UNSTABLE if p is held over T_s",
+            "under premises that fail here; unstable with zero-order hold over T_s",
+        ),
+    ],
+)
+def test_published_gains_keep_what_is_said_of_how_they_run(monkeypatch, grade, said):
+    one = compared(monkeypatch, entry("A (designed)", "1e-4", "1e-5"), entry("P (published)", origin="published"))
+    monkeypatch.setattr("quakedesign.report.summary.grade", lambda _: grade)
+    (note,) = (note for note in summary(one).notes if "(published)" in note)
+    assert note == f"P (published): {said if grade == 'undecided' else f'proved in continuous time only, {said}'}"
+
+
+def test_numbers_of_any_size_stay_apart():
+    rates = (UpperBound("69.7e-6"), 5.08e-6, 0.542e-6)
+    rows = [Row(name="a", outcome="t", slip_rate=rates, slip=(UpperBound("1.32e-6"), 1.45e-7, 8.08e-9), pressure=None)]
+    rows += [replace(rows[0], slip_rate=(UpperBound("1.00001e-12"), 123456e-6, 3e-3))]
+    lines = summary_lines(made(rows=tuple(rows)))
+    assert lines[4].split() == ["a", "t", "69.7", "5.08", "0.542", "1.32", "0.145", "0.008", "–"]
+    assert lines[5].split()[2:5] == ["2e-06", "1e+05", "3000"]
 
 
 def test_without_a_guarantee_each_reason_is_given(monkeypatch):
