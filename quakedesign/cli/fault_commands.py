@@ -297,8 +297,8 @@ def identify(
 def schema(command: str, /, *, output: Output = PLAIN) -> int:
     """Print the JSON Schema (draft 2020-12) of what a command prints with --json.
 
-    Required keys are always there; further keys may come with options. Units are in the table of keys
-    (docs/reference/json.md).
+    For faults of one block. Required keys are in every output; options add others, which may be null. Units are in the
+    table of keys (docs/reference/json.md).
 
     Parameters
     ----------
