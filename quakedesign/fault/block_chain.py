@@ -190,7 +190,7 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
 def _tables(given: Any, key: str, problems: Problems) -> list[Table]:
     if not isinstance(given, list) or not all(isinstance(one, Mapping) for one in given):
         with problems.collected():
-            raise ScenarioError(f"{key} must be tables [[{key}]]. Received another kind of entry.")
+            raise ScenarioError(f"{key} must be tables [[{key}]]. Received {type(given).__name__}. Write [[{key}]] before each.")
         return []
     return [Table(one, Problems()) for one in given]
 

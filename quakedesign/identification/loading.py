@@ -330,7 +330,7 @@ def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float)
 
 
 def _rate_errors(u: "np.ndarray", left: "np.ndarray", knots: "np.ndarray") -> "np.ndarray":
-    """Standard deviation of the slope of each piece: of a line of its own, as the knots are free.
+    """Standard deviation of the slope of each piece: of a separate line, as the knots are free.
 
     By the long-run variance of what is left: that of AR(1) noise is `_spread` times its variance.
     """

@@ -354,7 +354,7 @@ def _levels(entry: "Entry") -> "Iterator[tuple[float, str, str, str]]":
     limit = getattr(entry.answer, "limit", None)
     if limit is not None:
         least = limit.slip_rate_error
-        yield float(least), f"none can: below {least.quantity('m/s')}", "dashdot", "#777777"
+        yield float(least), f"limit of every controller: {least.quantity('m/s')}", "dashdot", "#777777"
 
 
 def _largest(time: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":

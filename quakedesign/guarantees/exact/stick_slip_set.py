@@ -42,7 +42,7 @@ alone.
 value of a linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
 
 **Noise.** Measured is the slip x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is exact, and so is whether it is 0. Let
-e1 stand for the slip less the reference plus N, and d be less m·n of its own sample, m and c the slip and return gains.
+e1 stand for the slip less the reference plus N, and d be less m·n of the same sample, m and c the slip and return gains.
 Then this noise counts in one period alone: v is that of a reference at the rate r′ + c(N − n), in [0, max r′ + 2cN],
 which moves up to 2cNT less than that, and U is m·n larger. Where the innovation is cut off, d gains from −mTv⁺/2 −
 m(rest_slip + 2N) to −mTv⁺/2 of it, never less than without cut-off; otherwise noise leaves d. At first e1 = N, and d =
@@ -201,7 +201,7 @@ class SampledStickSlip:
 
     @property
     def told(self) -> Fraction:
-        """What noise adds to the rate of the reference that the law is told, at most [m/s]."""
+        """What noise adds at most to the rate of the reference in the law [m/s]."""
         return 2 * self.law.return_rate * self.slip_noise
 
     @property
@@ -550,7 +550,7 @@ def _carried(
         push, push0, (q1, q0) = push_row(held, fastest + told, combination)
         p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
         # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative: it may be 0 for r' up to max|r''|T/2.
-        # As the law is told r', it may be `told` less.
+        # r' in the law contains noise, so that the reference may move `told` less.
         moves = np.where(back.middle(n1) > 0, float(bool(q1 or q0)), 1.0)
         late = abs(n1) * number(bend * step**2 / 2) + (abs(n1) + n1) * number(told * step / 2)
         late = back.array(moves.tolist()) * late

@@ -118,7 +118,7 @@ def _template(row: FormRow, loop: Loop, scale: Sequence[Fraction]) -> Statement:
 # multipliers. All numbers are floating point: a sweep screens, it proves nothing.
 
 ACCURACY = 1e-10
-"""What the solver is asked for by default."""
+"""Tolerance of the solver by default."""
 SURE = 5e-10
 """Margins above this count as found; the solver's answers are about as accurate as that."""
 CLEAR = 1e-6
