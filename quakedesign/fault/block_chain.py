@@ -190,7 +190,8 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
 def _tables(given: Any, key: str, problems: Problems) -> list[Table]:
     if not isinstance(given, list) or not all(isinstance(one, Mapping) for one in given):
         with problems.collected():
-            raise ScenarioError(f"{key} must be tables [[{key}]]. Received {type(given).__name__}. Write [[{key}]] before each.")
+            kind = type(given).__name__
+            raise ScenarioError(f"{key} must be tables [[{key}]]. Received {kind}. Write [[{key}]] before each.")
         return []
     return [Table(one, Problems()) for one in given]
 

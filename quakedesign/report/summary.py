@@ -67,8 +67,8 @@ class Summary:
 def summary(comparison: "Compared") -> Summary:
     """Answer, table and notes of a comparison."""
     designed = comparison.of("designed")
-    proved = [entry for entry in designed if entry.guaranteed is not None]
-    best = min(proved, key=lambda entry: (bool(entry.design.other_step), _rate(entry)), default=None)
+    proved = [(bool(e.design.other_step), e.guaranteed.peak_slip_rate, e) for e in designed if e.guaranteed]
+    best = min(proved, key=lambda one: one[:2])[2] if proved else None
     rows = [_uncontrolled(comparison.uncontrolled), *map(_row, (*designed, *comparison.of("published")))]
     return Summary(
         answer=_answer(comparison, best),
@@ -76,11 +76,6 @@ def summary(comparison: "Compared") -> Summary:
         conditions=_conditions(designed, best),
         notes=tuple(_notes(comparison, best)),
     )
-
-
-def _rate(entry: "Entry") -> float:
-    assert entry.guaranteed is not None
-    return float(entry.guaranteed.peak_slip_rate)
 
 
 def _answer(comparison: "Compared", best: "Entry | None") -> str:
@@ -190,10 +185,8 @@ def _published(said: str) -> str:
     missing = said.removeprefix("proved, but ").split("; ")
     others = [part for part in missing if " fails" not in part]
     failing = ["under premises that fail here"] if len(others) < len(missing) else []
-    said = f"proved in continuous time only, {'; '.join([*failing, *others])}"
-    return said.replace("UNSTABLE if p is held", "unstable with zero-order hold").replace(
-        "UNSTABLE with p held", "unstable with zero-order hold"
-    )
+    said = "; ".join([*failing, *others]).replace("UNSTABLE if p is held", "UNSTABLE with p held")
+    return f"proved in continuous time only, {said.replace('UNSTABLE with p held', 'unstable with zero-order hold')}"
 
 
 def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
@@ -211,17 +204,8 @@ def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
 # ----------------------------------------------------------------------
 # The table with units in its cells, for pages.
 
-SUMMARY_COLUMNS = (
-    "controller",
-    "outcome",
-    "slip rate proved",
-    "worst found",
-    "run",
-    "slip error proved",
-    "worst found",
-    "run",
-    "pressure",
-)
+_NUMBERED = (f"{of} {kind}" for of in ("slip rate", "slip error") for kind in ("proved", "worst found", "run"))
+SUMMARY_COLUMNS = ("controller", "outcome", *_NUMBERED, "pressure")
 
 
 def summary_cells(rows: Sequence[Row]) -> list[tuple[str, ...]]:

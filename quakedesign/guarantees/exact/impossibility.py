@@ -179,7 +179,7 @@ class SlidingPush:
 # **Theorem 3 (a fault that sticks).** Let a fault rest at slip 0 and p = 0, held by friction, and never slip backward.
 # Let the pressure be decided at samples T apart and stay for T. No controller that moves it at all keeps its slip rate
 # below 2H·h(T), h as in theorem 1 with σ = −κ, κT² ≤ 1, for every φ, with friction that does not change.
-# *Proof.* Let φ = −H for all t. While the fault rests, the force on it changes with the pressure alone, so that it first
+# *Proof.* Let φ = −H always. While the fault rests, the force on it changes with the pressure alone, so that it first
 # moves in a period of some pressure p with N̂μ*p ≥ H. Turn φ to H as that pressure begins to act. Until then both are
 # the same course, so p is the same, and it stays for T. The fault starts from rest with the force N̂μ*p + H ≥ 2H, and
 # y = x2 has y′ = N̂μ*p + H − κx1 − wy, whose solution is that many times h and positive up to T. ∎

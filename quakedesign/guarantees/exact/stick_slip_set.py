@@ -42,7 +42,7 @@ alone.
 value of a linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
 
 **Noise.** Measured is the slip x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is exact, and so is whether it is 0. Let
-e1 stand for the slip less the reference plus N, and d be less m·n of the same sample, m and c the slip and return gains.
+e1 stand for the slip less the reference plus N, and d be less m·n of that sample, m and c the slip and return gains.
 Then this noise counts in one period alone: v is that of a reference at the rate r′ + c(N − n), in [0, max r′ + 2cN],
 which moves up to 2cNT less than that, and U is m·n larger. Where the innovation is cut off, d gains from −mTv⁺/2 −
 m(rest_slip + 2N) to −mTv⁺/2 of it, never less than without cut-off; otherwise noise leaves d. At first e1 = N, and d =
