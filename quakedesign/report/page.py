@@ -156,7 +156,7 @@ def _cards(told: Iterable[Account]) -> list[Account]:
     cards: dict[tuple[Any, ...], Account] = {}
     for one in told:
         key = (tuple(one.guarantee), tuple(one.run), tuple(one.verdict))
-        known = cards.get(key) if one.guarantee else None
+        known = cards.get(key)
         label = one.label if known is None else f"{known.label.removesuffix(' (designed)')}, {one.label}"
         cards[key if one.guarantee else (one.label,)] = replace(one, label=label)
     return list(cards.values())

@@ -10,11 +10,12 @@ import pytest
 import quakedesign as qd
 from quakedesign.cli.app import console
 from quakedesign.errors import OutputError
+from quakedesign.exact import UpperBound
 from quakedesign.fault import Reference
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.report import Comparison, headline
-from quakedesign.report.figures import metrics
+from quakedesign.report.figures import metrics, overview
 from quakedesign.report.folder import write_folder
 from quakedesign.report.sentences import remarks
 from quakedesign.report.tables import COLUMNS, rows
@@ -188,3 +189,30 @@ def test_a_brief_account_leaves_out_what_holds_and_says_once_what_is_the_same(co
     assert all(f"{float(v):.6g}" in whole for entry in entries for v in entry.design.gains.values())
     failing = [p for entry in entries for p in entry.design.conditions if not p.holds]
     assert all(f"premise {p.name}" in whole for p in failing)
+
+
+def test_the_overview_has_lines_at_the_proved_bound_the_worst_case_and_the_limit(comparison):
+    (designed,) = comparison.of("designed")
+    rate, slip = comparison.figures()["overview"].axes
+    levels = {line.get_label(): line.get_ydata()[0] for line in rate.lines if len(set(line.get_ydata())) == 1}
+    answer = designed.answer
+    bounds = [value for label, value in levels.items() if "proved" in label]
+    assert bounds == [float(answer.found.peak_slip_rate)]
+    assert [v for label, v in levels.items() if "worst case" in label] == [answer.worst.slip_rate_error]
+    assert [v for label, v in levels.items() if "limit of every" in label] == [float(answer.limit.slip_rate_error)]
+    assert rate.get_yscale() == slip.get_xscale() == "log"
+    run = next(line for line in rate.lines if line.get_label() == designed.label)
+    assert max(v for v in run.get_ydata() if v == v) == pytest.approx(abs(designed.run.slip_rate).max())
+    (free,) = (line for line in rate.lines if line.get_label() == "without control")
+    assert max(v for v in free.get_ydata() if v == v) == abs(comparison.uncontrolled.slip_rate).max()
+
+
+def test_the_overview_is_of_the_design_with_the_smallest_proved_bound(comparison):
+    (best,) = comparison.of("designed")
+    claims = replace(best.answer.found.claims, peak_slip_rate=UpperBound(1))
+    answer = replace(best.answer, found=replace(best.answer.found, claims=claims))
+    worse = replace(best, label="worse", answer=answer)
+    both = Comparison(fault=comparison.fault, uncontrolled=comparison.uncontrolled, entries=(worse, best))
+    labels = [line.get_label() for line in overview(both).axes[0].lines]
+    assert best.label in labels
+    assert "worse" not in labels

@@ -214,6 +214,11 @@ def test_a_linear_law_is_shown_as_difference_equation_and_for_python_control():
     sliding = parse_guarantee((PROOFS / "guarantee_cta_real-fault.json").read_text())
     implicit = SimpleNamespace(guaranteed=sliding)
     assert page._python(implicit) == page._difference(implicit) == []
+    large = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
+    many = SimpleNamespace(guaranteed=large)
+    assert len(large.held.law.states) > 4
+    assert page._python(many)
+    assert page._difference(many) == []
     assert page._python(SimpleNamespace(guaranteed=None)) == []
 
 

@@ -21,7 +21,7 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoGuarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.guarantee_result import SlidingAnswer
-from quakedesign.report.figures import cycle, errors, slow_sliding
+from quakedesign.report.figures import cycle, errors, overviews, slow_sliding
 from quakedesign.report.folder import write_folder
 from quakedesign.report.page import accounts, parameter_rows
 from quakedesign.report.sentences import cycle_sentence, part_of_task, sentences, state_run_lines
@@ -105,11 +105,21 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     claims, worst = comparison.entries[0].guarantee.claims, comparison.entries[0].answer.worst
     assert row[2] == f"{UpperBound(10**6 * Fraction(comparison.entries[0].guarantee.peak_slip_rate)):.3g}"
     assert row[3] == f"{1e6 * math.exp(worst.log_rate) * float(comparison.entries[0].guarantee.task.rate):.3g}"
+    ends = comparison.entries[0].guarantee.valve_pressures
+    assert [row[-3], row[-1]] == [f"{type(end)(Fraction(end) / 10**6):.3g}" for end in ends]
+    assert "Without control: the fault creeps" in said
     assert row[5:7] == [f"{UpperBound(10**6 * Fraction(claims.slip_error)):.3g}", f"{1e6 * worst.slip_error:.3g}"]
     print_comparison(comparison, terminal(file=told, width=200))
     gains = next(line for line in told.getvalue().splitlines() if "gains: " in line)
     assert re.search(r"k1 = \S+ Pa/m, k2 = 0 Pa s/m, slip = \S+ Pa, ", gains)
     assert "slip error, state of friction, diffusion modes" in " ".join(told.getvalue().split())
+
+
+def test_a_cycle_that_is_not_known_has_no_overview(comparison):
+    assert list(overviews(comparison)) == ["overview"]
+    failed = replace(comparison.uncontrolled, failed="the integration stopped.")
+    without = type(comparison)(fault=SHORT, uncontrolled=failed, entries=comparison.entries)
+    assert overviews(without) == {}
 
 
 def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(comparison, monkeypatch):

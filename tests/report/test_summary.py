@@ -202,6 +202,15 @@ def test_a_design_without_a_guarantee_beside_one_that_has_it_is_named(monkeypatc
     assert "B (designed): undecided" in said.notes
 
 
+def test_what_a_design_and_a_fault_take_for_granted_is_said(monkeypatch):
+    one = compared(monkeypatch, entry("A (designed)", "3e-4", "1e-5"))
+    one.of("designed")[0].design.details["assumed"] = "a well near the fault"
+    one.fault.source = "poor fit accepted (the sign is open); a record"
+    notes = summary(one).notes
+    assert notes[0] == one.fault.source
+    assert "A (designed) assumes a well near the fault" in notes
+
+
 def test_two_sliding_modes_with_the_same_bounds_say_why(monkeypatch):
     one, other = (entry(f"{name} (designed)", 3e-4, 1e-5, compensation="c") for name in ("2-CTA", "2-DIA"))
     other.guaranteed.claims = one.guaranteed.claims
