@@ -14,6 +14,7 @@ from numbers import Rational, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from quakedesign.errors import ParameterError
+from quakedesign.text import PREFIXES
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -176,7 +177,6 @@ def six_digits(value: Fraction) -> str:
 _SPEC = re.compile(
     r"(?P<align>.?[<>^])?(?P<sign>[-+ ]?)(?P<width>([1-9]\d*)?)(\.(?P<digits>\d+))?(?P<kind>[eEfFgG%]?)", re.ASCII
 )
-_PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate("a f p n µ m  k M G T P E".split(" "))}
 
 
 class Bound(Fraction):
@@ -207,7 +207,7 @@ class Bound(Fraction):
         _, exponent = self._significant(digits)
         power = min(max(3 * (exponent // 3), -18), 18)
         shown = format(type(self)(self / Fraction(10) ** power), f".{max(digits - 1 - exponent + power, 0)}f")
-        return f"{_bare(shown)} {_PREFIXES[power]}{unit}"
+        return f"{_bare(shown)} {PREFIXES[power]}{unit}"
 
     def __str__(self) -> str:
         return format(self, "")

@@ -104,7 +104,7 @@ def lasting(seconds: float, digits: int = 4) -> str:
 # ----------------------------------------------------------------------
 # Measured numbers for people; those of bounds are rounded outward by `quakedesign.exact.Bound`.
 
-PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate("a f p n µ m  k M G T P E".split(" "))}
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:

@@ -21,8 +21,8 @@ from quakedesign.text import plain, power_of, quantity
         (9.996e-4, "1 mm/s"),
         (0.0, "0 m/s"),
         (-14.29e6, "-14.3 Mm/s"),
-        (3e-14, "0.03 pm/s"),
-        (5e12, "5000 Gm/s"),
+        (3e-14, "30 fm/s"),
+        (5e12, "5 Tm/s"),
     ],
 )
 def test_a_measured_number_has_an_engineering_prefix(value, shown):
