@@ -52,12 +52,7 @@ def allow_code(allowed: bool) -> None:
 
 @contextmanager
 def user_code() -> Iterator[None]:
-    """Turn whatever code of the user's raises into one error, but for interruptions and refusals of quakedesign.
-
-    Raises
-    ------
-    UserCodeError
-    """
+    """Turn whatever code of the user's raises into one error, but for interruptions and refusals of quakedesign."""
     try:
         yield
     except (KeyboardInterrupt, MemoryError, QuakedesignError):

@@ -37,10 +37,6 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
     name : str
         What the number is, for the message.
 
-    Returns
-    -------
-    Fraction
-
     Raises
     ------
     ParameterError
@@ -289,11 +285,6 @@ class LowerBound(Bound):
 @dataclass(frozen=True, slots=True)
 class Enclosure:
     """Interval that contains a quantity: printed, it contains it still.
-
-    Attributes
-    ----------
-    low : LowerBound
-    high : UpperBound
 
     Raises
     ------

@@ -261,12 +261,7 @@ _LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for what go
 
 
 def require_room(path: Path) -> None:
-    """Refuse a place that cannot be written, before the work begins; put in order what a killed process left there.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse a place that cannot be written, before the work begins; put in order what a killed process left there."""
     parent, length = path.absolute().parent, len(path.name.encode(errors="surrogatepass"))
     if length > _LONGEST_NAME:
         raise OutputError(
@@ -295,10 +290,6 @@ def hold(folder: Path, *, make: bool = False) -> bool:
     folder : Path
     make : bool
         Make the folders above it where there are none.
-
-    Raises
-    ------
-    OutputError
     """
     place = Path(os.path.realpath(folder))
     if place in _held:

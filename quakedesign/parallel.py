@@ -300,10 +300,6 @@ class Processes(Crew):
     begin : callable, optional
         Called in every process before its first task, with `arguments`.
     arguments : tuple
-
-    Raises
-    ------
-    ParameterError
     """
 
     def __init__(
@@ -353,12 +349,7 @@ def cores() -> int:
 
 
 def require_workers(count: int) -> int:
-    """Refuse a number of workers that is none.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a number of workers that is none."""
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise ParameterError(f"workers must be a whole number of at least 1. Received {count!r}.")
     return count

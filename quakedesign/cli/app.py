@@ -74,12 +74,7 @@ def given(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def refuse(options: Mapping[str, Any], what: str) -> None:
-    """Refuse options that belong to something else, if any is given.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse options that belong to something else, if any is given."""
     if names := list(given(options)):
         raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Omit {', '.join(names)}.")
 
@@ -142,12 +137,7 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
 
 
 def require_different(places: Mapping[str, Path | None]) -> None:
-    """Refuse two names for one place, so that what is read is not replaced.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse two names for one place, so that what is read is not replaced."""
     named = {name: os.path.realpath(path) for name, path in places.items() if path is not None}
     for one, other in combinations(named, 2):
         if named[one] == named[other]:

@@ -93,12 +93,7 @@ class DesignOptions(WellOptions):
     accept_poor_fit: Annotated[bool, Parameter(negative="")] = False
 
     def asked(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
-        """Fault of a name, and what `designed_comparison` is asked about it; refused before anything heavy is loaded.
-
-        Raises
-        ------
-        UnknownNameError, ParameterError
-        """
+        """Fault of a name, and the arguments of `designed_comparison`; checked before anything heavy is loaded."""
         from quakedesign.fault import load_fault, with_accepted_fit
 
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
@@ -134,12 +129,7 @@ class DesignOptions(WellOptions):
 
     @property
     def _laws(self) -> str:
-        """Laws that are asked for: of the slip alone the only one that there is.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Laws that are asked for: of the slip alone the only one that there is."""
         if self.measured != "slip" or self.controller == "elqr":
             return self.controller
         if self.controller != "all":
@@ -208,12 +198,7 @@ def design(
 
 
 def controllers(name: str, fault: "Fault | None" = None) -> list[str]:
-    """Laws to design: the one named, or all that apply to a fault.
-
-    Raises
-    ------
-    UnknownNameError
-    """
+    """Laws to design: the one named, or all that apply to a fault."""
     from quakedesign.laws import control_law
     from quakedesign.synthesis import designable
 

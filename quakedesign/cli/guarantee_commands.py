@@ -156,12 +156,7 @@ def _lines(answer: Any) -> list[str]:
 
 
 def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | None]:
-    """Files of certificates, one a fault, refused early where they cannot be written.
-
-    Raises
-    ------
-    ParameterError, OutputError
-    """
+    """Files of certificates, one a fault, refused early where they cannot be written."""
     again = next((name for name in names if names.count(name) > 1), None)
     if again is not None:
         raise ParameterError(f"faults must have different names. Received {again} twice. Rename one of them.")

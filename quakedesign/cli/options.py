@@ -428,12 +428,7 @@ class WellOptions:
     ] = None
 
     def setup(self, **more: Any) -> LoopSetup:
-        """Loop setup of the options, with further fields of `LoopSetup`.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Loop setup of the options, with further fields of `LoopSetup`."""
         known = quantities()
         told = {name: value for name, value in vars(self).items() if name in known}
         told["diffusion"] = rock(told["diffusion"], self.well, self.diffusivity)
@@ -747,10 +742,6 @@ class SpreadOptions:
 
         With a state it is the law that `design` finds for the nominal normal stress, stiffness and damping, whatever
         the box of the campaign.
-
-        Raises
-        ------
-        ParameterError
         """
         if not fault.friction.state_names:
             if self != SpreadOptions():

@@ -58,10 +58,6 @@ class BlockChain:
         2 to 20 blocks, whose lengths add up to that of the fault.
     wells : tuple of float
         Positions along the fault [m], in increasing order.
-
-    Raises
-    ------
-    ParameterError
     """
 
     fault: Fault
@@ -159,10 +155,6 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
         Name of an uncertainty box in place of that of the file.
     allow_code : bool
         As of `load_fault`.
-
-    Raises
-    ------
-    UnknownNameError, ScenarioError, UnitError, ParameterError
     """
     text = source_text(source)
     try:

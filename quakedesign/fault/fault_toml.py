@@ -163,12 +163,7 @@ def presets() -> list[str]:
 
 
 def require_source(source: str) -> str:
-    """Name of a preset or of a file.
-
-    Raises
-    ------
-    UnknownNameError
-    """
+    """Name of a preset or of a file."""
     if source not in presets() and Path(source).suffix != ".toml":
         raise UnknownNameError(
             f"fault must be a preset ({', '.join(presets())}) or the path of a .toml file. Received {source!r}."
@@ -178,12 +173,7 @@ def require_source(source: str) -> str:
 
 
 def source_text(source: str | Path) -> str:
-    """Text of a preset or file.
-
-    Raises
-    ------
-    UnknownNameError, ScenarioError
-    """
+    """Text of a preset or file."""
     if require_source(str(source)) in presets():
         return (_PRESETS / f"{source}.toml").read_text(encoding="utf-8")
     return read_text(source, "fault file", largest=LARGEST_FILE, refusal=ScenarioError)

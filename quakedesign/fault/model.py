@@ -77,12 +77,7 @@ BOXES = {
 
 
 def uncertainty_box(name: str) -> UncertaintyBox:
-    """Named box: ``paper`` (only friction is uncertain) or ``ten-percent`` (also ±10 % on k, η and N̂).
-
-    Raises
-    ------
-    UnknownNameError
-    """
+    """Named box: ``paper`` (only friction is uncertain) or ``ten-percent`` (also ±10 % on k, η and N̂)."""
     require_known(name, BOXES, "uncertainty box", UnknownNameError)
     return BOXES[name]
 
@@ -160,12 +155,7 @@ class Problems:
             self.found += error.parts or (error,)
 
     def refuse(self, where: str = "") -> None:
-        """Raise what was collected, if anything: as it is, or as one error that counts and names them all.
-
-        Raises
-        ------
-        QuakedesignError
-        """
+        """Raise what was collected, if anything: as it is, or as one error that counts and names them all."""
         if not self.found:
             return
         kinds = {type(error) for error in self.found}
@@ -179,12 +169,7 @@ class Problems:
 
 
 def require_all(*checks: Callable[[], None]) -> None:
-    """Make every check, and refuse all that is wrong at once.
-
-    Raises
-    ------
-    QuakedesignError
-    """
+    """Make every check, and refuse all that is wrong at once."""
     problems = Problems()
     for check in checks:
         with problems.collected():
@@ -193,43 +178,23 @@ def require_all(*checks: Callable[[], None]) -> None:
 
 
 def require_seed(seed: int) -> None:
-    """Refuse what is no seed.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse what is no seed."""
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise ParameterError(f"seed must be a whole number of at least 0. Received {seed!r}.")
 
 
 def require_positive(remedy: str = "", **values: float | Fraction) -> None:
-    """Refuse values that are not positive finite numbers, all at once; the keyword is the name.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse values that are not positive finite numbers, all at once; the keyword is the name."""
     _require(values, lambda v: v > 0, "positive and finite", remedy)
 
 
 def require_nonnegative(remedy: str = "", **values: float) -> None:
-    """Refuse values that are negative or no finite numbers.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse values that are negative or no finite numbers."""
     _require(values, lambda v: v >= 0, "zero or positive, and finite", remedy)
 
 
 def require_finite(remedy: str = "", **values: float) -> None:
-    """Refuse values that are no finite numbers.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse values that are no finite numbers."""
     _require(values, lambda v: True, "finite", remedy)
 
 
@@ -239,12 +204,7 @@ def is_ordinary(size: float | Fraction, least: float = 1 / _LARGEST) -> bool:
 
 
 def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) -> None:
-    """Refuse values that are no sizes of anything, so that no product of them leaves the floats; zero is one.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse values that are no sizes of anything, so that no product of them leaves the floats; zero is one."""
     problems = Problems()
     for name, value in values.items():
         with problems.collected():
@@ -257,12 +217,7 @@ def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) ->
 
 
 def require_count(most: int, **values: int) -> None:
-    """Refuse values that are no whole numbers from 1 to `most`.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse values that are no whole numbers from 1 to `most`."""
     for name, value in values.items():
         if not isinstance(value, Integral) or isinstance(value, bool) or not 1 <= value <= most:
             raise ParameterError(f"{name} must be a whole number from 1 to {most}. Received {shown(value)}.")
@@ -288,12 +243,7 @@ def is_finite(value: Real | float) -> bool:
 
 
 def require_name(name: str) -> None:
-    """Refuse a name after which no file can be named everywhere.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a name after which no file can be named everywhere."""
     if not isinstance(name, str) or not _NAME.fullmatch(name) or len(name.encode()) > _MOST_BYTES:
         raise ParameterError(
             "name must be a text of at most 60 letters, digits, spaces and _ . - (120 bytes in UTF-8), beginning "
@@ -604,12 +554,7 @@ class Fault:
             )
 
     def require_memoryless(self, purpose: str) -> None:
-        """Refuse friction with a state variable where only slip and slip rate are covered.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Refuse friction with a state variable where only slip and slip rate are covered."""
         if self.friction.state_names:
             raise ParameterError(
                 f"{purpose} needs a friction law of slip and slip rate alone. Received {self.friction.name}, with the "
@@ -742,12 +687,7 @@ _PLANT = {
 
 
 def require_plant(**numbers: float) -> None:
-    """Refuse numbers of a fault that are unphysical, all of them at once.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse numbers of a fault that are unphysical, all of them at once."""
     problems = Problems()
     compression = "Compression is positive here; check the sign."
     for name, value in numbers.items():
@@ -770,12 +710,7 @@ _ACCEPTED = "poor-fit"
 
 
 def with_accepted_fit(fault: Fault, accept_poor_fit: bool) -> Fault:
-    """A fault to design for: one whose friction a record does not support only if that is accepted, and named so.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """A fault to design for: one whose friction a record does not support only if that is accepted, and named so."""
     if not fault.poor_fit:
         return fault
     if not accept_poor_fit:
@@ -788,12 +723,7 @@ def with_accepted_fit(fault: Fault, accept_poor_fit: bool) -> Fault:
 
 
 def require_fault(fault: Fault) -> Fault:
-    """The fault, if it is one.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """The fault, if it is one."""
     if not isinstance(fault, Fault):
         raise ParameterError(f"fault must be a Fault. Received {fault!r:.60}. Write load_fault('real-fault'), say.")
     return fault

@@ -93,10 +93,6 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
     name : str
         What the quantity is, for the message.
 
-    Returns
-    -------
-    float
-
     Raises
     ------
     UnitError

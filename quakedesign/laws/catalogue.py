@@ -25,12 +25,7 @@ def laws() -> dict[str, type[Law]]:
 
 
 def law(name: str) -> type[Law]:
-    """Law by name, or a user-defined one as ``module:Class``.
-
-    Raises
-    ------
-    UnknownNameError
-    """
+    """Law by name, or a user-defined one as ``module:Class``."""
     return named(name, laws(), Law, "controller")
 
 
@@ -41,12 +36,7 @@ def control_laws() -> dict[str, type[Controller]]:
 
 
 def control_law(name: str | type[Controller]) -> type[Controller]:
-    """Control law by name, or a user-defined one as a class or as ``module:Class``.
-
-    Raises
-    ------
-    UnknownNameError
-    """
+    """Control law by name, or a user-defined one as a class or as ``module:Class``."""
     return named(name, control_laws(), Controller, "controller") if isinstance(name, str) else name
 
 

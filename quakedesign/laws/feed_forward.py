@@ -101,10 +101,6 @@ def feed_forward(name: str, fault: Fault, divisor: Fraction) -> FeedForward:
     fault : Fault
     divisor : Fraction
         μ0N̂0 of the law [m²/kg].
-
-    Raises
-    ------
-    UnknownNameError
     """
     require_known(name, _NAMED, "feed-forward", UnknownNameError)
     return _NAMED[name](fault, divisor)

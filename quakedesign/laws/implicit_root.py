@@ -32,10 +32,6 @@ class Power:
         a ≥ 0, numerator and denominator at most 6.
     argument : str or tuple of Power
         x: ``slip``, e1 at the end of the step [m], ``rate``, e2 there [m/s], or a sum.
-
-    Raises
-    ------
-    ParameterError
     """
 
     factor: tuple[Fraction, Fraction]
@@ -66,10 +62,6 @@ class ImplicitRoot:
         γ0 ≤ γ1 in [0, 1]: |T_s·w + γ·e1| ≤ T_s·ε for some γ between them.
     remainder : Fraction
         ε [m/s].
-
-    Raises
-    ------
-    ParameterError
     """
 
     pull: tuple[Power, ...]

@@ -68,10 +68,6 @@ def sound_field(
         Everything that a rate may hold.
     states : iterable of Symbol
 
-    Returns
-    -------
-    dict of Symbol to Expr
-
     Raises
     ------
     ParameterError
@@ -119,12 +115,7 @@ def _require_known(expression: sp.Expr, known: set[sp.Symbol], what: str) -> Non
 
 
 def require_names(symbols: Iterable[sp.Symbol]) -> None:
-    """Reject names that a certificate file does not admit, and equal names.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Reject names that a certificate file does not admit, and equal names."""
     names = [str(symbol) for symbol in symbols]
     wrong = [name for name in names if not _NAME.fullmatch(name)]
     twice = [name for name, n in Counter(names).items() if n > 1]
@@ -136,12 +127,7 @@ def require_names(symbols: Iterable[sp.Symbol]) -> None:
 
 
 def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Symbol]) -> None:
-    """Reject a root of anything but a gain or constant.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Reject a root of anything but a gain or constant."""
     known = set(numbers)
     for root, of in roots.items():
         if of not in known:
@@ -151,12 +137,7 @@ def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Sym
 def require_units(
     units: Mapping[sp.Symbol, sp.Expr], states: Iterable[sp.Symbol], numbers: Iterable[sp.Symbol]
 ) -> None:
-    """Reject a unit that is not of a state, or contains more than gains, constants and roots.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Reject a unit that is not of a state, or contains more than gains, constants and roots."""
     order, known = tuple(states), set(numbers)
     for state, unit in units.items():
         if state not in order:

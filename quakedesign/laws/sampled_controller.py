@@ -246,10 +246,6 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
         a [-], above 0 and at most 1.
     gain : Fraction
         T_sB0 [m/(s Pa)], positive.
-
-    Raises
-    ------
-    ParameterError
     """
     if not 0 < weight <= 1:
         received, _ = apart(weight, Fraction(1))

@@ -99,12 +99,7 @@ class LinearLaw:
 def require_sizes(
     states: tuple[str, ...], own: Matrix, measured: Matrix, output: Row, feedback: Row, seen: int = len(MEASURED)
 ) -> None:
-    """Reject matrices of inconsistent sizes, and too many states.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Reject matrices of inconsistent sizes, and too many states."""
     n = len(states)
     if n > MOST_STATES or len(set(states)) != n:
         raise ParameterError(
@@ -353,10 +348,6 @@ def slip_observer(
     prediction : ErrorPrediction
     gain : Fraction
         β·b of the model [m²/kg], positive.
-
-    Raises
-    ------
-    ParameterError
     """
     require_gain(gain)
     late = len(prediction.ahead_of_pushes)

@@ -54,12 +54,7 @@ class QuadraticProposal:
 
 
 class CommonQuadratic:
-    """Search for one V for all vertices of a polytope, in modal coordinates; modelled once for every decay rate.
-
-    Parameters
-    ----------
-    polytope : Polytope
-    """
+    """Search for one V for all vertices of a polytope, in modal coordinates; modelled once for every decay rate."""
 
     def __init__(self, polytope: Polytope) -> None:
         import cvxpy as cp

@@ -293,12 +293,7 @@ _NOT_OF_A_LOOP = ("step", "measured", "averaging_time", "saturation", "withdrawa
 
 
 def require_step(step: Fraction) -> None:
-    """Reject a sampling time [s] for which no loop is computed in floating point.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Reject a sampling time [s] for which no loop is computed in floating point."""
     if not Fraction(1, 10**9) <= step <= 10**9:
         raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {shortly(step)} s.")
 

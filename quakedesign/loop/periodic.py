@@ -166,12 +166,7 @@ class Instants:
     ramp: Fraction = Fraction(0)
 
     def require_within(self, step: Fraction, part: Fraction) -> None:
-        """Reject timing errors that may reach another event; `part` [s] is the delay after a sample.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Reject timing errors that may reach another event; `part` [s] is the delay after a sample."""
         if min(self.measured, self.arrived, self.ramp) < 0 or 2 * self.measured > step:
             raise ParameterError(
                 f"jitter must be from 0 to half a step of {float(step):.4g} s. Received {float(self.measured):.4g} s "

@@ -68,10 +68,6 @@ class FaultPlant:
         Bound of |φ′| [m/s³], for a disturbance that starts at 0 and has one; None: φ is any measurable function.
     growths : (Fraction, Fraction)
         φ1 [1/s²] and φ2 [1/s]: what the disturbance adds per slip and per slip rate.
-
-    Raises
-    ------
-    ParameterError
     """
 
     name: str
@@ -211,12 +207,7 @@ class FaultPlant:
         return bound * self.target_slip / self.operation_time**3
 
     def require_smooth_reference(self) -> None:
-        """Reject a reference whose acceleration jumps at its start or end.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Reject a reference whose acceleration jumps at its start or end."""
         bent = _derived(self.shape, 2)
         if bent[0] or sum(bent):
             raise ParameterError(

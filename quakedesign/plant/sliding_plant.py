@@ -62,10 +62,6 @@ class SlidingPlant:
         ``"ageing"`` or ``"slip"``.
     regularised : bool
         Whether friction is of the form that stays finite at rest.
-
-    Raises
-    ------
-    ParameterError
     """
 
     name: str

@@ -480,10 +480,6 @@ def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | No
     inertia : bool
         Whether the mass counts.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
     Raises
     ------
     ParameterError

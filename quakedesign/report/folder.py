@@ -26,12 +26,7 @@ if TYPE_CHECKING:
 
 
 def prepare(out: Path, *, force: bool) -> None:
-    """Refuse early a folder that cannot be written or that holds results.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse early a folder that cannot be written or that holds results."""
     if os.path.exists(out) and not force:
         raise OutputError(f"output folder must be new. Received {out}, which exists. Give --force to replace it.")
     if os.path.exists(out) and not (out / "results.json").is_file():
@@ -119,10 +114,6 @@ def write_folder(
     -------
     dict
         What ``results.json`` holds.
-
-    Raises
-    ------
-    OutputError
     """
     prepare(out, force=force)
     found = study_results(study, formats) if study else results(comparison)

@@ -17,16 +17,7 @@ _FAILED = "#D55E00"
 
 
 def gain_map_figure(drawn: GainMap) -> Any:
-    """Draw a map: shades are levels that were screened in floating point, markers are points proved exactly.
-
-    Parameters
-    ----------
-    drawn : GainMap
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw a map: shades are levels that were screened in floating point, markers are points proved exactly."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.figure import Figure
 
@@ -217,10 +208,6 @@ def write_gain_map(drawn: GainMap, folder: Path, formats: Sequence[str] = ("png"
     -------
     dict
         What ``results.json`` holds.
-
-    Raises
-    ------
-    OutputError
     """
     facts = gain_map_facts(drawn)
     with whole_folder(folder) as partial:

@@ -100,12 +100,7 @@ def _outliers(identification: Identification) -> list[str]:
 
 
 def identification_figure(identification: Identification) -> Any:
-    """Friction with fit and trend, rate of the load point, every step, residuals, their correlation, a joint region.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Friction with fit and trend, rate of the load point, every step, residuals, their correlation, a joint region."""
     record, used, fit = identification.record, identification.used, identification.fit
     along = record.load_point if record.load_point is not None else record.slip
     way = record.time[used] if along is None else along[used] * 1e6
@@ -220,22 +215,12 @@ def _region(axis: Any, identification: Identification) -> None:
 
 
 def require_format(path: Path) -> None:
-    """Refuse a figure of another format than SVG, PNG or PDF.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse a figure of another format than SVG, PNG or PDF."""
     if path.suffix[1:] not in FORMATS:
         raise OutputError(f"a figure must end in .{', .'.join(FORMATS)}. Received {path}. Write {path.stem}.svg, say.")
 
 
 def save_figure(identification: Identification, path: Path) -> None:
-    """Write the figure, whole or not at all, without a date so that the same figure is the same file.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Write the figure, whole or not at all, without a date so that the same figure is the same file."""
     require_format(path)
     write_whole(path, figure_bytes(identification_figure(identification), path.suffix[1:], path.stem))

@@ -123,12 +123,7 @@ def _shown(bound: Bound | None, unit: str) -> str:
 
 
 def limits_figure(limits: Limits) -> Any:
-    """Slip-rate errors over T_s: impossible, proved, and the natural earthquake's slip rate.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Slip-rate errors over T_s: impossible, proved, and the natural earthquake's slip rate."""
     drawing, axes = figure(1, 4.2)
     axis, natural = axes[0, 0], limits.natural_peak
     axis.set(xscale="log", yscale="log", xlabel="T_s [s]", ylabel="slip-rate error [m/s]")
@@ -156,12 +151,7 @@ def limits_figure(limits: Limits) -> Any:
 
 
 def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
-    """Write the figure ``limits`` and ``results.json`` into a folder that appears whole; return what the latter holds.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Write the figure ``limits`` and ``results.json`` into a folder that appears whole; return its content."""
     facts = limits.to_dict()
     with whole_folder(folder) as partial:
         write_figures(partial, {"limits": limits_figure(limits)}, formats)

@@ -74,12 +74,7 @@ def paper_figures(study: "PaperRuns") -> dict[str, Any]:
 
 
 def peak_against_tracking(study: "PaperRuns") -> Any:
-    """Errors that were seen over the slip-rate error that is guaranteed, one point a design.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Errors that were seen over the slip-rate error that is guaranteed, one point a design."""
     claims = [point.guarantee.claims for point in study.front]
     drawing, axes = figure(1, 3.2, 2)
     largest = max(float(claim.slip_rate_error) for claim in claims)

@@ -23,14 +23,7 @@ Triangle = list[list[int]]
 
 @dataclass(frozen=True, kw_only=True)
 class IntegerSquare:
-    """(Π g_i)·bᵀQb with integers.
-
-    Attributes
-    ----------
-    product : tuple of int
-    basis : tuple of Polynomial
-    gram : list of list of int
-    """
+    """(Π g_i)·bᵀQb with integers."""
 
     product: tuple[int, ...]
     basis: tuple[Polynomial, ...]

@@ -23,12 +23,7 @@ _FEWER = 16
 
 
 def require_smooth(recorder: Recorder, method: str) -> None:
-    """Refuse a loop whose field jumps or has an infinite slope, where a tolerance means nothing.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a loop whose field jumps or has an infinite slope, where a tolerance means nothing."""
     loop, remedy = recorder.loop, "Use a fixed step: method dormand-prince or rk4."
     said = f"method {method} follows smooth loops only. Received"
     if loop.sticks:

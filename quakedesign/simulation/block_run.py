@@ -136,12 +136,7 @@ class _Period:
 
 
 def whole_periods(chain: BlockChain, step: Fraction, duration: float | None) -> int:
-    """Periods of a run [-] of a duration [s], of the operation time unless given.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Periods of a run [-] of a duration [s], of the operation time unless given."""
     whole = chain.fault.reference.operation_time if duration is None else duration
     if not step <= whole <= _MOST_PERIODS * step:
         raise ParameterError(
@@ -165,14 +160,6 @@ def simulate_blocks(
         [s]; the operation time unless given.
     substeps : int
         Of a period, 1 to 1000: slip rates by a projected Euler step, v = max(v + h·a, 0), then slips.
-
-    Returns
-    -------
-    BlockRun
-
-    Raises
-    ------
-    ParameterError
     """
     step, periods = float(law.step), whole_periods(chain, law.step, duration)
     if not 1 <= substeps <= 1000:

@@ -119,12 +119,7 @@ class Variation:
     phase: float = 0.0
 
     def require_within(self, fault: Fault) -> None:
-        """Refuse what the fault's uncertainty box excludes.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Refuse what the fault's uncertainty box excludes."""
         box = fault.box
         for name in ("stiffness", "damping", "authority"):
             width = getattr(box, name)

@@ -547,13 +547,7 @@ _OF_THE_LIBRARY = {
 
 @dataclass(frozen=True)
 class Value:
-    """A value in C.
-
-    Attributes
-    ----------
-    text : str
-    true_or_false : bool
-    """
+    """A value in C."""
 
     text: str
     true_or_false: bool = False
@@ -570,12 +564,7 @@ class Value:
 
 
 def operation(code: int, arguments: Sequence[Value], named: Callable[[int], str | None]) -> Value:
-    """Result of an operation in C; `named` are the functions to call for operations, by code.
-
-    Raises
-    ------
-    NotPortableError
-    """
+    """Result of an operation in C; `named` are the functions to call for operations, by code."""
     numbers = [argument.number for argument in arguments]
     if name := named(code):
         return Value(f"{name}({', '.join(numbers)})")
@@ -830,12 +819,7 @@ def shared_library(text: str, folder: Path, command: tuple[str, ...], flags: tup
 
 
 def _run(call: list[str], folder: Path) -> None:
-    """Run a compiler to its end; whatever else ends it ends those that it has started, and its files lie in a folder.
-
-    Raises
-    ------
-    OSError, SubprocessError
-    """
+    """Run a compiler in a folder of its own; an interruption ends it and the processes that it has started."""
     where, pipe = os.environ | {"TMPDIR": str(folder)}, subprocess.PIPE
     with subprocess.Popen(
         call, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, env=where, start_new_session=True

@@ -159,14 +159,6 @@ def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
     otherwise. The output ``pressure`` [Pa] is the commanded pressure since the last sample; the samples lie T_s apart
     from the start of the experiment. The sources lie inside, so that any platform can compile them.
 
-    Parameters
-    ----------
-    exported : ControllerStep
-
-    Returns
-    -------
-    tuple of bytes and str
-
     References
     ----------
     Functional Mock-up Interface for Model Exchange and Co-Simulation, version 2.0.4, sections 2.2 and 4.
@@ -264,10 +256,6 @@ def controller_step(
         it.
     remarks : tuple of str
         Further sentences to be said first, after what is said of the T_s and of what stands behind the law.
-
-    Returns
-    -------
-    ControllerStep
 
     Raises
     ------

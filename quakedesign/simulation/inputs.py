@@ -137,10 +137,6 @@ class PressureCourse:
         [s], never descending, the same one at most twice.
     pressures : tuple of float
         [Pa], one for each.
-
-    Raises
-    ------
-    ParameterError
     """
 
     times: tuple[float, ...]
@@ -201,10 +197,6 @@ def pressure_course(text: str) -> PressureCourse:
         A constant; or instants as ``"0 s: 0 MPa, 1 day: 0 MPa, 1 day: 5 MPa, 9 day: 2 MPa"``, linear between, a step
         where one stands twice; or a path that ends in ``.csv``, its first row ``time [s],pressure [MPa]`` or with
         other units.
-
-    Raises
-    ------
-    ParameterError, UnitError
     """
     if Path(text).suffix.lower() == ".csv":
         rows = list(_rows(text))

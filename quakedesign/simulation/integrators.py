@@ -208,13 +208,7 @@ class AdaptiveIntegrator(ABC):
 
 @dataclass(frozen=True)
 class Flow:
-    """Solution over intervals of one subdivision.
-
-    Attributes
-    ----------
-    solver : casadi.Function
-    scales : ndarray
-    """
+    """Solution over intervals of one subdivision."""
 
     solver: Any
     scales: "np.ndarray"
@@ -245,12 +239,7 @@ class Flow:
 
 
 def require_tolerance(rtol: float) -> None:
-    """Refuse a tolerance that no solver meets or that means nothing.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a tolerance that no solver meets or that means nothing."""
     if not TIGHTEST <= rtol <= LOOSEST:
         raise ParameterError(f"rtol must be between {TIGHTEST} and {LOOSEST}. Received {rtol!r}.")
 

@@ -563,12 +563,7 @@ def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:
 
 
 def _linear(system: Any, names: tuple[str, ...]) -> Any:
-    """StateSpace from the first inputs, named, to pressure of a system whose answers are linear, read off unit vectors.
-
-    Raises
-    ------
-    UnsupportedError
-    """
+    """StateSpace from the first inputs, named, to pressure of a linear system, read off unit vectors."""
     import control
 
     n, seen = system.nstates, system.ninputs

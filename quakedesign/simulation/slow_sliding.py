@@ -110,10 +110,6 @@ def simulate_sliding(
     -------
     SlidingRun
         One that opens ends there; one with which the solver cannot go on has diverged, and has no metrics.
-
-    Raises
-    ------
-    ParameterError, SimulationError
     """
     if len(fault.friction.state_names) != 1 or not law.of_slip_alone:
         raise ParameterError(

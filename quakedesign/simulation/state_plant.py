@@ -304,12 +304,7 @@ class PressurePath:
 
     @classmethod
     def of(cls, meant: Sampling, actuator: Actuator | None) -> "PressurePath":
-        """That of an actuator; without a lag and rock in it that which a law of samples is meant for.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """That of an actuator; without a lag and rock in it that which a law of samples is meant for."""
         given = (
             Actuator.meant_for(replace(meant, lag=Fraction(0), diffusion=Fraction(0))) if actuator is None else actuator
         )

@@ -79,10 +79,6 @@ def simulate_state(
     rtol : float
         Tolerance of one step, for logarithms of rate and state absolute, 1e-13 … 1e-3.
 
-    Returns
-    -------
-    StateTrajectory
-
     Raises
     ------
     ParameterError
@@ -131,10 +127,6 @@ def velocity_step(
         Pairs of (time it lasts [s], rate of the far end [m/s]).
     times, method, rtol
         As in `simulate_state`.
-
-    Returns
-    -------
-    StateTrajectory
 
     Raises
     ------
@@ -477,10 +469,6 @@ def locked(fault: Fault, rate: float, hold: float, **settings: Any) -> StartingS
     """A fault that slid steadily at a rate [m/s] until the far end stopped, and has been held so for a time [s].
 
     `settings` are ``inertia, method, rtol`` of `simulate_state`.
-
-    Raises
-    ------
-    ParameterError, SimulationError
     """
     require_positive(hold=hold)
     run = simulate_state(fault, [(hold, 0.0)], start_rate=rate, times=[hold], **settings)

@@ -100,10 +100,6 @@ def one_block(
         As of `UncertainPlant.from_blocks` [1/s²].
     step : str, float or Fraction, optional
         T_s; the fault's unless given.
-
-    Returns
-    -------
-    BlocksAnswer
     """
     setup = LoopSetup(step=rational(fault.sampling_time) if step is None else step)
     found: dict[int, Any] = {}

@@ -187,12 +187,7 @@ def compared(
 
 
 def require_plant(fault: Fault, plant: str | None) -> None:
-    """Refuse a plant of the runs for friction with a state, which never rests.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a plant of the runs for friction with a state, which never rests."""
     if plant is not None and fault.friction.state_names:
         raise ParameterError(
             f"plant is for friction without a state, got {plant!r} with {fault.friction.name}, which never rests: omit "

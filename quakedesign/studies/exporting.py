@@ -53,10 +53,6 @@ def export_answer(
     -------
     dict
         ``step, measurement, memory, facts, remarks, files, premises``.
-
-    Raises
-    ------
-    ParameterError, OutputError
     """
     way, step, own = own_way(law, scheme, step)
     period = fault.sampling_time if step is None else step

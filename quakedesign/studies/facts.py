@@ -286,10 +286,6 @@ def sampling_adequacy(fault: Fault) -> SamplingAdequacy:
 
     The rule is one of thumb, necessary in spirit: a sampled law answers what happens between two samples only after it
     has grown by e^{pT_s}. It is no proof; what a given law bears is certified by its largest step.
-
-    Parameters
-    ----------
-    fault : Fault
     """
     try:
         poles, over_box = _box_poles(fault), True

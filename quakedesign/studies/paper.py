@@ -187,10 +187,6 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     comparison : Compared
     progress : callable, optional
         Called with what is being done and the fraction done [-].
-
-    Returns
-    -------
-    PaperRuns
     """
     tell, fault = progress or (lambda _what, _done: None), comparison.fault
     if fault.friction.state_names:

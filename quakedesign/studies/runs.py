@@ -231,10 +231,6 @@ def run_state(
         ``smooth`` (with inertia) or ``quasi-dynamic`` (without).
     method : str
         As of `simulate_state`.
-
-    Raises
-    ------
-    ParameterError, UnknownNameError, SimulationError
     """
     _require_runnable(fault, plant)
     rate = fault.friction.operating_rate if loading_rate is None else loading_rate
@@ -403,10 +399,6 @@ def run_held(
         As of `run_state`.
     claim : SlidingGuarantee, optional
         Its law runs, with its T_s, delay, lag and rock in place of those above, which are not to be given.
-
-    Raises
-    ------
-    ParameterError, UnknownNameError, SimulationError
     """
     _require_runnable(fault, plant)
     held, path = rational(fault.sampling_time if step is None else step), rational(diffusion)
@@ -703,10 +695,6 @@ def choice(
         T_s [s] of a design; the fault's unless given.
     path : mapping of str to float, optional
         Delay, lag and diffusion [s] for which a law is designed as it runs, as `answer` does; none unless given.
-
-    Raises
-    ------
-    UnknownNameError, ParameterError
     """
     law, base = _with_gains(fault, name, gains, step, path or {})
     if law.divisor is None:
@@ -816,10 +804,6 @@ def run_single(
     Trajectory
     list of Premise
         `on_trajectory` of a sliding mode, certified or not, and `differentiator`.
-
-    Raises
-    ------
-    UnknownNameError, ParameterError
     """
     around: dict[str, Any] = {"measurement": noise} if noise.noisy else {}
     around |= {"actuator": actuator} if actuator.stages else {}

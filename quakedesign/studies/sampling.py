@@ -122,10 +122,6 @@ def sampling_report(
     progress : callable, optional
         Called with what is being done and the fraction done [-].
 
-    Returns
-    -------
-    SamplingReport
-
     Raises
     ------
     ParameterError

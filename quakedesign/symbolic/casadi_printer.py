@@ -47,15 +47,6 @@ def to_casadi(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], m
 def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -> list[Any]:
     """Values of expressions at floats or NumPy arrays of one shape, with the operations of `to_casadi`.
 
-    Parameters
-    ----------
-    expressions : sequence of Expr
-    values : mapping of Symbol to float or ndarray
-
-    Returns
-    -------
-    list of float or ndarray
-
     Raises
     ------
     ParameterError

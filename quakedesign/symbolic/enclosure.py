@@ -506,10 +506,6 @@ def upper_bound(
     limit : Fraction, optional
         Stop as soon as the bound is below that, or never will be, where nothing else is asked.
 
-    Returns
-    -------
-    Fraction
-
     Raises
     ------
     ParameterError

@@ -284,10 +284,6 @@ def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -
     degree : int or Rational
         Such as −1 for sliding modes with a discontinuous integral.
 
-    Returns
-    -------
-    dict of Symbol to Rational
-
     Raises
     ------
     ParameterError

@@ -141,10 +141,6 @@ def normal_form(expression: sp.Expr) -> sp.Expr:
     expression : Expr
         In real symbols.
 
-    Returns
-    -------
-    Expr
-
     Raises
     ------
     KinkError

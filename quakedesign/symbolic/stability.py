@@ -123,10 +123,6 @@ def stability(
     uncertain : bool
         Whether stiffness, damping and authority range over the fault's uncertainty box.
 
-    Returns
-    -------
-    StabilityVerdict
-
     Raises
     ------
     ParameterError
@@ -303,10 +299,6 @@ class Model:
 
     A law without state is studied at rest, a law with state (rate and state) in steady sliding at its
     ``operating_rate``; then the plant has one more dimension for every state variable.
-
-    Attributes
-    ----------
-    fault : Fault
     """
 
     fault: Fault

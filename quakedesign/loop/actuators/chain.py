@@ -103,12 +103,7 @@ class Actuator:
         return max((math.ceil(step * stage.fastest / LONGEST) for stage in self.flowing), default=1)
 
     def require_resolved(self, substep: float) -> None:
-        """Reject a substep [s] that does not resolve a stage.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Reject a substep [s] that does not resolve a stage."""
         for stage in self.flowing:
             times = substep * stage.fastest / LONGEST
             if times > 1:

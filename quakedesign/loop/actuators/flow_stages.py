@@ -21,10 +21,6 @@ class Lag(FlowStage):
     ----------
     time_constant : float
         τ [s], positive.
-
-    Raises
-    ------
-    ParameterError
     """
 
     name: ClassVar[str] = "lag"
@@ -99,10 +95,6 @@ class Diffusion(FlowStage):
         Without it pressures are the same, but volume and flow rate are not known.
     cells : int
         N, 1 … 200.
-
-    Raises
-    ------
-    ParameterError
     """
 
     name: ClassVar[str] = "diffusion"
@@ -137,12 +129,7 @@ class Diffusion(FlowStage):
 
     @classmethod
     def of_time(cls, time: float, *, storage: float | None = None, cells: int = 16) -> Self:
-        """Layer with given τ = L²/D [s]; its length of 1 m is arbitrary.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Layer with given τ = L²/D [s]; its length of 1 m is arbitrary."""
         require_positive(time=time)
         return cls(length=1.0, diffusivity=1.0 / time, storage=storage, cells=cells)
 

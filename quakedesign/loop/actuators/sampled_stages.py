@@ -31,10 +31,6 @@ class Delay(SampledStage):
         Of the jitter, not negative.
     part : float
         Share of a sampling period by which it acts later still, at least 0 and below 1.
-
-    Raises
-    ------
-    ParameterError
     """
 
     name: ClassVar[str] = "delay"
@@ -69,12 +65,7 @@ class Delay(SampledStage):
 
     @classmethod
     def asked(cls, step: float, *, delay: float, jitter: int | None = None) -> Self:  # type: ignore[override]
-        """See `Stage.asked`.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """See `Stage.asked`."""
         if not 0 <= delay <= MOST_SAMPLES * step:
             raise ParameterError(
                 f"delay must be 0 to {MOST_SAMPLES} sampling periods of {step:g} s. Received {delay:g} s. "
@@ -118,10 +109,6 @@ class Quantisation(SampledStage):
     ----------
     quantum : float
         [Pa], positive.
-
-    Raises
-    ------
-    ParameterError
     """
 
     name: ClassVar[str] = "quantisation"
@@ -160,10 +147,6 @@ class RateLimit(SampledStage):
     ----------
     rate : float
         [Pa/s], positive.
-
-    Raises
-    ------
-    ParameterError
     """
 
     name: ClassVar[str] = "rate-limit"
@@ -214,10 +197,6 @@ class Saturation(SampledStage):
     ----------
     lowest, highest : float
         [Pa]; zero, the pressure before injection, must lie between them.
-
-    Raises
-    ------
-    ParameterError
     """
 
     name: ClassVar[str] = "saturation"

@@ -80,10 +80,6 @@ class Scheme(ABC):
 
     The state of a run is [x1, x2, ξ, memory], where the memory belongs to the scheme: what a controller keeps from one
     sample to the next, and numbers that are carried along so that one machine code serves all of their values.
-
-    Attributes
-    ----------
-    name : str
     """
 
     name: ClassVar[str]
@@ -241,10 +237,6 @@ class NoClock:
         Steps from one sample to the next, 1 … 1000.
     seed : int
         Of what is drawn, not negative.
-
-    Raises
-    ------
-    ParameterError
     """
 
     shortest: int
@@ -323,10 +315,6 @@ class Sampled(Scheme, Decided):
         Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
     clock : NoClock or None
         When samples are taken, in steps; None: at every step, by a clock.
-
-    Raises
-    ------
-    ParameterError
     """
 
     substeps: int = 1

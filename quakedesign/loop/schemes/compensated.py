@@ -47,10 +47,6 @@ class Compensated(Sampled):
         Of the same [m].
     substeps, actuator, measurement, authority
         As in `Sampled`; B0 is the geometric middle of the box by default, so that β/β0 is as far from both limits.
-
-    Raises
-    ------
-    ParameterError
     """
 
     name: ClassVar[str] = "compensated"

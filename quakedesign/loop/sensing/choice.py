@@ -197,10 +197,6 @@ def joint_condition(
     noise : float
         ε, bound of the error of a reading [m]; for normal noise some four standard deviations.
 
-    Returns
-    -------
-    JointCondition
-
     Raises
     ------
     ParameterError

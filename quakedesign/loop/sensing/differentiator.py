@@ -206,10 +206,6 @@ class Differentiator:
         ``"euler"``, ``"homogeneous"`` (both estimate from earlier readings), or ``"implicit"`` (with the latest too).
     inner_steps : int
         n, at least 1: so many steps of T/n per reading, which is held in between.
-
-    Raises
-    ------
-    ParameterError
     """
 
     bound: float

@@ -63,12 +63,7 @@ class Sensor(ABC):
         return len(self.start)
 
     def require_step(self, step: float) -> None:
-        """Refuse a sampling period [s] other than the sensor's.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Refuse a sampling period [s] other than the sensor's."""
         if self.step is not None and abs(step - self.step) > _SAME * self.step:
             raise ParameterError(
                 f"the sampling period must be that of the sensor, {self.step:.6g} s. Received {step:.6g} s. "
@@ -132,10 +127,6 @@ class Measurement(Sensor):
         Of the noise, not negative.
     bounded : bool
         Whether the noise is uniform within bounds, as a guarantee has them, instead of normal.
-
-    Raises
-    ------
-    ParameterError
     """
 
     of_slip_alone: ClassVar[bool] = False
@@ -237,10 +228,6 @@ class Transducer(SlipStage):
         q, of which a reading is the nearest multiple, halves upward [m]; 0 for a reading as it is.
     seed : int
         Of the noise, not negative.
-
-    Raises
-    ------
-    ParameterError
     """
 
     hardware: ClassVar[bool] = True
@@ -303,10 +290,6 @@ class Averaging(SlipStage):
     ----------
     samples : int
         N, 1 … 1000.
-
-    Raises
-    ------
-    ParameterError
     """
 
     hardware: ClassVar[bool] = False

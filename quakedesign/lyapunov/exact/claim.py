@@ -204,11 +204,6 @@ def root_enclosure(number: Fraction) -> Range:
 
 
 def require(condition: bool, reason: str) -> None:
-    """Refuse a certificate.
-
-    Raises
-    ------
-    CertificateError
-    """
+    """Refuse a certificate."""
     if not condition:
         raise CertificateError(reason)

@@ -68,13 +68,7 @@ class Obligation:
 
 @dataclass(frozen=True)
 class Obligations:
-    """All polynomials that decide V > 0 and V̇ < 0 for one loop and one V.
-
-    Attributes
-    ----------
-    loop : Loop
-    lyapunov : tuple of Term
-    """
+    """All polynomials that decide V > 0 and V̇ < 0 for one loop and one V."""
 
     loop: Loop
     lyapunov: tuple[Term, ...]

@@ -388,12 +388,7 @@ def slip_degree() -> int | None:
 
 
 def require_degree_of_slip(loop: Loop) -> None:
-    """Refuse a loop whose control acts on another derivative of its first state than the pressure on that of the slip.
-
-    Raises
-    ------
-    CertificateError
-    """
+    """Reject a loop whose control acts on another derivative of its first state than pressure on that of slip."""
     first, *_ = loop.states
     control = loop.symbols.get(_CONTROL, sp.Dummy())
     degree = relative_degree(loop.symbols[first], sympy_field(loop), control)
@@ -417,10 +412,6 @@ def covers(certificate: Certificate, fault: Fault) -> list[str]:
     -------
     list of str
         What is covered, in lines.
-
-    Raises
-    ------
-    CertificateError
     """
     require_degree_of_slip(certificate.loop)
     loop, said = certificate.loop, [f'covers {certificate.loop.law} on "{fault.name}", box {fault.box.name}']

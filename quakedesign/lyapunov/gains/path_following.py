@@ -659,10 +659,6 @@ def climb(setting: PathSetting, state: State, *, free: bool = True, until: float
         Whether the gains may move.
     until : float, optional
         Level at which to stop.
-
-    Returns
-    -------
-    list of State
     """
     states, share, centred = [state], TRUST.initial, None
     objective = setting.objective
@@ -792,10 +788,6 @@ def look(
     beyond : float, optional
     least : float, optional
         Margin that counts; that of the setting unless given.
-
-    Returns
-    -------
-    State or None
     """
     objective = setting.objective
     if beyond is not None and not objective.better(level, beyond):

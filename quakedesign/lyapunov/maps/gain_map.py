@@ -168,13 +168,7 @@ def _solved(sweep: Sweep, loop: Loop) -> bool:
 
 
 class Screeners:
-    """Screeners of a sheet, wherever a crew computes.
-
-    Parameters
-    ----------
-    sheet : Sheet
-    crew : Crew
-    """
+    """Screeners of a sheet, wherever a crew computes."""
 
     def __init__(self, sheet: Sheet, crew: Crew) -> None:
         self._sheet, self._crew = sheet, crew
@@ -313,10 +307,6 @@ def gain_map(
         Any other executor of `concurrent.futures` that is used instead.
     tell : callable
         Progress.
-
-    Returns
-    -------
-    GainMap
 
     Raises
     ------

@@ -440,10 +440,6 @@ def largest_lipschitz(
     degrees : int or iterable of int, optional
         Degrees of V to try; those that `certify` tries unless given.
 
-    Returns
-    -------
-    CertifiedLimit
-
     Raises
     ------
     ParameterError, UnknownNameError

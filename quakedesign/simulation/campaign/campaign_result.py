@@ -306,12 +306,7 @@ def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
 
 
 def require_metric(metric: str, known: Sequence[str]) -> None:
-    """Refuse a metric that there is not.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a metric that there is not."""
     if not known:
         raise ParameterError(f"metric must be one of none, as all diverge. Received {metric!r}.")
     require_known(metric, known, "metric")

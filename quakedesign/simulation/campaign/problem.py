@@ -110,18 +110,7 @@ class CampaignProgram(Protocol):
 
 @checked_dataclass(frozen=True, kw_only=True)
 class CampaignProblem(ABC):
-    """One closed loop, and how its samples differ; a vector of numbers at the start of a sample tells the end of it.
-
-    Attributes
-    ----------
-    fault : Fault
-    controller : Controller or None
-    scheme : Scheme
-    setting : RunSetting
-    plant : str
-    space : Space
-    seed : int
-    """
+    """One closed loop, and how its samples differ; a vector of numbers at the start of a sample tells the end of it."""
 
     fault: Fault
     controller: Controller | None
@@ -402,13 +391,7 @@ SLICE = 200_000  # steps of all samples together in one call of compiled code, w
 
 @dataclass(frozen=True, kw_only=True)
 class Library:
-    """Compiled source, bound to its content: whoever loads it makes sure that it is what was built.
-
-    Attributes
-    ----------
-    path : Path
-    digest : str
-    """
+    """Compiled source, bound to its content: whoever loads it makes sure that it is what was built."""
 
     path: Path
     digest: str

@@ -63,10 +63,6 @@ class Space:
         fault : Fault
         initial_slip, initial_slip_rate : float
             Largest x1 [m] and x2 [m/s] at the start, not negative.
-
-        Raises
-        ------
-        ParameterError
         """
         require_nonnegative(initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
         widths = {name: getattr(fault.box, name) for name in ("stiffness", "damping", "authority")}
@@ -123,12 +119,7 @@ def noise_seed(seed: int, index: int) -> int:
 
 
 def require_count(samples: int) -> None:
-    """Refuse a number of samples that is none.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a number of samples that is none."""
     if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
         raise ParameterError(f"samples must be a whole number, 1 to {MOST_SAMPLES}. Received {samples!r}.")
 
@@ -206,10 +197,6 @@ def search(
         Points of the unit cube.
     noise_seed : int
     rounds : int
-
-    Returns
-    -------
-    Worst
     """
     looked_at: list[Sample] = []
 

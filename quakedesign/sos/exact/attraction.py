@@ -43,12 +43,7 @@ from quakedesign.sos.exact.work import limited
 
 @dataclass(frozen=True, kw_only=True)
 class LyapunovProof:
-    """Squares of V and of −V̇.
-
-    Attributes
-    ----------
-    positive, decrease : SumOfSquares
-    """
+    """Squares of V and of −V̇."""
 
     positive: SumOfSquares
     decrease: SumOfSquares

@@ -471,12 +471,7 @@ def read(
 
 
 def read_element(given: Any, names: tuple[str, ...]) -> Element:
-    """Element of a basis: a polynomial as for `read`, or the exponents of a monomial.
-
-    Raises
-    ------
-    PolynomialError
-    """
+    """Element of a basis: a polynomial as for `read`, or the exponents of a monomial."""
     exponents = tuple(map(_whole, given)) if isinstance(given, Sequence) and not isinstance(given, str) else None
     return as_element(_polynomial({exponents: 1} if exponents is not None else given, names))
 

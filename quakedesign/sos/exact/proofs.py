@@ -207,12 +207,7 @@ class Functional:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Point:
-    """A point of the set where the polynomial is negative.
-
-    Attributes
-    ----------
-    coordinates : tuple of Fraction
-    """
+    """A point of the set where the polynomial is negative."""
 
     coordinates: tuple[Fraction, ...]
 

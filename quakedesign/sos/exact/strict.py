@@ -202,11 +202,6 @@ def polynomial_text(polynomial: Any) -> dict[str, str]:
 
 
 def write_readable(path: str | Path, written: str, load: Callable[[str], Any]) -> None:
-    """Write a text whole or not at all, and only if it can be read again.
-
-    Raises
-    ------
-    CertificateError, OutputError
-    """
+    """Write a text whole or not at all, and only if it can be read again."""
     load(written)
     write_whole(Path(path), written)

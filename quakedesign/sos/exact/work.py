@@ -21,12 +21,7 @@ _left: ContextVar[int | None] = ContextVar("steps left", default=None)
 
 @contextmanager
 def limited(steps: int | None = None) -> Iterator[None]:
-    """Count the work inside, and refuse what is more than so many steps, `STEPS` by default.
-
-    Raises
-    ------
-    WorkError
-    """
+    """Count the work inside, and refuse what is more than so many steps, `STEPS` by default."""
     before = _left.set(STEPS if steps is None else steps)
     try:
         yield
@@ -74,11 +69,6 @@ def longest(numbers: Iterable[Fraction]) -> int:
 
 
 def expanded(terms: int) -> None:
-    """Refuse a polynomial of too many terms.
-
-    Raises
-    ------
-    WorkError
-    """
+    """Refuse a polynomial of too many terms."""
     if counted() and terms > TERMS:
         raise WorkError(f"an expanded polynomial has more than {TERMS} terms. Split it.")

@@ -29,12 +29,7 @@ KERNELS = ((1e-6, 1e-5), (1e-6, 1e-7), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2),
 
 @dataclass
 class StatementSearch:
-    """One statement under way.
-
-    Attributes
-    ----------
-    original : Statement
-    """
+    """One statement under way."""
 
     original: Statement
     moved: Scaled = field(init=False)

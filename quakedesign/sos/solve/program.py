@@ -78,12 +78,7 @@ class NoSolution:
 
 
 class Program:
-    """Polynomials, affine in decision variables, that must be sums of squares on their sets.
-
-    Parameters
-    ----------
-    variables, decisions : sequence of str
-    """
+    """Polynomials, affine in decision variables, that must be sums of squares on their sets."""
 
     def __init__(self, variables: Sequence[str], decisions: Sequence[str]) -> None:
         import cvxpy as cp
