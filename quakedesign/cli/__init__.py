@@ -46,7 +46,9 @@ def main(arguments: list[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     if arguments is None and not sys.warnoptions:
-        _without_warnings()
+        # Keep warnings of libraries from users, in workers too; ``python -W default -m quakedesign`` shows them.
+        warnings.simplefilter("ignore")
+        os.environ.setdefault("PYTHONWARNINGS", "ignore")
     try:
         typed(sys.argv[1:] if arguments is None else arguments)
         with ending(), user_code():
@@ -80,12 +82,6 @@ def _with_help(error: CycloptsError) -> str:
         return str(error)
     hyphen = " A value that begins with - is joined by =." if isinstance(error, MissingArgumentError) else ""
     return f"{error}{hyphen} See {' '.join(('quakedesign', *(error.command_chain or ())))} --help."
-
-
-def _without_warnings() -> None:
-    """Keep warnings of libraries from users, in workers too; ``python -W default -m quakedesign`` shows them."""
-    warnings.simplefilter("ignore")
-    os.environ.setdefault("PYTHONWARNINGS", "ignore")
 
 
 def _refuse(reason: str) -> None:

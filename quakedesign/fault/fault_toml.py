@@ -579,8 +579,10 @@ _LEFT_OUT = {
 
 def fault_toml(fault: Fault) -> str:
     """Text of a TOML file that `load_fault` reads as this fault, every number in SI units and nothing left out."""
+    law = type(fault.friction)
     named: dict[str, Mapping[str, Any]] = {
-        "friction": {"law": _law_name(type(fault.friction))} | _law_values(fault.friction),
+        "friction": {"law": (law.name if law in friction_laws().values() else f"{law.__module__}:{law.__qualname__}")}
+        | _law_values(fault.friction),
         "task": _values(fault.reference, TASK) | {"sampling_time": f"{fault.sampling_time!r} s"},
         "disturbance": _values(fault.disturbance, DISTURBANCE) | _stresses(fault),
         "uncertainty": {key: float(getattr(fault.box, key)) for key in WIDTHS},
@@ -595,11 +597,6 @@ def fault_toml(fault: Fault) -> str:
     for table, entries in named.items():
         lines += ["", f"[{table}]", *_entries(entries)]
     return "\n".join(lines) + "\n"
-
-
-def _law_name(law: type[FrictionLaw]) -> str:
-    """Name of a law in a file: of one of the user's own, where it is defined."""
-    return law.name if law in friction_laws().values() else f"{law.__module__}:{law.__qualname__}"
 
 
 def _values(part: object, units: Mapping[str, str]) -> dict[str, Any]:
@@ -733,7 +730,7 @@ def fault_schema() -> dict[str, Any]:
         **_quantities(PLANT, said),
         "uncertainty": {
             "oneOf": [{"enum": sorted(BOXES)}, _table(widths, ())],
-            "description": _first_line(UncertaintyBox),
+            "description": (inspect.getdoc(UncertaintyBox) or "").splitlines()[0],
         },
         "friction": {"oneOf": [_law_schema(law) for _, law in sorted(friction_laws().items())]},
         "task": _table(_quantities(TASK, _task_described()), ()),
@@ -752,10 +749,6 @@ def fault_schema() -> dict[str, Any]:
         "title": "fault of quakedesign",
         **_table(properties, required),
     }
-
-
-def _first_line(kind: type) -> str:
-    return (inspect.getdoc(kind) or "").splitlines()[0]
 
 
 def _table(properties: Mapping[str, Any], required: Any) -> dict[str, Any]:

@@ -48,16 +48,6 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.])\s
 _WITHIN_A_UNIT = re.compile(r"^1\s*(?=/)|(\^|\*\*)\s*[+-]?\d+|(?<=[A-Za-z])\d+", re.ASCII)
 
 
-def _number_and_unit(quantity: str, received: str) -> tuple[Decimal | None, str]:
-    """One number and the unit behind it: pint multiplies what stands side by side, so "1 000 s" were 0 s."""
-    if re.match(r"\s*[+-]?\d+,\d", quantity):
-        raise UnitError(f"{received}, with a comma. Write a decimal point, and nothing between thousands.")
-    split = _NUMBER.fullmatch(quantity)
-    if re.search(r"[\d+-]", _WITHIN_A_UNIT.sub("", split[2]) if split else quantity):
-        raise UnitError(f"{received}, which is more than one number and a unit. Write the number in one piece.")
-    return (Decimal(split[1]), split[2]) if split else (None, quantity)
-
-
 @cache
 def _words_of_units() -> frozenset[str]:
     """Every word of the definitions that come with pint, names of units and prefixes among them; none if not found."""
@@ -109,7 +99,12 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
         return _plain_number(quantity, unit, received)
     if len(quantity) > 100:
         raise UnitError(f"{name} must be {wanted}. Received a text of {len(quantity)} characters.")
-    number, written = _number_and_unit(quantity, received)
+    if re.match(r"\s*[+-]?\d+,\d", quantity):
+        raise UnitError(f"{received}, with a comma. Write a decimal point, and nothing between thousands.")
+    split = _NUMBER.fullmatch(quantity)
+    if re.search(r"[\d+-]", _WITHIN_A_UNIT.sub("", split[2]) if split else quantity):
+        raise UnitError(f"{received}, which is more than one number and a unit. Write the number in one piece.")
+    number, written = (Decimal(split[1]), split[2]) if split else (None, quantity)
     remedy = nearest_name(written, _PLAIN.get(unit, ())) or " Check its spelling."
     unknown = f"{received}, whose unit is unknown.{remedy}"
     if number is not None and _is_no_unit(written):

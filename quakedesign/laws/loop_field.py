@@ -216,6 +216,9 @@ class LoopField:
         _require_bounded(speeds)
         arguments = {lift.name: to_terms(argument, powers) for lift, argument in lifts.items()}
         gains, constants, uncertain = (tuple(s.name for s in g) for g in (self.gains, self.constants, self.uncertain))
+        used = {name for terms in speeds.values() for term in terms for name, _, _ in term.factors}
+        for lift, terms in reversed(list(arguments.items())):
+            used |= {name for term in terms for name, _, _ in term.factors} if lift in used else set()
         return FieldTerms(
             states={s.name: weight for s, weight in self.states.items()},
             field=speeds,
@@ -224,7 +227,7 @@ class LoopField:
             uncertain=uncertain,
             domain=self.domain,
             roots={root.name: of.name for root, of in self.roots.items()},
-            lifts=_occurring(arguments, speeds),
+            lifts={lift: terms for lift, terms in arguments.items() if lift in used},
         )
 
 
@@ -243,13 +246,3 @@ def _require_bounded(speeds: Mapping[str, Iterable[Term]]) -> None:
                 f"every rate must be bounded near the origin. Received {power} in the rate of {state}, unbounded at "
                 f"{of} = 0. Multiply this term by a power of {of} with a larger exponent."
             )
-
-
-def _occurring(
-    lifts: Mapping[str, tuple[Term, ...]], speeds: Mapping[str, Iterable[Term]]
-) -> dict[str, tuple[Term, ...]]:
-    """Lifts that the field, or one of these, needs: a sign squared is 1, and leaves its argument unused."""
-    used = {name for terms in speeds.values() for term in terms for name, _, _ in term.factors}
-    for lift, terms in reversed(list(lifts.items())):
-        used |= {name for term in terms for name, _, _ in term.factors} if lift in used else set()
-    return {lift: terms for lift, terms in lifts.items() if lift in used}

@@ -27,7 +27,6 @@ from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.solve.conic import solve
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
-from quakedesign.symbolic.terms import Term
 
 # ----------------------------------------------------------------------
 # One quadratic V for a whole box, and feedback designed for it: semidefinite programs, exact proofs.
@@ -126,7 +125,10 @@ def robust_stability(loop: Loop, *, fastest: bool = False) -> Certificate | None
 
 def finished(loop: Loop, proposal: QuadraticProposal) -> Certificate | None:
     """Certificate for a proposed V, in exact arithmetic, with the largest share of its decay rate that holds."""
-    lyapunov = _decimal_terms(tuple(loop.states), proposal.form)
+    form = proposal.form
+    size = float(abs(form).max())
+    both = form + form.T - np.diag(np.diag(form))
+    lyapunov = quadratic_terms(tuple(loop.states), lambda i, j: rational(float(both[i, j] / size)))
     positive = quadratic_margin(loop, lyapunov) / 2
     for share in _SHARES:
         claims = {"positive": positive, "rate": below(share * proposal.rate)}
@@ -169,13 +171,6 @@ def quadratic_witness(one: Obligation) -> Witness:
 
     gram = tuple(entry(i, j) for i in range(size) for j in range(i, size))
     return Witness(multiplier=constant(size), squares=(Square(basis=basis, gram=gram),))
-
-
-def _decimal_terms(states: Sequence[str], form: Any) -> tuple[Term, ...]:
-    """xᵀPx over its largest entry, every float of it read as the decimal that Python prints for it."""
-    size = float(abs(form).max())
-    both = form + form.T - np.diag(np.diag(form))
-    return quadratic_terms(states, lambda i, j: rational(float(both[i, j] / size)))
 
 
 def sector_loop(controller: Any, sectors: Sectors) -> Loop:

@@ -23,7 +23,6 @@ from quakedesign.guarantees.exact.norms import matrix
 from quakedesign.linear.linear_problem import (
     LinearProblem,
     Matrix,
-    ProblemScales,
     Rows,
     Vertex,
     congruent,
@@ -140,7 +139,10 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
     proposal = proposed(_propose, *question) if any(K) else []
     for bits in BITS if proposal else ():
         P, W = (rounded(matrix, bits) for matrix in proposal)
-        proof = DelayProof(longest=period, P=scales.form_outside(P), W=_weight_outside(W, scales))
+        units = (scales.states[0], scales.states[2], scales.pressure)
+        proof = DelayProof(
+            longest=period, P=scales.form_outside(P), W=times(1 / scales.time, congruent(W, [1 / u for u in units]))
+        )
         if proof.holds(problem, gains):
             return proof
     return None
@@ -151,12 +153,6 @@ def proposed(programme: Callable[..., list[Any]], *question: Any) -> list[Any]:
     if handing_back():
         return programme(*question)
     return list(search_once(lambda: programme(*question), programme.__module__, *question))
-
-
-def _weight_outside(W: Rows, scales: ProblemScales) -> Matrix:
-    """W in SI: units of x1, ξ1, p, and of the time in V'."""
-    units = (scales.states[0], scales.states[2], scales.pressure)
-    return times(1 / scales.time, congruent(W, [1 / u for u in units]))
 
 
 def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> list[Any]:

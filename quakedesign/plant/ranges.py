@@ -105,7 +105,10 @@ class FaultPlant:
             )
         if self.change is not None:
             self._require(self.change >= 0, "disturbance rate", "0 or more", self.change)
-        if not _rises_from_rest_to_rest(self.shape):
+        shape = self.shape
+        slope = _derived(shape, 1)
+        ends = shape[:1] == (Fraction(0),) and sum(shape) == 1 and slope[:1] == (Fraction(0),) and sum(slope) == 0
+        if not (ends and _range_of(slope)[0] >= 0):
             raise ParameterError(
                 f"the shape of the reference of {self.name} must rise from 0 to 1 with slope 0 at both ends. "
                 f"Received the coefficients {', '.join(map(shortly, self.shape))}. Give them lowest power first."
@@ -256,12 +259,6 @@ def _derived(shape: tuple[Fraction, ...], order: int) -> tuple[Fraction, ...]:
     return shape
 
 
-def _bernstein(shape: tuple[Fraction, ...]) -> list[Fraction]:
-    """Coefficients on [0, 1] in Bernstein's basis, whose hull holds every value there."""
-    n = len(shape) - 1
-    return [sum((Fraction(comb(i, j), comb(n, j)) * shape[j] for j in range(i + 1)), Fraction(0)) for i in range(n + 1)]
-
-
 def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
     """Coefficients on both halves (de Casteljau), on the right one from its end."""
     left, right = [], []
@@ -274,14 +271,10 @@ def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
 
 def _range_of(shape: tuple[Fraction, ...]) -> Range:
     """Enclosure of a polynomial on [0, 1], by halving."""
-    rows = [_bernstein(shape)]
+    n = len(shape) - 1
+    rows = [
+        [sum((Fraction(comb(i, j), comb(n, j)) * shape[j] for j in range(i + 1)), Fraction(0)) for i in range(n + 1)]
+    ]
     for _ in range(_HALVINGS):
         rows = [half for row in rows for half in _halves(row)]
     return _hull(v for row in rows for v in row)
-
-
-def _rises_from_rest_to_rest(shape: tuple[Fraction, ...]) -> bool:
-    """Whether a polynomial goes from 0 to 1 on [0, 1] with slope 0 at both ends and never falls."""
-    slope = _derived(shape, 1)
-    ends = shape[:1] == (Fraction(0),) and sum(shape) == 1 and slope[:1] == (Fraction(0),) and sum(slope) == 0
-    return ends and _range_of(slope)[0] >= 0

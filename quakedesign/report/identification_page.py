@@ -38,6 +38,7 @@ def identification_lines(identification: Identification) -> list[str]:
     head += [""]
     columns = f"{'parameter':24}{'value':>12}{'95 %: from':>14}{'to':>12}  unit"
     shown = [*identification.estimates.values(), *([identification.difference] if identification.difference else [])]
+    rate = getattr(identification.law, "reference_rate", None)
     tail = [
         f"noise {fit.noise:.3g} of friction in {_samples(identification)}; of {fit.starts} searches from different "
         f"starts (seed {identification.seed}) {fit.agreeing} end in this fit"
@@ -45,7 +46,7 @@ def identification_lines(identification: Identification) -> list[str]:
         *([str(identification.rival)] if identification.rival else []),
         *_warnings(identification),
         *_outliers(identification),
-        *_reference(identification),
+        *([] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]),
         f"assumed: {'; '.join(identification.notes)}",
         *([f"read: {'; '.join(identification.record.remarks)}"] if identification.record.remarks else []),
     ]
@@ -84,11 +85,6 @@ def _samples(identification: Identification) -> str:
     fit = identification.fit
     kept, all_ = int(fit.kept.sum()), int(np.sum(fit.counts))
     return f"{kept} samples" if all_ == len(fit.counts) else f"one of {all_} samples, taken as {len(fit.counts)} means"
-
-
-def _reference(identification: Identification) -> list[str]:
-    rate = getattr(identification.law, "reference_rate", None)
-    return [] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]
 
 
 def _outliers(identification: Identification) -> list[str]:

@@ -43,7 +43,6 @@ from quakedesign.studies.runs import StateRun
 from quakedesign.text import quantity, visible
 
 if TYPE_CHECKING:
-    from quakedesign.laws import Controller
     from quakedesign.lyapunov.exact.premises import Premise
     from quakedesign.studies.comparison import Compared, Entry
 
@@ -168,6 +167,8 @@ def _account(entry: "Entry") -> Account:
     said, limits = guarantee_lines(entry), limit_lines(entry)
     compensated = [entry.answer.compensation.sentence()] if entry.answer and entry.answer.compensation else []
     domain = [domain_sentence(design.domain)] if design.domain else []
+    # How a law of samples runs; nothing for a law in continuous time.
+    sampling = design.controller.sampling if design.controller else None
     return Account(
         label=entry.label,
         badge=badge(entry),
@@ -176,7 +177,12 @@ def _account(entry: "Entry") -> Account:
         run=run,
         limits=limits,
         verdict=beside_guarantee([sentence for sentence in sentences(entry) if sentence not in run], entry),
-        proof=[*compensated, *_stepping(design.controller), *_slowly(entry), *domain],
+        proof=[
+            *compensated,
+            *([f"it runs in the scheme {sampling.scheme}, once every {float(sampling.step):g} s"] if sampling else []),
+            *_slowly(entry),
+            *domain,
+        ],
         law=[mathml(equation) for equation in law_latex(design.controller)] + _difference(entry),
         python=_python(entry),
         gains=_gains(entry),
@@ -184,12 +190,6 @@ def _account(entry: "Entry") -> Account:
         base_premises=[_row(p) for p in design.premises if p not in design.conditions],
         known=feedforward_rows(entry.variants) if entry.variants else [],
     )
-
-
-def _stepping(law: "Controller | None") -> list[str]:
-    """How a law of samples runs; nothing for a law in continuous time."""
-    sampling = law.sampling if law else None
-    return [f"it runs in the scheme {sampling.scheme}, once every {float(sampling.step):g} s"] if sampling else []
 
 
 def _slowly(entry: "Entry") -> list[str]:

@@ -355,13 +355,18 @@ def _step_verdict(entry: "Entry") -> list[str]:
 
 def _premises(entry: "Entry") -> list[str]:
     """Every premise that fails, and what the proof is about besides."""
-    design, told = entry.design, _broken(entry.design.conditions)
+    premises = entry.design.conditions
+    design, told = (
+        entry.design,
+        [_SAID[p.name].format(p.ratio) for p in premises if not p.holds and (p.proved or p.name == "along_reference")],
+    )
     if design.verdict is Verdict.PROVED and design.conditions and all(p.holds for p in design.conditions):
         told.append("every premise holds")
     if _sampled(design):
         told += ["its base gains are proved in continuous time too"] if design.certificate is not None else []
     else:
-        told += _held_headline(entry.run)
+        scheme = entry.run.provenance["scheme"] if entry.run else AS_IN_THE_PAPER
+        told += [] if scheme == AS_IN_THE_PAPER else [f"in this run p is held over every step, scheme {scheme}"]
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
         told.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
     return told
@@ -418,12 +423,6 @@ def scheme_sentence(comparison: "Compared") -> str:
     )
 
 
-def _held_headline(run: Trajectory | None) -> list[str]:
-    """What the certificate in continuous time does not cover."""
-    scheme = run.provenance["scheme"] if run else AS_IN_THE_PAPER
-    return [] if scheme == AS_IN_THE_PAPER else [f"in this run p is held over every step, scheme {scheme}"]
-
-
 def _reversed(run: Trajectory | None) -> list[str]:
     """Slip against the direction of the model."""
     share = run.metrics.reverse_slip_fraction if run else None
@@ -448,12 +447,6 @@ _SAID = {
     "constant_reference": "the reference moves, the certificate is about constant ones",
     "vanishing_disturbance": "the disturbance does not vanish at the equilibrium, so a bounded error remains",
 }
-
-
-def _broken(premises: Iterable[Any]) -> list[str]:
-    return [
-        _SAID[p.name].format(p.ratio) for p in premises if not p.holds and (p.proved or p.name == "along_reference")
-    ]
 
 
 # ----------------------------------------------------------------------

@@ -59,7 +59,12 @@ def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True
         if entry.variants:
             known = zip(FEEDFORWARD_COLUMNS, (None,) * len(FEEDFORWARD_COLUMNS), "lrrrr", strict=True)
             console.print(table(known, feedforward_rows(entry.variants), indent=2))
-    _print_tables(comparison, console)
+    console.print()
+    console.print("closed loop", style="bold", end=", ")
+    console.print("errors after a quarter of the run; p < 0 is withdrawal")
+    numbers = zip(COLUMNS, (17, 8, 8, 9, 9, 8, 8, 4), "lrrrrrrr", strict=True)
+    console.print(table(numbers, rows(comparison)), soft_wrap=False)
+    console.print(f"{scheme_sentence(comparison)}.")
 
 
 def _whole(entry: "Entry") -> list[str]:
@@ -89,15 +94,6 @@ def _gains(entry: "Entry") -> str:
         f"{name} = {float(v):.6g} {units.get(name, '')}".rstrip() for name, v in entry.design.gains.items()
     )
     return f"gains: {gains or 'none'}{_OF_SLIDING if units else ''}"
-
-
-def _print_tables(comparison: Comparison, console: Any) -> None:
-    console.print()
-    console.print("closed loop", style="bold", end=", ")
-    console.print("errors after a quarter of the run; p < 0 is withdrawal")
-    numbers = zip(COLUMNS, (17, 8, 8, 9, 9, 8, 8, 4), "lrrrrrrr", strict=True)
-    console.print(table(numbers, rows(comparison)), soft_wrap=False)
-    console.print(f"{scheme_sentence(comparison)}.")
 
 
 def table(columns: Iterable[tuple[str, int | None, str]], rows: Iterable[Sequence[str]], indent: int = 0) -> Table:

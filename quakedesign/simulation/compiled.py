@@ -229,12 +229,8 @@ def log(x: Any) -> Any:
     whole, mantissa = _parted(x)
     f, half, product = _logarithm(mantissa)
     value = whole * _LN2_PIECES[0] - ((half - (product + whole * _LN2_PIECES[1])) - f)
-    return _at_the_ends(x, value, -math.inf, math.inf)
-
-
-def _at_the_ends(x: Any, value: Any, at_zero: float, at_infinity: float) -> Any:
-    """Value with that of zero and of infinity; no number where x is negative or none."""
-    proper = choice(x == 0, ca.SX(at_zero), choice(x < math.inf, value, ca.SX(at_infinity)))
+    # Value with that of zero and of infinity; no number where x is negative or none.
+    proper = choice(x == 0, ca.SX(-math.inf), choice(x < math.inf, value, ca.SX(math.inf)))
     return choice(x >= 0, proper, ca.SX(math.nan))
 
 
@@ -827,17 +823,13 @@ def _run(call: list[str], folder: Path) -> None:
         try:
             said = process.communicate(timeout=_LONGEST_COMPILATION)
         except BaseException:
-            _kill_all(process)
+            if hasattr(os, "killpg"):
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
             raise
     if process.returncode:
         raise subprocess.CalledProcessError(process.returncode, call, *said)
-
-
-def _kill_all(process: "subprocess.Popen[bytes]") -> None:
-    if hasattr(os, "killpg"):
-        os.killpg(process.pid, signal.SIGKILL)
-    else:
-        process.kill()
 
 
 def _reason(error: Exception) -> str:
@@ -942,11 +934,13 @@ class _Body:
         self._by_number = {task.number: task for task in self.tasks}
         loop_of = {task.number: i for i, tasks in enumerate(self._loops) for task in tasks}
         used = {(place, task.number) for task in self.tasks for place in task.sources}
-        crossing = {place for place, user in used if loop_of[place[0]] != loop_of[user] and not self._at_hand(place)}
+        crossing = {
+            place
+            for place, user in used
+            if loop_of[place[0]] != loop_of[user]
+            and self._by_number[place[0]].work.operation not in (ca.OP_INPUT, ca.OP_CONST)
+        }
         self._kept = {place: f"kept[{i}][lane]" for i, place in enumerate(sorted(crossing))}
-
-    def _at_hand(self, place: Place) -> bool:
-        return self._by_number[place[0]].work.operation in (ca.OP_INPUT, ca.OP_CONST)
 
     def lines(self) -> Iterator[str]:
         """Text of the body."""

@@ -58,14 +58,9 @@ def perturbation(text: str) -> "sp.Expr":
     if sum(1 for _ in ast.walk(tree)) > MOST_NODES:
         raise ParameterError(f"a perturbation must be short, {MOST_NODES} terms at most. Received more. Shorten it.")
     expression = _value(tree.body, text.strip())
-    if not _real(expression):
+    if not all(part.is_real and part.is_finite for part in sp.preorder_traversal(expression) if part.is_number):
         raise _refusal(text, text)
     return expression
-
-
-def _real(expression: Any) -> bool:
-    """Whether every number in an expression is real and finite."""
-    return all(part.is_real and part.is_finite for part in sp.preorder_traversal(expression) if part.is_number)
 
 
 def _value(node: ast.expr, text: str) -> Any:

@@ -392,24 +392,22 @@ def metrics(
         peak = watched["peak_slip_rate"]  # of a plant that stays finite where the numbers of its law overflow
         known = {"peak_slip_rate": peak} if peak <= _FASTEST else {}
         return kind(**known, settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
-    figures = _whole_run(watched, step) | _settled(watched) | _metric_ranges(watched, signals) if controlled else {}
+    figures = (
+        {
+            "max_h_rate": watched["max_h_change"] / step,
+            "max_pressure": watched["max_pressure"],
+            "min_pressure": watched["min_pressure"],
+        }
+        | _settled(watched)
+        | {name: watched[name] for signal in signals for name in (f"max_{signal}", f"min_{signal}")}
+        if controlled
+        else {}
+    )
     figures["peak_slip_rate"] = watched["peak_slip_rate"]
     if sticks:
         figures |= _shares(watched)
     finite = {name: value for name, value in figures.items() if math.isfinite(value)}
     return kind(**finite, settled_from=settled_from, steps=steps, seconds=seconds)
-
-
-def _whole_run(watched: dict[str, float], step: float) -> dict[str, float]:
-    return {
-        "max_h_rate": watched["max_h_change"] / step,
-        "max_pressure": watched["max_pressure"],
-        "min_pressure": watched["min_pressure"],
-    }
-
-
-def _metric_ranges(watched: dict[str, float], signals: list[str]) -> dict[str, float]:
-    return {name: watched[name] for signal in signals for name in (f"max_{signal}", f"min_{signal}")}
 
 
 def _shares(watched: dict[str, float]) -> dict[str, float]:

@@ -190,7 +190,9 @@ class SmoothProblem:
         SimulationError
             When the method cannot go on.
         """
-        _check(method, rtol)
+        known = (*METHODS, *adaptive_integrators())
+        require_known(method, known, "method")
+        require_tolerance(rtol)
         began, clock = float(times[0]), replace(load, start=load.start - float(times[0]))
         solution = self._stepped(start, clock, times - began, every_step=every_step, method=method, rtol=rtol)
         time = np.append(began + solution.time[:-1], times[-1]) if every_step else times
@@ -199,7 +201,11 @@ class SmoothProblem:
     def _stepped(
         self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
     ) -> SmoothSolution:
-        field, crossing, solver = self._field(load), self._crossing(), self._solver(method, load, rtol)
+        field, crossing, solver = (
+            _Bound.of(self.rates, 0, load, np.empty(self.rates.size1_in(0))).at,
+            self._crossing(),
+            self._solver(method, load, rtol),
+        )
         spans = [times] if every_step or method == "dop853" else [times[i : i + 2] for i in range(len(times) - 1)]
         pieces: list[tuple[np.ndarray, np.ndarray]] = []
         crossed: list[np.ndarray] = []
@@ -236,10 +242,6 @@ class SmoothProblem:
         )
         told = [*load.value, *load.slope, load.start]
         return {"method": Resolved, "pieces": pieces, "whole": whole, "parameters": told}
-
-    def _field(self, load: Ramp) -> Any:
-        """Field as a function of (t, y)."""
-        return _Bound.of(self.rates, 0, load, np.empty(self.rates.size1_in(0))).at
 
     def _jacobian(self, load: Ramp) -> Any:
         """Jacobian as a function of (t, y)."""
@@ -293,9 +295,3 @@ def _solve(*arguments: Any, **options: Any) -> Any:
             "Check that the slip rate stays finite, or loosen rtol."
         )
     return part
-
-
-def _check(method: str, rtol: float) -> None:
-    known = (*METHODS, *adaptive_integrators())
-    require_known(method, known, "method")
-    require_tolerance(rtol)

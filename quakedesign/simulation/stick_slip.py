@@ -90,13 +90,23 @@ def simulate_state(
     if not slider.law.state_names:
         raise ParameterError(f"the friction law must have a state. Received {slider.law.name}. Use simulate.")
     course = pressure if isinstance(pressure, PressureCourse) else PressureCourse.constant(pressure)
-    _require_closed(slider, course)
+    if course.largest >= slider.normal_stress:
+        raise ParameterError(
+            f"pressure must stay below the effective normal stress, {slider.normal_stress:.6g} Pa, at which the fault "
+            f"opens. Received {course.largest:.6g} Pa. Inject less."
+        )
     pieces = _pieces(loading, duration)
     first = pieces[0][1] if start_rate is None else start_rate
     start = slider.start(first, None if start_state is None else tuple(start_state), course.before(0.0))
     level = _ONSET * max(v for _, v in pieces) if onset_rate is None else onset_rate
     scales = _scales(slider, start)
-    _require_near(pieces, _FARTHEST * float(scales[0]))
+    farthest = _FARTHEST * float(scales[0])
+    travelled = sum(length * speed for length, speed in pieces)
+    if travelled > farthest:
+        raise ParameterError(
+            f"loading must move the load point by at most {_FARTHEST:.0e} critical slips, {farthest:.6g} m. "
+            f"Received {travelled:.6g} m. Shorten the duration."
+        )
     problem = SmoothProblem(slider.rates, scales, 2, math.log(level) if level > 0 else math.inf)
     history = _History(slider, problem, pieces, course, _wanted(times, pieces), method, rtol)
     name = f"{subject.name if isinstance(subject, Fault) else slider.law.name}, loaded from afar"
@@ -156,23 +166,6 @@ def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
     if not pieces:
         raise ParameterError("loading must hold at least one pair of (time, rate). Received none.")
     return [(float(length), float(speed)) for length, speed in pieces]
-
-
-def _require_near(pieces: list[tuple[float, float]], farthest: float) -> None:
-    travelled = sum(length * speed for length, speed in pieces)
-    if travelled > farthest:
-        raise ParameterError(
-            f"loading must move the load point by at most {_FARTHEST:.0e} critical slips, {farthest:.6g} m. "
-            f"Received {travelled:.6g} m. Shorten the duration."
-        )
-
-
-def _require_closed(slider: SpringSlider, course: PressureCourse) -> None:
-    if course.largest >= slider.normal_stress:
-        raise ParameterError(
-            f"pressure must stay below the effective normal stress, {slider.normal_stress:.6g} Pa, at which the fault "
-            f"opens. Received {course.largest:.6g} Pa. Inject less."
-        )
 
 
 def _wanted(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None":

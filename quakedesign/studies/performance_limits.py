@@ -383,7 +383,8 @@ def limits(
         proved["largest_step"] = LowerBound(held[-1].held.step)
     if own is not None:
         proved["peak_slip_rate_error"] = own.claims.slip_rate_error
-        proved["largest_delay"] = _proved_delay(task, step, told)
+        longest = longest_delay(task, step, **told.around)
+        proved["largest_delay"] = LowerBound(longest.held.delay) if longest else None
         proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
         if (rock := _proved_rock(task, step, told)) is not None:
             proved["largest_diffusion_time"] = rock
@@ -532,11 +533,6 @@ def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
     tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.around)
     found = [least_peak, *([tracking] if tracking.proved else [])]
     return min(found, key=lambda g: g.claims.slip_rate_error)
-
-
-def _proved_delay(task: FaultPlant, step: Fraction, told: Told) -> LowerBound | None:
-    longest = longest_delay(task, step, **told.around)
-    return LowerBound(longest.held.delay) if longest else None
 
 
 def _proved_rock(task: FaultPlant, step: Fraction, told: Told) -> LowerBound | None:

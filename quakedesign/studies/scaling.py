@@ -67,6 +67,7 @@ def scale_answer(
     own = given != ("published",) and law.divisor is not None
     relation = similarity(start, end, clock=clock)
     carried = carry(law, relation.scales, divisor=least_authority(end) if own else None)
+    scales = relation.scales
     return {
         "from": start.name,
         "to": end.name,
@@ -78,7 +79,7 @@ def scale_answer(
         "exponents": _exponents(law, own),
         **_options(law, carried),
         "integrals": _texts(carried.integrals),
-        "scale_factors": _scale_factors(relation.scales),
+        "scale_factors": {name: scales.of(unit).text() for name, (_, unit) in SCALED.items()},
         **_relation(relation),
         "published": _published(end, carried),
         "unrounded": _unrounded(start, end, law, relation.scales) if given == ("published",) else None,
@@ -105,10 +106,6 @@ def _options(law: Controller, carried: CarriedGains) -> dict[str, Any]:
     if law.divisor is not None:
         return {"scale": str(law.scale), "source_divisor": str(law.divisor), "divisor": str(carried.law.divisor)}
     return {"feedback": law.feedback} if hasattr(law, "feedback") else {}
-
-
-def _scale_factors(scales: Scales) -> dict[str, str]:
-    return {name: scales.of(unit).text() for name, (_, unit) in SCALED.items()}
 
 
 def _relation(relation: Similarity) -> dict[str, Any]:

@@ -73,34 +73,26 @@ def _number(node: Any) -> float:
 
 def _operate(node: Any, table: Operations, walk: Callable[[Any], Any]) -> Any:
     if node.is_Add or node.is_Mul:
-        return _fold(node, walk)
+        # Sum or product, with its numbers joined exactly before they are rounded.
+        numbers = [arg for arg in node.args if arg.is_number]
+        rest = [walk(arg) for arg in node.args if not arg.is_number]
+        first = [walk(node.func(*numbers))] if numbers else []
+        return reduce(add if node.is_Add else mul, first + rest)
     if isinstance(node, SignedPower | AbsolutePower | sp.Pow) and node.args[1].is_number:
         return table[node.func](walk(node.args[0]), node.args[1])
     if node in (sp.true, sp.false):
         return float(bool(node))
     if isinstance(node, sp.Piecewise):
-        return _branches(node, table, walk)
+        if node.args[-1][1] != sp.true:
+            raise ParameterError(f"the last branch of a piecewise expression must hold otherwise. Received {node}.")
+        result = walk(node.args[-1][0])
+        for value, condition in reversed(node.args[:-1]):
+            result = table[sp.Piecewise](walk(condition), walk(value), result)
+        return result
     if node.func not in table:
         what = "a value for the symbol" if node.is_Symbol else "a known operation instead of"
         raise ParameterError(f"an expression to evaluate needs {what} {node}. Received none.")
     return table[node.func](*(walk(arg) for arg in node.args))
-
-
-def _fold(node: Any, walk: Callable[[Any], Any]) -> Any:
-    """Sum or product, with its numbers joined exactly before they are rounded."""
-    numbers = [arg for arg in node.args if arg.is_number]
-    rest = [walk(arg) for arg in node.args if not arg.is_number]
-    first = [walk(node.func(*numbers))] if numbers else []
-    return reduce(add if node.is_Add else mul, first + rest)
-
-
-def _branches(node: Any, table: Operations, walk: Callable[[Any], Any]) -> Any:
-    if node.args[-1][1] != sp.true:
-        raise ParameterError(f"the last branch of a piecewise expression must hold otherwise. Received {node}.")
-    result = walk(node.args[-1][0])
-    for value, condition in reversed(node.args[:-1]):
-        result = table[sp.Piecewise](walk(condition), walk(value), result)
-    return result
 
 
 def _power(library: Any, base: Any, exponent: sp.Expr) -> Any:

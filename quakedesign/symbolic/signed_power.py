@@ -148,7 +148,8 @@ def normal_form(expression: sp.Expr) -> sp.Expr:
     """
     current = sp.sympify(expression)
     for _ in range(_ROUNDS):
-        following = _collected(sp.expand(_flat(current)))
+        e = sp.expand(_flat(current))
+        following = sp.Add(*(_merged(term) for term in sp.Add.make_args(e)))
         if following == current:
             break
         current = following
@@ -221,10 +222,6 @@ def _content(inner: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
             factor *= symbol**least
     content, rest = sp.expand(inner / factor).primitive()
     return factor * content, rest
-
-
-def _collected(e: sp.Expr) -> sp.Expr:
-    return sp.Add(*(_merged(term) for term in sp.Add.make_args(e)))
 
 
 def _merged(term: sp.Expr) -> sp.Expr:

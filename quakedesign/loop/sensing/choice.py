@@ -65,12 +65,11 @@ def worst_errors(differentiator: Differentiator, noise: float = 0.0) -> tuple[fl
 @lru_cache(maxsize=64)
 def constants(unit: Differentiator, noisy: bool) -> tuple[float, ...]:
     """c_0 … c_nd of a differentiator with λ_d = T = 1, without and, if noisy, also with dominating noise."""
-    ratios = [_errors(unit, scale) / _orders(unit, scale) for scale in ((1.0, STRETCH) if noisy else (1.0,))]
+    ratios = [
+        _errors(unit, scale) / (scale ** np.arange(unit.order + 1, 0, -1.0))
+        for scale in ((1.0, STRETCH) if noisy else (1.0,))
+    ]
     return tuple(float(max(column)) for column in zip(*ratios, strict=True))
-
-
-def _orders(unit: Differentiator, scale: float) -> "np.ndarray":
-    return scale ** np.arange(unit.order + 1, 0, -1.0)
 
 
 def _errors(unit: Differentiator, scale: float) -> "np.ndarray":

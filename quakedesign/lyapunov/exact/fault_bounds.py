@@ -73,16 +73,11 @@ def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -
     """h' along a solution [unit of ν per s], in what `known_ranges` and the errors bound."""
     bending, flat = plant.matched_rate_in_parts()
     moved = (plant.r3, plant.r2, plant.r1, plant.phi_t, plant.acceleration_error, plant.e2)
-    flat = sp.expand(flat + _feedforward_rate(feedforward))
-    return _with_known(bending + sp.collect(flat, moved), fault, divisor)
-
-
-def _feedforward_rate(feedforward: FeedForward) -> sp.Expr:
-    """Time derivative of the feed-forward along a solution, by the chain rule."""
     x1, x2, push = sp.symbols("x1 x2 push", real=True)
     rates = {x1: plant.e2 + plant.r1, x2: plant.acceleration_error + plant.r2, push: plant.r3}
     added = feedforward.acceleration(x1, x2, push)
-    return sum((added.diff(signal) * rate for signal, rate in rates.items()), start=sp.Integer(0))
+    flat = sp.expand(flat + sum((added.diff(signal) * rate for signal, rate in rates.items()), start=sp.Integer(0)))
+    return _with_known(bending + sp.collect(flat, moved), fault, divisor)
 
 
 @lru_cache(maxsize=16)
@@ -278,7 +273,11 @@ def rest_pressure(
     step, ends = (slip[1] - slip[0]) / pieces, list[Fraction]()
     for n in range(pieces if step else 1):
         part = (slip[0] + n * step, slip[0] + (n + 1) * step)
-        pressures = enclose(expression, box | {_r: part, _mu: _friction_at(fault, part)})
+        friction, start = friction_bounds(fault.friction), static_friction(fault)
+        most = friction.slip_slope * part[1]
+        pressures = enclose(
+            expression, box | {_r: part, _mu: (max(friction.least, start - most), min(friction.most, start + most))}
+        )
         if not pressures.is_finite():
             raise ParameterError("no finite pressure at rest was found. Positive friction is expected. Narrow the box.")
         ends += [end_of(pressures.lower()), end_of(pressures.upper())]
@@ -333,10 +332,3 @@ def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]
         return expression, {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)}
     law = fault.friction.exact()
     return expression.subs(plant.plant_values(fault)).subs(_mu, law.coefficient(_r, sp.Integer(0))), {}
-
-
-def _friction_at(fault: Fault, slip: Range) -> Range:
-    """Friction at rest at a slip, anywhere between its bounds and its slope bound from the static value."""
-    friction, start = friction_bounds(fault.friction), static_friction(fault)
-    most = friction.slip_slope * slip[1]
-    return max(friction.least, start - most), min(friction.most, start + most)

@@ -178,7 +178,15 @@ def _largest(problems: tuple[Problem, ...], tolerance: Fraction, pieces: int) ->
     heapq.heapify(heap)
     for _ in range(pieces):
         top, _, forms, powers, corners = heap[0]
-        attained = max(attained, _attained(forms, powers))
+        # Largest value at the corners of a piece; only decides when to stop.
+        values = [[abs(v) for v in f.at_corners()] for f in forms]
+        attained = max(
+            attained,
+            max(
+                prod(v[i] ** power.near if v[i] else 0.0 for v, power in zip(values, powers, strict=True))
+                for i in range(forms[0].variables)
+            ),
+        )
         if -top <= attained * (1 + float(tolerance)):
             break
         heapq.heappop(heap)
@@ -213,15 +221,6 @@ def _bound(forms: Sequence[Form], powers: Sequence[_FormPower]) -> float:
     upper = total.upper()
     near = float(upper)  # has the digits of a float, unless it is out of range
     return near if upper <= near else float_above(end_of(upper))
-
-
-def _attained(forms: Sequence[Form], powers: Sequence[_FormPower]) -> float:
-    """Largest value at the corners of a piece; only decides when to stop."""
-    values = [[abs(v) for v in f.at_corners()] for f in forms]
-    return max(
-        prod(v[i] ** power.near if v[i] else 0.0 for v, power in zip(values, powers, strict=True))
-        for i in range(forms[0].variables)
-    )
 
 
 def _identity(size: int) -> tuple[tuple[float, ...], ...]:

@@ -605,7 +605,12 @@ class _Rows:
         self._shapes = [shape for shape, _ in rows]
         shape = self._shapes[0]
         self._places = np.array([start + np.arange(len(shape.keys)) for _, start in rows])
-        self._bases = np.array([_solutions(one) for one in self._shapes])
+        self._bases = np.array(
+            [
+                (null_space(one.relations().toarray()) if one.relation_count else np.eye(len(one.keys)))
+                for one in self._shapes
+            ]
+        )
         sizes = np.array([block.size for block in shape.blocks])
         ends = np.cumsum(sizes * (sizes + 1) // 2)
         triangles = [one.triangles() @ basis for one, basis in zip(self._shapes, self._bases, strict=True)]
@@ -668,11 +673,6 @@ def _corners(size: int) -> tuple[Any, Any, Any]:
     """Rows and columns of an upper triangle, and what makes its length that of the matrix."""
     rows, columns = pairs(size)
     return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
-
-
-def _solutions(shape: MomentProgram) -> Any:
-    """Basis of the functionals that vanish on the relations, orthonormal."""
-    return null_space(shape.relations().toarray()) if shape.relation_count else np.eye(len(shape.keys))
 
 
 def _matrices(triangle: Any, size: int) -> Any:

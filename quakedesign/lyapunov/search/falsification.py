@@ -72,18 +72,13 @@ def _choices(loop: Loop, name: str) -> list[_Play]:
     low, high = loop.uncertain[name]
     rates = {state: f"{state}'" for state in loop.states}
     products: list[tuple[str, ...]]
-    if _is_even(loop, name):
+    terms = (term for rates in loop.field.values() for term in rates if name in term.parameters)
+    if all(sum(kind == "s" for _, _, kind in term.factors) % 2 == 1 for term in terms):
         products = [*rates.items(), *combinations(loop.states, 2)]
     else:
         products = [(one,) for pair in rates.items() for one in pair]
     everything = [_Play(names, sign) for names in products for sign in (1, -1)]
     return everything if low < high else everything[:1]
-
-
-def _is_even(loop: Loop, name: str) -> bool:
-    """Whether the loop is odd in its states when the parameter stays as it is."""
-    terms = (term for rates in loop.field.values() for term in rates if name in term.parameters)
-    return all(sum(kind == "s" for _, _, kind in term.factors) % 2 == 1 for term in terms)
 
 
 class _FloatField:

@@ -41,7 +41,6 @@ from quakedesign.lyapunov.exact.obligations import (
 )
 from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.polynomial import constant, monomial, product
-from quakedesign.sos.exact.proofs import Square, SumOfSquares
 from quakedesign.sos.solve.conic import handing_back
 from quakedesign.sos.solve.decide import strict_proof
 from quakedesign.sos.solve.joint import Demand, Proposal, joint_program
@@ -89,7 +88,7 @@ def witness_of(one: Obligation, domain: str) -> Witness | None:
         if proof is not None:
             return Witness(
                 multiplier=multiplier,
-                squares=_ordered(proof, size),
+                squares=tuple(sorted(proof.squares, key=lambda s: max((i - size + 1 for i in s.product), default=0))),
                 cofactors=proof.cofactors,
                 conditions=len(one.inequalities),
             )
@@ -100,11 +99,6 @@ def power_of_sum(size: int, power: int) -> dict[tuple[int, ...], Fraction]:
     """(Σ u_i)^power."""
     total = {tuple(int(i == j) for j in range(size)): Fraction(1) for i in range(size)}
     return product(size, [total] * power)
-
-
-def _ordered(proof: SumOfSquares, size: int) -> tuple[Square, ...]:
-    """Squares without a condition first, then by condition, as in the file."""
-    return tuple(sorted(proof.squares, key=lambda s: max((i - size + 1 for i in s.product), default=0)))
 
 
 # ----------------------------------------------------------------------

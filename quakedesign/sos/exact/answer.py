@@ -67,7 +67,11 @@ class Answer:
         alone with a constant among them, or an equality has such coefficients of one sign.
         """
         asked = self.statement
-        below = [*asked.inequalities, *asked.equalities, *(_negated(h) for h in asked.equalities)]
+        below = [
+            *asked.inequalities,
+            *asked.equalities,
+            *({exponents: -c for exponents, c in h.items()} for h in asked.equalities),
+        ]
         constant = [p for p in (asked.polynomial,) if not any(map(any, p))]
         return self.verdict is Positivity.SOS and any(_is_below_zero(p) for p in (*constant, *below))
 
@@ -93,10 +97,6 @@ class Answer:
             When nothing was decided, or the proof is too large for the format.
         """
         save(self.statement, self.proof, path)
-
-
-def _negated(polynomial: Polynomial) -> Polynomial:
-    return {exponents: -c for exponents, c in polynomial.items()}
 
 
 def _is_below_zero(polynomial: Polynomial) -> bool:

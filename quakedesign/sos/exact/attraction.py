@@ -274,16 +274,12 @@ def read(raw: Any) -> Attraction:
             level=read_rational(level[0]) if level else None,
             multiplier=constant(size) if refuted else read_polynomial(raw["multiplier"], "multiplier", size, TERMS),
         )
-        return _with_proof(claim, raw, refuted)
+        if refuted:
+            return replace(claim, proof=read_proof(raw["negative"], "negative", claim.positive))
+        found = [read_proof(raw[part], "sos", getattr(claim, part)) for part in ("positive", "decrease")]
+        return replace(claim, proof=LyapunovProof(positive=found[0], decrease=found[1]))
     except PolynomialError as error:
         raise CertificateError(str(error)) from None
-
-
-def _with_proof(claim: Attraction, raw: dict[str, Any], refuted: bool) -> Attraction:
-    if refuted:
-        return replace(claim, proof=read_proof(raw["negative"], "negative", claim.positive))
-    found = [read_proof(raw[part], "sos", getattr(claim, part)) for part in ("positive", "decrease")]
-    return replace(claim, proof=LyapunovProof(positive=found[0], decrease=found[1]))
 
 
 def load(text: str) -> Attraction:

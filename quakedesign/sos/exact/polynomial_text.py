@@ -499,18 +499,16 @@ def _polynomial(given: Any, names: tuple[str, ...]) -> dict[Exponents, Fraction]
     if isinstance(given, str):
         return parse(given, names)[1]
     if isinstance(given, Mapping):
-        return _mapping(given, names)
+        for e in given:
+            if not isinstance(e, tuple) or len(e) != len(names) or not all(type(x) is int and x >= 0 for x in e):
+                raise PolynomialError(
+                    f"exponents must be {len(names)} non-negative integers in a tuple. Received {e!r}."
+                )
+        exact = {e: rational(c, "coefficient") for e, c in given.items()}
+        return {e: c for e, c in exact.items() if c}
     if hasattr(given, "free_symbols"):
         return _sympy(given, names)
     return {e: c for e, c in {(0,) * len(names): rational(given, "polynomial")}.items() if c}
-
-
-def _mapping(given: Polynomial, names: tuple[str, ...]) -> dict[Exponents, Fraction]:
-    for e in given:
-        if not isinstance(e, tuple) or len(e) != len(names) or not all(type(x) is int and x >= 0 for x in e):
-            raise PolynomialError(f"exponents must be {len(names)} non-negative integers in a tuple. Received {e!r}.")
-    exact = {e: rational(c, "coefficient") for e, c in given.items()}
-    return {e: c for e, c in exact.items() if c}
 
 
 def _sympy(given: Any, names: tuple[str, ...]) -> dict[Exponents, Fraction]:

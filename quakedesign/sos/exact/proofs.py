@@ -231,7 +231,7 @@ def holds(statement: Statement, proof: Proof) -> bool:
     """
     try:
         if isinstance(proof, SumOfSquares):
-            return _sum_of_squares_holds(statement, proof)
+            return multiplier_is_positive(statement, proof.multiplier) and _identity_holds(statement, proof)
         if isinstance(proof, Functional):
             return _functional_holds(statement, proof)
         return _point_holds(statement, proof)
@@ -245,10 +245,6 @@ def identity_holds(statement: Statement, proof: SumOfSquares) -> bool:
         return _identity_holds(statement, proof)
     except (ValueError, TypeError, AttributeError):
         return False
-
-
-def _sum_of_squares_holds(statement: Statement, proof: SumOfSquares) -> bool:
-    return multiplier_is_positive(statement, proof.multiplier) and _identity_holds(statement, proof)
 
 
 def _identity_holds(statement: Statement, proof: SumOfSquares) -> bool:

@@ -132,7 +132,10 @@ def region_words(found: Region) -> list[str]:
     if shown is not None:
         lines += claim_words(shown)
     if found.inclusion is not None:
-        lines.append(_inclusion_words(found))
+        assert found.shape_level is not None
+        lines.append(
+            f"that is so wherever {_shape(found)} <= {found.shape_level} ({LowerBound(found.shape_level)} rounded down)"
+        )
     if found.proved is not None and found.refuted is not None:
         lines += _point_words(found.refuted)
     return [*lines, *filter(None, [found.remark])]
@@ -163,11 +166,6 @@ def _shape(found: Region) -> str:
     assert found.inclusion is not None
     asked = found.inclusion.statement
     return polynomial_words({e: -c for e, c in asked.inequalities[0].items() if any(e)}, asked.variables)
-
-
-def _inclusion_words(found: Region) -> str:
-    assert found.shape_level is not None
-    return f"that is so wherever {_shape(found)} <= {found.shape_level} ({LowerBound(found.shape_level)} rounded down)"
 
 
 def _start(claim: Attraction) -> str:

@@ -1,6 +1,5 @@
 """The search for a proof of one statement: solve, round, look for a point, refute, pass to a face."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
@@ -125,18 +124,15 @@ class StatementSearch:
         interior = program.interior(target, solution.margin / 2)
         for values in (interior, solution.functional) if interior is not None else (solution.functional,):
             for bits in (6, 10, 14, 18, 22, 26, 32, 40):
-                proof = Functional(values=self._consistent(values, bits))
+                # Functional rounded to multiples of 2^-bits of its largest value, exactly zero on the equalities.
+                size = max(abs(v) for v in values.values())
+                exact = {e: nearest(v / size, 2**bits) for e, v in values.items()}
+                if self.relations:
+                    exact = _project(exact, self.relations)
+                proof = Functional(values={e: v for e, v in exact.items() if v})
                 if holds(self.statement, proof):
                     return self._finish(proof)
         return None
-
-    def _consistent(self, values: Mapping[Exponents, float], bits: int) -> dict[Exponents, Fraction]:
-        """Functional rounded to multiples of 2^-bits of its largest value, exactly zero on the equalities."""
-        size = max(abs(v) for v in values.values())
-        exact = {e: nearest(v / size, 2**bits) for e, v in values.items()}
-        if self.relations:
-            exact = _project(exact, self.relations)
-        return {e: v for e, v in exact.items() if v}
 
     def _on_faces(self, candidates: Any, solution: MomentSolution | None) -> Proof | None:
         zeros = rational_zeros(self.statement, candidates, self.units)
@@ -151,7 +147,13 @@ class StatementSearch:
 
     def _descend(self, blocks: list[Block], threshold: float, tolerance: float, accuracy: float) -> Proof | None:
         for _ in range(_ROUNDS):
-            solution = self._solve(blocks, accuracy)[0] if blocks else self._nothing()
+            solution = (
+                self._solve(blocks, accuracy)[0]
+                if blocks
+                else MomentSolution(
+                    margin=1.0, grams=[], moments=[], functional={}, cofactors=[0.0] * len(self.relations)
+                )
+            )
             if solution is None:
                 return None
             if solution.margin > 1e-9:
@@ -163,10 +165,6 @@ class StatementSearch:
                 return None
             blocks = smaller
         return None
-
-    def _nothing(self) -> MomentSolution:
-        """Answer without squares, where only multiples of the equalities are left."""
-        return MomentSolution(margin=1.0, grams=[], moments=[], functional={}, cofactors=[0.0] * len(self.relations))
 
 
 def strict_proof(asked: Statement) -> SumOfSquares | None:

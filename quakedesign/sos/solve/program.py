@@ -350,21 +350,17 @@ def largest(
         return None
     best = below, answer
     while above - below > Fraction(relative) * abs(above):
-        middle = nearest(float((below + above) / 2), _grid(above - below))
+        width = above - below
+        grid = 1
+        while Fraction(8, grid) > width:
+            grid *= 10
+        middle = nearest(float((below + above) / 2), grid)
         answer = question(middle)
         if answer.verdict is Positivity.SOS:
             below, best = middle, (middle, answer)
         else:
             above = middle
     return best
-
-
-def _grid(width: Fraction) -> int:
-    """Power of ten that resolves an eighth of a width."""
-    grid = 1
-    while Fraction(8, grid) > width:
-        grid *= 10
-    return grid
 
 
 def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fraction:

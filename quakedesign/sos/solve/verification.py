@@ -248,7 +248,11 @@ def read_gram(path: str | Path) -> GramFile:
     path = Path(path)
     content = read_bytes(path, "a file with a Gram matrix", largest=_LARGEST, refusal=PolynomialError)
     try:
-        raw = _matlab(content) if path.suffix == ".mat" else _json(content)
+        raw = (
+            _matlab(content)
+            if path.suffix == ".mat"
+            else json.loads(content, object_pairs_hook=unique, parse_float=_number)
+        )
     except Exception as error:  # a broken file raises anything
         reason = str(error).partition("\n")[0]
         raise PolynomialError(
@@ -260,10 +264,6 @@ def read_gram(path: str | Path) -> GramFile:
             f"{path} must have exactly the keys {', '.join(sorted(_KEYS))}. Received {shown(received or 'none')}."
         )
     return _gram_file(raw)
-
-
-def _json(content: bytes) -> Any:
-    return json.loads(content, object_pairs_hook=unique, parse_float=_number)
 
 
 def _number(written: str) -> Fraction | str:
