@@ -10,10 +10,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
-from functools import cache, cached_property, reduce
+from functools import cache, cached_property
 from math import lcm, prod
+from operator import attrgetter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnitError, UnknownNameError, require_known
@@ -26,14 +27,10 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# The dimensions of the spring-slider: what may be rescaled independently.
-#
-# The equation of motion never compares a slip with the length of the fault, nor a tangential with a normal direction:
-# a stiffness k = GL is a force per slip, a friction coefficient a tangential force per normal force. The metres of
-# the
-# three are therefore three units (directed lengths, as in Huntley 1967, Dimensional Analysis), with mass and time
-# five
-# in all; this is why slip, fault length and friction scale by different factors in Table I of the paper.
+# Dimensions. The equation of motion never compares a slip with the length of the fault, nor a tangential with a normal
+# direction: a stiffness k = GL is a force per slip, a friction coefficient a tangential force per normal force. The
+# metres of the three are therefore three units, with mass and time five in all; this is why slip, fault length and
+# friction scale by different factors in Table I of the paper.
 
 BASES = ("mass", "fault_length", "slip", "normal_length", "time")
 """Independent dimensions, in the order of the rows of the dimensional matrix."""
@@ -63,19 +60,8 @@ _FRICTION = "slip_m/normal_m"
 _UNIT_FRICTION = "unit friction"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
-    """One parameter of a fault.
-
-    Attributes
-    ----------
-    name : str
-        Dotted name inside the `Fault`.
-    unit : str
-        With directed lengths.
-    value : Fraction
-        In that unit.
-    """
+class Quantity(NamedTuple):
+    """One parameter of a fault: dotted name, unit with directed lengths, value in that unit."""
 
     name: str
     unit: str
@@ -125,23 +111,15 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
     own; the constant friction coefficient 1 is then one more parameter, the same for every fault.
     """
     law = fault.friction
-    named = {name: (unit, number) for name, unit in PLANT_UNITS.items() if (number := _number(fault, name)) is not None}
-    named |= {
-        f"friction.{name}": (_friction_unit(field.metadata), getattr(law, name))
-        for name, field in law.quantities().items()
-    }
-    quantities = {n: Quantity(name=n, unit=u, value=rational(v, n)) for n, (u, v) in named.items()}
+    named = {name: (unit, attrgetter(name)(fault)) for name, unit in PLANT_UNITS.items()}
+    named |= {f"friction.{name}": (_friction_unit(f.metadata), getattr(law, name)) for name, f in _fields(law)}
     if not stretches(law):
-        quantities[_UNIT_FRICTION] = Quantity(name=_UNIT_FRICTION, unit=_FRICTION, value=Fraction(1))
-    return quantities
+        named[_UNIT_FRICTION] = _FRICTION, 1
+    return {n: Quantity(n, unit, rational(value, n)) for n, (unit, value) in named.items() if value is not None}
 
 
-def _number(fault: Fault, dotted: str) -> float | None:
-    value: Any = fault
-    for part in dotted.split("."):
-        value = getattr(value, part)
-    number: float | None = value
-    return number
+def _fields(law: FrictionLaw) -> Any:
+    return law.quantities().items()
 
 
 def _friction_unit(metadata: Mapping[str, Any]) -> str:
@@ -153,14 +131,18 @@ def stretches(law: FrictionLaw) -> bool:
     """True where μ grows by any factor as all friction coefficients among the parameters do (degree 1 of Euler)."""
     import sympy as sp
 
-    factor = sp.Symbol("c", positive=True)
-    slip, rate = sp.Symbol("x", positive=True), sp.Symbol("v", positive=True)
-    state = sp.symbols(f"theta:{len(law.state_names)}", positive=True)
-    plain = sp.sympify(law.symbolic().coefficient(slip, rate, *state))
-    symbols = law.symbols()
-    numbers = [symbols[n] for n, f in law.quantities().items() if _friction_unit(f.metadata) == _FRICTION]
+    factor, symbols = sp.Symbol("c", positive=True), law.symbols()
+    plain = sp.sympify(law.symbolic().coefficient(*_arguments(law)))
+    numbers = [symbols[n] for n, f in _fields(law) if _friction_unit(f.metadata) == _FRICTION]
     grown = plain.subs({symbol: factor * symbol for symbol in numbers}, simultaneous=True)
     return bool(sp.expand(grown - factor * plain) == 0)
+
+
+def _arguments(law: FrictionLaw) -> "tuple[sp.Symbol, ...]":
+    """Symbols of slip, slip rate and state, which a coefficient takes."""
+    import sympy as sp
+
+    return sp.symbols(("x", "v", *(f"theta{i}" for i in range(len(law.state_names)))), positive=True)
 
 
 # ----------------------------------------------------------------------
@@ -171,29 +153,15 @@ _WORKING_DIGITS = 60
 
 @dataclass(frozen=True, slots=True)
 class Radical:
-    """sign · radicand^(1/degree), held in its one canonical form, so that equal numbers compare equal.
+    """sign · radicand^(1/degree) with sign −1, 0 or 1, radicand > 0 (1 for zero), and the smallest possible degree.
 
-    Products, quotients and rational powers of such numbers are such numbers, hence every scale factor and every
-    carried gain is exact. Build them with `radical`.
-
-    Attributes
-    ----------
-    sign : int
-        −1, 0 or 1.
-    radicand : Fraction
-        Positive; 1 for the number zero.
-    degree : int
-        Smallest possible, so 1 for a rational number.
+    Equal numbers so compare equal. Products, quotients and rational powers of such numbers are such numbers, hence
+    every scale factor and every scaled gain is exact. Build them with `radical`.
     """
 
     sign: int
     radicand: Fraction
     degree: int
-
-    @property
-    def is_rational(self) -> bool:
-        """True where the number is a rational."""
-        return self.degree == 1
 
     @property
     def fraction(self) -> Fraction:
@@ -204,7 +172,7 @@ class Radical:
         ParameterError
             When it is irrational.
         """
-        if not self.is_rational:
+        if self.degree > 1:
             raise ParameterError(
                 f"a rational number is needed. Received {self.text()}…, a root of degree {self.degree}."
             )
@@ -239,11 +207,11 @@ class Radical:
 
     def nearest(self, digits: int = 12) -> Fraction:
         """The number itself where it is rational, else the nearest decimal with so many significant digits."""
-        return self.fraction if self.is_rational else rational(str(self.decimal(digits)))
+        return self.fraction if self.degree == 1 else rational(str(self.decimal(digits)))
 
     def text(self, digits: int = 12) -> str:
         """Exact decimal or p/q where the number is rational, else a decimal with so many significant digits."""
-        if not self.is_rational:
+        if self.degree > 1:
             return f"{self.decimal(digits):.{digits}g}"
         rounded = self.decimal(17).normalize()
         if Fraction(rounded) != self.fraction:
@@ -253,8 +221,7 @@ class Radical:
     def __float__(self) -> float:
         return float(self.decimal(40))
 
-    def __str__(self) -> str:
-        return self.text()
+    __str__ = text
 
 
 def radical(value: "Radical | Fraction | int") -> Radical:
@@ -268,32 +235,13 @@ def radical(value: "Radical | Fraction | int") -> Radical:
 def _canonical(sign: int, radicand: Fraction, degree: int) -> Radical:
     if sign == 0:
         return Radical(0, Fraction(1), 1)
-    return Radical(sign, *reduce(_without_prime, _primes(degree), (radicand, degree)))
+    for power in (n for n in range(degree, 1, -1) if degree % n == 0):
+        from sympy import integer_nthroot
 
-
-def _without_prime(held: tuple[Fraction, int], prime: int) -> tuple[Fraction, int]:
-    radicand, degree = held
-    while degree % prime == 0 and (root := _root(radicand, prime)) is not None:
-        radicand, degree = root, degree // prime
-    return radicand, degree
-
-
-def _root(value: Fraction, degree: int) -> Fraction | None:
-    """Rational root of a positive rational, None where there is none."""
-    from sympy import integer_nthroot
-
-    (top, exact_top), (bottom, exact_bottom) = (
-        integer_nthroot(n, degree) for n in (value.numerator, value.denominator)
-    )
-    return Fraction(int(top), int(bottom)) if exact_top and exact_bottom else None
-
-
-def _primes(number: int) -> list[int]:
-    if number == 1:
-        return []
-    from sympy import primefactors
-
-    return [int(prime) for prime in primefactors(number)]
+        (top, whole), (bottom, whole_below) = (integer_nthroot(n, power) for n in radicand.as_integer_ratio())
+        if whole and whole_below:
+            return Radical(sign, Fraction(int(top), int(bottom)), degree // power)
+    return Radical(sign, radicand, degree)
 
 
 # ----------------------------------------------------------------------
@@ -347,14 +295,9 @@ class Scales:
             )
         if any(radical(ratio).sign <= 0 for ratio in ratios.values()):
             raise ParameterError(f"ratios must be positive. Received {', '.join(str(r) for r in ratios.values())}.")
-        inverse = matrix.inv()
+        powers = {base: map(fraction_of, matrix.inv().col(i)) for i, base in enumerate(BASES)}
         return cls(
-            factors={
-                base: power_product(
-                    ratios, {unit: fraction_of(inverse[row, column]) for row, unit in enumerate(ratios)}
-                )
-                for column, base in enumerate(BASES)
-            }
+            factors={base: power_product(ratios, dict(zip(ratios, powers[base], strict=True))) for base in BASES}
         )
 
     def of(self, unit: str) -> Radical:
@@ -372,11 +315,9 @@ def power_product(bases: Mapping[str, Radical | Fraction | int], exponents: Mapp
 
 
 # ----------------------------------------------------------------------
-# Similarity of faults: π-groups as the null space of the dimensional matrix, scale factors, and scaled faults.
-#
-# The dimensional matrix comes from units alone (`quakedesign.fault.similarity`). Two faults are similar if every
-# π-group has the same value in both (Buckingham 1914, Phys. Rev. 4, 345); then every solution of one is a solution of
-# the other after slip, time and pressure are multiplied by their scale factors.
+# Similarity of faults: π-groups as the null space of the dimensional matrix, scale factors, and scaled faults. If every
+# π-group has the same value in both, every solution of one fault is a solution of the other after slip, time and
+# pressure are multiplied by their scale factors.
 
 TOLERANCE = Fraction(1, 100)
 """Relative difference of a π-group up to which faults known to three digits count as similar."""
@@ -389,14 +330,9 @@ _SUPERSCRIPTS = str.maketrans("-/0123456789", "⁻ᐟ⁰¹²³⁴⁵⁶⁷⁸⁹
 
 @dataclass(frozen=True, kw_only=True)
 class PiGroup:
-    """One dimensionless product of parameters, Π parameter^exponent.
+    """One dimensionless product Π parameter^exponent, without zero exponents.
 
-    Attributes
-    ----------
-    name : str
-        The parameter that this group makes dimensionless; its exponent is 1.
-    exponents : mapping of str to Fraction
-        By dotted name of the parameter, without zeros.
+    `name` is the parameter that it makes dimensionless; its exponent is 1.
     """
 
     name: str
@@ -413,21 +349,13 @@ class PiGroup:
 
     def value(self, parameters: Mapping[str, Quantity]) -> Radical:
         """Exact value [-] for given parameters."""
-        if any(parameters[name].value == 0 for name in self.exponents):
-            return radical(0)
-        return power_product({name: parameters[name].value for name in self.exponents}, self.exponents)
+        values = {name: parameters[name].value for name in self.exponents}
+        return power_product(values, self.exponents) if all(values.values()) else radical(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GroupComparison:
-    """One π-group in two faults.
-
-    Attributes
-    ----------
-    group : PiGroup
-    source, target : Radical
-        Values [-].
-    """
+    """Values [-] of one π-group in two faults."""
 
     group: PiGroup
     source: Radical
@@ -442,16 +370,14 @@ class GroupComparison:
 
     def within(self, tolerance: Fraction) -> bool:
         """True where the ratio is in [1 − tolerance, 1 + tolerance], decided in exact arithmetic."""
-        if self.ratio is None:
+        if (ratio := self.ratio) is None:
             return False
-        bound = self.ratio.degree
-        size = self.ratio.sign * self.ratio.radicand
-        return (1 - tolerance) ** bound <= size <= (1 + tolerance) ** bound
+        return (1 - tolerance) ** ratio.degree <= ratio.sign * ratio.radicand <= (1 + tolerance) ** ratio.degree
 
 
 @dataclass(frozen=True, kw_only=True)
 class Similarity:
-    """How one fault maps onto another, and what stands in the way.
+    """Scale factors from one fault to another, and the differences that remain.
 
     Attributes
     ----------
@@ -486,28 +412,18 @@ class Similarity:
 def pi_groups(parameters: Sequence[Quantity]) -> tuple[PiGroup, ...]:
     """Basis of the rational null space of the dimensional matrix, one group for every parameter that is not repeated.
 
-    Parameters
-    ----------
-    parameters : sequence of Quantity
-        The first ones with independent dimensions are the repeated ones, so the order decides on the basis.
+    The first parameters with independent dimensions are the repeated ones, so the order decides on the basis.
     """
-    names = [q.name for q in parameters]
     groups = []
     for vector in dimensional_matrix([q.unit for q in parameters]).nullspace():
-        powers = {name: fraction_of(power) for name, power in zip(names, vector, strict=True) if power}
+        powers = {q.name: fraction_of(power) for q, power in zip(parameters, vector, strict=True) if power}
         made = list(powers)[-1]
         groups.append(PiGroup(name=made, exponents={made: Fraction(1)} | powers))
     return tuple(groups)
 
 
 def ordered(fault: Fault, clock: str = CLOCKS[0]) -> tuple[Quantity, ...]:
-    """Parameters of a fault, those that fix the scales first.
-
-    Parameters
-    ----------
-    fault : Fault
-    clock : str
-        One of `CLOCKS`.
+    """Parameters of a fault, those that fix the scales first; `clock` is one of `CLOCKS`.
 
     Raises
     ------
@@ -515,17 +431,14 @@ def ordered(fault: Fault, clock: str = CLOCKS[0]) -> tuple[Quantity, ...]:
         For another clock.
     """
     require_known(clock, CLOCKS, "clock", UnknownNameError)
-    first = ("unit friction", "density", "length", clock, *_slip_parameters(fault), "effective_normal_stress")
-    found = quantities(fault)
+    found, (slip, normal, time) = quantities(fault), map(BASES.index, ("slip", "normal_length", "time"))
+    # Friction parameters with a slip length, pure lengths first, then the target slip.
+    sizes = {name: dimension(q.unit) for name, q in found.items() if name.startswith("friction.")}
+    lengths = sorted(
+        (n for n, size in sizes.items() if size[slip] and not size[normal]), key=lambda n: sizes[n][time] != 0
+    )
+    first = (_UNIT_FRICTION, "density", "length", clock, *lengths, "reference.target_slip", "effective_normal_stress")
     return tuple(sorted(found.values(), key=lambda q: (q.value == 0, first.index(q.name) if q.name in first else 99)))
-
-
-def _slip_parameters(fault: Fault) -> tuple[str, ...]:
-    """Friction parameters with a slip length, pure lengths first, then the target slip."""
-    slip = BASES.index("slip")
-    found = [q for q in quantities(fault).values() if q.name.startswith("friction.")]
-    held = [q for q in found if dimension(q.unit)[slip] and not dimension(q.unit)[BASES.index("normal_length")]]
-    return (*(q.name for q in sorted(held, key=lambda q: dimension(q.unit)[-1] != 0)), "reference.target_slip")
 
 
 def similarity(source: Fault, target: Fault, *, clock: str | None = None) -> Similarity:
@@ -538,40 +451,29 @@ def similarity(source: Fault, target: Fault, *, clock: str | None = None) -> Sim
         What fixes the scale of time, one of `CLOCKS`. Unless given the task, as in Table I of the paper; but the
         natural period where the operation times are not in the ratio of the natural periods (within `TOLERANCE`).
     """
-    if clock is not None:
-        return _compared(source, target, clock)
-    by_task = _compared(source, target, CLOCKS[0])
-    agrees = all(c.within(TOLERANCE) for c in by_task.comparisons if c.group.name == CLOCKS[1])
-    return by_task if agrees else _compared(source, target, CLOCKS[1])
-
-
-def _compared(source: Fault, target: Fault, clock: str) -> Similarity:
+    if clock is None:
+        by_task = similarity(source, target, clock=CLOCKS[0])
+        agrees = all(c.within(TOLERANCE) for c in by_task.comparisons if c.group.name == CLOCKS[1])
+        return by_task if agrees else similarity(source, target, clock=CLOCKS[1])
     there, here = quantities(target), quantities(source)
     common = [q for q in ordered(source, clock) if q.name in there and there[q.name].unit == q.unit]
     common.sort(key=lambda q: q.value == 0 or there[q.name].value == 0)
-    pivots = dimensional_matrix([q.unit for q in common]).rref()[1]
-    repeating = [common[i] for i in pivots]
-    comparisons = tuple(
-        GroupComparison(group=g, source=g.value(here), target=g.value(there)) for g in pi_groups(common)
-    )
-    matched = {q.name for q in common}
+    repeating = [common[i] for i in dimensional_matrix([q.unit for q in common]).rref()[1]]
     law = () if _law(source) == _law(target) else ("friction.law",)
     return Similarity(
         scales=Scales.from_ratios({q.unit: there[q.name].value / q.value for q in repeating}),
         repeating=tuple(q.name for q in repeating),
-        comparisons=comparisons,
-        unmatched=(*law, *(n for n in (here | there) if n not in matched)),
+        comparisons=tuple(
+            GroupComparison(group=g, source=g.value(here), target=g.value(there)) for g in pi_groups(common)
+        ),
+        unmatched=(*law, *(name for name in here | there if name not in {q.name for q in common})),
     )
 
 
 def _law(fault: Fault) -> tuple[Any, ...]:
     """Friction as a function, in symbols: equal for equal laws, whatever their parameters' values."""
-    import sympy as sp
-
-    slip, rate = sp.Symbol("x", positive=True), sp.Symbol("v", positive=True)
-    state = sp.symbols(f"theta:{len(fault.friction.state_names)}", positive=True)
-    law = fault.friction.symbolic()
-    return law.coefficient(slip, rate, *state), *law.state_rates(slip, rate, *state)
+    law, arguments = fault.friction.symbolic(), _arguments(fault.friction)
+    return law.coefficient(*arguments), *law.state_rates(*arguments)
 
 
 def scaled_parameters(parameters: Mapping[str, Quantity], scales: Scales) -> dict[str, Radical]:
@@ -595,17 +497,15 @@ def scaled_fault(source: Fault, scales: Scales, name: str | None = None) -> Faul
         When a scaled value is out of range, or friction shall be scaled though its law admits no factor.
     """
     exact = scaled_parameters(quantities(source), scales)
-    if exact.pop("unit friction", radical(1)) != radical(1):
+    if exact.pop(_UNIT_FRICTION, radical(1)) != radical(1):
         raise ParameterError(
             f"{source.friction.name} cannot be multiplied by a factor, so the scales must leave friction as it is. "
             f"Received the factor {scales.of('slip_m/normal_m')} for slip_m/normal_m."
         )
-    held = {dotted: float(value) for dotted, value in exact.items()}
-    changes: dict[str, Any] = {key: held[key] for key in PLANT_UNITS if "." not in key and key in held}
-    for part in ("friction", "reference", "disturbance"):
-        changes[part] = replace(getattr(source, part), **_inside(held, f"{part}."))
+    parts: dict[str, dict[str, float]] = {"": {}, "friction": {}, "reference": {}, "disturbance": {}}
+    for dotted, value in exact.items():
+        part, _, key = dotted.rpartition(".")
+        parts[part][key] = float(value)
+    changes: dict[str, Any] = dict(parts.pop(""))
+    changes |= {part: replace(getattr(source, part), **values) for part, values in parts.items()}
     return replace(source, name=name or f"{source.name}-scaled", source=f"similar to: {source.source}", **changes)
-
-
-def _inside(values: Mapping[str, float], prefix: str) -> dict[str, float]:
-    return {name.removeprefix(prefix): value for name, value in values.items() if name.startswith(prefix)}

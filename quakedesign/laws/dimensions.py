@@ -15,7 +15,7 @@ from fractions import Fraction
 from functools import cache
 from importlib.resources import files
 from types import MappingProxyType
-from typing import Any
+from typing import NamedTuple
 
 import sympy as sp
 
@@ -36,15 +36,8 @@ UNROUNDED = {("lab-fault", "elqr"): ("1250000000/3", "6250000/9", "125000000/3",
 """Laboratory gains before they were rounded for print; only these give the printed real-fault gains (ERRATA 25)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LawDimensions:
-    """Exponents of slip, time and output in every gain and integral state of a law.
-
-    Attributes
-    ----------
-    gains, integrals : mapping of str to Form
-        By name; integral states are ``xi1``, ``xi2`` and so on.
-    """
+class LawDimensions(NamedTuple):
+    """Exponents of slip, time and output by name of gain and integral state (``xi1``, ``xi2`` and so on) of a law."""
 
     gains: Mapping[str, Form]
     integrals: Mapping[str, Form]
@@ -52,17 +45,7 @@ class LawDimensions:
 
 @dataclass(frozen=True, kw_only=True)
 class CarriedGains:
-    """Exact gains of a law on a fault, rational or roots of rationals.
-
-    Attributes
-    ----------
-    law : Controller
-        The law with its options; its own gains are those that were carried first.
-    gains : mapping of str to Radical
-        In the units of `gain_units`.
-    integrals : mapping of str to Radical
-        Factors by which the integral states grew from the first fault to this one.
-    """
+    """Exact gains of a law on a fault in `gain_units`, and growth of its integral states since the first fault."""
 
     law: Controller
     gains: Mapping[str, Radical]
@@ -97,11 +80,11 @@ def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction
         law = law.with_divisor(divisor)
         output *= Fraction(divisor) / (start.law.divisor or 1)
     factors = {"slip": scales.of("slip_m"), "time": scales.of("s"), "output": output}
-    dimensions = law_dimensions(law)
+    forms = law_dimensions(law)
     return CarriedGains(
         law=law,
-        gains=_grown(start.gains, dimensions.gains, factors),
-        integrals=_grown(start.integrals, dimensions.integrals, factors),
+        gains={name: gain * power_product(factors, forms.gains[name]) for name, gain in start.gains.items()},
+        integrals={name: xi * power_product(factors, forms.integrals[name]) for name, xi in start.integrals.items()},
     )
 
 
@@ -109,17 +92,9 @@ def exact(controller: Controller) -> CarriedGains:
     """Gains of a controller before they are carried anywhere."""
     return CarriedGains(
         law=controller,
-        gains=MappingProxyType({name: radical(gain) for name, gain in controller.gains.items()}),
-        integrals=MappingProxyType({name: radical(1) for name in _integral_names(controller)}),
+        gains={name: radical(gain) for name, gain in controller.gains.items()},
+        integrals={name: radical(1) for name in _integral_names(controller)},
     )
-
-
-def _grown(values: Mapping[str, Radical], forms: Mapping[str, Form], factors: Mapping[str, Radical]) -> Any:
-    return MappingProxyType({name: value * _factor(forms[name], factors) for name, value in values.items()})
-
-
-def _factor(form: Form, factors: Mapping[str, Radical]) -> Radical:
-    return power_product(factors, form)
 
 
 def _integral_names(controller: Controller) -> list[str]:
@@ -196,13 +171,8 @@ def printed_gains(fault_name: str, law: str) -> Mapping[str, str]:
 def agrees(value: Radical, printed: str) -> bool:
     """True where a number rounds to a printed one, decided in exact arithmetic."""
     half = Fraction(Decimal(1).scaleb(int(Decimal(printed).as_tuple().exponent))) / 2
-    low, high = rational(printed) - half, rational(printed) + half
-    return _below(low, value) and _below(value, high)
-
-
-def _below(left: Radical | Fraction, right: Radical | Fraction) -> bool:
-    a, b = radical(left), radical(right)
-    if a.sign != b.sign:
-        return a.sign < b.sign
-    quotient = a / b if a.sign else radical(1)
-    return quotient.radicand <= 1 if a.sign >= 0 else quotient.radicand >= 1
+    low, high = (  # signs and powers of the ends, in the order of the ends
+        (1 if end >= 0 else -1) * abs(end) ** value.degree
+        for end in (rational(printed) - half, rational(printed) + half)
+    )
+    return low <= value.sign * value.radicand <= high

@@ -6,10 +6,19 @@ from typing import Any
 
 from quakedesign.exact import rational
 from quakedesign.fault import Fault, load_fault
-from quakedesign.fault.similarity import TOLERANCE, GroupComparison, Radical, Scales, Similarity, radical, similarity
+from quakedesign.fault.similarity import TOLERANCE, GroupComparison, Radical, Scales, similarity
 from quakedesign.laws import Controller, control_law
 from quakedesign.laws import published as published_controllers
-from quakedesign.laws.dimensions import UNROUNDED, CarriedGains, Form, agrees, carry, law_dimensions, printed_gains
+from quakedesign.laws.dimensions import (
+    UNROUNDED,
+    CarriedGains,
+    Form,
+    agrees,
+    carry,
+    exact,
+    law_dimensions,
+    printed_gains,
+)
 from quakedesign.lyapunov.exact.fault_bounds import least_authority
 from quakedesign.studies.runs import chosen_controller
 
@@ -67,7 +76,10 @@ def scale_answer(
     own = given != ("published",) and law.divisor is not None
     relation = similarity(start, end, clock=clock)
     carried = carry(law, relation.scales, divisor=least_authority(end) if own else None)
-    scales = relation.scales
+    output = "pressure·divisor" if own else "pressure"
+    options: dict[str, Any] = {"feedback": law.feedback} if hasattr(law, "feedback") else {}
+    if law.divisor is not None:
+        options = {"scale": law.scale, "source_divisor": law.divisor, "divisor": carried.law.divisor}
     return {
         "from": start.name,
         "to": end.name,
@@ -75,12 +87,17 @@ def scale_answer(
         "title": law.title,
         "gains": _texts(carried.gains),
         "gains_decimal": {name: float(gain) for name, gain in carried.gains.items()},
-        "source_gains": _texts({name: radical(gain) for name, gain in law.gains.items()}),
-        "exponents": _exponents(law, own),
-        **_options(law, carried),
+        "source_gains": _texts(exact(law).gains),
+        "exponents": {name: _product_text(form, output) for name, form in law_dimensions(law).gains.items()},
+        **{name: value if name == "feedback" else str(value) for name, value in options.items()},
         "integrals": _texts(carried.integrals),
-        "scale_factors": {name: scales.of(unit).text() for name, (_, unit) in SCALED.items()},
-        **_relation(relation),
+        "scale_factors": {name: relation.scales.of(unit).text() for name, (_, unit) in SCALED.items()},
+        "fixed_by": list(relation.repeating),
+        "similar": relation.similar(),
+        "tolerance": str(TOLERANCE),
+        "differing": [_group(c) for c in relation.differing],
+        "violations": [c.group.name for c in relation.violations()],
+        "unmatched": list(relation.unmatched),
         "published": _published(end, carried),
         "unrounded": _unrounded(start, end, law, relation.scales) if given == ("published",) else None,
     }
@@ -90,33 +107,10 @@ def _texts(values: Mapping[str, Radical]) -> dict[str, str]:
     return {name: value.text() for name, value in values.items()}
 
 
-def _exponents(law: Controller, own: bool) -> dict[str, str]:
-    output = "pressure·divisor" if own else "pressure"
-    return {name: _product_text(form, output) for name, form in law_dimensions(law).gains.items()}
-
-
 def _product_text(form: Form, output: str) -> str:
     words = {"output": f"({output})" if "·" in output else output}
     powers = [(words.get(base, base), form[base]) for base in ("output", "slip", "time") if base in form]
     return "·".join(word if power == 1 else f"{word}^({power})" for word, power in powers) or "1"
-
-
-def _options(law: Controller, carried: CarriedGains) -> dict[str, Any]:
-    """λ and the divisors of a sliding mode, the feedback of a linear law."""
-    if law.divisor is not None:
-        return {"scale": str(law.scale), "source_divisor": str(law.divisor), "divisor": str(carried.law.divisor)}
-    return {"feedback": law.feedback} if hasattr(law, "feedback") else {}
-
-
-def _relation(relation: Similarity) -> dict[str, Any]:
-    return {
-        "fixed_by": list(relation.repeating),
-        "similar": relation.similar(),
-        "tolerance": str(TOLERANCE),
-        "differing": [_group(c) for c in relation.differing],
-        "violations": [c.group.name for c in relation.violations()],
-        "unmatched": list(relation.unmatched),
-    }
 
 
 def _group(comparison: GroupComparison) -> dict[str, Any]:
@@ -136,14 +130,14 @@ def _published(target: Fault, carried: CarriedGains) -> dict[str, Any] | None:
         getattr(printed, option, None) != getattr(carried.law, option, None) for option in ("scale", "divisor")
     ):
         return None
-    texts = printed_gains(target.name, carried.law.name)
-    return {n: _against(carried.gains[n], text) for n, text in texts.items()}
-
-
-def _against(value: Radical, printed: str) -> dict[str, Any]:
-    number = rational(printed)
-    deviation = float(value / number) - 1 if number else None
-    return {"printed": printed, "agrees": agrees(value, printed), "deviation": deviation}
+    return {
+        name: {
+            "printed": text,
+            "agrees": agrees(carried.gains[name], text),
+            "deviation": float(carried.gains[name] / rational(text)) - 1 if rational(text) else None,
+        }
+        for name, text in printed_gains(target.name, carried.law.name).items()
+    }
 
 
 def _unrounded(source: Fault, target: Fault, law: Controller, scales: Scales) -> dict[str, Any] | None:
@@ -154,7 +148,7 @@ def _unrounded(source: Fault, target: Fault, law: Controller, scales: Scales) ->
     first = control_law(law.name).from_values(values)
     carried = carry(first, scales)
     return {
-        "source_gains": _texts({name: radical(gain) for name, gain in first.gains.items()}),
+        "source_gains": _texts(exact(first).gains),
         "gains": _texts(carried.gains),
         "published": _published(target, carried),
     }
