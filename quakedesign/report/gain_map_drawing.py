@@ -215,11 +215,6 @@ def write_gain_map(drawn: GainMap, folder: Path, formats: Sequence[str] = ("png"
         for place, text in drawn.certificates.items():
             write_whole(partial / _file(place), text)
         write_figures(partial, {"map": gain_map_figure(drawn)}, formats)
-        write_whole(partial / "map.csv", gain_map_csv(drawn))
+        write_whole(partial / "map.csv", csv_text(gain_map_rows(drawn)))
         write_results(partial, facts)
     return facts
-
-
-def gain_map_csv(drawn: GainMap) -> str:
-    """The table of all points as CSV."""
-    return csv_text(gain_map_rows(drawn))

@@ -161,11 +161,6 @@ def symbol(name: str) -> sp.Symbol:
     return sp.Symbol(f"factor_{name}", nonnegative=True)
 
 
-def varied_disturbance(disturbance: sp.Expr) -> sp.Expr:
-    """The disturbance of a fault with share and phase of its sine."""
-    return disturbance.replace(sp.sin, lambda angle: symbol("amplitude") * sp.sin(angle + symbol("phase")))
-
-
 @dataclass(frozen=True)
 class WeakenedFriction:
     """A friction law of which only a share of the drop takes place."""
@@ -618,7 +613,11 @@ class ClosedLoop(Metered):
     def disturbance(self) -> sp.Expr:
         """φ̂_e [m/s²] of the fault and of the user, in x1, x2 and t."""
         own = plant.with_disturbance(plant.disturbance(plant.x1, plant.x2, plant.t), self.fault)
-        return (varied_disturbance(own) if self.factors else own) + self.load.acceleration
+        return (
+            own.replace(sp.sin, lambda angle: symbol("amplitude") * sp.sin(angle + symbol("phase")))
+            if self.factors
+            else own
+        ) + self.load.acceleration
 
 
 def _column(values: tuple[Any, ...]) -> Any:

@@ -586,11 +586,6 @@ def constant(value: float) -> str:
     return f"({'-' if value < 0 else ''}INFINITY)" if math.isinf(value) else f"({value.hex()})"
 
 
-def portable_name(code: int) -> str | None:
-    """Name in C of an elementary function."""
-    return f"portable_{FUNCTIONS[code].__name__}" if code in FUNCTIONS else None
-
-
 def called_alone(code: int) -> str | None:
     """Name in C of a function of the C library that is called for one number at a time."""
     return _OF_THE_LIBRARY.get(code)
@@ -999,7 +994,7 @@ class _Body:
 
 
 def _named(code: int) -> str | None:
-    return portable_name(code) or called_alone(code)
+    return (f"portable_{FUNCTIONS[code].__name__}" if code in FUNCTIONS else None) or called_alone(code)
 
 
 def _over_lanes(lines: list[str]) -> Iterator[str]:

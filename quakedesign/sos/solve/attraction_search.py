@@ -119,12 +119,6 @@ def lowest_crossing(claim: Attraction) -> Point | None:
     return min(candidates, key=lambda point: evaluate(claim.lyapunov, point.coordinates), default=None)
 
 
-def lowest_value_on(function: Polynomial, boundary: Polynomial) -> float:
-    """Lowest value found of a polynomial where another, negative at the origin, first vanishes along a ray."""
-    rays = _Rays(len(next(iter(boundary))), function, boundary)
-    return min(map(rays.height, rays.lowest(rays.sampled())), default=0.0)
-
-
 def _rational(claim: Attraction, x: Any) -> Iterator[Point]:
     """Points near one, or a little beyond it, that refute."""
     for beyond in _BEYOND:
@@ -183,7 +177,9 @@ def with_shape(found: Region, shape: Polynomial) -> Region:
     if claim is None or claim.level is None:
         return found
     size = len(claim.variables)
-    touching = lowest_value_on(shape, combination([(Fraction(1), claim.lyapunov), (-claim.level, constant(size))]))
+    boundary = combination([(Fraction(1), claim.lyapunov), (-claim.level, constant(size))])
+    rays = _Rays(len(next(iter(boundary))), shape, boundary)
+    touching = min(map(rays.height, rays.lowest(rays.sampled())), default=0.0)
     if not 0 < touching < inf:
         return found
     for beta in (just_below(Fraction(touching) * share) for share in _SHARES):
