@@ -613,11 +613,9 @@ class ClosedLoop(Metered):
     def disturbance(self) -> sp.Expr:
         """φ̂_e [m/s²] of the fault and of the user, in x1, x2 and t."""
         own = plant.with_disturbance(plant.disturbance(plant.x1, plant.x2, plant.t), self.fault)
-        return (
-            own.replace(sp.sin, lambda angle: symbol("amplitude") * sp.sin(angle + symbol("phase")))
-            if self.factors
-            else own
-        ) + self.load.acceleration
+        if self.factors:
+            own = own.replace(sp.sin, lambda angle: symbol("amplitude") * sp.sin(angle + symbol("phase")))
+        return own + self.load.acceleration
 
 
 def _column(values: tuple[Any, ...]) -> Any:
