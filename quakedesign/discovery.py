@@ -25,8 +25,6 @@ def discovered(package: str, kind: type, shared: Collection[str] | None = None) 
 
     Parameters
     ----------
-    package : str
-    kind : type
     shared : collection of str, optional
         Modules that need none; unless given, none of them does.
 
@@ -78,7 +76,6 @@ def named(
 
     Parameters
     ----------
-    name : str
     known : mapping of str to type
         What the package has.
     kind : type

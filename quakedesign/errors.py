@@ -84,10 +84,8 @@ def require_known(
     ----------
     name : object
         As it was received.
-    known : iterable of str
     what : str
         What the name is of, such as ``"controller"``.
-    refusal : type of QuakedesignError
 
     Raises
     ------

@@ -287,7 +287,6 @@ def hold(folder: Path, *, make: bool = False) -> bool:
 
     Parameters
     ----------
-    folder : Path
     make : bool
         Make the folders above it where there are none.
     """

@@ -299,7 +299,6 @@ class Processes(Crew):
         One process per core that this process may use, unless given.
     begin : callable, optional
         Called in every process before its first task, with `arguments`.
-    arguments : tuple
     """
 
     def __init__(
@@ -420,7 +419,6 @@ class Given(Crew):
 
     Parameters
     ----------
-    executor : Executor
     width : int or None
         One batch per core, unless given.
     """
@@ -539,7 +537,6 @@ def crew_of(workers: int | None, scheduler: str | None = None, executor: Executo
         Number of processes, or of tasks that an executor is given at once; one per core where it is None.
     scheduler : str, optional
         Address of one of dask.distributed.
-    executor : Executor, optional
 
     Raises
     ------

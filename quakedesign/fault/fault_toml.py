@@ -218,7 +218,6 @@ def sliding_step(law: FrictionLaw, task: Reference) -> float:
     ----------
     law : FrictionLaw
         With a state.
-    task : Reference
     """
     ageing = float(min(law.steady_state(mean_rate(task))))
     return _cut(min(ageing / AGEINGS, task.operation_time / _SHARE), digits=2)

@@ -372,7 +372,6 @@ def acceleration(quantity: Any, authority: Fraction, name: str) -> tuple[float, 
 
     Parameters
     ----------
-    quantity : str
     authority : Fraction
         A/m [m²/kg] of the fault, the nominal one.
     name : str

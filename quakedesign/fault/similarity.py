@@ -381,7 +381,6 @@ class Similarity:
 
     Attributes
     ----------
-    scales : Scales
     repeating : tuple of str
         Parameters from whose ratios the scales follow; they fix slip, time, pressure, length and mass.
     comparisons : tuple of GroupComparison
@@ -446,7 +445,6 @@ def similarity(source: Fault, target: Fault, *, clock: str | None = None) -> Sim
 
     Parameters
     ----------
-    source, target : Fault
     clock : str, optional
         What fixes the scale of time, one of `CLOCKS`. Unless given the task, as in Table I of the paper; but the
         natural period where the operation times are not in the ratio of the natural periods (within `TOLERANCE`).

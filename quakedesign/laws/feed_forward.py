@@ -21,7 +21,6 @@ class FeedForward:
 
     Attributes
     ----------
-    name : str
     stiffness : Fraction
         k̂0 [1/s²].
     damping : Fraction
@@ -98,7 +97,6 @@ def feed_forward(name: str, fault: Fault, divisor: Fraction) -> FeedForward:
     ----------
     name : str
         ``none``; ``nominal``, the paper's remark; or ``centred``, which leaves the smallest residuals.
-    fault : Fault
     divisor : Fraction
         μ0N̂0 of the law [m²/kg].
     """

@@ -17,8 +17,6 @@ class FieldTerms:
         Weight of every state.
     field : mapping of str to tuple of Term
         Time derivative of every state.
-    gains, constants, uncertain : tuple of str
-    domain : str
     roots : mapping of str to str
         The gain or constant whose positive square root a name stands for.
     lifts : mapping of str to tuple of Term

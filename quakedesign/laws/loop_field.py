@@ -63,10 +63,8 @@ def sound_field(
 
     Parameters
     ----------
-    field : mapping of Symbol to Expr
     known : iterable of Symbol
         Everything that a rate may hold.
-    states : iterable of Symbol
 
     Raises
     ------

@@ -89,7 +89,6 @@ class SampledLaw(SampledController):
             reference_rate [m, m/s].
         output : str
             ``"pressure"``.
-        label : str
 
         Raises
         ------
@@ -130,7 +129,6 @@ class SampledLaw(SampledController):
             T_s, [s] or with a unit.
         inputs : (str, str)
             What k1 and k2 act on: slip_error or slip, slip_rate_error or slip_rate. Integrals are those of the error.
-        label : str
         """
         values = [rational(v, f"k{i}") for i, v in enumerate(np.asarray(gains, dtype=object).ravel().tolist(), 1)]
         if not 1 <= len(values) <= 4:
@@ -174,7 +172,6 @@ class SampledLaw(SampledController):
             Bandwidth of the derivative [1/s]: D = s·N/(s + N), by backward differences.
         step : str, float or Fraction
             T_s, [s] or with a unit.
-        label : str
         """
         named = zip(("kp", "ki", "kd", "N"), (kp, ki, kd, N), strict=True)
         p, i, d, rate = (rational(v, name) for name, v in named)

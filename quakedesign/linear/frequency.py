@@ -67,7 +67,6 @@ class FrequencyFacts:
     ----------
     beta, slip, rate : float
         The vertex: β [-], s [1/s²], w [1/s].
-    stable : bool
     gain_margin : float or None
         Smallest factor above 1 on K that destabilises; None if none does.
     gain_reduction : float or None

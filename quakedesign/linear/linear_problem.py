@@ -327,7 +327,6 @@ class Polytope:
 
     Attributes
     ----------
-    states : tuple of str
     vertices : mapping of str to Matrix
         Exact, by the name of the vertex.
     """
@@ -409,7 +408,6 @@ def modal_scaling(polytope: Polytope, entries: Sequence[Sequence[float]]) -> Mod
 
     Parameters
     ----------
-    polytope : Polytope
     entries : sequence of sequence of float
         Columns through which the disturbances, or the uncertainty, enter.
     """
@@ -446,8 +444,6 @@ def decreases(
 
     Parameters
     ----------
-    problem : LinearProblem
-    gains : sequence of 4 Fraction
     theta : matrix (4 × 4)
     rate : Fraction
         a [1/s].

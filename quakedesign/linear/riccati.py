@@ -176,7 +176,6 @@ class ScaledDesign:
     ----------
     problem : LinearProblem
         In SI.
-    scales : ProblemScales
     """
 
     def __init__(self, problem: LinearProblem, scales: ProblemScales) -> None:
@@ -334,7 +333,6 @@ def riccati_design(fault: Fault, *, bandwidth: float | None = None) -> RiccatiDe
 
     Parameters
     ----------
-    fault : Fault
     bandwidth : float, optional
         Largest modulus of a closed-loop pole over the uncertainty [rad/s]; 1.5/T_s without.
 

@@ -203,14 +203,12 @@ class SlopeMargin:
         The common quadratic V proves it up to here; 0 when nothing was proved.
     limit : UpperBound
         A constant s of limit·s_max, with β = `limit_beta`, is not asymptotically stable (Routh–Hurwitz, exact).
-    limit_beta : Fraction
     circle : float
         What the circle criterion allows for time-varying s at `limit_beta`, measured.
     slope : Fraction
         s_max = N̂σ'_n·|Δμ|/d_c [1/s²].
     working_slope : Fraction
         The same with the largest effective stress on the way to the target slip (ERRATA 8) [1/s²].
-    certificate : Certificate or None
     """
 
     certified: LowerBound
@@ -314,7 +312,6 @@ class GainRange:
         times the box's: no upper limit was looked for above.
     low_limit : LowerBound
         A constant β of this, with a constant vertex of the rest, is not asymptotically stable (exact).
-    certificates : tuple of Certificate
     """
 
     low: UpperBound
@@ -383,7 +380,6 @@ class DecayRate:
         a with |x(t)| ≤ C·e^{−at} [1/s].
     limit : float
         The slowest pole of a constant vertex [1/s], measured; nothing decays faster.
-    certificate : Certificate
     """
 
     certified: LowerBound
@@ -414,8 +410,6 @@ class Analysis:
         None when no V was found for the whole box.
     unstable_at : (Fraction, Fraction, Fraction) or None
         β, s [1/s²] and w [1/s] of a vertex at which the loop is not asymptotically stable (Routh–Hurwitz, exact).
-    slope : SlopeMargin or None
-    span : GainRange or None
     frequency : tuple of FrequencyFacts
         Measured, one for every vertex.
     """
@@ -460,7 +454,6 @@ def analysis(fault: Fault, controller: Controller) -> Analysis:
 
     Parameters
     ----------
-    fault : Fault
     controller : Controller
         e-LQR.
     """

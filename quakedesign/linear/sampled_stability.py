@@ -129,7 +129,6 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
     ----------
     problem : LinearProblem
         In SI.
-    gains : sequence of 4 Fraction
     step : number or text
         T [s].
     """
@@ -318,7 +317,6 @@ def clock_proof(
     ----------
     problem : LinearProblem
         In SI.
-    gains : sequence of 4 Fraction
     steps : (Fraction, Fraction)
         Shortest and longest T [s].
     degree : int
@@ -380,7 +378,6 @@ def poles(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, ver
     ----------
     problem : LinearProblem
         In units in which its numbers are near 1.
-    gains : sequence of 4 Fraction
     step : Fraction
         T_s.
     vertex : (Fraction, Fraction, Fraction)
@@ -409,7 +406,6 @@ class HeldPoles:
     ----------
     problem : LinearProblem
         In SI.
-    gains : sequence of 4 Fraction
     """
 
     problem: LinearProblem
@@ -535,7 +531,6 @@ def varying_verdict(
     ----------
     problem : LinearProblem
         In SI.
-    gains : sequence of 4 Fraction
     step : number or text
         T [s].
     known : LargestVaryingStep, optional
@@ -561,7 +556,6 @@ def largest_varying_step(problem: LinearProblem, gains: Sequence[Fraction]) -> L
     ----------
     problem : LinearProblem
         In SI.
-    gains : sequence of 4 Fraction
 
     Returns
     -------
@@ -675,7 +669,6 @@ def held_loop(problem: LinearProblem, gains: Sequence[Fraction], step: float | s
     ----------
     problem : LinearProblem
         In SI.
-    gains : sequence of 4 Fraction
     step : number or text
         T_s [s].
 

@@ -21,7 +21,6 @@ class Contribution:
 
     Attributes
     ----------
-    name : str
     acts_on : str
         ``"slip"``, ``"slip rate"``, or ``"nothing"`` for a part that does not vanish at the equilibrium.
     range : (Fraction, Fraction)
@@ -42,8 +41,6 @@ class UncertaintyBounds:
 
     Attributes
     ----------
-    sectors : Sectors
-    contributions : tuple of Contribution
     control : (Fraction, Fraction)
         Interval of μN̂ [m²/kg].
     rest_pressure : (Fraction, Fraction)

@@ -95,9 +95,6 @@ class LinearVerdict:
 
     Attributes
     ----------
-    fault : Fault
-    controller : ExtendedLQR
-    analysis : Analysis
     facts : mapping
         See `linear_facts`.
     held : HeldLoop
@@ -205,8 +202,6 @@ def linear_facts(fault: Fault, controller: ExtendedLQR, held: HeldLoop) -> dict[
 
     Parameters
     ----------
-    fault : Fault
-    controller : ExtendedLQR
     held : HeldLoop
         What is decided of the same gains when p is held.
 

@@ -66,7 +66,6 @@ class Lifted:
 
     Attributes
     ----------
-    expressions : tuple of Expr
     numbers : tuple of Symbol
         Positive ones: signs stay in the expressions.
     values : tuple of float

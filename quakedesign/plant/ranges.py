@@ -31,7 +31,6 @@ class Friction:
 
     Attributes
     ----------
-    static, least, largest : Fraction
     weakening, strengthening : Fraction
         Largest fall and rise of μ per slip.
     rate_slope : Fraction

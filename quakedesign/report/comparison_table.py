@@ -110,8 +110,6 @@ def designed_comparison(
 
     Parameters
     ----------
-    fault : Fault
-    names : iterable of str
     tell : callable
         Progress.
     options : mapping, optional

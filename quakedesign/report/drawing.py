@@ -182,7 +182,6 @@ def figure_bytes(drawing: Any, kind: str, name: str) -> bytes:
 
     Parameters
     ----------
-    drawing : matplotlib.figure.Figure
     kind : str
         One of `FORMATS`.
     name : str
@@ -237,7 +236,6 @@ def inline_svg(drawn: str, drawing: Any, name: str, told: str) -> Markup:
     ----------
     drawn : str
         SVG file of the figure.
-    drawing : matplotlib.figure.Figure
     name : str
         Unique in its page.
     told : str

@@ -144,7 +144,6 @@ def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None
 
     Parameters
     ----------
-    comparison : Compared
     close_ups : mapping of str to Trajectory, optional
         Short runs by label of the entry.
     """

@@ -39,7 +39,6 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
 
     Parameters
     ----------
-    comparison : Comparison
     stored : bool
         Name the files of certificates; None stands for them where nothing is written.
     """
@@ -97,8 +96,6 @@ def write_folder(
 
     Parameters
     ----------
-    comparison : Comparison
-    out : Path
     force : bool
         Replace a folder of earlier results.
     study : PaperStudy, optional

@@ -113,7 +113,6 @@ class Account:
 
     Attributes
     ----------
-    label, badge : str
     good : bool
         Whether the loop that ran has a guarantee, or its proof covers it.
     guarantee, run, limits, verdict, proof : list of str

@@ -29,7 +29,6 @@ class Row:
 
     Attributes
     ----------
-    name, outcome : str
     slip_rate, slip : tuple
         Proved bound, worst case found, and largest value of the run: slip rate [m/s], slip error [m]; None without.
     pressure : (float, float) or None
@@ -51,7 +50,6 @@ class Summary:
     ----------
     answer : str
         What is guaranteed, against the natural earthquake.
-    rows : tuple of Row
     conditions : str
         Sentence of the guarantee of the answer, or why there is none.
     notes : tuple of str

@@ -62,9 +62,6 @@ def in_integers(
 
     Parameters
     ----------
-    asked : Statement
-    squares : sequence of Square
-    cofactors : sequence of Polynomial
     constraints : int, optional
         What the constraints are multiplied by; then the polynomial is taken as it is, with integers.
     """
@@ -119,7 +116,6 @@ class Reason:
     ----------
     sums : IntegerWitness, optional
         numerator · μ − rest as a sum of squares; without it the terms of μ show its sign.
-    numerator, rest : int
     """
 
     sums: IntegerWitness | None = None
@@ -132,7 +128,6 @@ def multiplier_reason(asked: Statement, squares: Sequence[Square]) -> Reason:
 
     Parameters
     ----------
-    asked : Statement
     squares : sequence of Square
         The multiplier as a sum of squares; empty where its terms show its sign.
 

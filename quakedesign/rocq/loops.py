@@ -19,7 +19,6 @@ class Columns:
 
     Attributes
     ----------
-    weights : mapping of str to int
     varying : tuple of str
         Parameters with a range of more than one point.
     values : mapping of str to Fraction

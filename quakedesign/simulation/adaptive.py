@@ -58,14 +58,7 @@ def scales(loop: ClosedLoop) -> list[float]:
 
 @dataclass(frozen=True)
 class SmoothMarch:
-    """One run to a tolerance.
-
-    Attributes
-    ----------
-    recorder : Recorder
-    method : type of AdaptiveIntegrator
-    rtol : float
-    """
+    """One run to a tolerance."""
 
     recorder: Recorder
     method: type[AdaptiveIntegrator]
@@ -128,11 +121,8 @@ class _Piece:
 
     Attributes
     ----------
-    recorder : Recorder
-    flow : Flow
     watch : casadi.Function
         (first vector, states and works at each instant) → vector at each.
-    count : int
     """
 
     recorder: Recorder

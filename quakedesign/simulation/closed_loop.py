@@ -251,7 +251,6 @@ class Meter:
 
     Attributes
     ----------
-    loop : ClosedLoop
     works : SX
         So far, in the order of `WORKS`.
     """
@@ -290,7 +289,6 @@ class Metered(Stepped):
 
     Attributes
     ----------
-    load : Load
     factors : tuple of float or SX
         True over nominal parameters; empty for the nominal fault.
     """
@@ -427,8 +425,6 @@ class ClosedLoop(Metered):
 
     Attributes
     ----------
-    fault : Fault
-    controller : Controller or None
     constant_pressure : float
         p [Pa] where there is no controller.
     load : Load
@@ -455,11 +451,9 @@ class ClosedLoop(Metered):
 
         Parameters
         ----------
-        method : type of Integrator
         motion : callable
             Time derivative of the state, given the plant as a function of t [s], x and p [Pa], how much of the step has
             passed [-], and the state.
-        state : SX
         step : float
             [s].
         works : int
@@ -480,7 +474,6 @@ class ClosedLoop(Metered):
             As there, with `passed` counting steps, and with `given`.
         given : SX
             What else the motion depends on.
-        times : int
         """
         return self.metered_often(method, motion, given, (state, ca.SX(0, 1)), step, times)[0]
 

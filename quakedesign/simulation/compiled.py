@@ -395,7 +395,6 @@ class Instruction:
         Places of the arguments; for an input its number and the entry.
     given : tuple of int
         Places of the results, −1 where none is wanted; for an output its number and the entry.
-    constant : float
     """
 
     operation: int

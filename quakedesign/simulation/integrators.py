@@ -61,10 +61,8 @@ class RungeKutta(Integrator):
 
     Attributes
     ----------
-    nodes : tuple of Fraction
     matrix : tuple of tuple of Fraction
         Row i holds the shares of the stages before i.
-    weights : tuple of Fraction
     """
 
     nodes: ClassVar[tuple[Fraction, ...]]
@@ -148,7 +146,6 @@ class AdaptiveIntegrator(ABC):
     ----------
     name : str
         Also that of CasADi's plugin.
-    source : str
     """
 
     name: ClassVar[str]

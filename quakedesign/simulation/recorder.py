@@ -57,7 +57,6 @@ class Parts:
         Time from which errors count [s].
     state : SX or ndarray
         x1 [m], x2 [m/s], ξ, memory of the scheme.
-    watched : dict of str to SX or float
     factors : tuple of SX or float
         Numbers of the plant that a run carries along unchanged.
     """
@@ -79,8 +78,6 @@ class Recorder:
 
     Attributes
     ----------
-    loop : ClosedLoop
-    scheme : Scheme
     step : float
         T_s [s].
     initial : tuple of float

@@ -93,12 +93,8 @@ def trajectory(
 
     Parameters
     ----------
-    recorder : Recorder
-    setting : RunSetting
     kept : ndarray
         Vectors of the recorder, shape (their length, number of instants).
-    criterion : OutcomeCriterion
-    provenance : dict
     began : tuple of float
         Readings of the clock when the work and when the stepping began [s].
 

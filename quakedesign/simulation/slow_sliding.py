@@ -104,7 +104,6 @@ def simulate_sliding(
         Whether the fault has its mass.
     method : str
         ``"cvodes"`` or ``"idas"``.
-    progress : callable
 
     Returns
     -------

@@ -148,12 +148,10 @@ class SmoothProblem:
 
     Attributes
     ----------
-    rates : casadi.Function
     scales : ndarray
         Size of each variable below which its error counts absolutely.
     watched : int
         Index of the variable whose upward crossings of `level` are found.
-    level : float
     """
 
     rates: Any
@@ -170,8 +168,6 @@ class SmoothProblem:
 
         Parameters
         ----------
-        start : ndarray
-        load : Ramp
         times : ndarray
             Ascending instants [s].
         every_step : bool

@@ -33,7 +33,6 @@ class Checkpoint:
 
     Attributes
     ----------
-    path : Path
     fingerprint : str
         Of everything that determines the digits of the run; a file of another run is refused.
     """
@@ -120,7 +119,6 @@ class Advancer:
 
     Attributes
     ----------
-    vector : ndarray
     calls : tuple of callable
         Advance the vector by 1, 64 and 4096 steps; none beside machine code.
     owners : tuple

@@ -37,7 +37,6 @@ class Recording(ABC):
 
     Attributes
     ----------
-    name : str
     time : ndarray
         [s], shape (n,).
     """

@@ -20,7 +20,6 @@ class BlocksAnswer:
 
     Attributes
     ----------
-    fault : Fault
     wells : str
         ``"one"`` or ``"each"``.
     step : Fraction

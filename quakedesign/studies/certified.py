@@ -46,7 +46,6 @@ class Certified:
 
     Attributes
     ----------
-    verdict : Verdict
     certificate : Certificate or None
         Proof or counterexample.
     facts : mapping
@@ -75,7 +74,6 @@ def certified(
     ----------
     name : str
         Law.
-    gains : tuple of number or text
     lipschitz : number or text, optional
         L̄. Not needed to maximise it; if given all the same, the smallest scale λ for it is told.
     maximize : str, optional
@@ -333,11 +331,9 @@ def trajectory_premise(law: Controller, lipschitz: float | None, run: Trajectory
 
     Parameters
     ----------
-    law : Controller
     lipschitz : float or None
         Certified bound on |h'| [m/s³]. None where there is no certificate: then nothing is certified, the premise does
         not hold whatever the run does, and its note names the limit that no certificate of these gains exceeds.
-    run : Trajectory
     """
     if law.lipschitz_limit is None:
         return None

@@ -129,10 +129,8 @@ class Compared:
 
     Attributes
     ----------
-    fault : Fault
     uncontrolled : Trajectory or StateRun
         The natural earthquake; of friction with a state the cycle of them.
-    entries : tuple of Entry
     """
 
     fault: Fault

@@ -37,7 +37,6 @@ class ErrataRow:
 
     Attributes
     ----------
-    number : int
     printed, correct : str
         Both forms, in one line of text.
     kind : str

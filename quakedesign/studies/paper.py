@@ -62,7 +62,6 @@ def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> li
 
     Parameters
     ----------
-    comparison : Compared
     more : dict of str to Trajectory, optional
         Further runs without a controller, by name.
     """
@@ -163,7 +162,6 @@ class PaperRuns:
 
     Attributes
     ----------
-    comparison : Compared
     induced : Trajectory or None
         Without control, under a constant pressure of a tenth of the effective normal stress; None for friction with a
         state, which has none of the short runs.
@@ -184,7 +182,6 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
 
     Parameters
     ----------
-    comparison : Compared
     progress : callable, optional
         Called with what is being done and the fraction done [-].
     """

@@ -260,8 +260,6 @@ class SlidingLimits(Limits):
 
     Attributes
     ----------
-    push : SlidingPush
-    guarantee : SlidingGuarantee or None
     rock : Fraction
         L²/D [s] of the well that was asked about; 0 without one.
     """

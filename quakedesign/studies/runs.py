@@ -95,11 +95,8 @@ class StateRun:
 
     Attributes
     ----------
-    fault : Fault
     loading_rate : float
         v_∞ [m/s].
-    start : StartingState
-    trajectory : StateTrajectory
     seconds : float
         Time that it took [s], where that was measured.
     failed : str
@@ -213,7 +210,6 @@ def run_state(
 
     Parameters
     ----------
-    fault : Fault
     start : str
         ``steady`` (sliding at the loading rate), ``locked`` (held since then for the time `hold`) or ``late`` (when a
         `share` of the time between two events has passed).
@@ -312,13 +308,10 @@ class HeldRun:
 
     Attributes
     ----------
-    fault : Fault
-    model : SlidingModel
     step, lag, diffusion : Fraction
         [s].
     stages : tuple of str
         What else the pressure goes through.
-    trajectory : SlidingRun
     claim : SlidingGuarantee or None
         What is proved of the law, where it comes from the file of that.
     """
@@ -476,7 +469,6 @@ def sensor(
     ----------
     step : float
         Sampling period [s].
-    noise : Measurement
     bound : float or None
         λ_d [m/s^(n_d + 1)] of a differentiator; None for none.
     filter_order : int
@@ -585,7 +577,6 @@ class Choice:
 
     Attributes
     ----------
-    controller : Controller
     lipschitz : Fraction or None
         Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law.
     claim : Guarantee, SlidingGuarantee, StickSlipGuarantee or None
@@ -684,9 +675,6 @@ def choice(
 
     Parameters
     ----------
-    fault : Fault
-    name : str
-    gains : tuple of str
     scale : str, optional
         λ of a sliding mode in place of that of the gains.
     feedforward : str
@@ -779,7 +767,6 @@ def run_single(
 
     Parameters
     ----------
-    fault : Fault
     law : Controller, Choice or None
         Of a choice it is known what is certified. None with a duration: the fault under its own disturbance. None
         without: the natural earthquake.
@@ -787,7 +774,6 @@ def run_single(
         Progress.
     duration : float, optional
         [s]; the operation time unless given.
-    load : Load, optional
     noise : Measurement or Sensor
         What the law is told.
     actuator : Actuator

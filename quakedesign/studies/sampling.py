@@ -33,9 +33,6 @@ class SchemeRow:
         Law, and whether it is the published one, or its λ.
     origin : str
         Of the gains: ``"designed"``, ``"given"``, ``"published"``.
-    controller : Controller
-    scheme : str
-    run : Trajectory
     premise : Premise or None
         |h'| on the trajectory, for a sliding mode that did not diverge; nothing is certified of gains that come without
         a certificate.
@@ -73,7 +70,6 @@ class SamplingReport:
 
     Attributes
     ----------
-    fault : Fault
     rows : tuple of SchemeRow
         The law under every scheme, then the published ones: as in the paper, held, and with the compensated scheme.
     studies : dict of str to Study
@@ -110,7 +106,6 @@ def sampling_report(
 
     Parameters
     ----------
-    fault : Fault
     law : Controller or Design
         Of a design the certified bound on |h'| is known.
     scales : sequence of str

@@ -312,7 +312,6 @@ def enclose(expression: sp.Expr, box: BallBox) -> Any:
     ----------
     expression : Expr
         Built from rationals, symbols, +, ·, powers, exp, sin, cos, Abs, Max, Min and signed powers.
-    box : mapping of Symbol to (Fraction, Fraction)
 
     Returns
     -------
@@ -497,8 +496,6 @@ def upper_bound(
 
     Parameters
     ----------
-    expression : Expr
-    box : mapping of Symbol to (Fraction, Fraction)
     tolerance : Fraction
         Stop when the bound is within this share of a value that is attained.
     pieces : int
@@ -584,7 +581,6 @@ class Excess:
 
     Attributes
     ----------
-    at : mapping of Symbol to Fraction
     value : Fraction
         A rigorous lower bound of the expression there.
     """

@@ -57,7 +57,6 @@ class Counterexample:
         The identity in words.
     point : mapping of Symbol to Rational
         Exact values of all states and parameters.
-    epsilon : Rational
     """
 
     identity: Identity
@@ -319,10 +318,8 @@ def size_of(e: sp.Expr, sizes: Mapping[sp.Symbol, sp.Expr], equations: list[sp.E
 
     Parameters
     ----------
-    e : Expr
     sizes : mapping of Symbol to Expr
         Linear in what is unknown; any other symbol does not grow.
-    equations : list of Expr
     """
     if e in sizes or not e.has(*sizes):
         return sizes.get(e, sp.Integer(0))
@@ -350,10 +347,8 @@ def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control
 
     Parameters
     ----------
-    output : Expr
     field : mapping of Symbol to Expr
         Rate of every state.
-    control : Symbol
 
     Returns
     -------

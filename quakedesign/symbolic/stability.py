@@ -74,13 +74,10 @@ class StabilityVerdict:
 
     Attributes
     ----------
-    outcome : Stability
-    conditions : tuple of Condition
     pressure : (Fraction, Fraction)
         Range of the pressure [Pa].
     loading_rate : Fraction
         Slip rate of the equilibrium [m/s].
-    inertia : bool
     """
 
     outcome: Stability

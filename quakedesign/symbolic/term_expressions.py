@@ -40,8 +40,6 @@ def without_nesting(
 
     Parameters
     ----------
-    expressions : sequence of Expr
-    states : sequence of Symbol
     taken : iterable of str
         Names that the new symbols must not have.
 
@@ -148,8 +146,6 @@ def signed_monomials(weights: Mapping[str, int], degree: int, domain: str) -> tu
 
     Parameters
     ----------
-    weights : mapping of state to int
-    degree : int
     domain : str
         ``"cells"``, or ``"reals"`` for polynomials only.
 

@@ -18,7 +18,6 @@ class Term:
 
     Attributes
     ----------
-    coefficient : Fraction
     parameters : tuple of str
         Names, each as often as it multiplies.
     factors : tuple of (state, exponent, kind)
@@ -104,11 +103,9 @@ def cell_polynomial(
 
     Parameters
     ----------
-    terms : iterable of Term
     weights : mapping of state to r_i
         In the order of the variables.
     signs : mapping of state to ±1
-    parameters : mapping of name to Fraction
 
     Raises
     ------

@@ -24,7 +24,6 @@ def friction_law(name: str, *, in_file: bool = False, allow_code: bool = False) 
 
     Parameters
     ----------
-    name : str
     in_file : bool
         The name stands in a file: it may be one of the package only, unless code is allowed.
     allow_code : bool

@@ -308,7 +308,6 @@ class Sampled(Scheme, Decided):
     ----------
     substeps : int
         Steps of the integrator per sample, 1 … 100.
-    actuator : Actuator
     measurement : Measurement or Sensor
         A sensor is told the true slip alone, once per sample of its own period.
     authority : float or None

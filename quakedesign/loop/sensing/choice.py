@@ -47,7 +47,6 @@ def worst_errors(differentiator: Differentiator, noise: float = 0.0) -> tuple[fl
 
     Parameters
     ----------
-    differentiator : Differentiator
     noise : float
         ε, bound of the error of a reading [m].
 

@@ -264,7 +264,6 @@ class Differentiator:
 
         Parameters
         ----------
-        numbers, memory : list of SX
         slip : SX
             Reading [m].
 

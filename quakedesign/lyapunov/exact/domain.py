@@ -82,8 +82,6 @@ class DomainProblem:
 
     Attributes
     ----------
-    fault : Fault
-    controller : SlidingMode
     certificate : Certificate
         For the base gains, with bounds of all states.
     robustness : Robustness or None

@@ -148,7 +148,6 @@ def largest_matched_rate(
 
     Parameters
     ----------
-    fault : Fault
     divisor : Fraction
         μ0N̂0 [m²/kg].
     errors : Errors
@@ -253,7 +252,6 @@ def rest_pressure(
 
     Parameters
     ----------
-    fault : Fault
     slip : (Fraction, Fraction)
         Range of the reference r0 [m], not negative.
     nominal : bool

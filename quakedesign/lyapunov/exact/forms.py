@@ -91,10 +91,8 @@ class Form:
 
     Attributes
     ----------
-    variables, degree : int
     coefficients : tuple of int
         In the order of `_exponents`.
-    scale : flint.fmpq
     """
 
     variables: int

@@ -29,7 +29,6 @@ class Cell:
     ----------
     name : str
         Signs as a word of + and −, states first; empty on the reals.
-    signs : mapping of str to int
     equalities, inequalities : tuple of Polynomial
         Each is 0, or ≥ 0, on the cell.
     """
@@ -46,10 +45,8 @@ class Obligation:
 
     Attributes
     ----------
-    name : str
     polynomial : Polynomial
         In the variables of states, lifts and, for a decay, V^{1/m}; all ≥ 0 unless on the reals.
-    equalities, inequalities : tuple of Polynomial
     """
 
     name: str

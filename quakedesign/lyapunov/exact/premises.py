@@ -51,12 +51,10 @@ class Premise:
 
     Attributes
     ----------
-    name : str
     required : UpperBound
         What the loop asks for, in `unit`; a rigorous upper bound unless `measured`.
     certified : LowerBound
         What the certificate covers, in `unit`.
-    unit : str
     proved : bool
         False if `certified` is only a limit that no certificate can exceed; the premise then never holds.
     measured : bool
@@ -153,8 +151,6 @@ class Variant:
 
     Attributes
     ----------
-    feedforward : FeedForward
-    premises : tuple of Premise
     domain : Domain or None
         None where the certificate has no bounds of its states, or there is none.
     """

@@ -120,7 +120,6 @@ def robustness(certificate: Certificate, model: LoopField | None = None) -> Robu
 
     Parameters
     ----------
-    certificate : Certificate
     model : LoopField, optional
         Loop of the law, see `LevelSets`.
 

@@ -112,12 +112,10 @@ def neighbourhood(
 
     Parameters
     ----------
-    loop : Loop
     degree : int
         Of V.
     scale : tuple of Fraction
         Of the variables.
-    pace : Pace, optional
     lyapunov : tuple of Term
         V as it is now, which the changes act on.
     changed : sequence of Loop
@@ -271,7 +269,6 @@ def box(loop: Loop, units: Mapping[str, sp.Expr]) -> tuple[float, ...]:
 
     Parameters
     ----------
-    loop : Loop
     units : mapping of str to Expr
         Error that one unit of a state stands for, see `LoopField.units`.
     """
@@ -467,7 +464,6 @@ class PathSetting:
 
     Attributes
     ----------
-    objective : Objective
     exponents : mapping of str to Fraction
         Of gains and states, see `stretch_exponents`.
     degree : int
@@ -495,8 +491,6 @@ class State:
         With the ranges that the level asks for.
     level : float
         Of the objective.
-    lyapunov : tuple of Term
-    margin : float
     """
 
     loop: Loop
@@ -653,8 +647,6 @@ def climb(setting: PathSetting, state: State, *, free: bool = True, until: float
 
     Parameters
     ----------
-    setting : PathSetting
-    state : State
     free : bool
         Whether the gains may move.
     until : float, optional
@@ -780,12 +772,8 @@ def look(
 
     Parameters
     ----------
-    setting : PathSetting
-    loop : Loop
-    level : float
     lyapunov : tuple of Term
         V of a state nearby; only a rate needs it.
-    beyond : float, optional
     least : float, optional
         Margin that counts; that of the setting unless given.
     """

@@ -232,7 +232,6 @@ class SynthesisProblem:
         With gains of one.
     setting : PathSetting
         With the lowest degree.
-    degrees : tuple of int
     known : tuple of Loop
         With gains from the literature, scaled to the same ranges.
     """
@@ -368,8 +367,6 @@ class Synthesis:
 
     Attributes
     ----------
-    law, objective, unit : str
-    gains : mapping of str to Fraction
     certificate : Certificate
         Checked in exact arithmetic.
     value : float
@@ -591,7 +588,6 @@ def given(asked: SynthesisProblem, loop: Loop) -> ComparedGains:
 
     Parameters
     ----------
-    asked : SynthesisProblem
     loop : Loop
         With the gains.
     """

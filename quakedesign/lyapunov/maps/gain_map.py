@@ -226,7 +226,6 @@ class GainMap:
         Points with a neighbour of a lower level; all of them were tried.
     certificates : mapping of (i, j) to str
         Text of the certificate for the highest level proved.
-    solves : int
     seconds : mapping of str to float
         Of ``"screening"`` and ``"proving"``.
     """

@@ -42,8 +42,6 @@ class Cones:
 
     Parameters
     ----------
-    rows : sequence of FormRow
-    loop : Loop
     monomials : sequence of Term
         V_j.
     scale : tuple of Fraction
@@ -154,7 +152,6 @@ class Screened:
         Largest t.
     decision : list of float
         a_j, in the units of the frame.
-    frame : Frame
     slopes : mapping of str to float
         Derivative of the margin in every number that V̇ depends on, by the names of `rows_of`.
     """
@@ -223,7 +220,6 @@ class Sweep:
 
         Parameters
         ----------
-        loop : Loop
         frame : Frame, optional
             Units; those of the point unless given. Margins in different units share their sign only.
         accuracy : float
@@ -402,7 +398,6 @@ class _Step:
 
     Attributes
     ----------
-    tau : float
     moves, multipliers, bound
         ΔL, those of the equations over τ, and μ.
     least, most : float
@@ -437,7 +432,6 @@ class Path:
 
     Parameters
     ----------
-    sweep : Sweep
     frame : Frame
         Units of all points.
     """
@@ -500,11 +494,8 @@ class _Newton:
 
     Parameters
     ----------
-    kinds : sequence of _Rows
     tables : sequence of array
         C, of every kind of rows.
-    means : array
-    place : _Place
 
     Raises
     ------

@@ -373,8 +373,6 @@ class CertifiedLimit:
         Proof for the value; where there is none, the exact counterexample, if one is known.
     counterexample : str
         What speaks against the gains where nothing is found, see `against`; else ``"none"``.
-    solves : int
-    seconds : float
     """
 
     quantity: str

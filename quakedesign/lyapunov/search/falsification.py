@@ -40,7 +40,6 @@ def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
 
     Parameters
     ----------
-    loop : Loop
     steps : int
         Of the first runs; every step moves the state by at most 1/200 of its size.
     """

@@ -52,10 +52,8 @@ class Dual:
 
     Attributes
     ----------
-    loop : Loop
     degree : int
         Of V.
-    atoms : tuple of Atom
     """
 
     loop: Loop

@@ -402,7 +402,6 @@ def find_certificate(
 
     Parameters
     ----------
-    loop : Loop
     degrees : int or iterable of int, optional
         Of V in the weights of the loop, tried in turn; `candidate_degrees` unless given.
     subject : str, type of Law or LoopField, optional

@@ -27,7 +27,6 @@ class Settling:
     ----------
     decay : Fraction
         κ, proved; it belongs to this V.
-    factor, power : Fraction
     start : Fraction
         Size of every |e_i| at the start.
     seconds : float

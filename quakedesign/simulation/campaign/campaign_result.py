@@ -30,7 +30,6 @@ def figure(title: str, caption: str, shown: Mapping[str, tuple[Any, Mapping[floa
 
     Parameters
     ----------
-    title, caption : str
     shown : mapping of str to tuple
         Under what is shown, with its unit: values of the samples, nan where there is none, and quantiles to mark.
     """
@@ -196,7 +195,6 @@ class Campaign:
         ----------
         index : int or str
             Of the sample; ``"search-3"`` is one that the search looked at.
-        samples : int
 
         Raises
         ------

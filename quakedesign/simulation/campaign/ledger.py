@@ -62,7 +62,6 @@ class Ledger:
 
     Attributes
     ----------
-    folder : Path
     fingerprint : str
         Of everything that the campaign is about.
     """
@@ -76,7 +75,6 @@ class Ledger:
 
         Parameters
         ----------
-        folder : Path
         inputs : mapping
             Everything that determines the digits of every sample, as `plain` gives it.
         renew : bool

@@ -218,14 +218,10 @@ class SlidingProgram:
 
     Attributes
     ----------
-    fault : Fault
-    law : LinearLaw
     step : Fraction
         T_s [s].
-    path : PressurePath
     stress, period : float
         Amplitude [Pa] and period [s] of the stress of a sample whose share is 1.
-    plant, method : str
     settled_from : float
         [s].
     """
@@ -473,7 +469,6 @@ class CompiledProgram:
         ----------
         starts : ndarray
             Shape (samples, size).
-        steps : int
         """
         move = mover(self)
         vectors = np.array(starts, dtype=np.float64, order="C", ndmin=2)

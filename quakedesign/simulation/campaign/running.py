@@ -65,7 +65,6 @@ def dispatch(
         Computes one batch from its arguments.
     batches : mapping of int to tuple
         Arguments, by key.
-    crew : Crew
     keep : callable
         Called with key and answer, in any order.
     """

@@ -60,7 +60,6 @@ class Space:
 
         Parameters
         ----------
-        fault : Fault
         initial_slip, initial_slip_rate : float
             Largest x1 [m] and x2 [m/s] at the start, not negative.
         """
@@ -188,15 +187,12 @@ def search(
 
     Parameters
     ----------
-    space : Space
     metric : str
         Only handed on.
     evaluate : callable
         How bad samples are: larger is worse, infinite ends the search.
     starts : sequence of sequence of float
         Points of the unit cube.
-    noise_seed : int
-    rounds : int
     """
     looked_at: list[Sample] = []
 

@@ -68,7 +68,6 @@ class Expansion:
     ----------
     text : str
         For the excerpt in messages.
-    variables : sequence of str
     """
 
     def __init__(self, text: str, variables: Sequence[str]) -> None:

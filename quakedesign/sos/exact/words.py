@@ -34,7 +34,6 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
 
     Parameters
     ----------
-    answer : Answer
     verbose : bool
         With the sizes of the Gram matrices before and after the reduction.
     """

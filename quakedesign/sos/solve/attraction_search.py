@@ -195,9 +195,6 @@ def expanded(found: Region, shape: Polynomial, top: int, certify: Callable[[Attr
 
     Parameters
     ----------
-    found : Region
-    shape : Polynomial
-    top : int
     certify : callable
         Region that is proved for a V.
     """

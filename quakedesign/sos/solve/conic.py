@@ -113,7 +113,6 @@ class Compiled:
 
         Parameters
         ----------
-        accuracy : float
         anew : bool
             False goes on with the solver of the last call, faster by what it has ordered and scaled; its last digits
             then depend on what was solved before.

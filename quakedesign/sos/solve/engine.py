@@ -100,7 +100,6 @@ class Method(ABC):
 
     Attributes
     ----------
-    name : str
     order : int
         Lower ones, which are cheaper, are tried first.
     """

@@ -75,7 +75,6 @@ class Forced:
 
     Attributes
     ----------
-    requirements : tuple of Requirement
     solved : mapping of int to Affine
         Decisions that follow from the others.
     reasons : tuple of str

@@ -57,8 +57,6 @@ class DecisionBounds:
     ----------
     radii : sequence of float
         Without effect on those that have a share.
-    rows : sequence of sequence of float
-    bounds : sequence of float
     shares : sequence of float
         Of the first decisions, positive; none unless given.
     """
@@ -118,7 +116,6 @@ class JointProgram:
 
         Parameters
         ----------
-        demands : sequence of Demand
         fixed : sequence of Polynomial, optional
             C_o, in the monomials of the demand's template; nothing unless given.
         limits : DecisionBounds, optional

@@ -29,7 +29,6 @@ class Shape:
 
     Attributes
     ----------
-    weight : mapping of exponents to float
     basis : tuple of exponents
         Monomials m (length n).
     face : array (r × n), optional
@@ -52,10 +51,8 @@ class MomentSolution:
 
     Attributes
     ----------
-    margin : float
     grams, moments : list of array
         Q = Z + t·I and L(g_S·b bᵀ) of every block.
-    functional : mapping of exponents to float
     cofactors : array
         Coefficients of the multiples of the equalities, in the order of their rows.
     """
@@ -72,7 +69,6 @@ class MomentProgram:
 
     Parameters
     ----------
-    blocks : sequence of Shape
     relations : sequence of mapping of exponents to float
         The multiples m·h on which L vanishes.
     """

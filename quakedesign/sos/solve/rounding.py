@@ -52,10 +52,8 @@ def rounded(
 
     Parameters
     ----------
-    statement : Statement
     blocks : sequence of Block
         As solved.
-    solution : MomentSolution
     checked : callable, optional
         The exact decision: the proof that is returned for a rounded one, or None where that one does not hold. Unless
         given, the identity is checked and the proof is returned as it is.
@@ -197,8 +195,6 @@ class Scaled:
 
     Attributes
     ----------
-    statement : Statement
-    scale : tuple of Fraction
     target : Fraction
         Factor that the target was divided by.
     inequalities, equalities : tuple of Fraction

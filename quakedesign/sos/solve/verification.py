@@ -216,10 +216,8 @@ class GramFile:
 
     Attributes
     ----------
-    variables : tuple of str
     polynomial : str or mapping of exponents to Fraction
     gram : array of float (n × n)
-    basis : list of str or of exponents (length n)
     """
 
     variables: tuple[str, ...]
