@@ -692,14 +692,14 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
     certificate = changed.pop("certificate", None)
     if certificate is not None:
         told = _as_proved(fault, certificate, changed, options)
-        held, more = run_held(fault, **told), told["stress"] > told["claim"].task.stress
+        more, (trajectory, answer) = told["stress"] > told["claim"].task.stress, run_held(fault, **told)
         outside = [*(["stress"] if more else []), *(name for name in changed if name in (*_PUMP, *_READING, "plant"))]
-        trajectory, answer = held.trajectory, held.to_dict() | {"outside": [n for n in outside if n != "seed"]}
+        answer |= {"outside": [n for n in outside if n != "seed"]}
         lines = sliding_run_lines
     elif "controller" in changed:
         _require_designed(asked)
-        held = run_held(fault, **_instruments(fault, changed, options), **options["state"].of_control())
-        trajectory, answer, lines = held.trajectory, held.to_dict(), sliding_run_lines
+        trajectory, answer = run_held(fault, **_instruments(fault, changed, options), **options["state"].of_control())
+        lines = sliding_run_lines
     else:
         free = run_state(fault, **_told(fault, changed, _FREE), **options["state"].of_free())
         trajectory, answer, lines = free.trajectory, free.to_dict(), state_run_lines

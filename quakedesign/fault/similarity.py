@@ -142,7 +142,7 @@ def _arguments(law: FrictionLaw) -> "tuple[sp.Symbol, ...]":
     """Symbols of slip, slip rate and state, which a coefficient takes."""
     import sympy as sp
 
-    return sp.symbols(("x", "v", *(f"theta{i}" for i in range(len(law.state_names)))), positive=True)
+    return tuple(sp.Symbol(n, positive=True) for n in ("x", "v", *(f"theta{i}" for i in range(len(law.state_names)))))
 
 
 # ----------------------------------------------------------------------

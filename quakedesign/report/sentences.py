@@ -531,7 +531,7 @@ def proved_line(sentence: str | None, outside: list[str]) -> str:
 
 
 def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
-    """Lines for people, from `HeldRun.to_dict`: outcome, errors, pressure, and what is proved where that is known."""
+    """Lines for people, from the JSON of `run_held`: outcome, errors, pressure, and what is proved."""
     outcome, found = answer["outcome"], answer["metrics"]
     least, largest = (p / 1e6 for p in answer["pressure"])
     path = "".join(f", through a {name.replace('_', ' ')}" for name in answer["stages"])

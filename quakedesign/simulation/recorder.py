@@ -389,27 +389,15 @@ def metrics(
         peak = watched["peak_slip_rate"]  # of a plant that stays finite where the numbers of its law overflow
         known = {"peak_slip_rate": peak} if peak <= _FASTEST else {}
         return kind(**known, settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
-    figures = (
-        {
-            "max_h_rate": watched["max_h_change"] / step,
-            "max_pressure": watched["max_pressure"],
-            "min_pressure": watched["min_pressure"],
-        }
-        | _settled(watched)
-        | {name: watched[name] for signal in signals for name in (f"max_{signal}", f"min_{signal}")}
-        if controlled
-        else {}
-    )
-    figures["peak_slip_rate"] = watched["peak_slip_rate"]
-    if sticks:
-        figures |= _shares(watched)
+    figures = {"peak_slip_rate": watched["peak_slip_rate"]}
+    if controlled:
+        extremes = [f"{side}_{signal}" for signal in ("pressure", *signals) for side in ("max", "min")]
+        figures |= _settled(watched) | {name: watched[name] for name in extremes}
+        figures["max_h_rate"] = watched["max_h_change"] / step
+    if sticks and watched["settled_count"]:
+        figures["time_at_rest_fraction"] = watched["rest_count"] / watched["settled_count"]
     finite = {name: value for name, value in figures.items() if math.isfinite(value)}
     return kind(**finite, settled_from=settled_from, steps=steps, seconds=seconds)
-
-
-def _shares(watched: dict[str, float]) -> dict[str, float]:
-    count = watched["settled_count"]
-    return {"time_at_rest_fraction": watched["rest_count"] / count} if count else {}
 
 
 def _settled(watched: dict[str, float]) -> dict[str, float]:

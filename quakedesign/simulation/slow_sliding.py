@@ -1,7 +1,7 @@
 """A controlled fault with rate-and-state friction: sampled, held, through rock, with a stiff solver between samples."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from fractions import Fraction
 from time import perf_counter
@@ -18,7 +18,7 @@ from quakedesign.laws import LinearLaw
 from quakedesign.loop.actuators.base import SampledStage
 from quakedesign.loop.sensing import Transducer
 from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
-from quakedesign.simulation.recorder import Metrics
+from quakedesign.simulation.recorder import NEVER, metrics
 from quakedesign.simulation.run import RunSetting, library_versions
 from quakedesign.simulation.state_plant import Instruments, PressurePath, SlidingVariation, SpringSlider, Tide
 from quakedesign.simulation.stick_slip import dynamic_rate
@@ -121,26 +121,83 @@ def simulate_sliding(
     kept = 1 if samples is None else samples
     setting = RunSetting.of(fault, float(step), max(length, float(step)), kept, settled_from)
     path = PressurePath(lag=lag, diffusion=diffusion, stages=tuple(stages))
-    loop = _Loop.of(fault, path, tide or Tide(), variation or SlidingVariation(), inertia)
+    varied = variation or SlidingVariation()
+    loop = _Loop.of(fault, path, tide or Tide(), varied, inertia)
     around = Instruments.of(path, transducer, float(step))
     rows, events = _followed(loop, law, around, length, method, progress)
-    told = {"scheme": "explicit", "step": float(step), "method": method, "inertia": str(inertia)}
-    told |= {
-        f"variation_{name}": value for name, value in asdict(variation or SlidingVariation()).items() if value != 1
-    }
-    run = _recorded(fault, loop, rows, events, told | {"plant": "smooth" if inertia else "quasi-dynamic"})
-    run = replace(run, metrics=_metrics(run, setting, perf_counter() - began))
-    return run if samples is None else _thinned(run, samples)
-
-
-def _thinned(run: SlidingRun, samples: int) -> SlidingRun:
-    """About so many instants of a run, the first and the last among them."""
-    count = len(run.time)
-    kept = np.unique(np.linspace(0, count - 1, min(count, samples + 1)).astype(int))
+    time, slip, _, log_rate, log_state, asked, pressure = rows.T.copy()
+    rate, reference, reference_rate = np.exp(log_rate), loop.reference.slip(time), loop.reference.rate(time)
+    friction = loop.slider.readings.map(len(time))(rows[:, 1:5].T, pressure)[0].full().ravel()
+    late = time > setting.settled_from
+    figures = metrics(
+        {
+            "settled_count": float(np.count_nonzero(late)),
+            **_of_errors((slip - reference)[late], (rate - reference_rate)[late], pressure[late]),
+            "reverse_count": 0.0,  # the logarithm of the slip rate is what is integrated
+            "max_h_change": math.nan,
+            "max_pressure": float(pressure.max()),
+            "min_pressure": float(pressure.min()),
+            "peak_slip_rate": math.inf if "diverged" in events else float(rate.max()),
+            "diverged": len(time) - 1 if "diverged" in events else NEVER,
+        },
+        controlled=True,
+        step=1.0,
+        steps=len(time) - 1,
+        settled_from=setting.settled_from,
+        seconds=perf_counter() - began,
+    )
+    run = SlidingRun(
+        name=f"{fault.name}, held in slow sliding",
+        time=time,
+        slip=slip,
+        slip_rate=rate,
+        pressure=pressure,
+        reference=reference,
+        reference_rate=reference_rate,
+        matched_perturbation=None,
+        friction=friction,
+        shear_stress=friction * (loop.slider.normal_stress - pressure),
+        moment_per_slip=fault.moment_of(1.0),
+        integrals=np.empty((0, len(time))),
+        integral_units=(),
+        metrics=figures,
+        energy=None,
+        events=events,
+        criterion=criterion_of(fault),
+        provenance={
+            "friction": fault.friction.name,
+            "controller": "elqr",
+            "scheme": "explicit",
+            "step": float(step),
+            "method": method,
+            "inertia": str(inertia),
+            **{f"variation_{name}": value for name, value in asdict(varied).items() if value != 1},
+            "plant": "smooth" if inertia else "quasi-dynamic",
+        }
+        | library_versions("casadi", "numpy", "quakedesign"),
+        theta=np.exp(log_state),
+        asked=asked,
+        stress=loop.tide.at(time),
+    )
+    if samples is None:
+        return run
+    shown = np.unique(np.linspace(0, len(time) - 1, min(len(time), samples + 1)).astype(int))
     arrays: dict[str, Any] = {
-        f.name: value[..., kept] for f in fields(run) if isinstance(value := getattr(run, f.name), np.ndarray)
+        f.name: value[..., shown] for f in fields(run) if isinstance(value := getattr(run, f.name), np.ndarray)
     }
     return replace(run, **arrays)
+
+
+def _of_errors(slip: "np.ndarray", rate: "np.ndarray", pressure: "np.ndarray") -> dict[str, float]:
+    """What a recorder accumulates of the errors of slip and slip rate and of the pressure."""
+    return {
+        "max_slip_error": float(np.max(np.abs(slip), initial=0.0)),
+        "max_slip_rate_error": float(np.max(np.abs(rate), initial=0.0)),
+        "sum_square_slip_error": float(np.sum(slip**2)),
+        "sum_square_slip_rate_error": float(np.sum(rate**2)),
+        "sum_square_pressure": float(np.sum(pressure**2)),
+        "pressure_variation": float(np.sum(np.abs(np.diff(pressure)))),
+    }
 
 
 @dataclass(frozen=True)
@@ -225,37 +282,6 @@ def _followed(
     return np.array(rows), {}
 
 
-def _recorded(
-    fault: Fault, loop: _Loop, rows: "np.ndarray", events: Mapping[str, float], told: Mapping[str, Any]
-) -> SlidingRun:
-    time, slip, _, log_rate, log_state, asked, pressure = rows.T.copy()
-    friction = loop.slider.readings.map(len(time))(rows[:, 1:5].T, pressure)[0].full().ravel()
-    return SlidingRun(
-        name=f"{fault.name}, held in slow sliding",
-        time=time,
-        slip=slip,
-        slip_rate=np.exp(log_rate),
-        pressure=pressure,
-        reference=loop.reference.slip(time),
-        reference_rate=loop.reference.rate(time),
-        matched_perturbation=None,
-        friction=friction,
-        shear_stress=friction * (loop.slider.normal_stress - pressure),
-        moment_per_slip=fault.moment_of(1.0),
-        integrals=np.empty((0, len(time))),
-        integral_units=(),
-        metrics=Metrics(settled_from=0.0, steps=0, seconds=0.0),
-        energy=None,
-        events=events,
-        criterion=criterion_of(fault),
-        provenance={"friction": fault.friction.name, "controller": "elqr", **told}
-        | library_versions("casadi", "numpy", "quakedesign"),
-        theta=np.exp(log_state),
-        asked=asked,
-        stress=loop.tide.at(time),
-    )
-
-
 def criterion_of(fault: Fault) -> OutcomeCriterion:
     """What the outcome of a run in slow sliding is decided by; the natural peak takes a cycle to know."""
     reference = SlidingReference(task=fault.reference)
@@ -265,35 +291,4 @@ def criterion_of(fault: Fault) -> OutcomeCriterion:
         reference_rate=float(reference.first_rate * (1 + reference.swing)),
         target_slip=fault.reference.target_slip,
         dynamic_rate=dynamic_rate(fault),
-    )
-
-
-def _metrics(run: SlidingRun, setting: RunSetting, seconds: float) -> Metrics:
-    """Figures of all instants of a run that followed its reference; none of one that diverged."""
-    if "diverged" in run.events:
-        return Metrics(settled_from=setting.settled_from, steps=len(run.time) - 1, seconds=seconds)
-    late = run.time > setting.settled_from
-    slip, rate = (values[late] for values in (run.slip - run.reference, run.slip_rate - run.reference_rate))
-    pressure = run.pressure[late]
-    of_errors: dict[str, float] = {}
-    if late.any():
-        of_errors = {
-            "max_slip_error": float(np.max(np.abs(slip))),
-            "max_slip_rate_error": float(np.max(np.abs(rate))),
-            "mise_slip": float(np.mean(slip**2)),
-            "mise_slip_rate": float(np.mean(rate**2)),
-            "rms_slip_error": math.sqrt(np.mean(slip**2)),
-            "rms_slip_rate_error": math.sqrt(np.mean(rate**2)),
-            "rms_pressure": math.sqrt(np.mean(pressure**2)),
-            "pressure_total_variation": float(np.sum(np.abs(np.diff(pressure)))),
-            "reverse_slip_fraction": 0.0,  # its logarithm is what is integrated
-        }
-    return Metrics(
-        **of_errors,
-        peak_slip_rate=float(run.slip_rate.max()),
-        max_pressure=float(run.pressure.max()),
-        min_pressure=float(run.pressure.min()),
-        settled_from=setting.settled_from,
-        steps=len(run.time) - 1,
-        seconds=seconds,
     )

@@ -17,7 +17,7 @@ import numpy as np
 
 from quakedesign.errors import CertificateError, ParameterError, SimulationError, UnknownNameError, require_known
 from quakedesign.exact import rational
-from quakedesign.fault import Disturbance, Fault, SlidingReference
+from quakedesign.fault import Disturbance, Fault
 from quakedesign.fault.model import require_positive
 from quakedesign.guarantees import ContinuousPeaks, Guarantee, SlidingGuarantee, load_guarantee
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
@@ -27,7 +27,7 @@ from quakedesign.guarantees.search.compensated_search import recovered
 from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_model
 from quakedesign.laws import Controller, Sampling, control_law, published
 from quakedesign.laws.feed_forward import feed_forward
-from quakedesign.loop import Actuator, SlidingModel, simulation_scheme
+from quakedesign.loop import Actuator, simulation_scheme
 from quakedesign.loop.actuators.base import SampledStage
 from quakedesign.loop.actuators.chain import DIRECT
 from quakedesign.loop.loop_setup import IDEAL
@@ -302,59 +302,6 @@ def designed_run(
     return replace(run, criterion=replace(run.criterion, natural_peak=natural_peak))
 
 
-@dataclass(frozen=True, kw_only=True)
-class HeldRun:
-    """A controlled simulation, and its result.
-
-    Attributes
-    ----------
-    step, lag, diffusion : Fraction
-        [s].
-    stages : tuple of str
-        What else the pressure goes through.
-    claim : SlidingGuarantee or None
-        What is proved of the law, where it comes from the file of that.
-    """
-
-    fault: Fault
-    model: SlidingModel
-    step: Fraction
-    lag: Fraction
-    diffusion: Fraction
-    stages: tuple[str, ...]
-    trajectory: SlidingRun
-    claim: SlidingGuarantee | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Answer of ``simulate`` with a controller, SI units."""
-        run, rate = self.trajectory, float(self.model.rate)
-        reference = SlidingReference(task=self.fault.reference)
-        followed = reference.rate(run.time)
-        return {
-            "outcome": run.outcome.to_dict() | {"earthquake_from": rate + 0.1 * dynamic_rate(self.fault)},
-            "reference_rate": rate,
-            "largest_reference_rate": float(np.max(followed)),
-            "growth_rate": growth_rate(self.model),
-            "step": float(self.step),
-            "lag": float(self.lag),
-            "diffusion": float(self.diffusion),
-            "stages": list(self.stages),
-            "metrics": {
-                "max_log_rate": float(np.max(np.abs(np.log(run.slip_rate / followed)))),
-                "max_slip_error": float(np.max(np.abs(run.slip - reference.slip(run.time)))),
-                "max_asked": float(np.max(np.abs(run.asked))),
-            },
-            "pressure": [float(run.pressure.min()), float(run.pressure.max())],
-            "stress": float(np.max(np.abs(run.stress))),
-            "slip": float(run.slip[-1]),
-            "duration": float(run.time[-1]),
-            "steps": len(run.time),
-            "run": dict(run.provenance),
-            "guarantee": {"sentence": self.claim.sentence()} if self.claim else None,
-            "outside": [],
-        }
-
-
 def run_held(
     fault: Fault,
     *,
@@ -369,10 +316,8 @@ def run_held(
     plant: str = "smooth",
     method: str = "cvodes",
     claim: SlidingGuarantee | None = None,
-) -> HeldRun:
-    """Let the e-LQR of `sliding_law`, or that of a guarantee, hold a fault at the mean rate of its task.
-
-    It starts in steady sliding.
+) -> tuple[SlidingRun, dict[str, Any]]:
+    """Run the e-LQR of `sliding_law`, or of a guarantee, on a fault that starts in steady sliding; with its JSON.
 
     Parameters
     ----------
@@ -414,8 +359,32 @@ def run_held(
         inertia=PLANTS[plant],
         method=method,
     )
-    around: dict[str, Any] = {"lag": through, "diffusion": path, "stages": tuple(s.name for s in stages)}
-    return HeldRun(fault=fault, model=model, step=held, **around, trajectory=run, claim=claim)
+    assert run.reference is not None
+    assert run.reference_rate is not None
+    answer = {
+        "outcome": run.outcome.to_dict() | {"earthquake_from": float(model.rate) + 0.1 * dynamic_rate(fault)},
+        "reference_rate": float(model.rate),
+        "largest_reference_rate": float(np.max(run.reference_rate)),
+        "growth_rate": growth_rate(model),
+        "step": float(held),
+        "lag": float(through),
+        "diffusion": float(path),
+        "stages": [stage.name for stage in stages],
+        "metrics": {
+            "max_log_rate": float(np.max(np.abs(np.log(run.slip_rate / run.reference_rate)))),
+            "max_slip_error": float(np.max(np.abs(run.slip - run.reference))),
+            "max_asked": float(np.max(np.abs(run.asked))),
+        },
+        "pressure": [float(run.pressure.min()), float(run.pressure.max())],
+        "stress": float(np.max(np.abs(run.stress))),
+        "slip": float(run.slip[-1]),
+        "duration": float(run.time[-1]),
+        "steps": len(run.time),
+        "run": dict(run.provenance),
+        "guarantee": {"sentence": claim.sentence()} if claim else None,
+        "outside": [],
+    }
+    return run, answer
 
 
 def _require_runnable(fault: Fault, plant: str) -> None:

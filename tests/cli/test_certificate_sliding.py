@@ -82,7 +82,7 @@ def test_it_is_for_its_fault_and_as_it_is(capsys, fault, more, said):
 
 def test_a_delay_and_noise_of_the_proof_are_in_the_run(capsys, monkeypatch, tmp_path):
     late = replace(CLAIM, held=replace(CLAIM.held, delay=CLAIM.held.step, slip_noise=F(1, 10**6)))
-    assert run_held(CRUSTAL, claim=late, duration=1000.0).stages == ("delay",)
+    assert run_held(CRUSTAL, claim=late, duration=1000.0)[1]["stages"] == ["delay"]
     save_guarantee(late, tmp_path / "late.json")
     monkeypatch.setattr(type(CLAIM), "check", lambda claim: Verdict.PROVED)
     seen = {}
