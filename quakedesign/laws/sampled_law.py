@@ -5,7 +5,6 @@ laws with a model of the diffusion path between well and fault; a pressure limit
 integrator windup.
 """
 
-from collections.abc import Sequence
 from dataclasses import field
 from fractions import Fraction
 from typing import ClassVar
@@ -20,6 +19,7 @@ from quakedesign.laws.implicit_root import ImplicitRoot
 
 Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
+Estimated = tuple[tuple[str, ...], tuple[Row, Row], Row]
 
 MEASURED = ("slip_error", "slip_rate_error")
 NOISES = ("slip_noise", "rate_noise")
@@ -222,18 +222,9 @@ def disturbance_estimate(
     gain : Fraction
         β·b of the model [m²/kg], positive.
     """
-    require_gain(gain)
-    late = len(prediction.ahead_of_pushes)
-    size = 4 + late  # rows act on (π, d, p_1 …) and then on (e1, e2)
-    share, one = weight / sum(prediction.of_pushes), Fraction(1)
-    level = unit_row(size, {0: -share, 1: one, size - 1: share})
-    errors = unit_row(size, {size - 2: one}), unit_row(size, {size - 1: one})
-    waiting = [unit_row(size, {2 + j: one}) for j in range(late)]
-    asked, pushes = answered(gains, gain, errors, level, waiting, prediction.ahead, prediction.ahead_of_pushes)
-    own = unit_row(size, {size - 2: prediction.of_slip, size - 1: prediction.of_rate})
-    predicted = combined((one, own), *zip(prediction.of_pushes, pushes, strict=True))
-    pushed = (gain * prediction.of_pushes[0], Fraction(0))
-    return law_of_rows(("predicted_rate", "disturbance"), [predicted, level], asked, waiting, pushed)
+    names, errors, level = _estimated(weight / sum(prediction.of_pushes), len(prediction.ahead_of_pushes))
+    of_errors, of_pushes = ((prediction.of_slip, prediction.of_rate),), tuple((push,) for push in prediction.of_pushes)
+    return _delayed(names, gains, gain, errors, level, of_errors, of_pushes, prediction)
 
 
 def require_gain(gain: Fraction) -> None:
@@ -242,41 +233,58 @@ def require_gain(gain: Fraction) -> None:
         raise ParameterError(f"the input gain of a model must be positive. Received {shortly(gain)} m²/kg.")
 
 
-def answered(
+def _estimated(share: Fraction, behind: int) -> Estimated:
+    """Names of the first states, and rows for errors and disturbance that act on (π, d, `behind` others, e1, e2)."""
+    size, one = 4 + behind, Fraction(1)
+    level = unit_row(size, {0: -share, 1: one, size - 1: share})
+    errors = unit_row(size, {size - 2: one}), unit_row(size, {size - 1: one})
+    return ("predicted_rate", "disturbance"), errors, level
+
+
+def _observed(corrections: tuple[Fraction, Fraction, Fraction], behind: int) -> Estimated:
+    """As `_estimated`, acting on (π1, π2, d, `behind` others, e1, e2)."""
+    size, one = 5 + behind, Fraction(1)
+    innovation = unit_row(size, {0: -one, size - 2: one})
+    slip, rate, level = (combined((one, unit_row(size, {i: one})), (v, innovation)) for i, v in enumerate(corrections))
+    return ("predicted_slip", "predicted_rate", "disturbance"), (slip, rate), level
+
+
+def _delayed(
+    names: tuple[str, ...],
     gains: tuple[Fraction, Fraction],
     gain: Fraction,
     errors: tuple[Row, Row],
     level: Row,
-    waiting: list[Row],
-    ahead: Matrix,
-    ahead_of_pushes: Matrix,
-) -> tuple[Row, list[Row]]:
-    """The commanded pressure, and βb·p_j + d for it and every delayed one."""
-    one = Fraction(1)
+    of_errors: Matrix,
+    of_pushes: Matrix,
+    prediction: "Prediction | ErrorPrediction",
+) -> LinearLaw:
+    """Law of rows that act on its states and then on e1 and e2; pressures on their way move one place on."""
+    require_gain(gain)
+    one, late = Fraction(1), len(prediction.ahead_of_pushes)
+    waiting = [unit_row(len(level), {len(names) + j: one}) for j in range(late)]
     before = [combined((gain, row), (one, level)) for row in waiting]
-    expected = [
+    slip, rate = (
         combined(
-            *zip(row, errors, strict=True), *((v[i], push) for v, push in zip(ahead_of_pushes, before, strict=True))
+            *zip(row, errors, strict=True),
+            *((v[i], p) for v, p in zip(prediction.ahead_of_pushes, before, strict=True)),
         )
-        for i, row in enumerate(ahead)
+        for i, row in enumerate(prediction.ahead)
+    )
+    asked = combined((-gains[0], slip), (-gains[1], rate), (-1 / gain, level))
+    pushes = [combined((gain, asked), (one, level)), *before]
+    predicted = [
+        combined(*zip(row, errors, strict=True), *((v[i], push) for v, push in zip(of_pushes, pushes, strict=True)))
+        for i, row in enumerate(of_errors)
     ]
-    asked = combined((-gains[0], expected[0]), (-gains[1], expected[1]), (-1 / gain, level))
-    return asked, [combined((gain, asked), (one, level)), *before]
-
-
-def law_of_rows(names: tuple[str, ...], own: list[Row], asked: Row, waiting: list[Row], pushed: Row) -> LinearLaw:
-    """Law of rows that act on its states and then on e1 and e2; pressures on their way move one place on.
-
-    Its own states gain `pushed` per Pa that is applied.
-    """
-    rows = [*own, *[asked, *waiting][: len(waiting)]]
+    rows = [*predicted, level, *[asked, *waiting][:late]]
     return LinearLaw(
-        states=(*names, *(f"asked_{j + 1}_ago" for j in range(len(waiting)))),
+        states=(*names, *(f"asked_{j + 1}_ago" for j in range(late))),
         update=tuple(row[:-2] for row in rows),
         measured=tuple(row[-2:] for row in rows),
         output=asked[:-2],
         feedback=asked[-2:],
-        applied=(*pushed, *[Fraction(1), *[Fraction(0)] * len(waiting)][: len(waiting)]),
+        applied=(*(gain * v for v in of_pushes[0]), Fraction(0), *[one, *[Fraction(0)] * late][:late]),
     )
 
 
@@ -349,23 +357,8 @@ def slip_observer(
     gain : Fraction
         β·b of the model [m²/kg], positive.
     """
-    require_gain(gain)
-    late = len(prediction.ahead_of_pushes)
-    size, one = 5 + late, Fraction(1)  # rows act on (π1, π2, d, p_1 …) and then on (e1, e2)
-    innovation = unit_row(size, {0: -one, size - 2: one})
-    slip, rate, level = (combined((one, unit_row(size, {i: one})), (v, innovation)) for i, v in enumerate(corrections))
-    waiting = [unit_row(size, {3 + j: one}) for j in range(late)]
-    asked, pushes = answered(gains, gain, (slip, rate), level, waiting, prediction.ahead, prediction.ahead_of_pushes)
-    predicted = [
-        combined(
-            (of_slip, slip),
-            (of_rate, rate),
-            *((v[i], push) for v, push in zip(prediction.of_pushes, pushes, strict=True)),
-        )
-        for i, (of_slip, of_rate) in enumerate(prediction.of_errors)
-    ]
-    pushed = (*(gain * v for v in prediction.of_pushes[0]), Fraction(0))
-    return law_of_rows(("predicted_slip", "predicted_rate", "disturbance"), [*predicted, level], asked, waiting, pushed)
+    names, errors, level = _observed(corrections, len(prediction.ahead_of_pushes))
+    return _delayed(names, gains, gain, errors, level, prediction.of_errors, prediction.of_pushes, prediction)
 
 
 # ----------------------------------------------------------------------
@@ -440,11 +433,7 @@ def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: 
     ParameterError
         When the gains do not fit, or the model's is not positive.
     """
-    size, one = 4 + len(model.kept), Fraction(1)  # rows act on (π, d, q) and then on (e1, e2)
-    share = weight / model.of_constant[1]
-    level = unit_row(size, {0: -share, 1: one, size - 1: share})
-    errors = unit_row(size, {size - 2: one}), unit_row(size, {size - 1: one})
-    return _through(("predicted_rate", "disturbance"), gains, model, gain, errors, level)
+    return _through(*_estimated(weight / model.of_constant[1], len(model.kept)), gains, model, gain)
 
 
 def observer_through_path(
@@ -470,14 +459,11 @@ def observer_through_path(
     ParameterError
         As `estimate_through_path`.
     """
-    size, one = 5 + len(model.kept), Fraction(1)  # rows act on (π1, π2, d, q) and then on (e1, e2)
-    innovation = unit_row(size, {0: -one, size - 2: one})
-    slip, rate, level = (combined((one, unit_row(size, {i: one})), (v, innovation)) for i, v in enumerate(corrections))
-    return _through(("predicted_slip", "predicted_rate", "disturbance"), gains, model, gain, (slip, rate), level)
+    return _through(*_observed(corrections, len(model.kept)), gains, model, gain)
 
 
 def _through(
-    names: Sequence[str], gains: Row, model: PathModel, gain: Fraction, errors: tuple[Row, Row], level: Row
+    names: tuple[str, ...], errors: tuple[Row, Row], level: Row, gains: Row, model: PathModel, gain: Fraction
 ) -> LinearLaw:
     """Law of the last so many predictions, the level and the path, from rows for the errors and the level."""
     count, own = len(model.kept), len(names)
