@@ -141,10 +141,6 @@ def _row_lines(row: dict[str, Any]) -> list[str]:
     return [told, f"    printed: {row['printed']}", f"    correct: {row['correct']}"]
 
 
-# ----------------------------------------------------------------------
-# The command with which a fault of one's own begins.
-
-
 @app.command
 def init(
     file: Path = Path("my-fault.toml"),
@@ -185,10 +181,6 @@ def init(
     facts = {"file": str(file), "schema": str(beside) if beside else None}
     output.show(facts, [f"written: {', '.join(written)}", f"next: edit it, then quakedesign fault {file}"])
     return 0
-
-
-# ----------------------------------------------------------------------
-# The command from a laboratory record to friction parameters.
 
 
 @app.command

@@ -186,10 +186,6 @@ def _facts(answer: Any, path: Path | None) -> dict[str, Any]:
     return {**answer.to_dict(), "certificate": written and str(written)}
 
 
-# ----------------------------------------------------------------------
-# The command about several blocks.
-
-
 @app.command
 def blocks(
     fault: FaultName,
@@ -242,10 +238,6 @@ def blocks(
                 save_guarantee(found, files[count])
     output.show(answer.to_dict(), answer.lines())
     return 0 if answer.proved else 1
-
-
-# ----------------------------------------------------------------------
-# The command about what no controller can do.
 
 
 @app.command

@@ -256,10 +256,6 @@ def sos(
     return 0 if facts["verdict"] == "sos" else 1
 
 
-# ----------------------------------------------------------------------
-# The command about polynomial fields: stability, and regions of attraction.
-
-
 @app.command
 def attraction(
     field: Path,

@@ -78,10 +78,6 @@ def _short(text: str) -> str:
     return f"{float(Fraction(text)):.6g}"
 
 
-# ----------------------------------------------------------------------
-# What was exported, in lines for people.
-
-
 def export_lines(answer: dict[str, Any]) -> list[str]:
     """The same for people."""
     measured = ", ".join(f"{name} [{unit}]" for name, unit in answer["measurement"].items())

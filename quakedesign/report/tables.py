@@ -50,10 +50,6 @@ def _cells(run: "Trajectory | None") -> tuple[str, ...]:
     )
 
 
-# ----------------------------------------------------------------------
-# Tables of numbers as CSV.
-
-
 def csv_text(rows: list[dict[str, Any]]) -> str:
     """Rows as CSV with a head line; what does not apply is empty."""
     heads = list(dict.fromkeys(name for row in rows for name in row))

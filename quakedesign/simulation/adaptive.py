@@ -1,8 +1,7 @@
 """Runs of smooth loops to a tolerance, watched at every instant of the grid as if each were a step."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, partial
 from typing import Any
 
 import casadi as ca
@@ -13,7 +12,7 @@ from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.laws.sampled_controller import law_expressions
 from quakedesign.loop import Scheme
 from quakedesign.simulation.closed_loop import WORKS, ClosedLoop
-from quakedesign.simulation.integrators import AdaptiveIntegrator, Flow, StoppedError
+from quakedesign.simulation.integrators import AdaptiveIntegrator, StoppedError
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.symbolic import SignedPower
 from quakedesign.symbolic.signed_power import AbsolutePower
@@ -56,101 +55,62 @@ def scales(loop: ClosedLoop) -> list[float]:
     return [slip, slip * pace, *(known.get(unit, 1.0) for unit in units)]
 
 
-@dataclass(frozen=True)
-class SmoothMarch:
-    """One run to a tolerance."""
+def smooth_march(
+    recorder: Recorder,
+    method: type[AdaptiveIntegrator],
+    rtol: float,
+    start: list[float],
+    kept: list[int],
+    progress: Callable[[float], None] | None = None,
+) -> "np.ndarray":
+    """Vectors at the kept steps, one a column; ends early after the first instant that counts as diverged.
 
-    recorder: Recorder
-    method: type[AdaptiveIntegrator]
-    rtol: float
-
-    def run(self, start: list[float], kept: list[int], progress: Callable[[float], None] | None = None) -> "np.ndarray":
-        """Vectors at the kept steps, one a column; ends early after the first instant that counts as diverged.
-
-        Raises
-        ------
-        SimulationError
-            When the solver stops although nothing has diverged.
-        """
-        wanted, vector, found = set(kept), np.array(start), [np.array(start)]
-        longest = CHUNK
-        while (now := self.recorder.parts(vector)).counter < kept[-1] and now.watched["diverged"] < 0:
-            vectors = self._chunk(vector, min(longest, kept[-1] - round(now.counter)))
-            longest = min(longest, vectors.shape[1])
-            counters = self.recorder.parts(vectors).counter
-            found += [column for column, counter in zip(vectors.T, counters, strict=True) if round(counter) in wanted]
-            vector = vectors[:, -1]
-            if progress:
-                progress(counters[-1] / kept[-1])
-        if self.recorder.parts(found[-1]).counter != now.counter:
-            found.append(vector)
-        return np.array(found).T
-
-    def _chunk(self, vector: "np.ndarray", count: int) -> "np.ndarray":
-        """Vectors after each of the next steps; where the solver stops, of as many as it can take at once."""
-        try:
-            return self._pieces[count].vectors(vector)
-        except StoppedError as error:
-            if count > 1:
-                return self._chunk(vector, max(1, count // _FEWER))
-            time = self.recorder.parts(vector).counter * self.recorder.step
-            raise SimulationError(
-                f"{self.method.name} cannot go on after t = {time:.6g} s ({error}). "
-                "Loosen rtol, or use a fixed step: method dormand-prince."
-            ) from None
-
-    @cached_property
-    def _pieces(self) -> "_Pieces":
-        return _Pieces(self)
-
-
-class _Pieces(dict[int, "_Piece"]):
-    """Solver and watching of a number of steps, built when first asked for."""
-
-    def __init__(self, march: SmoothMarch) -> None:
-        self.march = march
-
-    def __missing__(self, count: int) -> "_Piece":
-        self[count] = _Piece.of(self.march, count)
-        return self[count]
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """A number of steps at once.
-
-    Attributes
-    ----------
-    watch : casadi.Function
-        (first vector, states and works at each instant) → vector at each.
+    Raises
+    ------
+    SimulationError
+        When the solver stops although nothing has diverged.
     """
+    pieces = cache(partial(_piece, recorder, method, rtol))
+    wanted, vector, found, longest = set(kept), np.array(start), [np.array(start)], CHUNK
+    while (now := recorder.parts(vector)).counter < kept[-1] and now.watched["diverged"] < 0:
+        count, vectors = min(longest, kept[-1] - round(now.counter)), None
+        while vectors is None:  # where the solver stops, as many steps as it can take at once
+            try:
+                vectors = pieces(count)(vector)
+            except StoppedError as error:
+                if count == 1:
+                    raise SimulationError(
+                        f"{method.name} cannot go on after t = {now.counter * recorder.step:.6g} s ({error}). "
+                        "Loosen rtol, or use a fixed step: method dormand-prince."
+                    ) from None
+                count = max(1, count // _FEWER)
+        longest = min(longest, count)
+        counters = recorder.parts(vectors).counter
+        found += [column for column, counter in zip(vectors.T, counters, strict=True) if round(counter) in wanted]
+        vector = vectors[:, -1]
+        if progress:
+            progress(counters[-1] / kept[-1])
+    if recorder.parts(found[-1]).counter != now.counter:
+        found.append(vector)
+    return np.array(found).T
 
-    recorder: Recorder
-    flow: Flow
-    watch: Any
-    count: int
 
-    @classmethod
-    def of(cls, march: SmoothMarch, count: int) -> "_Piece":
-        """Piece of a march."""
-        recorder = march.recorder
-        shares = np.arange(1, count + 1) / count
-        sizes = scales(recorder.loop)
-        flow = march.method.flow(field(recorder), sizes, shares, rtol=march.rtol, quadratures=len(WORKS))
-        vector, state = ca.SX.sym("z", recorder.size), ca.SX.sym("state", recorder.state_size)
-        done = ca.SX.sym("works", len(WORKS))
-        follow = ca.Function("watch", [vector, state, done], [recorder.moved(vector, state, done)])
-        return cls(recorder, flow, follow.mapaccum("watch", count), count)
+def _piece(
+    recorder: Recorder, method: type[AdaptiveIntegrator], rtol: float, count: int
+) -> Callable[["np.ndarray"], "np.ndarray"]:
+    """Function that maps a vector onto those after each of the next steps, one a column; raises `StoppedError`."""
+    shares, works = np.arange(1, count + 1) / count, len(WORKS)
+    flow = method.flow(field(recorder), scales(recorder.loop), shares, rtol=rtol, quadratures=works)
+    symbols = [ca.SX.sym(n, size) for n, size in (("z", recorder.size), ("y", recorder.state_size), ("w", works))]
+    watch = ca.Function("watch", symbols, [recorder.moved(*symbols)]).mapaccum("watch", count)
+    factors, first, step = [float(factor) for factor in recorder.loop.factors], recorder.index(WORKS[0]), recorder.step
 
-    def vectors(self, vector: "np.ndarray") -> "np.ndarray":
-        """Vector after each step, one a column; raises `StoppedError`."""
-        recorder, step = self.recorder, self.recorder.step
-        factors = [float(factor) for factor in recorder.loop.factors]
+    def vectors(vector: "np.ndarray") -> "np.ndarray":
         now = recorder.parts(vector)
-        states, works = self.flow.follow(now.counter * step, self.count * step, now.state, factors)
-        first = recorder.index(WORKS[0])
-        done = vector[first : first + len(WORKS), None] + works
-        return np.asarray(self.watch(vector, states, done).full())
+        states, done = flow.follow(now.counter * step, count * step, now.state, factors)
+        return np.asarray(watch(vector, states, vector[first : first + works, None] + done).full())
+
+    return vectors
 
 
 def field(recorder: Recorder) -> Any:

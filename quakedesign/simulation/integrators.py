@@ -4,13 +4,11 @@ Fixed step: Dormand–Prince (order 5) and classic Runge–Kutta. Adaptive: back
 of SUNDIALS through CasADi. The last chapter tests whether a fixed step is short enough for a linear loop.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from fractions import Fraction as F
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -19,14 +17,11 @@ from quakedesign.errors import ParameterError, require_known
 from quakedesign.text import nearest_name
 
 # ----------------------------------------------------------------------
-# What every fixed-step integrator offers, and the explicit Runge–Kutta family.
-
-if TYPE_CHECKING:
-    pass
+# Explicit Runge–Kutta methods with a fixed step.
 
 
-class Integrator(ABC):
-    """One step of a fixed length.
+class Integrator:
+    """An explicit Runge–Kutta method with a fixed step.
 
     Attributes
     ----------
@@ -34,14 +29,20 @@ class Integrator(ABC):
     source : str
     order : int
         Order of convergence on smooth problems.
+    nodes : tuple of Fraction
+    matrix : tuple of tuple of Fraction
+        Row i holds the shares of the stages before i.
+    weights : tuple of Fraction
     """
 
     name: ClassVar[str]
     source: ClassVar[str]
     order: ClassVar[int]
+    nodes: ClassVar[tuple[F, ...]]
+    matrix: ClassVar[tuple[tuple[F, ...], ...]]
+    weights: ClassVar[tuple[F, ...]]
 
     @classmethod
-    @abstractmethod
     def advance(cls, field: Callable[[float, Any], Any], state: Any, step: float) -> Any:
         """State after one step.
 
@@ -54,40 +55,18 @@ class Integrator(ABC):
         step : float
             [s].
         """
-
-
-class RungeKutta(Integrator):
-    """An explicit Runge–Kutta method.
-
-    Attributes
-    ----------
-    matrix : tuple of tuple of Fraction
-        Row i holds the shares of the stages before i.
-    """
-
-    nodes: ClassVar[tuple[Fraction, ...]]
-    matrix: ClassVar[tuple[tuple[Fraction, ...], ...]]
-    weights: ClassVar[tuple[Fraction, ...]]
-
-    @classmethod
-    def advance(cls, field: Callable[[float, Any], Any], state: Any, step: float) -> Any:
-        """State after one step; see `Integrator.advance`."""
         stages: list[Any] = []
         for node, row in zip(cls.nodes, cls.matrix, strict=True):
             stages.append(field(float(node), cls._moved(state, row, stages, step)))
         return cls._moved(state, cls.weights, stages, step)
 
     @staticmethod
-    def _moved(state: Any, shares: tuple[Fraction, ...], stages: list[Any], step: float) -> Any:
+    def _moved(state: Any, shares: tuple[F, ...], stages: list[Any], step: float) -> Any:
         parts = [float(share) * stage for share, stage in zip(shares, stages, strict=True) if share]
         return state + step * sum(parts[1:], start=parts[0]) if parts else state
 
 
-# ----------------------------------------------------------------------
-# Dormand and Prince's method of fifth order with a fixed step.
-
-
-class DormandPrince(RungeKutta):
+class DormandPrince(Integrator):
     """Fifth-order weights of the 5(4) pair, six stages, as Simulink's ode5."""
 
     name: ClassVar[str] = "dormand-prince"
@@ -106,11 +85,7 @@ class DormandPrince(RungeKutta):
     weights = (F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84))
 
 
-# ----------------------------------------------------------------------
-# The classic Runge–Kutta method.
-
-
-class ClassicRungeKutta(RungeKutta):
+class ClassicRungeKutta(Integrator):
     """Fourth order with four stages."""
 
     name: ClassVar[str] = "rk4"
@@ -136,7 +111,7 @@ class StoppedError(RuntimeError):
     """The solver could not go on; the run that asked for it says where."""
 
 
-class AdaptiveIntegrator(ABC):
+class AdaptiveIntegrator:
     """A solver of smooth, possibly stiff problems that meets a tolerance and answers at any instants.
 
     Discontinuities are not located: CasADi's events are not used, so that a discontinuous field is the caller's to
@@ -293,10 +268,6 @@ def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
     return known[name]
 
 
-# ----------------------------------------------------------------------
-# Backward differentiation formulas of variable order and step.
-
-
 class Cvodes(AdaptiveIntegrator):
     """Orders 1 to 5, Newton's iteration with the exact Jacobian."""
 
@@ -306,19 +277,11 @@ class Cvodes(AdaptiveIntegrator):
     )
 
 
-# ----------------------------------------------------------------------
-# Backward differentiation formulas with fixed leading coefficient, for implicit equations.
-
-
 class Idas(AdaptiveIntegrator):
     """Orders 1 to 5 on 0 = f − y', a family of formulas other than that of `Cvodes`."""
 
     name: ClassVar[str] = "idas"
     source: ClassVar[str] = "Hindmarsh et al. (2005), ACM TOMS 31, 363; Brenan, Campbell and Petzold (1996), SIAM"
-
-
-# ----------------------------------------------------------------------
-# Whether a fixed step is short enough for a linear loop.
 
 
 def amplification(poles: Iterable[complex], step: float, method: str = "dormand-prince") -> float:

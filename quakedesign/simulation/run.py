@@ -20,7 +20,7 @@ from quakedesign.loop import Actuator, Scheme, simulation_scheme
 from quakedesign.loop.schemes.base import MOST_SUBSTEPS, NoClock
 from quakedesign.loop.sensing import Sensor
 from quakedesign.simulation import stepping
-from quakedesign.simulation.adaptive import SmoothMarch, require_smooth
+from quakedesign.simulation.adaptive import require_smooth, smooth_march
 from quakedesign.simulation.closed_loop import ClosedLoop, names
 from quakedesign.simulation.compiled import STEP, prepare
 from quakedesign.simulation.integrators import FLOOR, AdaptiveIntegrator, Integrator
@@ -286,8 +286,8 @@ def run_adaptive(
         raise ParameterError(f"a checkpoint needs a fixed step. Received method {method.name}. Use dormand-prince.")
     require_smooth(recorder, method.name)
     began = perf_counter()
-    smooth = SmoothMarch(recorder, method, rtol)
-    kept = smooth.run(recorder.start(setting.settled_from), instants(setting.steps, setting.samples), progress)
+    start, wanted = recorder.start(setting.settled_from), instants(setting.steps, setting.samples)
+    kept = smooth_march(recorder, method, rtol, start, wanted, progress)
     told = {"backend": "sundials", "rtol": rtol, "floor": FLOOR}
     return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | told, (began, began))
 

@@ -211,10 +211,6 @@ def logarithmic(law: Any, rate: Any, theta: Any) -> Any:
     )
 
 
-# ----------------------------------------------------------------------
-# Rate-and-state friction with Dieterich's evolution of the state.
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RateAndStateAging(RateAndState):
     """μ = μ_0 + a log(v/v_0) + b log(v_0 θ/d_c), θ' = 1 − vθ/d_c: parameters and working range of `RateAndState`."""
@@ -235,10 +231,6 @@ class RateAndStateAging(RateAndState):
     @property
     def _state_slope(self) -> "sp.Expr":
         return aging_slope(self.slowest_rate, self.fastest_rate)
-
-
-# ----------------------------------------------------------------------
-# Rate-and-state friction with Ruina's evolution of the state.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -86,10 +86,6 @@ class SlipWeakening(Weakening):
         return self.drop / self.critical_slip
 
 
-# ----------------------------------------------------------------------
-# Exponential slip weakening.
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExponentialSlipWeakening(SlipWeakening):
     """μ(slip) = residual + drop · exp(−slip/critical_slip), eq. mu of the paper, whose Δμ is −drop.
@@ -107,10 +103,6 @@ class ExponentialSlipWeakening(SlipWeakening):
         import sympy as sp
 
         return self.residual + self.drop * sp.exp(-slip / self.critical_slip)
-
-
-# ----------------------------------------------------------------------
-# Linear slip weakening.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,10 +126,6 @@ class LinearSlipWeakening(SlipWeakening):
         import sympy as sp
 
         return self.residual + self.drop * sp.Max(0, 1 - slip / self.critical_slip)
-
-
-# ----------------------------------------------------------------------
-# Slip-rate weakening.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,9 +9,6 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault.model import require_positive
 from quakedesign.loop.actuators.base import FlowStage, Option
 
-# ----------------------------------------------------------------------
-# Inertia of pump and pipe.
-
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Lag(FlowStage):

@@ -97,10 +97,6 @@ class Delay(SampledStage):
         return acting, [*queue[1:], age, *state]
 
 
-# ----------------------------------------------------------------------
-# Finite resolution of a converter.
-
-
 @checked_dataclass(frozen=True, kw_only=True)
 class Quantisation(SampledStage):
     """Rounds to the nearest multiple of a quantum, halves upward.
@@ -133,10 +129,6 @@ class Quantisation(SampledStage):
 
         (quantum,) = numbers
         return quantum * ca.floor(pressure / quantum + 0.5), memory
-
-
-# ----------------------------------------------------------------------
-# Fastest change of pressure that the pump can make.
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -183,10 +175,6 @@ class RateLimit(SampledStage):
         (rate,), (held,) = numbers, memory
         reached = held + ca.fmin(ca.fmax(pressure - held, -rate * step), rate * step)
         return reached, [reached]
-
-
-# ----------------------------------------------------------------------
-# Largest and smallest pressure that the pump can hold.
 
 
 @checked_dataclass(frozen=True, kw_only=True)

@@ -10,9 +10,6 @@ from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw, Values
 from quakedesign.loop.schemes.base import Decision, Sampled, Scheme, Stepped
 
-# ----------------------------------------------------------------------
-# The law at the measured state.
-
 
 @dataclass(frozen=True, kw_only=True)
 class Explicit(Sampled):
@@ -34,10 +31,6 @@ class Explicit(Sampled):
         pressure, *rates = discrete_law.values(found, known)
         after = [known[s] + known[discrete_law.step] * rate for s, rate in zip(law.integrals, rates, strict=True)]
         return Decision(pressure, after, [])
-
-
-# ----------------------------------------------------------------------
-# The law as a differential equation.
 
 
 class Continuous(Scheme):

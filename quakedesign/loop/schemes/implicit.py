@@ -309,10 +309,6 @@ def _at_end(law: DiscreteLaw, place: dict[sp.Symbol, sp.Expr]) -> tuple[sp.Expr,
     return law.pressure.xreplace(place | ends), list(ends.values())
 
 
-# ----------------------------------------------------------------------
-# Backward Euler of the law.
-
-
 @dataclass(frozen=True, kw_only=True)
 class Implicit(Sampled):
     """Evaluates the law at the end of the step, as the double integrator e1' = e2, e2' = B0·p predicts it.

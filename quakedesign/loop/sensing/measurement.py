@@ -208,10 +208,6 @@ def uniform(memory: list[Any]) -> tuple[list[Any], Any]:
     return after, (difference + ca.if_else(difference < 1, top, 0)) / (top + 1)
 
 
-# ----------------------------------------------------------------------
-# Linear variable differential transformer (LVDT) and its converter: bandwidth, noise, resolution.
-
-
 @checked_dataclass(frozen=True, kw_only=True)
 class Transducer(SlipStage):
     """Slip behind a low-pass filter of first order, plus independent normal noise at every sample, then rounded.

@@ -91,10 +91,6 @@ def _demand(variables: tuple[str, ...], parts: Sequence[Polynomial], margin: Pol
     return Demand(template=template, parts=parts, margin=margin)
 
 
-# ----------------------------------------------------------------------
-# What every way to a proof offers.
-
-
 class Method(ABC):
     """A search that may end in a proof; exact arithmetic decides whether it is one.
 
@@ -110,10 +106,6 @@ class Method(ABC):
     @abstractmethod
     def propose(self, asked: Statement) -> Proof | None:
         """Proof of exactly this statement, which is not that zero is a sum of squares; None if none is found."""
-
-
-# ----------------------------------------------------------------------
-# Ways to find a proof of one statement.
 
 
 @cache
@@ -300,10 +292,6 @@ def _squares_of_multiplier(asked: Statement) -> Any:
 
 
 __all__ = ["decide", "from_sympy", "prove"]
-
-
-# ----------------------------------------------------------------------
-# Gram matrices by conic programming, rounded.
 
 
 class Conic(Method):
