@@ -9,9 +9,11 @@ from dataclasses import field
 from fractions import Fraction
 from typing import ClassVar
 
+from flint import fmpq, fmpq_mat
+
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
-from quakedesign.exact import shortly
+from quakedesign.exact import fraction_of, shortly
 from quakedesign.laws.implicit_root import ImplicitRoot
 
 # ----------------------------------------------------------------------
@@ -297,6 +299,28 @@ def combined(*parts: tuple[Fraction, Row]) -> Row:
     """Combination of rows."""
     scaled = ([factor * v for v in row] for factor, row in parts)
     return tuple(sum(column, Fraction(0)) for column in zip(*scaled, strict=True))
+
+
+def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
+    """Steady states z of a law with zero errors: Mz = v and Cz = p; 0 where any will do.
+
+    Raises
+    ------
+    ParameterError
+        When there are none.
+    """
+    rows = [*([*row, rate] for row, rate in zip(own, rates, strict=True)), [*output, asked]]
+    reduced, rank = fmpq_mat([[fmpq(*v.as_integer_ratio()) for v in row] for row in rows]).rref()
+    found = [Fraction(0)] * (len(output) + 1)
+    for i in range(rank):
+        pivot = next(j for j in range(len(found)) if reduced[i, j] != 0)
+        found[pivot] = fraction_of(reduced[i, len(output)])
+    if found.pop():
+        raise ParameterError(
+            "a law must have a steady state with zero errors and a constant pressure. Received a law without "
+            "integral action. Add an integral of the slip error, or an estimate of the disturbance."
+        )
+    return tuple(found)
 
 
 # ----------------------------------------------------------------------

@@ -8,12 +8,12 @@ import json
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from flint import fmpq, fmpq_mat
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, ScenarioError, require_known
@@ -21,7 +21,7 @@ from quakedesign.exact import rational, shortly
 from quakedesign.fault.units import exact_value
 from quakedesign.files import read_bytes, write_whole
 from quakedesign.laws.sampled_controller import SampledController
-from quakedesign.laws.sampled_law import MOST_STATES, LinearLaw, Matrix, Row
+from quakedesign.laws.sampled_law import MOST_STATES, LinearLaw, Matrix, Row, steady_states
 
 # ----------------------------------------------------------------------
 # The law.
@@ -326,7 +326,11 @@ _DEPENDENT = 1e-6
 def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
     """A law with an integrator but for rounding as one with an integrator, and what was changed."""
     size = len(A)
-    if not size or _asks_for_any_pressure(A, C):
+    with suppress(ParameterError):
+        still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(A))
+        steady_states(still, C, (Fraction(0),) * size, Fraction(1))
+        return A, ()
+    if not size:
         return A, ()
     table = np.array([[float(v) for v in row] for row in A])
     poles, vectors = np.linalg.eig(table)
@@ -357,15 +361,6 @@ def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
         f"a pole at {pole} is taken for an integrator that rounding has moved and made exactly 1: entries of A change "
         f"by at most {float(moved):.1g}",
     )
-
-
-def _asks_for_any_pressure(A: Matrix, C: Row) -> bool:
-    """Whether Az = z and Cz = 1 have a solution."""
-    size = len(A)
-    rows = [[*(v - (i == j) for j, v in enumerate(row)), Fraction(0)] for i, row in enumerate(A)]
-    rows.append([*C, Fraction(1)])
-    reduced, _ = fmpq_mat([[fmpq(*v.as_integer_ratio()) for v in row] for row in rows]).rref()
-    return all(any(reduced[i, j] != 0 for j in range(size)) or reduced[i, size] == 0 for i in range(size + 1))
 
 
 # ----------------------------------------------------------------------

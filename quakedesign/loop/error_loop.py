@@ -12,7 +12,16 @@ from typing import Literal
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import apart, shortly
-from quakedesign.laws.sampled_law import NOISES, LinearLaw, Matrix, NominalModel, Row, require_sizes, unit_row
+from quakedesign.laws.sampled_law import (
+    NOISES,
+    LinearLaw,
+    Matrix,
+    NominalModel,
+    Row,
+    require_sizes,
+    steady_states,
+    unit_row,
+)
 from quakedesign.loop.layer import MODES, Layer
 from quakedesign.loop.periodic import EVEN, Fading, Instants, PeriodicLoop, Pulse, Segment
 
@@ -236,35 +245,6 @@ def _reference_drift(law: LinearLaw, path: _Path) -> Row:
     moved = steady_states(still, law.output, rates, -law.of_reference[-1][0])
     zero = Fraction(0)
     return (zero, zero, *(-v for v in moved), *[zero] * (path.size - 2 - path.own))
-
-
-def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
-    """Steady states of a law with zero errors: Mz = v and Cz = p, by elimination.
-
-    Raises
-    ------
-    ParameterError
-        When there are none.
-    """
-    n = len(output)
-    rows = [[*row, rate] for row, rate in zip(own, rates, strict=True)]
-    rows.append([*output, asked])
-    pivots: list[tuple[int, list[Fraction]]] = []
-    for column in range(n):
-        pivot = next((row for row in rows if row[column]), None)
-        if pivot is not None:
-            pivot = [v / pivot[column] for v in pivot]
-            rows = [[v - row[column] * p for v, p in zip(row, pivot, strict=True)] for row in rows]
-            pivots.append((column, pivot))
-    if any(row[n] for row in rows):
-        raise ParameterError(
-            "a law must have a steady state with zero errors and a constant pressure. Received a law without "
-            "integral action. Add an integral of the slip error, or an estimate of the disturbance."
-        )
-    solution = [Fraction(0)] * n
-    for column, pivot in reversed(pivots):
-        solution[column] = pivot[n] - sum((v * f for v, f in zip(pivot, solution, strict=False)), Fraction(0))
-    return tuple(solution)
 
 
 def _push(path: _Path) -> Row:

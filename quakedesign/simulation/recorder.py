@@ -183,85 +183,48 @@ class Recorder:
         }
 
     def _after(self, before: dict[str, Any], vector: Any) -> dict[str, Any]:
-        now, parts = self.signals(vector), self.parts(vector)
-        settled = now["time"] > parts.settled_from
-        later = parts.counter > 0
-        return {
-            **_errors(before, now, settled),
-            "rest_count": before["rest_count"] + ca.logic_and(settled, self._rests(now)),
-            **_pressures(before, now, settled, later),
-            **_extremes(before, now, later),
-            **_ranges(before, now, self.scheme.described),
+        now, parts, described = self.signals(vector), self.parts(vector), self.scheme.described
+        settled, later = now["time"] > parts.settled_from, parts.counter > 0
+        # The plant without stick is at rest only in passing.
+        rests: Any = now["slip_rate"] == 0 if self.loop.sticks else 0
+        slip_error = ca.if_else(settled, now["slip"] - now["reference"], 0)
+        rate_error = ca.if_else(settled, now["slip_rate"] - now["reference_rate"], 0)
+        pressure, h = now["pressure"], now["matched_perturbation"]
+        turned = ca.fabs(pressure - before["previous_pressure"])
+        changed = ca.if_else(later, ca.fabs(h - before["previous_h"]), 0)
+        after = {
+            "max_slip_error": ca.fmax(before["max_slip_error"], ca.fabs(slip_error)),
+            "max_slip_rate_error": ca.fmax(before["max_slip_rate_error"], ca.fabs(rate_error)),
+            "sum_square_slip_error": before["sum_square_slip_error"] + slip_error * slip_error,
+            "sum_square_slip_rate_error": before["sum_square_slip_rate_error"] + rate_error * rate_error,
+            "sum_square_pressure": before["sum_square_pressure"] + ca.if_else(settled, pressure * pressure, 0),
+            "pressure_variation": before["pressure_variation"] + ca.if_else(ca.logic_and(settled, later), turned, 0),
+            "reverse_count": before["reverse_count"] + ca.logic_and(settled, now["slip_rate"] < 0),
+            "settled_count": before["settled_count"] + settled,
+            "rest_count": before["rest_count"] + ca.logic_and(settled, rests),
+            "peak_slip_rate": ca.fmax(before["peak_slip_rate"], ca.fabs(now["slip_rate"])),
+            "max_h_change": ca.fmax(before["max_h_change"], changed),
+            "previous_pressure": pressure,
+            "previous_h": h,
             **{name: before[name] for name in WORKS},
-            **self._events(before, now, vector),
         }
-
-    def _events(self, before: dict[str, Any], now: dict[str, Any], vector: Any) -> dict[str, Any]:
+        for signal in ("pressure", *described):
+            after[f"max_{signal}"] = ca.fmax(before[f"max_{signal}"], now[signal])
+            after[f"min_{signal}"] = ca.fmin(before[f"min_{signal}"], now[signal])
         fine = ca.logic_and(ca.fabs(now["slip"]) <= LARGEST_MOTION, ca.fabs(now["slip_rate"]) <= LARGEST_MOTION)
-        parts = self.parts(vector)
         bounded = [parts.state[i] for i in range(2, self.state_size)]
-        further = (now[signal] for signal in self.scheme.described)
-        for value in (*bounded, now["pressure"], now["matched_perturbation"], *further):
+        for value in (*bounded, pressure, h, *(now[signal] for signal in described)):
             fine = ca.logic_and(fine, ca.fabs(value) <= LARGEST_STATE)
         happening = {
             "diverged": ca.logic_not(fine),
-            "opening": now["pressure"] >= self.loop.fault.effective_normal_stress,
+            "opening": pressure >= self.loop.fault.effective_normal_stress,
             "reverse_slip": now["slip_rate"] < 0,
-            "stick": ca.logic_and(parts.counter > 0, self._rests(now)),
-            "load_reversed": self.loop_of(vector).reversing(now["time"], parts.state, now["pressure"]),
+            "stick": ca.logic_and(later, rests),
+            "load_reversed": self.loop_of(vector).reversing(now["time"], parts.state, pressure),
         }
-        return {
-            name: ca.if_else(ca.logic_and(before[name] < 0, what), now["time"], before[name])
-            for name, what in happening.items()
-        }
-
-    def _rests(self, now: dict[str, Any]) -> Any:
-        """Whether friction holds the fault; the plant without stick is at rest only in passing."""
-        return now["slip_rate"] == 0 if self.loop.sticks else 0
-
-
-def _errors(before: dict[str, Any], now: dict[str, Any], settled: Any) -> dict[str, Any]:
-    slip_error = ca.if_else(settled, now["slip"] - now["reference"], 0)
-    rate_error = ca.if_else(settled, now["slip_rate"] - now["reference_rate"], 0)
-    reverse = ca.logic_and(settled, now["slip_rate"] < 0)
-    return {
-        "max_slip_error": ca.fmax(before["max_slip_error"], ca.fabs(slip_error)),
-        "max_slip_rate_error": ca.fmax(before["max_slip_rate_error"], ca.fabs(rate_error)),
-        "sum_square_slip_error": before["sum_square_slip_error"] + slip_error * slip_error,
-        "sum_square_slip_rate_error": before["sum_square_slip_rate_error"] + rate_error * rate_error,
-        "reverse_count": before["reverse_count"] + reverse,
-        "settled_count": before["settled_count"] + settled,
-    }
-
-
-def _pressures(before: dict[str, Any], now: dict[str, Any], settled: Any, later: Any) -> dict[str, Any]:
-    pressure = now["pressure"]
-    change = ca.fabs(pressure - before["previous_pressure"])
-    return {
-        "sum_square_pressure": before["sum_square_pressure"] + ca.if_else(settled, pressure * pressure, 0),
-        "pressure_variation": before["pressure_variation"] + ca.if_else(ca.logic_and(settled, later), change, 0),
-        "previous_pressure": pressure,
-        "max_pressure": ca.fmax(before["max_pressure"], pressure),
-        "min_pressure": ca.fmin(before["min_pressure"], pressure),
-    }
-
-
-def _extremes(before: dict[str, Any], now: dict[str, Any], later: Any) -> dict[str, Any]:
-    h = now["matched_perturbation"]
-    change = ca.if_else(later, ca.fabs(h - before["previous_h"]), 0)
-    return {
-        "peak_slip_rate": ca.fmax(before["peak_slip_rate"], ca.fabs(now["slip_rate"])),
-        "max_h_change": ca.fmax(before["max_h_change"], change),
-        "previous_h": h,
-    }
-
-
-def _ranges(before: dict[str, Any], now: dict[str, Any], signals: Iterable[str]) -> dict[str, Any]:
-    found = {}
-    for signal in signals:
-        found[f"max_{signal}"] = ca.fmax(before[f"max_{signal}"], now[signal])
-        found[f"min_{signal}"] = ca.fmin(before[f"min_{signal}"], now[signal])
-    return found
+        for name, what in happening.items():
+            after[name] = ca.if_else(ca.logic_and(before[name] < 0, what), now["time"], before[name])
+        return after
 
 
 # ----------------------------------------------------------------------

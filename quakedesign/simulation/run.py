@@ -103,7 +103,9 @@ def trajectory(
     SimulationError
         When nothing is finite, not even the start.
     """
-    observe, signals = _watchers(recorder)
+    vector = ca.SX.sym("z", recorder.size)
+    named = recorder.signals(vector)
+    observe = ca.Function("observe", [vector], [recorder.observe(vector)])
     end = observe(kept[:, -1]).full().ravel()
     watched, ended = recorder.watched(end), perf_counter()
     if watched["diverged"] >= 0:
@@ -124,7 +126,11 @@ def trajectory(
         sticks=loop.sticks,
         further=recorder.scheme.described,
     )
-    columns = _columns(recorder, kept, signals)
+    values = ca.Function("signals", [vector], list(named.values())).call([kept])
+    columns: dict[str, Any] = {name: value.full().ravel() for name, value in zip(named, values, strict=True)}
+    if loop.controller is None:  # nothing is followed
+        columns |= dict.fromkeys(("reference", "reference_rate", "matched_perturbation"))
+    columns["integrals"] = kept[4 : 4 + len(loop.integrals)]
     described = recorder.scheme.described
     further = {name: (columns.pop(name), *said) for name, said in described.items()}
     kind = partial(SampledTrajectory, actuation=further) if further else Trajectory
@@ -137,31 +143,8 @@ def trajectory(
         criterion=criterion,
         provenance=provenance | took | {"scenario": fault_toml(loop.fault)},
         integral_units=loop.controller.integral_units if loop.controller else (),
-        name=f"{loop.fault.name}, {_law_title(loop.controller)}{loop.plant_title}",
+        name=f"{loop.fault.name}, {loop.controller.title if loop.controller else 'no control'}{loop.plant_title}",
     )
-
-
-def _law_title(controller: Controller | None) -> str:
-    return controller.title if controller else "no control"
-
-
-def _watchers(recorder: Recorder) -> tuple[Any, Any]:
-    """CasADi Functions of the vector: the watching of one instant, and all signals."""
-    vector = ca.SX.sym("z", recorder.size)
-    signals = recorder.signals(vector)
-    return (
-        ca.Function("observe", [vector], [recorder.observe(vector)]),
-        ca.Function("signals", [vector], list(signals.values()), ["z"], list(signals)),
-    )
-
-
-def _columns(recorder: Recorder, kept: Any, signals: Any) -> dict[str, Any]:
-    """Arrays of a trajectory from the kept vectors; without a controller nothing is followed."""
-    values = signals.call([kept])
-    columns = {name: value.full().ravel() for name, value in zip(signals.name_out(), values, strict=True)}
-    if recorder.loop.controller is None:
-        columns |= dict.fromkeys(("reference", "reference_rate", "matched_perturbation"))
-    return columns | {"integrals": kept[4 : 4 + len(recorder.loop.integrals)]}
 
 
 # ----------------------------------------------------------------------

@@ -31,9 +31,9 @@ from quakedesign.guarantees.search.adversary import worst_found
 from quakedesign.guarantees.search.estimate import spectral_radius
 from quakedesign.laws import Controller, SampledController, Signals, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
+from quakedesign.laws.sampled_law import steady_states
 from quakedesign.linear.robust_stability import sector_loop
 from quakedesign.linear.sampled_stability import HeldLoop
-from quakedesign.loop.error_loop import steady_states
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup
 from quakedesign.lyapunov import Certificate, Verdict, decided_once
 from quakedesign.lyapunov.exact.domain import Domain

@@ -22,8 +22,8 @@ from quakedesign.laws import (
     slip_observer,
     summed_integrals,
 )
+from quakedesign.laws.sampled_law import steady_states
 from quakedesign.loop import held_loop
-from quakedesign.loop.error_loop import steady_states
 
 STEP = F(1, 5)
 MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
