@@ -377,21 +377,13 @@ class GroupComparison:
 
 @dataclass(frozen=True, kw_only=True)
 class Similarity:
-    """Scale factors from one fault to another, and the differences that remain.
-
-    Attributes
-    ----------
-    repeating : tuple of str
-        Parameters from whose ratios the scales follow; they fix slip, time, pressure, length and mass.
-    comparisons : tuple of GroupComparison
-        Every π-group of the parameters that both faults have.
-    unmatched : tuple of str
-        ``friction.law`` where the laws are different functions, and parameters that only one of them has.
-    """
+    """Scale factors from one fault to another, and the differences that remain."""
 
     scales: Scales
+    # Parameters from whose ratios the scales follow; they fix slip, time, pressure, length and mass
     repeating: tuple[str, ...]
-    comparisons: tuple[GroupComparison, ...]
+    comparisons: tuple[GroupComparison, ...]  # Every π-group of the parameters that both faults have
+    # ``friction.law`` where the laws are different functions, and parameters that only one of them has
     unmatched: tuple[str, ...] = ()
 
     @cached_property

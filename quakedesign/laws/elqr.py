@@ -42,20 +42,7 @@ class PressureLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class ExtendedLQR(Controller):
-    """e-LQR: p = −Kx_a with ξ1' = x1 − r, ξ2' = ξ1 (eqs. double_integrator and u).
-
-    Attributes
-    ----------
-    feedback : str
-        ``"state"``: k1 and k2 act on x1 and x2, as printed in eq. u. ``"error"``: they act on x1 − r and
-        x2 − r', which keeps p small and the error of tracking a ramp too (ERRATA 29). The loop about a
-        constant reference is the same.
-    limits : PressureLimits, optional
-        p is held inside them; the integrals are then driven back by the part that was cut off (back-calculation, Åström
-        and Rundqwist 1989, Proc. Amer. Control Conf., 1693). The loop field is the one without limits.
-    offset : Fraction
-        p for Kx_a = 0 [Pa]: a start without a jump is an offset, since ξ starts at 0.
-    """
+    """e-LQR: p = −Kx_a with ξ1' = x1 − r, ξ2' = ξ1 (eqs. double_integrator and u)."""
 
     name: ClassVar[str] = "elqr"
     title: ClassVar[str] = "e-LQR"
@@ -63,9 +50,13 @@ class ExtendedLQR(Controller):
     gain_units: ClassVar[Mapping[str, str]] = {"k1": "Pa/m", "k2": "Pa s/m", "k3": "Pa/(m s)", "k4": "Pa/(m s^2)"}
     integral_units: ClassVar[tuple[str, ...]] = ("m s", "m s^2")
 
+    # ``"state"``: k1 and k2 act on x1 and x2, as printed in eq. u. ``"error"``: they act on x1 − r and x2 − r', which
+    # keeps p small and the error of tracking a ramp too (ERRATA 29). The loop about a constant reference is the same.
     feedback: str = "error"
+    # p is held inside them; the integrals are then driven back by the part that was cut off (back-calculation, Åström
+    # and Rundqwist 1989, Proc. Amer. Control Conf., 1693). The loop field is the one without limits.
     limits: PressureLimits | None = None
-    offset: Fraction = Fraction(0)
+    offset: Fraction = Fraction(0)  # p for Kx_a = 0 [Pa]: a start without a jump is an offset, since ξ starts at 0
 
     def __post_init__(self) -> None:
         super().__post_init__()

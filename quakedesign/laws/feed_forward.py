@@ -18,21 +18,12 @@ class FeedForward:
 
     It adds the same to the matched perturbation h and leaves the loop in the errors as it is, so a certificate of the
     law serves with and without it; only what h asks of the certificate changes.
-
-    Attributes
-    ----------
-    stiffness : Fraction
-        k̂0 [1/s²].
-    damping : Fraction
-        η̂0 [1/s].
-    inertia : Fraction
-        ι0 [-], the share of r'' that is added; 1 in the paper's remark.
     """
 
     name: str = "none"
-    stiffness: Fraction = Fraction(0)
-    damping: Fraction = Fraction(0)
-    inertia: Fraction = Fraction(0)
+    stiffness: Fraction = Fraction(0)  # k̂0 [1/s²]
+    damping: Fraction = Fraction(0)  # η̂0 [1/s]
+    inertia: Fraction = Fraction(0)  # ι0 [-], the share of r'' that is added; 1 in the paper's remark
 
     def __post_init__(self) -> None:
         for part in ("stiffness", "damping", "inertia"):

@@ -9,25 +9,14 @@ from quakedesign.symbolic.terms import Term
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldTerms:
-    """A `LoopField` in terms of states and lifts.
+    """A `LoopField` in terms of states and lifts."""
 
-    Attributes
-    ----------
-    states : mapping of str to int
-        Weight of every state.
-    field : mapping of str to tuple of Term
-        Time derivative of every state.
-    roots : mapping of str to str
-        The gain or constant whose positive square root a name stands for.
-    lifts : mapping of str to tuple of Term
-        Argument of every nested power.
-    """
-
-    states: Mapping[str, int]
-    field: Mapping[str, tuple[Term, ...]]
+    states: Mapping[str, int]  # Weight of every state
+    field: Mapping[str, tuple[Term, ...]]  # Time derivative of every state
     gains: tuple[str, ...]
     constants: tuple[str, ...]
     uncertain: tuple[str, ...]
     domain: str
+    # The gain or constant whose positive square root a name stands for
     roots: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    lifts: Mapping[str, tuple[Term, ...]] = dataclasses.field(default_factory=dict)
+    lifts: Mapping[str, tuple[Term, ...]] = dataclasses.field(default_factory=dict)  # Argument of every nested power

@@ -154,21 +154,11 @@ Vertex = tuple[Fraction, Fraction, Fraction]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProblemScales:
-    """Units in which a problem is solved.
+    """Units in which a problem is solved."""
 
-    Attributes
-    ----------
-    time : Fraction
-        [s].
-    slip : Fraction
-        [m].
-    pressure : Fraction
-        [Pa].
-    """
-
-    time: Fraction
-    slip: Fraction
-    pressure: Fraction
+    time: Fraction  # [s]
+    slip: Fraction  # [m]
+    pressure: Fraction  # [Pa]
 
     @property
     def states(self) -> tuple[Fraction, ...]:
@@ -196,24 +186,15 @@ class ProblemScales:
 class LinearProblem:
     """x1' = x2, x2' = s·x1 − w·x2 + β·b·p with s, w, β anywhere in their ranges; ξ1' = x1, ξ2' = ξ1.
 
-    Attributes
-    ----------
-    stiffness : Fraction
-        Nominal k̂ [1/s²]: the nominal plant has s = −k̂.
-    damping : Fraction
-        Nominal η̂ [1/s].
-    sectors : Sectors
-        Ranges, authority b, and g1, g2 with |h| ≤ g1|x1| + g2|x2| about the nominal plant.
-
     Raises
     ------
     ParameterError
         For an authority that is not positive, or β below 1 (B0 must be the least, ERRATA 9).
     """
 
-    stiffness: Fraction
-    damping: Fraction
-    sectors: Sectors
+    stiffness: Fraction  # Nominal k̂ [1/s²]: the nominal plant has s = −k̂
+    damping: Fraction  # Nominal η̂ [1/s]
+    sectors: Sectors  # Ranges, authority b, and g1, g2 with |h| ≤ g1|x1| + g2|x2| about the nominal plant
 
     def __post_init__(self) -> None:
         if self.sectors.authority <= 0 or self.sectors.beta[0] < 1:
@@ -279,17 +260,10 @@ class FeedbackLoop:
     ζ' = k3e1 + χ + drift and χ' = k4e1 + drift_rate, where ζ = k3ξ1 + k4ξ2 + p*(r) and χ = k4ξ1, each plus what the
     law feeds forward of the reference. The substitution removes every large term: the loop sees only
     force = φ_e − r″ − w·r′, drift = dp*(r)/dt and, for feedback on the state, drift_rate = k1r″ + k2r‴.
-
-    Attributes
-    ----------
-    gains : sequence of 4 Fraction
-        k1 … k4 in SI.
-    sectors : Sectors
-        b and the ranges of β, s and w, which may change at any time.
     """
 
-    gains: Sequence[Fraction]
-    sectors: Sectors
+    gains: Sequence[Fraction]  # sequence of 4 Fraction: k1 … k4 in SI
+    sectors: Sectors  # b and the ranges of β, s and w, which may change at any time
 
     def matrix(self, vertex: Vertex) -> Matrix:
         """Matrix (4 × 4) at constant (β, s, w)."""
@@ -323,16 +297,10 @@ def loop_matrix(vertex: Vertex, authority: Fraction, gains: Sequence[Fraction]) 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Polytope:
-    """x' = A(t)x with A(t) anywhere in the convex hull of some matrices.
-
-    Attributes
-    ----------
-    vertices : mapping of str to Matrix
-        Exact, by the name of the vertex.
-    """
+    """x' = A(t)x with A(t) anywhere in the convex hull of some matrices."""
 
     states: tuple[str, ...]
-    vertices: Mapping[str, Matrix]
+    vertices: Mapping[str, Matrix]  # Exact, by the name of the vertex
 
     def floats(self) -> list[Any]:
         """Vertices as arrays (n × n)."""
@@ -377,22 +345,12 @@ class ModalScaling:
     """Real coordinates x = T·z in which the mean of a polytope is block diagonal and its input as large as its poles.
 
     They do not depend on the units of x; time is counted in 1/pace.
-
-    Attributes
-    ----------
-    transform : ndarray, shape (n, n)
-        T.
-    inverse : ndarray, shape (n, n)
-    poles : ndarray, shape (n,)
-        Moduli of the mean's eigenvalues over `pace` [-].
-    pace : float
-        Largest modulus [rad/s].
     """
 
-    transform: Any
-    inverse: Any
-    poles: Any
-    pace: float
+    transform: Any  # ndarray, shape (n, n): T
+    inverse: Any  # ndarray, shape (n, n)
+    poles: Any  # ndarray, shape (n,): Moduli of the mean's eigenvalues over `pace` [-]
+    pace: float  # Largest modulus [rad/s]
 
     def matrices(self, polytope: Polytope) -> list[Any]:
         """Vertices in z and scaled time."""

@@ -51,18 +51,11 @@ _ENOUGH = Fraction(1, 10**30)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RiccatiSolution:
-    """X of Q + AᵀX + XA − XGX = 0 in rationals, with what is left of the equation.
+    """X of Q + AᵀX + XA − XGX = 0 in rationals, with what is left of the equation."""
 
-    Attributes
-    ----------
-    X : Matrix
-        Symmetric, n × n.
-    residual : Fraction
-        Rigorous bound on ‖Q + AᵀX + XA − XGX‖ relative to ‖Q‖ + 2‖AᵀX‖ + ‖XGX‖, Frobenius norms, in the scaled
-        states in which X has a unit diagonal.
-    """
-
-    X: Matrix
+    X: Matrix  # Symmetric, n × n
+    # Rigorous bound on ‖Q + AᵀX + XA − XGX‖ relative to ‖Q‖ + 2‖AᵀX‖ + ‖XGX‖, Frobenius norms, in the scaled states in
+    # which X has a unit diagonal
     residual: Fraction
 
 

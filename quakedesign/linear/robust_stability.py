@@ -38,18 +38,10 @@ _DECADES, _GOOD = 13, 0.85
 
 @dataclass(frozen=True, slots=True)
 class QuadraticProposal:
-    """Floating-point V = xᵀPx for a polytope; proves nothing.
+    """Floating-point V = xᵀPx for a polytope; proves nothing."""
 
-    Attributes
-    ----------
-    form : ndarray, shape (n, n)
-        P.
-    rate : float
-        Largest a with V′ ≤ −2aV at every vertex [1/s].
-    """
-
-    form: Any
-    rate: float
+    form: Any  # ndarray, shape (n, n): P
+    rate: float  # Largest a with V′ ≤ −2aV at every vertex [1/s]
 
 
 class CommonQuadratic:
@@ -195,27 +187,15 @@ _LARGEST_BETA = 1024
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlopeMargin:
-    """Friction-slope margin: h = s(t)·x1 with 0 ≤ s ≤ margin·s_max at any time, for all β of the box ``paper``.
+    """Friction-slope margin: h = s(t)·x1 with 0 ≤ s ≤ margin·s_max at any time, for all β of the box ``paper``."""
 
-    Attributes
-    ----------
-    certified : LowerBound
-        The common quadratic V proves it up to here; 0 when nothing was proved.
-    limit : UpperBound
-        A constant s of limit·s_max, with β = `limit_beta`, is not asymptotically stable (Routh–Hurwitz, exact).
-    circle : float
-        What the circle criterion allows for time-varying s at `limit_beta`, measured.
-    slope : Fraction
-        s_max = N̂σ'_n·|Δμ|/d_c [1/s²].
-    working_slope : Fraction
-        The same with the largest effective stress on the way to the target slip (ERRATA 8) [1/s²].
-    """
-
-    certified: LowerBound
+    certified: LowerBound  # The common quadratic V proves it up to here; 0 when nothing was proved
+    # A constant s of limit·s_max, with β = `limit_beta`, is not asymptotically stable (Routh–Hurwitz, exact)
     limit: UpperBound
     limit_beta: Fraction
-    circle: float
-    slope: Fraction
+    circle: float  # What the circle criterion allows for time-varying s at `limit_beta`, measured
+    slope: Fraction  # s_max = N̂σ'_n·|Δμ|/d_c [1/s²]
+    # The same with the largest effective stress on the way to the target slip (ERRATA 8) [1/s²]
     working_slope: Fraction
     certificate: Certificate | None
 
@@ -372,18 +352,10 @@ def _least_stable(loop: FeedbackLoop) -> Fraction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecayRate:
-    """Exponential decay for all measurable courses of the parameters in the box.
+    """Exponential decay for all measurable courses of the parameters in the box."""
 
-    Attributes
-    ----------
-    certified : LowerBound
-        a with |x(t)| ≤ C·e^{−at} [1/s].
-    limit : float
-        The slowest pole of a constant vertex [1/s], measured; nothing decays faster.
-    """
-
-    certified: LowerBound
-    limit: float
+    certified: LowerBound  # a with |x(t)| ≤ C·e^{−at} [1/s]
+    limit: float  # The slowest pole of a constant vertex [1/s], measured; nothing decays faster
     certificate: Certificate
 
 
@@ -402,23 +374,14 @@ def decay_rate(loop: Loop) -> DecayRate | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
-    """What is proved of a K about any constant reference, and how much more than the box it tolerates.
+    """What is proved of a K about any constant reference, and how much more than the box it tolerates."""
 
-    Attributes
-    ----------
-    decay : DecayRate or None
-        None when no V was found for the whole box.
-    unstable_at : (Fraction, Fraction, Fraction) or None
-        β, s [1/s²] and w [1/s] of a vertex at which the loop is not asymptotically stable (Routh–Hurwitz, exact).
-    frequency : tuple of FrequencyFacts
-        Measured, one for every vertex.
-    """
-
-    decay: DecayRate | None
+    decay: DecayRate | None  # None when no V was found for the whole box
+    # β, s [1/s²] and w [1/s] of a vertex at which the loop is not asymptotically stable (Routh–Hurwitz, exact)
     unstable_at: Vertex | None
     slope: SlopeMargin | None
     span: GainRange | None
-    frequency: tuple[FrequencyFacts, ...]
+    frequency: tuple[FrequencyFacts, ...]  # Measured, one for every vertex
 
     @property
     def verdict(self) -> Verdict:

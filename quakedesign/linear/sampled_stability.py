@@ -66,21 +66,11 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DelayProof:
-    """P and W that prove every sampling period up to the longest one, in SI, exact.
+    """P and W that prove every sampling period up to the longest one, in SI, exact."""
 
-    Attributes
-    ----------
-    longest : Fraction
-        T [s].
-    P : Matrix
-        4 × 4, in x1, x2, ξ1, ξ2.
-    W : Matrix
-        3 × 3, in δ1, δ2, δu.
-    """
-
-    longest: Fraction
-    P: Matrix
-    W: Matrix
+    longest: Fraction  # T [s]
+    P: Matrix  # 4 × 4, in x1, x2, ξ1, ξ2
+    W: Matrix  # 3 × 3, in δ1, δ2, δu
 
     def covers(self, step: Fraction) -> bool:
         """Whether it is about a period [s]."""
@@ -400,15 +390,9 @@ def poles(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, ver
 
 @dataclass(frozen=True, slots=True)
 class HeldPoles:
-    """What the poles at the corners of the box tell about sampling periods.
+    """What the poles at the corners of the box tell about sampling periods."""
 
-    Attributes
-    ----------
-    problem : LinearProblem
-        In SI.
-    """
-
-    problem: LinearProblem
+    problem: LinearProblem  # In SI
     gains: Sequence[Fraction]
 
     def at(self, step: Fraction) -> dict[Vertex, list[Any]]:
@@ -476,42 +460,22 @@ HoldProof = DelayProof | ClockProof
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VaryingVerdict:
-    """Verdict on the law that runs at one sampling period.
+    """Verdict on the law that runs at one sampling period."""
 
-    Attributes
-    ----------
-    verdict : Verdict
-        REFUTED: not asymptotically stable with the constant parameters of `witness`.
-    step : Fraction
-        T [s].
-    proof : DelayProof, ClockProof or None
-    witness : (Fraction, Fraction, Fraction) or None
-        β, s [1/s²], w [1/s].
-    """
-
-    verdict: Verdict
-    step: Fraction
+    verdict: Verdict  # REFUTED: not asymptotically stable with the constant parameters of `witness`
+    step: Fraction  # T [s]
     proof: HoldProof | None = None
-    witness: Vertex | None = None
+    witness: Vertex | None = None  # β, s [1/s²], w [1/s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LargestVaryingStep:
-    """How long the sampling period of the law that runs may be.
+    """How long the sampling period of the law that runs may be."""
 
-    Attributes
-    ----------
-    proved : LowerBound
-        Every period in (0, proved] is stable [s].
-    refuted : UpperBound or None
-        A longer one at which some constant parameters of the box are unstable [s]; in between it is open.
-    proofs : tuple of DelayProof or ClockProof
-        Together about every period up to `proved`.
-    """
-
-    proved: LowerBound
+    proved: LowerBound  # Every period in (0, proved] is stable [s]
+    # A longer one at which some constant parameters of the box are unstable [s]; in between it is open
     refuted: UpperBound | None
-    proofs: tuple[HoldProof, ...]
+    proofs: tuple[HoldProof, ...]  # Together about every period up to `proved`
 
     def proof_at(self, step: Fraction) -> HoldProof | None:
         """Proof that is about a period [s]."""
@@ -613,21 +577,11 @@ def _short(step: Fraction) -> Fraction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeldLoop:
-    """What is decided of a K when p is held over a sampling period.
+    """What is decided of a K when p is held over a sampling period."""
 
-    Attributes
-    ----------
-    runs : VaryingVerdict
-        About the law that runs: summed integrals, any course of the parameters.
-    longest : LargestVaryingStep or None
-        Up to which period that is proved.
-    radius : float
-        Spectral radius of a period, largest over the vertices, measured.
-    """
-
-    runs: VaryingVerdict
-    longest: LargestVaryingStep | None
-    radius: float
+    runs: VaryingVerdict  # About the law that runs: summed integrals, any course of the parameters
+    longest: LargestVaryingStep | None  # Up to which period that is proved
+    radius: float  # Spectral radius of a period, largest over the vertices, measured
 
     @property
     def step(self) -> Fraction:

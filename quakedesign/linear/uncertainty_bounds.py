@@ -17,43 +17,24 @@ _ZERO: Range = (Fraction(0), Fraction(0))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contribution:
-    """What one uncertain quantity adds to h.
-
-    Attributes
-    ----------
-    acts_on : str
-        ``"slip"``, ``"slip rate"``, or ``"nothing"`` for a part that does not vanish at the equilibrium.
-    range : (Fraction, Fraction)
-        Coefficient in x2' [1/s² on slip, 1/s on slip rate, m/s² on nothing].
-    bound : Fraction
-        Largest share in |h| [Pa/m, Pa·s/m, Pa].
-    """
+    """What one uncertain quantity adds to h."""
 
     name: str
-    acts_on: str
-    range: Range
-    bound: Fraction
+    acts_on: str  # ``"slip"``, ``"slip rate"``, or ``"nothing"`` for a part that does not vanish at the equilibrium
+    range: Range  # Coefficient in x2' [1/s² on slip, 1/s on slip rate, m/s² on nothing]
+    bound: Fraction  # Largest share in |h| [Pa/m, Pa·s/m, Pa]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UncertaintyBounds:
-    """Bounds of h = (…)/b and of μN̂ over the uncertainty box, about any constant reference up to the target slip.
-
-    Attributes
-    ----------
-    control : (Fraction, Fraction)
-        Interval of μN̂ [m²/kg].
-    rest_pressure : (Fraction, Fraction)
-        Rigorous enclosure of p* [Pa] over the constant references and the box.
-    nonvanishing : Fraction
-        Bound on |h| [Pa] at the equilibrium: drift of the far end and disturbance. No equilibrium exists where it is
-        not zero; only a bounded error can then be certified (ERRATA 8, 11, 24).
-    """
+    """Bounds of h = (…)/b and of μN̂ over the uncertainty box, about any constant reference up to the target slip."""
 
     sectors: Sectors
     contributions: tuple[Contribution, ...]
-    control: Range
-    rest_pressure: Range
+    control: Range  # Interval of μN̂ [m²/kg]
+    rest_pressure: Range  # Rigorous enclosure of p* [Pa] over the constant references and the box
+    # Bound on |h| [Pa] at the equilibrium: drift of the far end and disturbance. No equilibrium exists where it is not
+    # zero; only a bounded error can then be certified (ERRATA 8, 11, 24).
     nonvanishing: Fraction
 
     def to_dict(self) -> dict[str, Any]:

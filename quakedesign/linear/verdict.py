@@ -91,27 +91,15 @@ def _answer(group: Mapping[str, Matrix]) -> Answer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearVerdict:
-    """Verdict on a K.
-
-    Attributes
-    ----------
-    facts : mapping
-        See `linear_facts`.
-    held : HeldLoop
-        What is decided when p is held over the sampling period asked for.
-    peaks : ContinuousPeaks, NoGuarantee or None
-        In continuous time; None when they were not asked for.
-    asked : str or None
-        Class of the disturbance for which peaks were asked for.
-    """
+    """Verdict on a K."""
 
     fault: Fault
     controller: ExtendedLQR
     analysis: Analysis
-    facts: Mapping[str, Any]
-    held: HeldLoop
-    peaks: ContinuousPeaks | NoGuarantee | None
-    asked: str | None = None
+    facts: Mapping[str, Any]  # mapping: See `linear_facts`
+    held: HeldLoop  # What is decided when p is held over the sampling period asked for
+    peaks: ContinuousPeaks | NoGuarantee | None  # In continuous time; None when they were not asked for
+    asked: str | None = None  # Class of the disturbance for which peaks were asked for
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values: exact numbers as texts, measured ones as numbers, SI."""

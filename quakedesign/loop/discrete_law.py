@@ -27,21 +27,11 @@ def values(expressions: tuple[sp.Expr, ...], known: Values) -> list[Any]:
 
 @dataclass(frozen=True)
 class DiscreteLaw:
-    """Pressure and integral states of a law, in the symbols of this module.
+    """Pressure and integral states of a law, in the symbols of this module."""
 
-    Attributes
-    ----------
-    pressure : Expr
-        p [Pa].
-    rates : tuple of Expr
-        ξ' of every integral state.
-    integrals : tuple of Symbol
-        ξ.
-    """
-
-    pressure: sp.Expr
-    rates: tuple[sp.Expr, ...]
-    integrals: tuple[sp.Symbol, ...]
+    pressure: sp.Expr  # p [Pa]
+    rates: tuple[sp.Expr, ...]  # ξ' of every integral state
+    integrals: tuple[sp.Symbol, ...]  # ξ
 
     @classmethod
     def of(cls, controller: Controller | None, constant_pressure: float) -> "DiscreteLaw":
@@ -62,19 +52,11 @@ class DiscreteLaw:
 
 @dataclass(frozen=True)
 class Lifted:
-    """Expressions whose numbers are symbols, so that laws with other gains share machine code.
-
-    Attributes
-    ----------
-    numbers : tuple of Symbol
-        Positive ones: signs stay in the expressions.
-    values : tuple of float
-        What the symbols stand for.
-    """
+    """Expressions whose numbers are symbols, so that laws with other gains share machine code."""
 
     expressions: tuple[sp.Expr, ...]
-    numbers: tuple[sp.Symbol, ...]
-    values: tuple[float, ...]
+    numbers: tuple[sp.Symbol, ...]  # Positive ones: signs stay in the expressions
+    values: tuple[float, ...]  # What the symbols stand for
 
     @classmethod
     def of(cls, expressions: tuple[sp.Expr, ...]) -> "Lifted":

@@ -330,24 +330,12 @@ _PACKAGES = ("quakedesign", "sympy", "cvxpy", "clarabel", "casadi", "numpy", "sc
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduction:
-    """How a report was made.
+    """How a report was made."""
 
-    Attributes
-    ----------
-    date : str
-        UTC; that of SOURCE_DATE_EPOCH where it is set, for pages that are the same byte for byte.
-    command : str
-        As it was typed; empty where the report was not made by one.
-    versions : mapping of str to str
-        Of the package, of all libraries that numbers depend on, and of Python.
-    scenario : list of str
-        Lines of the fault as TOML.
-    """
-
-    date: str
-    command: str
-    versions: Mapping[str, str]
-    scenario: list[str]
+    date: str  # UTC; that of SOURCE_DATE_EPOCH where it is set, for pages that are the same byte for byte
+    command: str  # As it was typed; empty where the report was not made by one
+    versions: Mapping[str, str]  # Of the package, of all libraries that numbers depend on, and of Python
+    scenario: list[str]  # Lines of the fault as TOML
 
 
 def versions() -> dict[str, str]:

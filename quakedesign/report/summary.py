@@ -44,22 +44,12 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What is said first of a comparison.
+    """What is said first of a comparison."""
 
-    Attributes
-    ----------
-    answer : str
-        What is guaranteed, against the natural earthquake.
-    conditions : str
-        Sentence of the guarantee of the answer, or why there is none.
-    notes : tuple of str
-        What limits the answer.
-    """
-
-    answer: str
+    answer: str  # What is guaranteed, against the natural earthquake
     rows: tuple[Row, ...]
-    conditions: str
-    notes: tuple[str, ...]
+    conditions: str  # Sentence of the guarantee of the answer, or why there is none
+    notes: tuple[str, ...]  # What limits the answer
 
 
 def summary(comparison: "Compared") -> Summary:

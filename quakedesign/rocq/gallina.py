@@ -110,14 +110,9 @@ def _square(square: Square, rows: Iterable[Iterable[Fraction]], common: int) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class Reason:
-    """Why a multiplier μ, times its common denominator, is nowhere negative on the set.
+    """Why a multiplier μ, times its common denominator, is nowhere negative on the set."""
 
-    Attributes
-    ----------
-    sums : IntegerWitness, optional
-        numerator · μ − rest as a sum of squares; without it the terms of μ show its sign.
-    """
-
+    # numerator · μ − rest as a sum of squares; without it the terms of μ show its sign
     sums: IntegerWitness | None = None
     numerator: int = 1
     rest: int = 0

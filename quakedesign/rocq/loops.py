@@ -15,19 +15,11 @@ _POINTS = "forall x, nowhere_zero x ->"
 
 @dataclass(frozen=True, kw_only=True)
 class Columns:
-    """States, lifts with a variable, V where a decay is claimed, lifts of which only the sign occurs; in this order.
-
-    Attributes
-    ----------
-    varying : tuple of str
-        Parameters with a range of more than one point.
-    values : mapping of str to Fraction
-        All others.
-    """
+    """States, lifts with a variable, V where a decay is claimed, lifts of which only the sign occurs; in this order."""
 
     weights: Mapping[str, int]
-    varying: tuple[str, ...]
-    values: Mapping[str, Fraction]
+    varying: tuple[str, ...]  # Parameters with a range of more than one point
+    values: Mapping[str, Fraction]  # All others
 
     def index(self, name: str) -> int:
         """Column of a state or lift."""

@@ -421,25 +421,16 @@ def _inserted(expression: sp.Expr, law: Any, values: Mapping[Any, Any]) -> sp.Ex
 
 @dataclass(frozen=True)
 class ClosedLoop(Metered):
-    """One fault under one law, or under a constant pressure.
-
-    Attributes
-    ----------
-    constant_pressure : float
-        p [Pa] where there is no controller.
-    load : Load
-        What acts on the fault beside its own disturbance.
-    factors : tuple of float or SX
-        True over nominal parameters as in `Variation.values`; empty for the nominal fault.
-    """
+    """One fault under one law, or under a constant pressure."""
 
     plant_name: ClassVar[str] = "printed"
     plant_title: ClassVar[str] = ", plant without stick"
 
     fault: Fault
     controller: Controller | None = None
-    constant_pressure: float = 0.0
-    load: Load = NOTHING
+    constant_pressure: float = 0.0  # p [Pa] where there is no controller
+    load: Load = NOTHING  # What acts on the fault beside its own disturbance
+    # tuple of float or SX: True over nominal parameters as in `Variation.values`; empty for the nominal fault
     factors: tuple[Any, ...] = ()
 
     def with_factors(self, factors: tuple[Any, ...]) -> Self:

@@ -385,21 +385,11 @@ class NotPortableError(ValueError):
 
 @dataclass(frozen=True)
 class Instruction:
-    """One step of a function's work.
+    """One step of a function's work."""
 
-    Attributes
-    ----------
-    operation : int
-        CasADi's code.
-    taken : tuple of int
-        Places of the arguments; for an input its number and the entry.
-    given : tuple of int
-        Places of the results, −1 where none is wanted; for an output its number and the entry.
-    """
-
-    operation: int
-    taken: tuple[int, ...]
-    given: tuple[int, ...]
+    operation: int  # CasADi's code
+    taken: tuple[int, ...]  # Places of the arguments; for an input its number and the entry
+    given: tuple[int, ...]  # Places of the results, −1 where none is wanted; for an output its number and the entry
     constant: float
 
 
@@ -413,18 +403,11 @@ def instructions(function: Any) -> Iterator[Instruction]:
 
 @dataclass(frozen=True)
 class Called:
-    """What one instruction of a function calls.
+    """What one instruction of a function calls."""
 
-    Attributes
-    ----------
-    function : casadi.Function
-        Of scalar operations, one vector in and one out.
-    times : int
-        How often, on its own result; 0: once if the first argument, which it does not take, is not zero, else its
-        result is 0.
-    """
-
-    function: Any
+    function: Any  # casadi.Function: Of scalar operations, one vector in and one out
+    # How often, on its own result; 0: once if the first argument, which it does not take, is not zero, else its result
+    # is 0
     times: int
 
     def __call__(self, function: Any, arguments: list[Any]) -> Any:
@@ -664,24 +647,14 @@ MachineCode = Callable[[Any, int], int]
 
 @dataclass(frozen=True)
 class Backend:
-    """What advances a vector.
+    """What advances a vector."""
 
-    Attributes
-    ----------
-    functions : tuple of casadi.Function
-        That advance it by 1, 64 and 4096 steps, one input and one output each; none beside machine code.
-    name : str
-        ``"compiled"`` or ``"virtual-machine"``.
-    reason : str
-        The compiler, or why there is none.
-    machine_code : callable, optional
-        Advances the floats at a pointer by a number of steps; not 0 if it fails.
-    """
-
+    # tuple of casadi.Function: That advance it by 1, 64 and 4096 steps, one input and one output each; none beside
+    # machine code
     functions: tuple[Any, ...]
-    name: str
-    reason: str
-    machine_code: MachineCode | None = None
+    name: str  # ``"compiled"`` or ``"virtual-machine"``
+    reason: str  # The compiler, or why there is none
+    machine_code: MachineCode | None = None  # Advances the floats at a pointer by a number of steps; not 0 if it fails
 
 
 def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:

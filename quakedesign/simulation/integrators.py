@@ -182,7 +182,7 @@ class AdaptiveIntegrator:
 class Flow:
     """Solution over intervals of one subdivision."""
 
-    solver: Any
+    solver: Any  # casadi.Function
     scales: "np.ndarray"
 
     def follow(

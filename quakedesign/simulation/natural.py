@@ -138,18 +138,11 @@ BEGUN_SHARE = 0.01
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waiting:
-    """An event that has not begun.
+    """An event that has not begun."""
 
-    Attributes
-    ----------
-    growth : float
-        Real part of the unstable eigenvalue [1/s].
-    onset : float or None
-        Time [s] at which the slip rate would reach 10 % of the natural peak, by growth at that rate from where the run
-        ends; None for a fault that has not moved forward.
-    """
-
-    growth: float
+    growth: float  # Real part of the unstable eigenvalue [1/s]
+    # Time [s] at which the slip rate would reach 10 % of the natural peak, by growth at that rate from where the run
+    # ends; None for a fault that has not moved forward
     onset: float | None
 
     def to_dict(self) -> dict[str, Any]:

@@ -47,25 +47,13 @@ START = {
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What the vector of a run holds.
+    """What the vector of a run holds."""
 
-    Attributes
-    ----------
-    counter : SX or float
-        Number of the step.
-    settled_from : SX or float
-        Time from which errors count [s].
-    state : SX or ndarray
-        x1 [m], x2 [m/s], ξ, memory of the scheme.
-    factors : tuple of SX or float
-        Numbers of the plant that a run carries along unchanged.
-    """
-
-    counter: Any
-    settled_from: Any
-    state: Any
+    counter: Any  # SX or float: Number of the step
+    settled_from: Any  # SX or float: Time from which errors count [s]
+    state: Any  # SX or ndarray: x1 [m], x2 [m/s], ξ, memory of the scheme
     watched: dict[str, Any]
-    factors: tuple[Any, ...]
+    factors: tuple[Any, ...]  # tuple of SX or float: Numbers of the plant that a run carries along unchanged
 
     def joined(self) -> Any:
         """The vector (SX)."""
@@ -74,20 +62,12 @@ class Parts:
 
 @dataclass(frozen=True)
 class Recorder:
-    """The vector [counter, settled_from, x1, x2, ξ, memory…, watched…, factors…] that one step maps onto itself.
-
-    Attributes
-    ----------
-    step : float
-        T_s [s].
-    initial : tuple of float
-        x1 [m] and x2 [m/s] at the start; rest unless given.
-    """
+    """The vector [counter, settled_from, x1, x2, ξ, memory…, watched…, factors…] that one step maps onto itself."""
 
     loop: ClosedLoop
     scheme: Scheme
-    step: float
-    initial: tuple[float, float] = (0.0, 0.0)
+    step: float  # T_s [s]
+    initial: tuple[float, float] = (0.0, 0.0)  # x1 [m] and x2 [m/s] at the start; rest unless given
 
     @cached_property
     def memory(self) -> dict[str, float]:

@@ -144,19 +144,11 @@ class SmoothSolution:
 
 @dataclass(frozen=True)
 class SmoothProblem:
-    """y' = f(y, load(t)) in the variables of a CasADi Function (y, load) → f, ∂f/∂y.
+    """y' = f(y, load(t)) in the variables of a CasADi Function (y, load) → f, ∂f/∂y."""
 
-    Attributes
-    ----------
-    scales : ndarray
-        Size of each variable below which its error counts absolutely.
-    watched : int
-        Index of the variable whose upward crossings of `level` are found.
-    """
-
-    rates: Any
-    scales: "np.ndarray"
-    watched: int
+    rates: Any  # casadi.Function
+    scales: "np.ndarray"  # Size of each variable below which its error counts absolutely
+    watched: int  # Index of the variable whose upward crossings of `level` are found
     level: float
 
     def integrate(

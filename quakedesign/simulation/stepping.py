@@ -29,16 +29,10 @@ SECONDS = 30.0
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """File that holds what a run has kept so far, written whole or not at all.
-
-    Attributes
-    ----------
-    fingerprint : str
-        Of everything that determines the digits of the run; a file of another run is refused.
-    """
+    """File that holds what a run has kept so far, written whole or not at all."""
 
     path: Path
-    fingerprint: str
+    fingerprint: str  # Of everything that determines the digits of the run; a file of another run is refused
     _written: list[float] = field(default_factory=lambda: [monotonic()], repr=False)
 
     @classmethod
@@ -115,22 +109,12 @@ ProgressReport = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Advancer:
-    """Moves one vector forward in place, by any number of steps.
-
-    Attributes
-    ----------
-    calls : tuple of callable
-        Advance the vector by 1, 64 and 4096 steps; none beside machine code.
-    owners : tuple
-        CasADi's buffers, which must live as long as the calls.
-    machine_code : callable or None
-        See `Backend`.
-    """
+    """Moves one vector forward in place, by any number of steps."""
 
     vector: "np.ndarray"
-    calls: tuple[Callable[[], None], ...] = ()
-    owners: tuple[Any, ...] = ()
-    machine_code: MachineCode | None = None
+    calls: tuple[Callable[[], None], ...] = ()  # Advance the vector by 1, 64 and 4096 steps; none beside machine code
+    owners: tuple[Any, ...] = ()  # tuple: CasADi's buffers, which must live as long as the calls
+    machine_code: MachineCode | None = None  # See `Backend`
 
     @classmethod
     def of(cls, backend: Backend, start: list[float]) -> "Advancer":

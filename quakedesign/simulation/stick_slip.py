@@ -329,33 +329,17 @@ def _energy(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlipEvent:
-    """One event of a fault, as far as the run shows it.
+    """One event of a fault, as far as the run shows it."""
 
-    Attributes
-    ----------
-    nucleation : float or None
-        Time [s] at which the slip rate last rose through the loading rate before the onset; None if it began above.
-    onset : float
-        Time [s] at which it rises through the `onset_rate` of the run.
-    arrest : float or None
-        Time [s] at which it falls below that again; None where the run ends before, as are the three last ones then.
-    peak_slip_rate : float
-        [m/s].
-    slip : float or None
-        From onset to arrest [m].
-    moment : float or None
-        GA times that slip [N·m].
-    magnitude : float or None
-        M_w of that moment [-].
-    """
-
+    # Time [s] at which the slip rate last rose through the loading rate before the onset; None if it began above
     nucleation: float | None
-    onset: float
+    onset: float  # Time [s] at which it rises through the `onset_rate` of the run
+    # Time [s] at which it falls below that again; None where the run ends before, as are the three last ones then
     arrest: float | None
-    peak_slip_rate: float
-    slip: float | None
-    moment: float | None
-    magnitude: float | None
+    peak_slip_rate: float  # [m/s]
+    slip: float | None  # From onset to arrest [m]
+    moment: float | None  # GA times that slip [N·m]
+    magnitude: float | None  # M_w of that moment [-]
 
 
 def slip_events(fault: Fault, run: StateTrajectory, loading_rate: float) -> tuple[SlipEvent, ...]:
@@ -439,18 +423,10 @@ _OLDER = 1.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartingState:
-    """Slip rate and state of friction at the start; the spring is stretched so that the forces are in balance.
+    """Slip rate and state of friction at the start; the spring is stretched so that the forces are in balance."""
 
-    Attributes
-    ----------
-    slip_rate : float
-        [m/s].
-    state : tuple of float
-        In the units of the law.
-    """
-
-    slip_rate: float
-    state: tuple[float, ...]
+    slip_rate: float  # [m/s]
+    state: tuple[float, ...]  # In the units of the law
 
 
 def sliding(fault: Fault, rate: float) -> StartingState:

@@ -16,22 +16,12 @@ from quakedesign.synthesis import guarantee
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlocksAnswer:
-    """What is proved of a fault cut into numbers of blocks.
-
-    Attributes
-    ----------
-    wells : str
-        ``"one"`` or ``"each"``.
-    step : Fraction
-        T_s [s].
-    found : mapping of int to PlantGuarantee or NoGuarantee
-        By the number of blocks.
-    """
+    """What is proved of a fault cut into numbers of blocks."""
 
     fault: Fault
-    wells: str
-    step: Fraction
-    found: Mapping[int, PlantGuarantee | NoGuarantee]
+    wells: str  # ``"one"`` or ``"each"``
+    step: Fraction  # T_s [s]
+    found: Mapping[int, PlantGuarantee | NoGuarantee]  # By the number of blocks
 
     @property
     def proved(self) -> bool:

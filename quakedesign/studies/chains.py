@@ -24,21 +24,12 @@ _UNREACHED = 1e-9  # of a mode's vectors
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnstableMode:
-    """An unstable mode of a fault of several blocks.
+    """An unstable mode of a fault of several blocks."""
 
-    Attributes
-    ----------
-    pole : float
-        p [1/s].
-    shape : tuple of float
-        Slips of the blocks, the largest 1 [-].
-    pressure : float
-        Least size [Pa] of pressures less their balance that a controller of any kind needs; infinite where no well
-        reaches the mode.
-    """
-
-    pole: float
-    shape: tuple[float, ...]
+    pole: float  # p [1/s]
+    shape: tuple[float, ...]  # Slips of the blocks, the largest 1 [-]
+    # Least size [Pa] of pressures less their balance that a controller of any kind needs; infinite where no well
+    # reaches the mode
     pressure: float
 
     @property

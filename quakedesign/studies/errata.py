@@ -17,18 +17,10 @@ KINDS = ("symbolic identity", "counterexample", "numeric reproduction")
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a check computed.
+    """What a check computed."""
 
-    Attributes
-    ----------
-    holds : bool
-        Whether the corrected form stands, and the printed one falls where the row says so.
-    evidence : str
-        The numbers, in one line.
-    """
-
-    holds: bool
-    evidence: str
+    holds: bool  # Whether the corrected form stands, and the printed one falls where the row says so
+    evidence: str  # The numbers, in one line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

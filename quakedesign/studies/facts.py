@@ -107,27 +107,13 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Plane:
-    """Stiffness against one quantity that sets the effective stress under pressure.
+    """Stiffness against one quantity that sets the effective stress under pressure."""
 
-    Attributes
-    ----------
-    across : numpy.ndarray
-        That quantity [Pa], shape (points,).
-    stable : numpy.ndarray of bool
-        Shape (stiffnesses, points).
-    critical : numpy.ndarray
-        Critical stiffness per area [Pa/m], shape (points,); nan where there is none.
-    limits : tuple of float
-        Where the damping alone decides [Pa]; nan outside of the plane.
-    own : float
-        Where the fault is [Pa].
-    """
-
-    across: np.ndarray
-    stable: np.ndarray
-    critical: np.ndarray
-    limits: tuple[float, ...]
-    own: float
+    across: np.ndarray  # That quantity [Pa], shape (points,)
+    stable: np.ndarray  # Shape (stiffnesses, points)
+    critical: np.ndarray  # Critical stiffness per area [Pa/m], shape (points,); nan where there is none
+    limits: tuple[float, ...]  # Where the damping alone decides [Pa]; nan outside of the plane
+    own: float  # Where the fault is [Pa]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,22 +220,13 @@ at most 22 % until the next one."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SamplingAdequacy:
-    """Sampling time of a fault beside its instability.
+    """Sampling time of a fault beside its instability."""
 
-    Attributes
-    ----------
-    step : float
-        T_s [s].
-    pole : float
-        Modulus of the fastest pole that grows [1/s]; 0 where none does.
-    over_box : bool
-        Whether `pole` is the fastest over the uncertainty box, at any pressure that equilibrium along the reference may
-        need there; if not, that of the nominal fault at its operating point: at rest, or with one state in slow sliding
-        along its task, whose mean rate sets it.
-    """
-
-    step: float
-    pole: float
+    step: float  # T_s [s]
+    pole: float  # Modulus of the fastest pole that grows [1/s]; 0 where none does
+    # Whether `pole` is the fastest over the uncertainty box, at any pressure that equilibrium along the reference may
+    # need there; if not, that of the nominal fault at its operating point: at rest, or with one state in slow sliding
+    # along its task, whose mean rate sets it
     over_box: bool
 
     @property

@@ -158,23 +158,15 @@ PERIODS = 16
 
 @dataclass(frozen=True, kw_only=True)
 class PaperRuns:
-    """Runs of all figures.
-
-    Attributes
-    ----------
-    induced : Trajectory or None
-        Without control, under a constant pressure of a tenth of the effective normal stress; None for friction with a
-        state, which has none of the short runs.
-    close_ups : mapping of str to Trajectory
-        By label of the entry: its first `PERIODS` natural periods with every step kept.
-    front : tuple of FrontPoint
-        Peak against tracking, where a law of samples was designed.
-    """
+    """Runs of all figures."""
 
     comparison: Compared
+    # Without control, under a constant pressure of a tenth of the effective normal stress; None for friction with a
+    # state, which has none of the short runs
     induced: Trajectory | None
+    # By label of the entry: its first `PERIODS` natural periods with every step kept
     close_ups: Mapping[str, Trajectory]
-    front: tuple[FrontPoint, ...] = ()
+    front: tuple[FrontPoint, ...] = ()  # Peak against tracking, where a law of samples was designed
 
 
 def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] | None = None) -> PaperRuns:

@@ -93,17 +93,13 @@ class Limit:
 class Told:
     """What controllers measure of slip and slip rate, at all times up to a sample.
 
-    Attributes
-    ----------
-    setup : LoopSetup
-        What controllers measure, with its noise; all of it is that of the designs that are proved.
-
     Raises
     ------
     ParameterError
         For noise of a slip rate that is not measured, or a differentiator.
     """
 
+    # What controllers measure, with its noise; all of it is that of the designs that are proved
     setup: LoopSetup = IDEAL
 
     def __post_init__(self) -> None:
@@ -256,17 +252,11 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingLimits(Limits):
-    """Limits of a fault in slow sliding along its task, of its nominal plant linearised there.
-
-    Attributes
-    ----------
-    rock : Fraction
-        L²/D [s] of the well that was asked about; 0 without one.
-    """
+    """Limits of a fault in slow sliding along its task, of its nominal plant linearised there."""
 
     push: SlidingPush
     guarantee: SlidingGuarantee | None
-    rock: Fraction
+    rock: Fraction  # L²/D [s] of the well that was asked about; 0 without one
 
     @property
     def beyond(self) -> bool:

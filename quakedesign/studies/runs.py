@@ -91,24 +91,14 @@ _SHOWN = 500  # D_c/V of a slow task that are run: the loop settles within some 
 
 @dataclass(frozen=True, kw_only=True)
 class StateRun:
-    """A simulation of a fault with a state, and its result.
-
-    Attributes
-    ----------
-    loading_rate : float
-        v_∞ [m/s].
-    seconds : float
-        Time that it took [s], where that was measured.
-    failed : str
-        Why what the fault does is not known: the trajectory is but the first instants. Empty otherwise.
-    """
+    """A simulation of a fault with a state, and its result."""
 
     fault: Fault
-    loading_rate: float
+    loading_rate: float  # v_∞ [m/s]
     start: StartingState
     trajectory: StateTrajectory
-    seconds: float = 0.0
-    failed: str = ""
+    seconds: float = 0.0  # Time that it took [s], where that was measured
+    failed: str = ""  # Why what the fault does is not known: the trajectory is but the first instants. Empty otherwise.
 
     @property
     def outcome(self) -> Outcome:
@@ -542,18 +532,12 @@ PUBLISHED, DESIGNED, CONTINUOUS = ("published",), ("designed",), ("continuous",)
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """Controller with its certified claim, without a solver.
-
-    Attributes
-    ----------
-    lipschitz : Fraction or None
-        Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law.
-    claim : Guarantee, SlidingGuarantee, StickSlipGuarantee or None
-        What is proved of the law, where it comes from a certificate file.
-    """
+    """Controller with its certified claim, without a solver."""
 
     controller: Controller
+    # Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law
     lipschitz: Fraction | None = None
+    # What is proved of the law, where it comes from a certificate file
     claim: Guarantee | SlidingGuarantee | StickSlipGuarantee | None = None
 
     def noise(self, seed: int) -> Measurement:

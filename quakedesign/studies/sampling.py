@@ -25,24 +25,15 @@ Tell = Callable[[str, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class SchemeRow:
-    """One law under one scheme.
+    """One law under one scheme."""
 
-    Attributes
-    ----------
-    label : str
-        Law, and whether it is the published one, or its λ.
-    origin : str
-        Of the gains: ``"designed"``, ``"given"``, ``"published"``.
-    premise : Premise or None
-        |h'| on the trajectory, for a sliding mode that did not diverge; nothing is certified of gains that come without
-        a certificate.
-    """
-
-    label: str
-    origin: str
+    label: str  # Law, and whether it is the published one, or its λ
+    origin: str  # Of the gains: ``"designed"``, ``"given"``, ``"published"``
     controller: Controller
     scheme: str
     run: Trajectory
+    # |h'| on the trajectory, for a sliding mode that did not diverge; nothing is certified of gains that come without a
+    # certificate
     premise: Premise | None
 
     def to_dict(self) -> dict[str, Any]:
@@ -66,18 +57,12 @@ class SchemeRow:
 
 @dataclass(frozen=True, kw_only=True)
 class SamplingReport:
-    """Report of the effect of sampling on a law.
-
-    Attributes
-    ----------
-    rows : tuple of SchemeRow
-        The law under every scheme, then the published ones: as in the paper, held, and with the compensated scheme.
-    studies : dict of str to Study
-        ``orders`` (of a sliding mode without feed-forward), ``slip_noise``, ``rate_noise``, ``input_gain``.
-    """
+    """Report of the effect of sampling on a law."""
 
     fault: Fault
+    # The law under every scheme, then the published ones: as in the paper, held, and with the compensated scheme
     rows: tuple[SchemeRow, ...]
+    # ``orders`` (of a sliding mode without feed-forward), ``slip_noise``, ``rate_noise``, ``input_gain``
     studies: dict[str, Study]
 
     def to_dict(self) -> dict[str, Any]:

@@ -577,29 +577,17 @@ FURTHEST = 10**60  # beyond it a half-line is not halved any more
 
 @dataclass(frozen=True)
 class Excess:
-    """Where a limit is exceeded.
-
-    Attributes
-    ----------
-    value : Fraction
-        A rigorous lower bound of the expression there.
-    """
+    """Where a limit is exceeded."""
 
     at: dict[sp.Symbol, Fraction]
-    value: Fraction
+    value: Fraction  # A rigorous lower bound of the expression there
 
 
 @dataclass(frozen=True)
 class Undecided:
-    """What subdivision did not decide.
+    """What subdivision did not decide."""
 
-    Attributes
-    ----------
-    where : Box
-        The box with the largest enclosure that is left.
-    """
-
-    where: Box
+    where: Box  # The box with the largest enclosure that is left
 
 
 def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction) -> Fraction | Excess | Undecided:

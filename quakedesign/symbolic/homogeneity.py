@@ -47,21 +47,11 @@ class Identity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counterexample:
-    """A point and an ε at which a necessary identity fails.
+    """A point and an ε at which a necessary identity fails."""
 
-    Attributes
-    ----------
-    identity : Identity
-        What homogeneity would require.
-    meaning : str
-        The identity in words.
-    point : mapping of Symbol to Rational
-        Exact values of all states and parameters.
-    """
-
-    identity: Identity
-    meaning: str
-    point: Mapping[sp.Symbol, sp.Rational]
+    identity: Identity  # What homogeneity would require
+    meaning: str  # The identity in words
+    point: Mapping[sp.Symbol, sp.Rational]  # Exact values of all states and parameters
     epsilon: sp.Rational
 
     @property

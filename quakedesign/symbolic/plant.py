@@ -91,18 +91,10 @@ reference = sp.Function("r", real=True)
 
 @dataclass(frozen=True, slots=True)
 class ErrorDynamics:
-    """e1' = e2, e2' = β(ν + h), eqs. esystem3: the two expressions that a controller must live with.
+    """e1' = e2, e2' = β(ν + h), eqs. esystem3: the two expressions that a controller must live with."""
 
-    Attributes
-    ----------
-    beta : Expr
-        Control coefficient β [-].
-    h : Expr
-        Matched perturbation [m/s²], the unit of ν.
-    """
-
-    beta: sp.Expr
-    h: sp.Expr
+    beta: sp.Expr  # Control coefficient β [-]
+    h: sp.Expr  # Matched perturbation [m/s²], the unit of ν
 
     def _repr_latex_(self) -> str:
         return (

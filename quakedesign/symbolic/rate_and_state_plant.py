@@ -296,18 +296,10 @@ sliding_rate = sp.Symbol("V", positive=True)
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingErrors:
-    """Friction and state about sliding at `sliding_rate`, in `log_rate` y and `log_state` z.
+    """Friction and state about sliding at `sliding_rate`, in `log_rate` y and `log_state` z."""
 
-    Attributes
-    ----------
-    friction_change : Expr
-        μ(y, z) − μ* [-].
-    state_change : Expr
-        z′ [1/s].
-    """
-
-    friction_change: sp.Expr
-    state_change: sp.Expr
+    friction_change: sp.Expr  # μ(y, z) − μ* [-]
+    state_change: sp.Expr  # z′ [1/s]
 
     @cached_property
     def slopes(self) -> tuple[sp.Expr, sp.Expr]:

@@ -43,23 +43,14 @@ class Stability(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """One expression that stability needs positive, and its value.
+    """One expression that stability needs positive, and its value."""
 
-    Attributes
-    ----------
-    expression : Expr
-        In the symbols of the plant and the slopes of friction (`state_plant.stability_conditions`).
-    margin : (Fraction, Fraction)
-        Enclosure of the expression relative to the sum of the sizes of its parts [-], in [−1, 1]. The parts are those
-        with and without the stiffness k, so that a condition k > k_c has the margin (k − k_c)/(k + |k_c|); a condition
-        without stiffness has its terms for parts.
-    exact : bool
-        Whether the two ends are one exact rational.
-    """
-
-    expression: sp.Expr
+    expression: sp.Expr  # In the symbols of the plant and the slopes of friction (`state_plant.stability_conditions`)
+    # Enclosure of the expression relative to the sum of the sizes of its parts [-], in [−1, 1]. The parts are those
+    # with and without the stiffness k, so that a condition k > k_c has the margin (k − k_c)/(k + |k_c|); a condition
+    # without stiffness has its terms for parts.
     margin: Interval
-    exact: bool
+    exact: bool  # Whether the two ends are one exact rational
 
     @property
     def holds(self) -> bool | None:
@@ -70,20 +61,12 @@ class Condition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StabilityVerdict:
-    """Whether sliding at a loading rate is stable, with the margin of every condition.
-
-    Attributes
-    ----------
-    pressure : (Fraction, Fraction)
-        Range of the pressure [Pa].
-    loading_rate : Fraction
-        Slip rate of the equilibrium [m/s].
-    """
+    """Whether sliding at a loading rate is stable, with the margin of every condition."""
 
     outcome: Stability
     conditions: tuple[Condition, ...]
-    pressure: Interval
-    loading_rate: Fraction
+    pressure: Interval  # Range of the pressure [Pa]
+    loading_rate: Fraction  # Slip rate of the equilibrium [m/s]
     inertia: bool
 
     @property

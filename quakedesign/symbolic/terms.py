@@ -14,19 +14,11 @@ Factor = tuple[str, Fraction, str]
 
 @dataclass(frozen=True, slots=True, order=True)
 class Term:
-    """coefficient · parameters · factors.
-
-    Attributes
-    ----------
-    parameters : tuple of str
-        Names, each as often as it multiplies.
-    factors : tuple of (state, exponent, kind)
-        At most one for every state.
-    """
+    """coefficient · parameters · factors."""
 
     coefficient: Fraction
-    parameters: tuple[str, ...]
-    factors: tuple[Factor, ...]
+    parameters: tuple[str, ...]  # Names, each as often as it multiplies
+    factors: tuple[Factor, ...]  # At most one for every state
 
 
 def plain(terms: Iterable[Term]) -> list[Any]:

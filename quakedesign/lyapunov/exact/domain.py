@@ -78,20 +78,12 @@ class Domain:
 
 @dataclass(frozen=True)
 class DomainProblem:
-    """Which level sets of a certificate hold on a fault under a law.
-
-    Attributes
-    ----------
-    certificate : Certificate
-        For the base gains, with bounds of all states.
-    robustness : Robustness or None
-        None: only the method ``"whole"`` is available.
-    """
+    """Which level sets of a certificate hold on a fault under a law."""
 
     fault: Fault
     controller: SlidingMode
-    certificate: Certificate
-    robustness: Robustness | None
+    certificate: Certificate  # For the base gains, with bounds of all states
+    robustness: Robustness | None  # None: only the method ``"whole"`` is available
 
     @cached_property
     def sets(self) -> LevelSets:

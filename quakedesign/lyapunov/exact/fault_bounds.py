@@ -188,29 +188,16 @@ class Sectors:
     """Chords of everything that depends on the state, about the equilibrium of any constant reference.
 
     x2' = s·x1 − w·x2 + β·b·p with all three anywhere in their ranges, at every time.
-
-    Attributes
-    ----------
-    authority : Fraction
-        b = μ_res·N̂_min [m²/kg] (ERRATA 9).
-    beta : (Fraction, Fraction)
-        Range of μN̂/b [-].
-    slip : (Fraction, Fraction)
-        Range of s [1/s²]: friction's weakening (and strengthening, unless the law only weakens), spring, growth of the
-        disturbance.
-    rate : (Fraction, Fraction)
-        Range of w [1/s]: damping, friction's slope in slip rate (ERRATA 10), growth of the disturbance.
-    row_bounds : (Fraction, Fraction)
-        g1 [Pa/m] and g2 [Pa·s/m] with |h| ≤ g1|x1| + g2|x2| about the nominal k̂, η̂ (ERRATA 6, 7).
-    largest_effective_stress : Fraction
-        max |σ' − p*| [Pa] over the constant references up to the target slip (ERRATA 8).
     """
 
-    authority: Fraction
-    beta: Range
+    authority: Fraction  # b = μ_res·N̂_min [m²/kg] (ERRATA 9)
+    beta: Range  # Range of μN̂/b [-]
+    # Range of s [1/s²]: friction's weakening (and strengthening, unless the law only weakens), spring, growth of the
+    # disturbance
     slip: Range
-    rate: Range
-    row_bounds: Range
+    rate: Range  # Range of w [1/s]: damping, friction's slope in slip rate (ERRATA 10), growth of the disturbance
+    row_bounds: Range  # g1 [Pa/m] and g2 [Pa·s/m] with |h| ≤ g1|x1| + g2|x2| about the nominal k̂, η̂ (ERRATA 6, 7)
+    # max |σ' − p*| [Pa] over the constant references up to the target slip (ERRATA 8)
     largest_effective_stress: Fraction
 
     def __post_init__(self) -> None:

@@ -87,17 +87,11 @@ def _halved(
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A form on one simplex: integer Bernstein coefficients times a scale.
-
-    Attributes
-    ----------
-    coefficients : tuple of int
-        In the order of `_exponents`.
-    """
+    """A form on one simplex: integer Bernstein coefficients times a scale."""
 
     variables: int
     degree: int
-    coefficients: tuple[int, ...]
+    coefficients: tuple[int, ...]  # In the order of `_exponents`
     scale: fmpq
 
     @classmethod

@@ -41,16 +41,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Obligation:
-    """One polynomial that must be non-negative on a cell.
-
-    Attributes
-    ----------
-    polynomial : Polynomial
-        In the variables of states, lifts and, for a decay, V^{1/m}; all ≥ 0 unless on the reals.
-    """
+    """One polynomial that must be non-negative on a cell."""
 
     name: str
-    polynomial: Polynomial
+    polynomial: Polynomial  # In the variables of states, lifts and, for a decay, V^{1/m}; all ≥ 0 unless on the reals
     equalities: tuple[Polynomial, ...] = ()
     inequalities: tuple[Polynomial, ...] = ()
 

@@ -47,29 +47,16 @@ _MOST_DIGITS = 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Premise:
-    """One condition under which a certificate speaks about a given loop.
-
-    Attributes
-    ----------
-    required : UpperBound
-        What the loop asks for, in `unit`; a rigorous upper bound unless `measured`.
-    certified : LowerBound
-        What the certificate covers, in `unit`.
-    proved : bool
-        False if `certified` is only a limit that no certificate can exceed; the premise then never holds.
-    measured : bool
-        True if `required` was read off a simulation.
-    note : str
-        What the number assumes.
-    """
+    """One condition under which a certificate speaks about a given loop."""
 
     name: str
-    required: Fraction | float
-    certified: Fraction | float
+    required: Fraction | float  # What the loop asks for, in `unit`; a rigorous upper bound unless `measured`
+    certified: Fraction | float  # What the certificate covers, in `unit`
     unit: str
-    measured: bool = False
+    measured: bool = False  # True if `required` was read off a simulation
+    # False if `certified` is only a limit that no certificate can exceed; the premise then never holds
     proved: bool = True
-    note: str = ""
+    note: str = ""  # What the number assumes
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "required", _bound(UpperBound, self.required))
@@ -147,17 +134,11 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
-    """What is certified of the same gains with one feed-forward.
-
-    Attributes
-    ----------
-    domain : Domain or None
-        None where the certificate has no bounds of its states, or there is none.
-    """
+    """What is certified of the same gains with one feed-forward."""
 
     feedforward: FeedForward
     premises: tuple[Premise, ...]
-    domain: Domain | None
+    domain: Domain | None  # None where the certificate has no bounds of its states, or there is none
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact coefficients as texts."""

@@ -181,20 +181,11 @@ _BASE, _OTHER = sp.symbols("x y", positive=True)
 
 @dataclass(frozen=True)
 class LevelSets:
-    """Level sets of a proved V for gains scaled by λ, in metres and seconds.
+    """Level sets of a proved V for gains scaled by λ, in metres and seconds."""
 
-    Attributes
-    ----------
-    certificate : Certificate
-        For the base gains (λ = 1), with bounds of all states.
-    scale : Fraction
-        λ; the scaled loop has the errors λe of the base loop at the same time.
-    model : LoopField, optional
-        Loop of the law, for the units of its states; that of the law of the package by the certificate's name.
-    """
-
-    certificate: Certificate
-    scale: Fraction
+    certificate: Certificate  # For the base gains (λ = 1), with bounds of all states
+    scale: Fraction  # λ; the scaled loop has the errors λe of the base loop at the same time
+    # Loop of the law, for the units of its states; that of the law of the package by the certificate's name
     model: LoopField | None = None
 
     @property

@@ -56,20 +56,11 @@ class Pace:
 
     By Young's inequality V^{n/m} ≤ (n/m)V/w^{m−n} + (1 − n/m)w^n for every w > 0, an equality at w = V^{1/m}; an error
     ε of w costs a share of order ε².
-
-    Attributes
-    ----------
-    rate : float
-        κ > 0.
-    degrees : (int, int)
-        m and n, of V and V̇.
-    forms : mapping of str to polynomial
-        w on every cell of the states, by its signs: linear with coefficients > 0.
     """
 
-    rate: float
-    degrees: tuple[int, int]
-    forms: Mapping[str, Form]
+    rate: float  # κ > 0
+    degrees: tuple[int, int]  # m and n, of V and V̇
+    forms: Mapping[str, Form]  # w on every cell of the states, by its signs: linear with coefficients > 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -460,25 +451,13 @@ _ROOM = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathSetting:
-    """What does not change during a search.
-
-    Attributes
-    ----------
-    exponents : mapping of str to Fraction
-        Of gains and states, see `stretch_exponents`.
-    degree : int
-        Of V.
-    units : mapping of str to Expr
-        See `LoopField.units`.
-    least : float
-        Margin that counts; a search over gains steers clear of the edge of what a solver can tell.
-    """
+    """What does not change during a search."""
 
     objective: "Objective"
-    exponents: Mapping[str, Fraction]
-    degree: int
-    units: Mapping[str, sp.Expr] = field(default_factory=dict)
-    least: float = MARGIN
+    exponents: Mapping[str, Fraction]  # Of gains and states, see `stretch_exponents`
+    degree: int  # Of V
+    units: Mapping[str, sp.Expr] = field(default_factory=dict)  # See `LoopField.units`
+    least: float = MARGIN  # Margin that counts; a search over gains steers clear of the edge of what a solver can tell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -501,13 +480,7 @@ class State:
 
 @dataclass(frozen=True, kw_only=True)
 class Objective(ABC):
-    """One way in which gains can be better than others.
-
-    Attributes
-    ----------
-    bound : float, optional
-        Largest ‖k_i/L̄^{p_i}‖₂ allowed.
-    """
+    """One way in which gains can be better than others."""
 
     name: ClassVar[str]
     unit: ClassVar[str]
@@ -516,7 +489,7 @@ class Objective(ABC):
     bounded: ClassVar[bool] = True
     paced: ClassVar[bool] = False
 
-    bound: float | None = None
+    bound: float | None = None  # Largest ‖k_i/L̄^{p_i}‖₂ allowed
 
     def better(self, level: float, other: float) -> bool:
         """Whether a level is better than another one."""

@@ -223,24 +223,13 @@ _HIGHEST = 12  # beyond, one programme takes minutes
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisProblem:
-    """What is asked of a synthesis, read and checked.
-
-    Attributes
-    ----------
-    subject : str, type of Law or LoopField
-    loop : Loop
-        With gains of one.
-    setting : PathSetting
-        With the lowest degree.
-    known : tuple of Loop
-        With gains from the literature, scaled to the same ranges.
-    """
+    """What is asked of a synthesis, read and checked."""
 
     subject: Subject
-    loop: Loop
-    setting: PathSetting
+    loop: Loop  # With gains of one
+    setting: PathSetting  # With the lowest degree
     degrees: tuple[int, ...]
-    known: tuple[Loop, ...]
+    known: tuple[Loop, ...]  # With gains from the literature, scaled to the same ranges
 
 
 def question(
@@ -338,53 +327,29 @@ _SHARES = (1.0, 0.9, 0.7)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComparedGains:
-    """What gains from elsewhere reach in the same objective.
+    """What gains from elsewhere reach in the same objective."""
 
-    Attributes
-    ----------
-    gains : mapping of str to Fraction
-        Scaled to the same L̄ and β.
-    value : float or None
-        Proved; None where no proof was found.
-    norm : float
-        ‖k_i/L̄^{p_i}‖₂.
-    ratio : float or None
-        By which factor the gains found are better.
-    certificate : Certificate or None
-        Of the value, V being the best that was found for these gains.
-    """
-
-    gains: Mapping[str, Fraction]
-    value: float | None
-    norm: float
-    ratio: float | None
-    certificate: Certificate | None = None
+    gains: Mapping[str, Fraction]  # Scaled to the same L̄ and β
+    value: float | None  # Proved; None where no proof was found
+    norm: float  # ‖k_i/L̄^{p_i}‖₂
+    ratio: float | None  # By which factor the gains found are better
+    certificate: Certificate | None = None  # Of the value, V being the best that was found for these gains
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Synthesis:
-    """Gains with a proof, and how good they are.
-
-    Attributes
-    ----------
-    certificate : Certificate
-        Checked in exact arithmetic.
-    value : float
-        In terms of the objective: what the certificate proves, rounded down where more is better; for `sampled` what
-        was measured.
-    norm : float
-        ‖k_i/L̄^{p_i}‖₂ of the gains.
-    compared : tuple of ComparedGains
-        Gains from the literature, where there are any for the law.
-    """
+    """Gains with a proof, and how good they are."""
 
     law: str
     objective: str
     unit: str
     gains: Mapping[str, Fraction]
-    certificate: Certificate
+    certificate: Certificate  # Checked in exact arithmetic
+    # In terms of the objective: what the certificate proves, rounded down where more is better; for `sampled` what was
+    # measured
     value: float
-    norm: float
+    norm: float  # ‖k_i/L̄^{p_i}‖₂ of the gains
+    # Gains from the literature, where there are any for the law
     compared: tuple[ComparedGains, ...] = field(default=())
 
 

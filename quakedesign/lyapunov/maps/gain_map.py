@@ -37,29 +37,14 @@ _FAST = 1e-8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
-    """What a map is about.
-
-    Attributes
-    ----------
-    subject : str, type of Law or LoopField
-    loop : Loop
-        With the base gains.
-    over : tuple of two str
-        Gains that vary.
-    axes : tuple of two tuples of Fraction
-        Their values.
-    levels : tuple of Fraction
-        L̄, rising.
-    degree : int
-        Of V.
-    """
+    """What a map is about."""
 
     subject: Subject
-    loop: Loop
-    over: tuple[str, str]
-    axes: tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
-    levels: tuple[Fraction, ...]
-    degree: int
+    loop: Loop  # With the base gains
+    over: tuple[str, str]  # Gains that vary
+    axes: tuple[tuple[Fraction, ...], tuple[Fraction, ...]]  # Their values
+    levels: tuple[Fraction, ...]  # L̄, rising
+    degree: int  # Of V
 
     def at(self, place: Place, level: int) -> Loop:
         """Loop at a point, for the bound of a level (from 1)."""
@@ -210,34 +195,18 @@ _NEIGHBOURS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainMap:
-    """Largest level of L̄ at every point of a grid of two gains, as screened and as proved.
+    """Largest level of L̄ at every point of a grid of two gains, as screened and as proved."""
 
-    Attributes
-    ----------
-    sheet : Sheet
-        What was asked: law, gains, axes, levels.
-    limits : mapping of (i, j) to Fraction or None
-        Necessary limit of L̄.
-    screened : mapping of (i, j) to int
-        Number of levels at which the search in floating point finds a Lyapunov function; proves nothing.
-    proved : mapping of (i, j) to int
-        Number of levels that a certificate, checked in exact arithmetic, covers; only for points that were tried.
-    edges : frozenset of (i, j)
-        Points with a neighbour of a lower level; all of them were tried.
-    certificates : mapping of (i, j) to str
-        Text of the certificate for the highest level proved.
-    seconds : mapping of str to float
-        Of ``"screening"`` and ``"proving"``.
-    """
-
-    sheet: Sheet
-    limits: Mapping[Place, Fraction | None]
+    sheet: Sheet  # What was asked: law, gains, axes, levels
+    limits: Mapping[Place, Fraction | None]  # Necessary limit of L̄
+    # Number of levels at which the search in floating point finds a Lyapunov function; proves nothing
     screened: Mapping[Place, int]
+    # Number of levels that a certificate, checked in exact arithmetic, covers; only for points that were tried
     proved: Mapping[Place, int]
-    edges: frozenset[Place]
-    certificates: Mapping[Place, str]
+    edges: frozenset[Place]  # Points with a neighbour of a lower level; all of them were tried
+    certificates: Mapping[Place, str]  # Text of the certificate for the highest level proved
     solves: int
-    seconds: Mapping[str, float] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)  # Of ``"screening"`` and ``"proving"``
 
     def role(self, place: Place) -> str:
         """``"edge"``, ``"interior"`` (drawn at random) or nothing for a point that was only screened."""

@@ -128,37 +128,20 @@ _KEPT = 64  # scales whose numbers are kept
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """Units in which a point is solved, so that its numbers are about one.
+    """Units in which a point is solved, so that its numbers are about one."""
 
-    Attributes
-    ----------
-    scale : tuple of Fraction
-        Powers of two, u_i = scale_i·ũ_i.
-    pace : float
-        What −V̇ is divided by.
-    """
-
-    scale: tuple[Fraction, ...]
-    pace: float
+    scale: tuple[Fraction, ...]  # Powers of two, u_i = scale_i·ũ_i
+    pace: float  # What −V̇ is divided by
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Screened:
-    """Floating-point answer at one point; proves nothing.
+    """Floating-point answer at one point; proves nothing."""
 
-    Attributes
-    ----------
-    margin : float
-        Largest t.
-    decision : list of float
-        a_j, in the units of the frame.
-    slopes : mapping of str to float
-        Derivative of the margin in every number that V̇ depends on, by the names of `rows_of`.
-    """
-
-    margin: float
-    decision: list[float]
+    margin: float  # Largest t
+    decision: list[float]  # a_j, in the units of the frame
     frame: Frame
+    # Derivative of the margin in every number that V̇ depends on, by the names of `rows_of`
     slopes: Mapping[str, float]
 
     @property

@@ -222,24 +222,13 @@ _NEAR = 3 * TOLERANCE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bracket:
-    """Where the search succeeds, and where it does not.
+    """Where the search succeeds, and where it does not."""
 
-    Attributes
-    ----------
-    low : Fraction or None
-        Largest number at which it succeeded.
-    high : Fraction or None
-        Smallest number at which it did not; None where none was tried, as a limit makes it needless.
-    best : Screened or None
-        Answer at `low`.
-    asked : int
-        How often it was told something.
-    """
-
-    low: Fraction | None = None
+    low: Fraction | None = None  # Largest number at which it succeeded
+    # Smallest number at which it did not; None where none was tried, as a limit makes it needless
     high: Fraction | None = None
-    best: Screened | None = None
-    asked: int = 0
+    best: Screened | None = None  # Answer at `low`
+    asked: int = 0  # How often it was told something
 
     def closed(self, limit: Fraction | None) -> bool:
         """Whether `low` is within the tolerance of `high` or of a limit."""
@@ -352,37 +341,19 @@ _HAIR = Fraction(1, 10**9)  # so that a range of β has two ends even where it i
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CertifiedLimit:
-    """How far gains reach in one number, with the proof.
+    """How far gains reach in one number, with the proof."""
 
-    Attributes
-    ----------
-    quantity : str
-        ``"lipschitz"``, ``"beta"`` (upper end b_M) or ``"beta-factor"`` (range [b/f, b·f]).
-    value : Fraction or None
-        Proved exactly; None where the search finds nothing at all.
-    beyond : Fraction or None
-        Smallest number at which the search found nothing, at most value·(1 + 1e-4) unless a proof could not be
-        finished; None where `limit` is as near, or where there seems to be no end.
-    limit : Fraction or None
-        No Lyapunov function exists there, of whatever kind; None where none is known.
-    degrees : tuple of int
-        Degrees of V that were tried, all sums of squares on cells without multiplier.
-    degree : int or None
-        That of the certificate.
-    certificate : Certificate or None
-        Proof for the value; where there is none, the exact counterexample, if one is known.
-    counterexample : str
-        What speaks against the gains where nothing is found, see `against`; else ``"none"``.
-    """
-
-    quantity: str
-    value: Fraction | None
+    quantity: str  # ``"lipschitz"``, ``"beta"`` (upper end b_M) or ``"beta-factor"`` (range [b/f, b·f])
+    value: Fraction | None  # Proved exactly; None where the search finds nothing at all
+    # Smallest number at which the search found nothing, at most value·(1 + 1e-4) unless a proof could not be finished;
+    # None where `limit` is as near, or where there seems to be no end
     beyond: Fraction | None
-    limit: Fraction | None
-    degrees: tuple[int, ...]
-    degree: int | None
+    limit: Fraction | None  # No Lyapunov function exists there, of whatever kind; None where none is known
+    degrees: tuple[int, ...]  # Degrees of V that were tried, all sums of squares on cells without multiplier
+    degree: int | None  # That of the certificate
+    # Proof for the value; where there is none, the exact counterexample, if one is known
     certificate: Certificate | None
-    counterexample: str
+    counterexample: str  # What speaks against the gains where nothing is found, see `against`; else ``"none"``
     solves: int
     seconds: float
 

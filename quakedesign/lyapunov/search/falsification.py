@@ -18,18 +18,10 @@ _UNCOUNTED = 0.25  # share of a run at its beginning
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Escape:
-    """A run that grows without end, since the loop is homogeneous; floating point.
+    """A run that grows without end, since the loop is homogeneous; floating point."""
 
-    Attributes
-    ----------
-    growth : float
-        e-foldings of Σ|x_i|^{1/r_i} over the run.
-    strategy : str
-        What the uncertain parameters follow.
-    """
-
-    growth: float
-    strategy: str
+    growth: float  # e-foldings of Σ|x_i|^{1/r_i} over the run
+    strategy: str  # What the uncertain parameters follow
 
 
 def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:

@@ -26,21 +26,11 @@ _SURE = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Atom:
-    """One point of one obligation.
+    """One point of one obligation."""
 
-    Attributes
-    ----------
-    obligation : str
-        Name, as in a certificate.
-    point : tuple of Fraction
-        u ≥ 0 in the variables of the states, not all zero.
-    weight : Fraction
-        Positive.
-    """
-
-    obligation: str
-    point: tuple[Fraction, ...]
-    weight: Fraction
+    obligation: str  # Name, as in a certificate
+    point: tuple[Fraction, ...]  # u ≥ 0 in the variables of the states, not all zero
+    weight: Fraction  # Positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,15 +39,10 @@ class Dual:
 
     The family are all sums of even C¹ signed monomials of one degree (`signed_monomials`). That excludes positivity
     itself, not only sums of squares of some level.
-
-    Attributes
-    ----------
-    degree : int
-        Of V.
     """
 
     loop: Loop
-    degree: int
+    degree: int  # Of V
     atoms: tuple[Atom, ...]
 
     @property

@@ -453,27 +453,13 @@ def finished(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """Lyapunov functions Σ a_j V_j with the monomials of one degree, as demands on a_j.
+    """Lyapunov functions Σ a_j V_j with the monomials of one degree, as demands on a_j."""
 
-    Attributes
-    ----------
-    monomials : tuple of Term
-        V_j·size_j.
-    sizes : tuple of Fraction
-        What a monomial is divided by, so that all are about one in the scaled variables.
-    demands : tuple of Demand
-        V and −V̇ on every different cell and vertex, scaled.
-    pace : Fraction
-        What −V̇ was divided by.
-    fallen : int
-        Degree of V̇.
-    """
-
-    monomials: tuple[Term, ...]
-    sizes: tuple[Fraction, ...]
-    demands: tuple[Demand, ...]
-    pace: Fraction
-    fallen: int
+    monomials: tuple[Term, ...]  # V_j·size_j
+    sizes: tuple[Fraction, ...]  # What a monomial is divided by, so that all are about one in the scaled variables
+    demands: tuple[Demand, ...]  # V and −V̇ on every different cell and vertex, scaled
+    pace: Fraction  # What −V̇ was divided by
+    fallen: int  # Degree of V̇
 
     def function(self, decision: Sequence[float], digits: int) -> tuple[Term, ...]:
         """V with coefficients rounded to multiples of 1/digits in the scaled variables."""

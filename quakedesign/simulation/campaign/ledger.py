@@ -58,16 +58,10 @@ def _told(names: list[str]) -> str:
 
 @dataclass(frozen=True)
 class Ledger:
-    """Answers of a campaign on disk: the vector at the end of a sample, by the vector at its start.
-
-    Attributes
-    ----------
-    fingerprint : str
-        Of everything that the campaign is about.
-    """
+    """Answers of a campaign on disk: the vector at the end of a sample, by the vector at its start."""
 
     folder: Path
-    fingerprint: str
+    fingerprint: str  # Of everything that the campaign is about
 
     @classmethod
     def open(cls, folder: Path, inputs: Mapping[str, Any], *, renew: bool = False) -> "Ledger":

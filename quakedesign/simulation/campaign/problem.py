@@ -417,30 +417,17 @@ def _digest(content: bytes) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class CompiledProgram:
-    """What a worker needs to move samples on; it can be sent anywhere.
-
-    Attributes
-    ----------
-    source : str
-        C text with ``advance_samples``, which steps several of them at once.
-    function : str
-        The step with all elementary functions written out, as CasADi writes it, for workers without a C compiler.
-    size : int
-        Length of the vector of one sample.
-    diverged : int
-        Index of the time of divergence in it.
-    library : Library or None
-        Where somebody has compiled the source already.
-    """
+    """What a worker needs to move samples on; it can be sent anywhere."""
 
     lanes: ClassVar[int] = LANES
     batch_steps: ClassVar[int] = 80_000_000
 
-    source: str
+    source: str  # C text with ``advance_samples``, which steps several of them at once
+    # The step with all elementary functions written out, as CasADi writes it, for workers without a C compiler
     function: str
-    size: int
-    diverged: int
-    library: Library | None = None
+    size: int  # Length of the vector of one sample
+    diverged: int  # Index of the time of divergence in it
+    library: Library | None = None  # Where somebody has compiled the source already
 
     @classmethod
     def of(cls, step: Any, diverged: int) -> "CompiledProgram":

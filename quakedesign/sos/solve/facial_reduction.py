@@ -24,24 +24,12 @@ _SIMPLE = 20_000
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """One block of the search.
+    """One block of the search."""
 
-    Attributes
-    ----------
-    product : tuple of int
-        Inequalities multiplied.
-    weight : Polynomial
-        Their product.
-    monomials : tuple of exponents
-        m (length n).
-    face : tuple of rows, optional
-        The basis is face·m (r × n); m itself unless given.
-    """
-
-    product: tuple[int, ...]
-    weight: Polynomial
-    monomials: tuple[Exponents, ...]
-    face: tuple[Row, ...] | None = None
+    product: tuple[int, ...]  # Inequalities multiplied
+    weight: Polynomial  # Their product
+    monomials: tuple[Exponents, ...]  # m (length n)
+    face: tuple[Row, ...] | None = None  # The basis is face·m (r × n); m itself unless given
 
     @property
     def basis(self) -> tuple[Element, ...]:

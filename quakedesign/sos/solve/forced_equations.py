@@ -29,21 +29,12 @@ Affine = tuple[Fraction, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Requirement:
-    """One polynomial p(d) that must be in a cone, as far as it is reduced.
+    """One polynomial p(d) that must be in a cone, as far as it is reduced."""
 
-    Attributes
-    ----------
-    parts : sequence of Polynomial
-        Constant part of p and the part of every decision; empty for those that are eliminated.
-    template : Statement
-        The cone; its polynomial only says which monomials may occur.
-    blocks : list of Block, optional
-        Faces, in place of the blocks that follow from the template.
-    """
-
+    # Constant part of p and the part of every decision; empty for those that are eliminated
     parts: Sequence[Polynomial]
-    template: Statement
-    blocks: Sequence[Block] | None = None
+    template: Statement  # The cone; its polynomial only says which monomials may occur
+    blocks: Sequence[Block] | None = None  # Faces, in place of the blocks that follow from the template
 
     @cached_property
     def shape(self) -> MomentProgram | None:
@@ -71,22 +62,12 @@ class Requirement:
 
 @dataclass(frozen=True, kw_only=True)
 class Forced:
-    """Equations on the decisions, solved, and the requirements without the decisions that they eliminate.
-
-    Attributes
-    ----------
-    solved : mapping of int to Affine
-        Decisions that follow from the others.
-    reasons : tuple of str
-        A sentence for every equation, in the order in which they were found.
-    contradiction : bool
-        Whether the last equation has no solution.
-    """
+    """Equations on the decisions, solved, and the requirements without the decisions that they eliminate."""
 
     requirements: tuple[Requirement, ...]
-    solved: Mapping[int, Affine] = field(default_factory=dict)
-    reasons: tuple[str, ...] = ()
-    contradiction: bool = False
+    solved: Mapping[int, Affine] = field(default_factory=dict)  # Decisions that follow from the others
+    reasons: tuple[str, ...] = ()  # A sentence for every equation, in the order in which they were found
+    contradiction: bool = False  # Whether the last equation has no solution
 
     def completed(self, values: Sequence[Fraction]) -> list[Fraction]:
         """Decisions that satisfy every equation, from those that are free."""

@@ -32,55 +32,29 @@ _known: dict[tuple[Any, ...], "JointProgram"] = {}
 
 @dataclass(frozen=True, kw_only=True)
 class Demand:
-    """One polynomial Σ_j x_j P_j − t·N that must be in a cone.
+    """One polynomial Σ_j x_j P_j − t·N that must be in a cone."""
 
-    Attributes
-    ----------
-    template : Statement
-        Its set, degree and multiplier; the polynomial only says which monomials may occur.
-    parts : sequence of Polynomial
-        P_j.
-    margin : Polynomial
-        N.
-    """
-
-    template: Statement
-    parts: Sequence[Polynomial]
-    margin: Polynomial
+    template: Statement  # Its set, degree and multiplier; the polynomial only says which monomials may occur
+    parts: Sequence[Polynomial]  # P_j
+    margin: Polynomial  # N
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecisionBounds:
-    """Bounds on the decisions x: |x_j| ≤ radius_j, row·x ≤ bound for every row, and Σ_j share_j|x_j| ≤ 1.
+    """Bounds on the decisions x: |x_j| ≤ radius_j, row·x ≤ bound for every row, and Σ_j share_j|x_j| ≤ 1."""
 
-    Attributes
-    ----------
-    radii : sequence of float
-        Without effect on those that have a share.
-    shares : sequence of float
-        Of the first decisions, positive; none unless given.
-    """
-
-    radii: Sequence[float]
+    radii: Sequence[float]  # Without effect on those that have a share
     rows: Sequence[Sequence[float]] = ()
     bounds: Sequence[float] = ()
-    shares: Sequence[float] = ()
+    shares: Sequence[float] = ()  # Of the first decisions, positive; none unless given
 
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """Floating-point answer of a search; proves nothing.
+    """Floating-point answer of a search; proves nothing."""
 
-    Attributes
-    ----------
-    decision : list of float
-        x_j.
-    margin : float
-        Largest t; negative or zero when no decision gives one.
-    """
-
-    decision: list[float]
-    margin: float
+    decision: list[float]  # x_j
+    margin: float  # Largest t; negative or zero when no decision gives one
 
 
 def joint_program(demands: Sequence[Demand]) -> "JointProgram":

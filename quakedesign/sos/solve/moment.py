@@ -25,19 +25,11 @@ _LARGEST_MARGINS = (4.0, 1e-2, 1e-5)  # keep the programme bounded where every p
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """Numbers of one block: weight g_S and basis, all as floats.
-
-    Attributes
-    ----------
-    basis : tuple of exponents
-        Monomials m (length n).
-    face : array (r × n), optional
-        The basis is face·m; the monomials themselves unless given.
-    """
+    """Numbers of one block: weight g_S and basis, all as floats."""
 
     weight: Mapping[Exponents, float]
-    basis: tuple[Exponents, ...]
-    face: Any = None
+    basis: tuple[Exponents, ...]  # Monomials m (length n)
+    face: Any = None  # array (r × n), optional: The basis is face·m; the monomials themselves unless given
 
     @property
     def size(self) -> int:

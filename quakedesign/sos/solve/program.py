@@ -38,26 +38,13 @@ _ROUNDS = 3  # of numerical kernels, each on the faces of the last
 
 @dataclass(frozen=True, kw_only=True)
 class Solution:
-    """Exact decision with a proof of every requirement.
+    """Exact decision with a proof of every requirement."""
 
-    Attributes
-    ----------
-    values : mapping of str to Fraction
-        Decision variables.
-    answers : tuple of Answer
-        One for every required polynomial, in order; each is ``sos``.
-    objective : Fraction
-        Exact value of the objective; a bound on the optimum from the feasible side.
-    bound : float
-        The solver's optimum, in floating point: no proof.
-    forced : tuple of str
-        Equations that were solved beforehand: each with its requirement, and the monomial or kernel that forces it.
-    """
-
-    values: Mapping[str, Fraction]
-    answers: tuple[Answer, ...]
-    objective: Fraction
-    bound: float
+    values: Mapping[str, Fraction]  # Decision variables
+    answers: tuple[Answer, ...]  # One for every required polynomial, in order; each is ``sos``
+    objective: Fraction  # Exact value of the objective; a bound on the optimum from the feasible side
+    bound: float  # The solver's optimum, in floating point: no proof
+    # Equations that were solved beforehand: each with its requirement, and the monomial or kernel that forces it
     forced: tuple[str, ...] = ()
 
 

@@ -212,17 +212,11 @@ _IN_MATLAB = {"vars": "variables", "p": "polynomial", "Q": "gram", "Z": "basis"}
 
 @dataclass(frozen=True, kw_only=True)
 class GramFile:
-    """What a file says: that polynomial = basisᵀ·gram·basis.
-
-    Attributes
-    ----------
-    polynomial : str or mapping of exponents to Fraction
-    gram : array of float (n × n)
-    """
+    """What a file says: that polynomial = basisᵀ·gram·basis."""
 
     variables: tuple[str, ...]
-    polynomial: Any
-    gram: Any
+    polynomial: Any  # str or mapping of exponents to Fraction
+    gram: Any  # array of float (n × n)
     basis: list[Any]
 
     def verify(self) -> Answer:
