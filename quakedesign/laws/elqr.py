@@ -17,19 +17,12 @@ FEEDBACKS = ("error", "state")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureLimits:
-    """Pressure limits (ERRATA 23) and the recovery time of the integrals at a limit.
+    """Pressure limits (ERRATA 23) and the recovery time of the integrals at a limit."""
 
-    Attributes
-    ----------
-    lowest, highest : Fraction
-        [Pa]; highest below the effective normal stress, so that the fault does not open.
-    recovery_time : Fraction
-        Time constant [s] of both integrals while p is at a limit.
-    """
-
+    # lowest, highest: [Pa]; highest below the effective normal stress, so that the fault does not open
     lowest: Fraction
     highest: Fraction
-    recovery_time: Fraction = Fraction(1)
+    recovery_time: Fraction = Fraction(1)  # Time constant [s] of both integrals while p is at a limit
 
     def __post_init__(self) -> None:
         if not self.lowest < 0 < self.highest or self.recovery_time <= 0:

@@ -61,35 +61,19 @@ def circle_limit(loop: FeedbackLoop, beta: Fraction, rate: Fraction, least: Frac
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrequencyFacts:
-    """Classical margins at one vertex of the box, measured with python-control in scaled time.
+    """Classical margins at one vertex of the box, measured with python-control in scaled time."""
 
-    Attributes
-    ----------
-    beta, slip, rate : float
-        The vertex: β [-], s [1/s²], w [1/s].
-    gain_margin : float or None
-        Smallest factor above 1 on K that destabilises; None if none does.
-    gain_reduction : float or None
-        Largest factor below 1 on K that destabilises; None if none does.
-    phase_margin : float or None
-        Smallest over all crossings [deg].
-    delay_margin : float or None
-        Smallest dead time in the loop that destabilises [s].
-    return_difference : float
-        min |1 + L(jω)| [-]; at least 1 for an optimal K.
-    disturbance_peak_slip, disturbance_peak_rate : float
-        H∞ norms from the force to e1 [s²] and to e2 [s].
-    """
-
+    # beta, slip, rate: The vertex: β [-], s [1/s²], w [1/s]
     beta: float
     slip: float
     rate: float
     stable: bool
-    gain_margin: float | None
-    gain_reduction: float | None
-    phase_margin: float | None
-    delay_margin: float | None
-    return_difference: float
+    gain_margin: float | None  # Smallest factor above 1 on K that destabilises; None if none does
+    gain_reduction: float | None  # Largest factor below 1 on K that destabilises; None if none does
+    phase_margin: float | None  # Smallest over all crossings [deg]
+    delay_margin: float | None  # Smallest dead time in the loop that destabilises [s]
+    return_difference: float  # min |1 + L(jω)| [-]; at least 1 for an optimal K
+    # disturbance_peak_slip, disturbance_peak_rate: H∞ norms from the force to e1 [s²] and to e2 [s]
     disturbance_peak_slip: float
     disturbance_peak_rate: float
 

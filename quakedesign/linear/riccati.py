@@ -400,19 +400,12 @@ def _decimal(value: Fraction, digits: int = 17) -> Fraction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SmallestGain:
-    """Infimum of the gain over every Q0 > 0 and R > 0 of the guaranteed set; reached as Q0/R → 0, with k3, k4 → 0.
+    """Infimum of the gain over every Q0 > 0 and R > 0 of the guaranteed set; reached as Q0/R → 0, with k3, k4 → 0."""
 
-    Attributes
-    ----------
-    slip, rate : float
-        k1 [Pa/m] and k2 [Pa·s/m] of the smallest gain in natural units, k1² + (ω_nk2)².
-    split : float
-        Its w.
-    """
-
+    # slip, rate: k1 [Pa/m] and k2 [Pa·s/m] of the smallest gain in natural units, k1² + (ω_nk2)²
     slip: float
     rate: float
-    split: float
+    split: float  # Its w
 
 
 def limiting_gains(problem: LinearProblem, split: float) -> tuple[float, float]:

@@ -283,19 +283,13 @@ def _decimal(value: Fraction) -> Fraction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainRange:
-    """Range of β = μN̂/b over which one V proves stability with everything else anywhere in the box.
+    """Range of β = μN̂/b over which one V proves stability with everything else anywhere in the box."""
 
-    Attributes
-    ----------
-    low, high : UpperBound, LowerBound
-        Printed, they stay inside what is proved. Each with the other end as the box has it. `high` is at most 1024
-        times the box's: no upper limit was looked for above.
-    low_limit : LowerBound
-        A constant β of this, with a constant vertex of the rest, is not asymptotically stable (exact).
-    """
-
+    # low, high: Printed, they stay inside what is proved. Each with the other end as the box has it. `high` is at most
+    # 1024 times the box's: no upper limit was looked for above.
     low: UpperBound
     high: LowerBound
+    # A constant β of this, with a constant vertex of the rest, is not asymptotically stable (exact)
     low_limit: LowerBound
     certificates: tuple[Certificate, ...]
 

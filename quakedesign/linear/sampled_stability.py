@@ -222,19 +222,12 @@ DEGREE = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClockProof:
-    """P_0 … P_D that prove every sampling period of a range, in SI, exact.
+    """P_0 … P_D that prove every sampling period of a range, in SI, exact."""
 
-    Attributes
-    ----------
-    shortest, longest : Fraction
-        T [s].
-    P : tuple of Matrix
-        5 × 5 each, in x1, x2, q1, q2, p.
-    """
-
+    # shortest, longest: T [s]
     shortest: Fraction
     longest: Fraction
-    P: tuple[Matrix, ...]
+    P: tuple[Matrix, ...]  # 5 × 5 each, in x1, x2, q1, q2, p
 
     def covers(self, step: Fraction) -> bool:
         """Whether it is about a period [s]."""

@@ -109,36 +109,22 @@ ASKED = {
 
 @dataclass(frozen=True, kw_only=True)
 class Account:
-    """What is told of one controller.
-
-    Attributes
-    ----------
-    good : bool
-        Whether the loop that ran has a guarantee, or its proof covers it.
-    guarantee, run, limits, verdict, proof : list of str
-        Sentences without a full stop.
-    law : list of Markup
-        Equations with the numbers of the design.
-    python : list of str
-        Lines of the sampled linear law for python-control; none for others.
-    gains : list of (str, str, Markup)
-        Name, value, unit.
-    premises, base_premises, known : list of tuple
-        Rows of their tables: premises of what is proved first, of the certificate of base gains in continuous time, and
-        what is certified with a feed-forward.
-    """
+    """What is told of one controller."""
 
     label: str
     badge: str
-    good: bool
+    good: bool  # Whether the loop that ran has a guarantee, or its proof covers it
+    # guarantee, run, limits, verdict, proof: Sentences without a full stop
     guarantee: list[str]
     run: list[str]
     limits: list[str]
     verdict: list[str]
     proof: list[str]
-    law: list[Markup]
-    python: list[str]
-    gains: list[tuple[str, str, Markup]]
+    law: list[Markup]  # Equations with the numbers of the design
+    python: list[str]  # Lines of the sampled linear law for python-control; none for others
+    gains: list[tuple[str, str, Markup]]  # Name, value, unit
+    # premises, base_premises, known: Rows of their tables: premises of what is proved first, of the certificate of base
+    # gains in continuous time, and what is certified with a feed-forward
     premises: list[tuple[str, ...]]
     base_premises: list[tuple[str, ...]]
     known: list[tuple[str, ...]]

@@ -25,21 +25,15 @@ Number = Bound | float | None
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """What is proved and what was seen of one controller.
-
-    Attributes
-    ----------
-    slip_rate, slip : tuple
-        Proved bound, worst case found, and largest value of the run: slip rate [m/s], slip error [m]; None without.
-    pressure : (float, float) or None
-        Range [Pa]: the proved one, or that of the run.
-    """
+    """What is proved and what was seen of one controller."""
 
     name: str
     outcome: str
+    # slip_rate, slip: Proved bound, worst case found, and largest value of the run: slip rate [m/s], slip error [m];
+    # None without
     slip_rate: tuple[Number, Number, Number]
     slip: tuple[Number, Number, Number]
-    pressure: tuple[Bound | float, Bound | float] | None
+    pressure: tuple[Bound | float, Bound | float] | None  # Range [Pa]: the proved one, or that of the run
 
 
 @dataclass(frozen=True, kw_only=True)

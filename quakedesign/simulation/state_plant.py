@@ -287,19 +287,13 @@ class SlidingVariation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressurePath:
-    """What a pressure goes through before it is in the fault: a pump, then a lag of pump and pipe, then rock.
+    """What a pressure goes through before it is in the fault: a pump, then a lag of pump and pipe, then rock."""
 
-    Attributes
-    ----------
-    lag, diffusion : Fraction
-        Time constant and L²/D [s], not negative; 0 for none.
-    stages : tuple of SampledStage
-        What happens to it once a sample, before it is held. All but a delay see the pump's whole pressure, the planned
-        one included; what is planned is known ahead, so that it is not late.
-    """
-
+    # lag, diffusion: Time constant and L²/D [s], not negative; 0 for none
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
+    # What happens to it once a sample, before it is held. All but a delay see the pump's whole pressure, the planned
+    # one included; what is planned is known ahead, so that it is not late.
     stages: tuple[SampledStage, ...] = ()
 
     @classmethod

@@ -27,15 +27,6 @@ class Finding:
 class ErrataRow:
     """One point at which the paper is corrected, with its check.
 
-    Attributes
-    ----------
-    printed, correct : str
-        Both forms, in one line of text.
-    kind : str
-        One of `KINDS`.
-    check : callable
-        Returns a `Finding`. Its optional argument replaces the corrected form by another, which must then fail.
-
     Raises
     ------
     ParameterError
@@ -43,9 +34,11 @@ class ErrataRow:
     """
 
     number: int
+    # printed, correct: Both forms, in one line of text
     printed: str
     correct: str
-    kind: str
+    kind: str  # One of `KINDS`
+    # Returns a `Finding`. Its optional argument replaces the corrected form by another, which must then fail.
     check: Callable[..., Finding]
 
     def __post_init__(self) -> None:

@@ -118,29 +118,16 @@ class Plane:
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityRegions:
-    """Stable and unstable regions of a fault; its own verdict is exact.
+    """Stable and unstable regions of a fault; its own verdict is exact."""
 
-    Attributes
-    ----------
-    verdict : StabilityVerdict
-        Of the fault itself.
-    stiffness : numpy.ndarray
-        Stiffnesses per area of both planes [Pa/m].
-    own : float
-        That of the fault [Pa/m].
-    critical : float
-        Critical stiffness per area at the fault's effective stress [Pa/m]; not positive or nan where there is none.
-    nucleation_length : float or None
-        [m]; None without a critical stiffness.
-    over_stress, over_pressure : Plane
-        The effective normal stress σ' varies at the given pressure, or the pressure at the fault's σ'.
-    """
-
-    verdict: StabilityVerdict
-    stiffness: np.ndarray
-    own: float
+    verdict: StabilityVerdict  # Of the fault itself
+    stiffness: np.ndarray  # Stiffnesses per area of both planes [Pa/m]
+    own: float  # That of the fault [Pa/m]
+    # Critical stiffness per area at the fault's effective stress [Pa/m]; not positive or nan where there is none
     critical: float
-    nucleation_length: float | None
+    nucleation_length: float | None  # [m]; None without a critical stiffness
+    # over_stress, over_pressure: The effective normal stress σ' varies at the given pressure, or the pressure at the
+    # fault's σ'
     over_stress: Plane
     over_pressure: Plane
 

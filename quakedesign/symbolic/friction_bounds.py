@@ -22,25 +22,14 @@ _UNITS = {"slip": "m", "rate": "m/s"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionBounds:
-    """What holds of a friction law for every slip and slip rate, and of its continuation too.
+    """What holds of a friction law for every slip and slip rate, and of its continuation too."""
 
-    Attributes
-    ----------
-    least, most : Fraction
-        Bounds of the friction coefficient [-], 0 < least.
-    slip_slope : Fraction
-        Largest chord slope in slip [1/m]; with state, along a motion that carries the state with it.
-    rate_slope : Fraction
-        Largest chord slope in slip rate [s/m], at a fixed state.
-    weakens : bool
-        Whether friction is proved not to grow with slip.
-    """
-
+    # least, most: Bounds of the friction coefficient [-], 0 < least
     least: Fraction
     most: Fraction
-    slip_slope: Fraction
-    rate_slope: Fraction
-    weakens: bool
+    slip_slope: Fraction  # Largest chord slope in slip [1/m]; with state, along a motion that carries the state with it
+    rate_slope: Fraction  # Largest chord slope in slip rate [s/m], at a fixed state
+    weakens: bool  # Whether friction is proved not to grow with slip
 
 
 @dataclass(frozen=True)

@@ -28,14 +28,9 @@ _TRIES = 50
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """left = right for every state and every ε > 0: the expression at the dilated point, and what it must be.
+    """left = right for every state and every ε > 0: the expression at the dilated point, and what it must be."""
 
-    Attributes
-    ----------
-    left, right : Expr
-        In the states and ε.
-    """
-
+    # left, right: In the states and ε
     left: sp.Expr
     right: sp.Expr
 

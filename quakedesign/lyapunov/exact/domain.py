@@ -41,35 +41,22 @@ _PIECES = 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Domain:
-    """Largest level set found on which the premises of a certificate prove themselves.
+    """Largest level set found on which the premises of a certificate prove themselves."""
 
-    Attributes
-    ----------
-    level : float
-        Of V for the base gains; 0 when there is none.
-    slip_error, slip_rate_error : UpperBound
-        Bounds on |e1| [m] and |e2| [m/s] on it; not every such pair lies in it.
-    start_slip_error, start_slip_rate_error, start_perturbation : LowerBound
-        Initial |e1| [m], |e2| [m/s] or |e3| [m/s²] that it admits, each while the other two are zero. For x = 0 and
-        ξ = 0 the initial e3 is h(0).
-    method : str
-        ``"whole"`` or ``"split"``, which part of h is in e3.
-    limited_by : str
-        Cause that keeps it from being larger: the largest part that grows with the errors; of an empty one the largest
-        part that is there without them.
-    feedforward : str
-        Name of the feed-forward of the law.
-    """
-
-    level: float
+    level: float  # Of V for the base gains; 0 when there is none
+    # slip_error, slip_rate_error: Bounds on |e1| [m] and |e2| [m/s] on it; not every such pair lies in it
     slip_error: UpperBound
     slip_rate_error: UpperBound
+    # start_slip_error, start_slip_rate_error, start_perturbation: Initial |e1| [m], |e2| [m/s] or |e3| [m/s²] that it
+    # admits, each while the other two are zero. For x = 0 and ξ = 0 the initial e3 is h(0).
     start_slip_error: LowerBound
     start_slip_rate_error: LowerBound
     start_perturbation: LowerBound
-    method: str
+    method: str  # ``"whole"`` or ``"split"``, which part of h is in e3
+    # Cause that keeps it from being larger: the largest part that grows with the errors; of an empty one the largest
+    # part that is there without them
     limited_by: str
-    feedforward: str
+    feedforward: str  # Name of the feed-forward of the law
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI."""

@@ -23,18 +23,11 @@ from quakedesign.symbolic.terms import Term, cell_polynomial, collected, lie_ter
 
 @dataclass(frozen=True)
 class Cell:
-    """Signs of states and lifts, and the conditions on the cell variables.
+    """Signs of states and lifts, and the conditions on the cell variables."""
 
-    Attributes
-    ----------
-    name : str
-        Signs as a word of + and −, states first; empty on the reals.
-    equalities, inequalities : tuple of Polynomial
-        Each is 0, or ≥ 0, on the cell.
-    """
-
-    name: str
+    name: str  # Signs as a word of + and −, states first; empty on the reals
     signs: Mapping[str, int]
+    # equalities, inequalities: Each is 0, or ≥ 0, on the cell
     equalities: tuple[Polynomial, ...] = ()
     inequalities: tuple[Polynomial, ...] = ()
 

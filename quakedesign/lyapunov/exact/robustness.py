@@ -38,23 +38,15 @@ _PUSHED = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robustness:
-    """What V' withstands in the acceleration.
+    """What V' withstands in the acceleration."""
 
-    Attributes
-    ----------
-    slip, rate : Fraction
-        Upper bounds on a1 [1/s² of the scaled loop, inverse] and a2; see the head of this file.
-    slip_power, rate_power : Fraction
-        p1 and p2 [-].
-    source : str
-        How they were bounded.
-    """
-
+    # slip, rate: Upper bounds on a1 [1/s² of the scaled loop, inverse] and a2; see the head of this file
     slip: Fraction
     rate: Fraction
+    # slip_power, rate_power: p1 and p2 [-]
     slip_power: Fraction
     rate_power: Fraction
-    source: str
+    source: str  # How they were bounded
 
 
 class _Cells:

@@ -65,25 +65,14 @@ class Pace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Neighbourhood:
-    """Demands on a_j and on shares of given changes of the gains.
+    """Demands on a_j and on shares of given changes of the gains."""
 
-    Attributes
-    ----------
-    monomials, sizes
-        V = Σ a_j·monomial_j/size_j.
-    program : JointProgram
-        For the demands.
-    demands : tuple of Demand
-        Parts: those of a_j, then those of the changes, with V as it is now.
-    fixed : tuple of Polynomial
-        Parts without a decision.
-    """
-
+    # monomials, sizes: V = Σ a_j·monomial_j/size_j
     monomials: tuple[Term, ...]
     sizes: tuple[Fraction, ...]
-    program: JointProgram
-    demands: tuple[Demand, ...]
-    fixed: tuple[Form, ...]
+    program: JointProgram  # For the demands
+    demands: tuple[Demand, ...]  # Parts: those of a_j, then those of the changes, with V as it is now
+    fixed: tuple[Form, ...]  # Parts without a decision
 
     def function(self, decision: Sequence[float]) -> tuple[Term, ...]:
         """V of a decision, to 2^−40 in the scaled variables."""
@@ -553,42 +542,25 @@ _ROUNDS = 100  # programmes of steps to solve at most
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrustRegion:
-    """How far the bilinear products that a step leaves out are trusted; a step is a share by which the level improves.
+    """How far the bilinear products that a step omits are trusted; a step is a share by which the level improves."""
 
-    Attributes
-    ----------
-    initial : float
-        First share. What a step leaves out is of second order, about (`gains` times the share)²: a tenth of what is
-        kept.
-    largest : float
-        Share at which what is left out is as large as what is kept.
-    least : float
-        Share below which the search centres instead: gains are rounded to four digits, ten of which it is.
-    grow, shrink : float
-        What the share is multiplied by after a step that was found, and divided by after one that was not: up slowly
-        and down fast, since a programme that fails takes as long as one that succeeds.
-    gains : float
-        Largest change of a gain over the share: a level asks for changes of several gains larger than its own.
-    again : float
-        Share after centring, below the initial one, which had failed.
-    worthwhile : float
-        Share by which the level must have improved since the last centring for another: three of the least steps.
-    margin : float
-        Factor by which centring must raise the margin; less leaves no room for a step, and the search ends.
-    under_root : float
-        Largest change of a gain under a root over the gain, so that the root stays real.
-    """
-
+    # First share. What a step leaves out is of second order, about (`gains` times the share)²: a tenth of what is kept.
     initial: float = 0.1
-    largest: float = 0.35
+    largest: float = 0.35  # Share at which what is left out is as large as what is kept
+    # Share below which the search centres instead: gains are rounded to four digits, ten of which it is
     least: float = 1e-3
+    # grow, shrink: What the share is multiplied by after a step that was found, and divided by after one that was not:
+    # up slowly and down fast, since a programme that fails takes as long as one that succeeds
     grow: float = 1.5
     shrink: float = 3.0
+    # Largest change of a gain over the share: a level asks for changes of several gains larger than its own
     gains: float = 3.0
-    again: float = 0.03
+    again: float = 0.03  # Share after centring, below the initial one, which had failed
+    # Share by which the level must have improved since the last centring for another: three of the least steps
     worthwhile: float = 3e-3
+    # Factor by which centring must raise the margin; less leaves no room for a step, and the search ends
     margin: float = 1.2
-    under_root: float = 0.5
+    under_root: float = 0.5  # Largest change of a gain under a root over the gain, so that the root stays real
 
     def longer(self, share: float) -> float:
         """Share after a step that was found."""

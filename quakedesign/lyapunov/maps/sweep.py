@@ -377,25 +377,17 @@ class _Place:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Step:
-    """Newton's step towards the centre of one τ.
-
-    Attributes
-    ----------
-    moves, multipliers, bound
-        ΔL, those of the equations over τ, and μ.
-    least, most : float
-        Eigenvalues of ΔS beside S.
-    missed : float
-        By how much the equations are missed at most, for rounding errors.
-    """
+    """Newton's step towards the centre of one τ."""
 
     tau: float
+    # moves, multipliers, bound: ΔL, those of the equations over τ, and μ
     moves: Sequence[Any]
     multipliers: Any
     bound: float
+    # least, most: Eigenvalues of ΔS beside S
     least: float
     most: float
-    missed: float
+    missed: float  # By how much the equations are missed at most, for rounding errors
 
     @property
     def size(self) -> float:

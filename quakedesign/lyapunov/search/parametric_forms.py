@@ -26,21 +26,13 @@ Part = tuple[int, tuple[int, ...], tuple[str, ...], Fraction | float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FormRow:
-    """V, or −V̇ beside V, on one cell (and vertex): a form Σ_j a_j P_j that must be non-negative there.
+    """V, or −V̇ beside V, on one cell (and vertex): a form Σ_j a_j P_j that must be non-negative there."""
 
-    Attributes
-    ----------
-    cell : str
-        Signs of the states.
-    function, fall : tuple of Part
-        Terms of all V_j, and of all −V̇_j; the latter is empty for the row of V itself.
-    equalities, inequalities : tuple of Polynomial
-        Conditions on the variables, besides u ≥ 0.
-    """
-
-    cell: str
+    cell: str  # Signs of the states
+    # function, fall: Terms of all V_j, and of all −V̇_j; the latter is empty for the row of V itself
     function: tuple[Part, ...]
     fall: tuple[Part, ...] = ()
+    # equalities, inequalities: Conditions on the variables, besides u ≥ 0
     equalities: tuple[Polynomial, ...] = ()
     inequalities: tuple[Polynomial, ...] = ()
 

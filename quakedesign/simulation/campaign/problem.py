@@ -214,30 +214,21 @@ _FACTORS = tuple(field.name for field in fields(SlidingVariation))
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingProgram:
-    """A run of `simulate_sliding` for every sample; vectors are its numbers, then its figures and times of its events.
-
-    Attributes
-    ----------
-    step : Fraction
-        T_s [s].
-    stress, period : float
-        Amplitude [Pa] and period [s] of the stress of a sample whose share is 1.
-    settled_from : float
-        [s].
-    """
+    """A run of `simulate_sliding` for every sample; vectors are its numbers, then its figures and event times."""
 
     lanes: ClassVar[int] = 1
     batch_steps: ClassVar[int] = 10_000
 
     fault: Fault
     law: LinearLaw
-    step: Fraction
+    step: Fraction  # T_s [s]
     path: PressurePath
+    # stress, period: Amplitude [Pa] and period [s] of the stress of a sample whose share is 1
     stress: float
     period: float
     plant: str
     method: str
-    settled_from: float
+    settled_from: float  # [s]
 
     @property
     def fingerprint(self) -> str:

@@ -39,21 +39,14 @@ class Shape:
 
 @dataclass(frozen=True, kw_only=True)
 class MomentSolution:
-    """Floating-point answer; proves nothing.
-
-    Attributes
-    ----------
-    grams, moments : list of array
-        Q = Z + t·I and L(g_S·b bᵀ) of every block.
-    cofactors : array
-        Coefficients of the multiples of the equalities, in the order of their rows.
-    """
+    """Floating-point answer; proves nothing."""
 
     margin: float
+    # grams, moments: list of array: Q = Z + t·I and L(g_S·b bᵀ) of every block
     grams: list[Any]
     moments: list[Any]
     functional: Mapping[Exponents, float]
-    cofactors: Any
+    cofactors: Any  # array: Coefficients of the multiples of the equalities, in the order of their rows
 
 
 class MomentProgram:

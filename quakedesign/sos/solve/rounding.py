@@ -191,19 +191,12 @@ class System:
 
 @dataclass(frozen=True, kw_only=True)
 class Scaled:
-    """A statement in ũ = u/scale, scale powers of two, with every polynomial divided by its largest coefficient.
-
-    Attributes
-    ----------
-    target : Fraction
-        Factor that the target was divided by.
-    inequalities, equalities : tuple of Fraction
-        Factors that the constraints were divided by.
-    """
+    """A statement in ũ = u/scale, scale powers of two, with every polynomial divided by its largest coefficient."""
 
     statement: Statement
     scale: tuple[Fraction, ...]
-    target: Fraction
+    target: Fraction  # Factor that the target was divided by
+    # inequalities, equalities: Factors that the constraints were divided by
     inequalities: tuple[Fraction, ...]
     equalities: tuple[Fraction, ...]
 
