@@ -43,7 +43,7 @@ class Integrator:
     weights: ClassVar[tuple[F, ...]]
 
     @classmethod
-    def advance(cls, field: Callable[[float, Any], Any], state: Any, step: float) -> Any:
+    def advance(cls, field: Callable[[Any, Any], Any], state: Any, step: Any) -> Any:
         """State after one step.
 
         Parameters
@@ -52,7 +52,7 @@ class Integrator:
             Time derivative of the state [1/s of its unit], given how much of the step has passed
             [-, 0 to 1] and the state.
         state : SX, float or ndarray
-        step : float
+        step : SX or float
             [s].
         """
         stages: list[Any] = []

@@ -2,11 +2,12 @@
 
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.simulation import integrator, integrators
+from quakedesign.simulation import Integrator, integrator, integrators
 
 
 def final_error(method, field, start, exact, steps, length):
@@ -63,3 +64,11 @@ def test_the_tableau_gives_the_factor_of_a_decaying_step():
 def test_an_unknown_method_is_refused_with_the_list():
     with pytest.raises(ParameterError, match=r"dormand-prince, rk4.*'euler'"):
         integrator("euler")
+
+
+def test_a_step_may_be_a_symbol_as_in_a_step_that_is_cut():
+    """y' = -y over h by the classic method: 1 - h + h²/2 - h³/6 + h⁴/24."""
+    assert issubclass(integrator("rk4"), Integrator)  # whose public name checks what it is called with
+    h = ca.SX.sym("h")
+    end = ca.Function("end", [h], [integrator("rk4").advance(lambda _, y: -y, ca.SX(1), h)])
+    assert float(end(0.5)) == pytest.approx(1 - 0.5 + 0.5**2 / 2 - 0.5**3 / 6 + 0.5**4 / 24, rel=1e-14)
