@@ -118,7 +118,7 @@ def robust_stability(loop: Loop, *, fastest: bool = False) -> Certificate | None
 def finished(loop: Loop, proposal: QuadraticProposal) -> Certificate | None:
     """Certificate for a proposed V, in exact arithmetic, with the largest share of its decay rate that holds."""
     form = proposal.form
-    size = float(abs(form).max())
+    size = float(abs(form).max())  # entries over the largest one are read as the decimals that Python prints
     both = form + form.T - np.diag(np.diag(form))
     lyapunov = quadratic_terms(tuple(loop.states), lambda i, j: rational(float(both[i, j] / size)))
     positive = quadratic_margin(loop, lyapunov) / 2

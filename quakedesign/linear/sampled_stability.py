@@ -128,7 +128,7 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
     proposal = proposed(_propose, *question) if any(K) else []
     for bits in BITS if proposal else ():
         P, W = (rounded(matrix, bits) for matrix in proposal)
-        units = (scales.states[0], scales.states[2], scales.pressure)
+        units = (scales.states[0], scales.states[2], scales.pressure)  # of x1, ξ1 and p, in which W is
         proof = DelayProof(
             longest=period, P=scales.form_outside(P), W=times(1 / scales.time, congruent(W, [1 / u for u in units]))
         )

@@ -271,7 +271,7 @@ def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
 def _range_of(shape: tuple[Fraction, ...]) -> Range:
     """Enclosure of a polynomial on [0, 1], by halving."""
     n = len(shape) - 1
-    rows = [
+    rows = [  # coefficients in Bernstein's basis, whose hull holds every value
         [sum((Fraction(comb(i, j), comb(n, j)) * shape[j] for j in range(i + 1)), Fraction(0)) for i in range(n + 1)]
     ]
     for _ in range(_HALVINGS):

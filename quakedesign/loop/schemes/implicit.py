@@ -54,9 +54,7 @@ def direction(expression: sp.Expr) -> int | None:
     if expression in (end_slip, end_rate):
         return 1
     if expression.is_Add or isinstance(expression, sp.Min | sp.Max):
-        ways = [direction(part) for part in expression.args]
-        found = {way for way in ways if way != 0}
-        return found.pop() if len(found) == 1 else None if found else 0
+        return _same([direction(part) for part in expression.args])
     if expression.is_Mul:
         moving = [part for part in expression.args if direction(part) != 0]
         fixed = sp.Mul(*(part for part in expression.args if part not in moving))
@@ -67,6 +65,11 @@ def direction(expression: sp.Expr) -> int | None:
     if isinstance(expression, SignedPower) and expression.args[1].is_nonnegative:
         return direction(expression.args[0])
     return None
+
+
+def _same(ways: list[int | None]) -> int | None:
+    found = {way for way in ways if way != 0}
+    return found.pop() if len(found) == 1 else None if found else 0
 
 
 @dataclass(frozen=True)
@@ -178,14 +181,7 @@ class Inclusion:
     def _smooth(self, known: InclusionValues, needed: Any) -> InclusionValues:
         """Solution with all signs fixed; where it is not needed, any number."""
         target = self.free + self.selected(self.pull)
-        straight = (
-            sp.Poly(sp.expand(target.subs(end_slip, self.slip_error + self.step * end_rate)), end_rate)
-            if (
-                all(not atom.free_symbols & {end_slip, end_rate} for atom in target.atoms(SignedPower, AbsolutePower))
-                and bool(target.is_polynomial(end_slip, end_rate))
-            )
-            else None
-        )
+        straight = sp.Poly(_straight(target, self.slip_error, self.step), end_rate) if _is_straight(target) else None
         if straight is None:
             end = _where(needed, self._used(target, known), partial(self._free_end, target))
         else:
@@ -258,6 +254,17 @@ def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:
         )
     moving = argument.as_independent(end_slip, end_rate, as_Add=False)[1]
     return (direction(moving) or 1) * moving, way
+
+
+def _is_straight(expression: sp.Expr) -> bool:
+    """Whether an expression is a polynomial of degree 1 at most in the end of the step."""
+    return all(
+        not atom.free_symbols & {end_slip, end_rate} for atom in expression.atoms(SignedPower, AbsolutePower)
+    ) and bool(expression.is_polynomial(end_slip, end_rate))
+
+
+def _straight(expression: sp.Expr, slip: sp.Expr, step: sp.Expr) -> sp.Expr:
+    return sp.expand(expression.subs(end_slip, slip + step * end_rate))
 
 
 def _sign_only(expression: sp.Expr) -> sp.Expr:

@@ -256,13 +256,12 @@ def rest_pressure(
     expression, box = _rest(fault, nominal)
     box = box | {_drift: (Fraction(0), drift)}
     step, ends = (slip[1] - slip[0]) / pieces, list[Fraction]()
+    friction, start = friction_bounds(fault.friction), static_friction(fault)
     for n in range(pieces if step else 1):
         part = (slip[0] + n * step, slip[0] + (n + 1) * step)
-        friction, start = friction_bounds(fault.friction), static_friction(fault)
-        most = friction.slip_slope * part[1]
-        pressures = enclose(
-            expression, box | {_r: part, _mu: (max(friction.least, start - most), min(friction.most, start + most))}
-        )
+        most = friction.slip_slope * part[1]  # by its slope bound from the static value, and within its bounds
+        at_rest = max(friction.least, start - most), min(friction.most, start + most)
+        pressures = enclose(expression, box | {_r: part, _mu: at_rest})
         if not pressures.is_finite():
             raise ParameterError("no finite pressure at rest was found. Positive friction is expected. Narrow the box.")
         ends += [end_of(pressures.lower()), end_of(pressures.upper())]

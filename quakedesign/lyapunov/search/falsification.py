@@ -64,7 +64,7 @@ def _choices(loop: Loop, name: str) -> list[_Play]:
     rates = {state: f"{state}'" for state in loop.states}
     products: list[tuple[str, ...]]
     terms = (term for rates in loop.field.values() for term in rates if name in term.parameters)
-    if all(sum(kind == "s" for _, _, kind in term.factors) % 2 == 1 for term in terms):
+    if all(sum(kind == "s" for _, _, kind in term.factors) % 2 == 1 for term in terms):  # odd in its states
         products = [*rates.items(), *combinations(loop.states, 2)]
     else:
         products = [(one,) for pair in rates.items() for one in pair]

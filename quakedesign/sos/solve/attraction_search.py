@@ -202,22 +202,15 @@ def expanded(found: Region, shape: Polynomial, top: int, certify: Callable[[Attr
     for degree_now in range(2, top + 1, 2):
         for _ in range(_ROUNDS):
             candidates = (with_shape(certify(claim), shape) for claim in _improved(best, shape, degree_now))
-            better = next(
-                (
-                    region
-                    for region in candidates
-                    if (
-                        region.shape_level is not None
-                        and best.shape_level is not None
-                        and region.shape_level > _GROWTH * best.shape_level
-                    )
-                ),
-                None,
-            )
+            better = next((region for region in candidates if _grows(best, region)), None)
             if better is None:
                 break
             best = better
     return best
+
+
+def _grows(old: Region, new: Region) -> bool:
+    return new.shape_level is not None and old.shape_level is not None and new.shape_level > _GROWTH * old.shape_level
 
 
 def _improved(found: Region, shape: Polynomial, top: int) -> Iterator[Attraction]:
@@ -440,14 +433,12 @@ def _refuted(claim: Attraction) -> Attraction | None:
     found = replace(claim, proof=lowest_crossing(claim))
     if found.height is None:
         return None
-    return _checked(
-        replace(
-            found,
-            level=simplest_between(found.height * (1 + Fraction(1, 10**9)), found.height * (1 + Fraction(2, 10**9)))
-            if found.height > 0
-            else None,
-        )
-    )
+    return _checked(replace(found, level=_just_above(found.height) if found.height > 0 else None))
+
+
+def _just_above(height: Fraction) -> Fraction:
+    """Simple number above one, by less than two parts in a thousand million."""
+    return simplest_between(height * (1 + Fraction(1, 10**9)), height * (1 + Fraction(2, 10**9)))
 
 
 def _checked(claim: Attraction) -> Attraction | None:

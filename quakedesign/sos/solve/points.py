@@ -328,17 +328,21 @@ def rational_zeros(
         for lead in _leads(statement, x):
             for tolerance in (1e-3, 1e-5, 1e-7):
                 point = rationalised([v / lead for v in x] if lead else list(x), scale, tolerance)
-                if any(point) and (
-                    evaluate(statement.polynomial, point) == 0
-                    and all(evaluate(g, point) >= 0 for g in statement.inequalities)
-                    and all(evaluate(h, point) == 0 for h in statement.equalities)
-                ):
+                if any(point) and _vanishes(statement, point):
                     points[point] = None
                     break
             else:
                 continue
             break
     return list(points)
+
+
+def _vanishes(statement: Statement, point: tuple[Fraction, ...]) -> bool:
+    return (
+        evaluate(statement.polynomial, point) == 0
+        and all(evaluate(g, point) >= 0 for g in statement.inequalities)
+        and all(evaluate(h, point) == 0 for h in statement.equalities)
+    )
 
 
 def _leads(statement: Statement, x: Sequence[float]) -> list[float]:
