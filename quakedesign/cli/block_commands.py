@@ -1,4 +1,4 @@
-"""What the commands `fault`, `guarantee`, `design`, `simulate` and `limits` do with a file of several blocks."""
+"""What `fault`, `guarantee`, `design`, `compare`, `simulate` and `limits` do with a file of several blocks."""
 
 import os
 from collections.abc import Collection
@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.cli.app import new_file, progress
 from quakedesign.cli.options import Output, changed_options
-from quakedesign.errors import ParameterError
-from quakedesign.exact import rational
+from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.files import hold, made_folder, require_room
 from quakedesign.text import counted
 
 if TYPE_CHECKING:
     from quakedesign.fault import BlockChain
+    from quakedesign.studies.chains import ChainRun
 
 
 def several_blocks(
@@ -52,11 +52,17 @@ def several_blocks(
 
 def _scope(chain: "BlockChain") -> list[str]:
     """What a statement about blocks depends on, and its units."""
+    from quakedesign.studies.chains import farthest_balance
+
     blocks, wells = counted(len(chain.blocks), "block"), counted(len(chain.wells), "well")
     pushed, meant = "m/s^2", "the load of a pressure is the pressure that balances the blocks on the reference"
-    if len(chain.wells) == 1:
+    if (far := farthest_balance(chain)) is not None:
         pushed += ", the second m/s"
-        meant += "; slip errors count from where each block is in balance under the one pressure"
+        meant = (
+            "the load of a pressure is the pressure that keeps the averages of the slips, one for each well, on the "
+            "reference; slip errors count from where each block is in balance under these pressures, which is within "
+            f"{far:.3g} m of the reference at every time"
+        )
     return [
         f"plant: {chain.name}, {blocks}, {wells}, any constants of box {chain.fault.box.name}, without stick (friction "
         "continues to negative slip rates)",
@@ -91,14 +97,32 @@ def chain_limits(chain: "BlockChain", output: Output) -> int:
     return 0
 
 
-def guarantee_chain(chain: "BlockChain", step: Any, out: Path | None, force: bool, output: Output) -> int:
+def block_law(named: str, usual: str) -> str:
+    """Kind of law of several blocks.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    from quakedesign.synthesis.guarantee import BLOCK_LAWS
+
+    if named == usual:
+        return BLOCK_LAWS[0]
+    require_known(named, BLOCK_LAWS, "controller of several blocks", UnknownNameError)
+    return named
+
+
+def guarantee_chain(
+    chain: "BlockChain", controller: str, step: Any, out: Path | None, force: bool, output: Output
+) -> int:
     """The command `guarantee`."""
     from quakedesign.guarantees.exact.guarantee_files import save_guarantee
     from quakedesign.synthesis import guarantee
 
+    law = block_law(controller, "elqr")
     if out is not None:
         new_file(out, "certificate file", force=force)
-    found: Any = guarantee(chain, step=step)
+    found: Any = guarantee(chain, law, step=step)
     if out is not None and found.proved:
         with made_folder(out.parent):
             save_guarantee(found, out)
@@ -108,28 +132,67 @@ def guarantee_chain(chain: "BlockChain", step: Any, out: Path | None, force: boo
     return 0 if found.proved else 1
 
 
+_HEADS = ("law", "proved", "", "found in the run", "", "pressure", "")
+
+
+def compare_chain(chain: "BlockChain", controller: str, output: Output) -> int:
+    """The command `compare`: laws whose wells know all measurements, or their own alone."""
+    from quakedesign.studies.chains import run_of_chain
+    from quakedesign.synthesis.guarantee import BLOCK_LAWS
+
+    laws = BLOCK_LAWS if controller == "all" else (block_law(controller, "all"),)
+    with progress() as tell:
+        runs = []
+        for place, law in enumerate(laws):
+            tell(f"{law}: design, proof and run", place / len(laws))
+            runs.append(run_of_chain(chain, law))
+    rows = [list(_HEADS), ["", "slip rate", "slip", "slip rate", "slip", "from", "to"], *(one.row() for one in runs)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    about = "its balance" if len(chain.wells) < len(chain.blocks) else "the reference"
+    said = [
+        f"{chain.name}: largest errors of {len(chain.blocks)} blocks under {counted(len(chain.wells), 'well')}",
+        f"(box {chain.fault.box.name}; slip of a block from {about} in what is proved,",
+        "from the reference in the run)",
+        "",
+        *("  ".join(f"{v:{w}}" for v, w in zip(row, widths, strict=True)).rstrip() for row in rows),
+        *(f"{one.controller}: {one.found.sentence()}" for one in runs if one.run is None),
+        "",
+        "proved without stick; run with stick, where an error may pass its bound",
+    ]
+    output.show({one.controller: _run_facts(one) for one in runs}, said)
+    return 0 if all(one.run is not None and not one.run.reversed and not one.run.opened for one in runs) else 1
+
+
+def _run_facts(one: "ChainRun") -> dict[str, Any]:
+    if one.run is None:
+        return _facts(one.found, one.chain)
+    return {"guarantee": _facts(one.found, one.chain), "run": one.run.to_dict()}
+
+
 def run_chain(
-    chain: "BlockChain", duration: float | None, out: Path | None, force: bool, output: Output, formats: Any = ("png",)
+    chain: "BlockChain",
+    controller: str,
+    duration: float | None,
+    out: Path | None,
+    force: bool,
+    output: Output,
+    formats: Any = ("png",),
 ) -> int:
     """The commands `design` and `simulate`: a law, its proof, a run and, with a folder, files and a figure."""
     from quakedesign.report.folder import prepare
-    from quakedesign.simulation.block_run import simulate_blocks, whole_periods
-    from quakedesign.synthesis import guarantee
+    from quakedesign.studies.chains import run_of_chain
 
-    whole_periods(chain, rational(chain.fault.sampling_time), duration)  # is refused before the long search
     if out is not None:
         prepare(out, force=force)
         require_room(out)
         hold(out)
     with progress() as tell:
-        tell("design and proof", 0.0)
-        found: Any = guarantee(chain)
-        if not found.proved:
-            output.show(_facts(found, chain), [*_lines(found, chain), "nothing is simulated, as no law is proved"])
-            return 1
-        tell("simulation", 0.5)
-        run = simulate_blocks(chain, found.law, duration=duration)
-    facts = {"guarantee": _facts(found, chain), "run": run.to_dict()}
+        tell("design, proof and run", 0.0)
+        one = run_of_chain(chain, controller, duration)
+    found, run, facts = one.found, one.run, _run_facts(one)
+    if run is None:
+        output.show(facts, [*_lines(found, chain), "nothing is simulated, as no law is proved"])
+        return 1
     said = [
         *_lines(found, chain),
         "",

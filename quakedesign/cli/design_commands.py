@@ -46,7 +46,8 @@ class DesignOptions(WellOptions):
     Parameters
     ----------
     controller
-        Control law to design: cta, dia, elqr or all.
+        Control law to design: cta, dia, elqr or all. Of several blocks: centralised, or decentralised, the pressure of
+        each well from its own measurements.
     objective
         tracking, or peak for the smallest certified slip-rate error.
     continuous
@@ -168,12 +169,13 @@ def design(
         Also print the fault, gains, verdicts with premises, certified domains and all metrics, as in the report.
     """
     given = dict(locals())
-    from quakedesign.cli.block_commands import run_chain, several_blocks
+    from quakedesign.cli.block_commands import block_law, run_chain, several_blocks
     from quakedesign.report.folder import prepare
 
-    known = ("out", "format", "verbose", "box")
+    known = ("out", "format", "verbose", "box", "controller")
     if (chain := several_blocks(fault, globals()["design"], given, known, options.box)) is not None:
-        return run_chain(chain, None, out or Path(f"quakedesign-{chain.name}"), force, output, format)
+        law = block_law(options.controller, "all")
+        return run_chain(chain, law, None, out or Path(f"quakedesign-{chain.name}"), force, output, format)
     loaded, asked = options.asked(fault)
     folder = out or Path(f"quakedesign-{loaded.name}")
     prepare(folder, force=force)
@@ -251,11 +253,15 @@ def compare(
     verbose
         Also print the fault, gains, verdicts with premises, all metrics, and numbers that the paper prints.
     """
+    given = dict(locals())
+    from quakedesign.cli.block_commands import compare_chain, several_blocks
     from quakedesign.report.comparison_table import designed_comparison
     from quakedesign.report.folder import results
     from quakedesign.report.terminal import printed_lines
     from quakedesign.studies.paper import printed, table
 
+    if (chain := several_blocks(fault, compare, given, ("verbose", "box", "controller"), options.box)) is not None:
+        return compare_chain(chain, options.controller, output)
     loaded, asked = options.asked(fault)
     with progress() as tell:
         comparison = designed_comparison(loaded, tell=tell, **asked)

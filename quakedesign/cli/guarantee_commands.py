@@ -76,7 +76,7 @@ def guarantee(
     Parameters
     ----------
     controller
-        elqr, or a sliding mode: cta, dia.
+        elqr, or a sliding mode: cta, dia. Of several blocks: centralised (default), or decentralised.
     objective
         Design objective: tracking, or peak for the smallest certified slip-rate error.
     gains
@@ -114,8 +114,10 @@ def guarantee(
     from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
 
-    if (chain := several_blocks(fault, globals()["guarantee"], options, ("step", "out"), box)) is not None:
-        return guarantee_chain(chain, step, out, force, output)
+    if (
+        chain := several_blocks(fault, globals()["guarantee"], options, ("step", "out", "controller"), box)
+    ) is not None:
+        return guarantee_chain(chain, controller, step, out, force, output)
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)

@@ -85,14 +85,14 @@ def simulate(
         NetCDF file to write; of a fault of several blocks, a folder.
     """
     options = dict(locals())
-    from quakedesign.cli.block_commands import run_chain, several_blocks
+    from quakedesign.cli.block_commands import block_law, run_chain, several_blocks
     from quakedesign.fault import load_fault
     from quakedesign.report.sentences import proved_line
     from quakedesign.simulation import Load
     from quakedesign.studies.runs import run_single
 
-    if (blocks := several_blocks(fault, simulate, options, ("duration", "out"))) is not None:
-        return run_chain(blocks, run.duration, out, force, output)
+    if (blocks := several_blocks(fault, simulate, options, ("duration", "out", "controller"))) is not None:
+        return run_chain(blocks, block_law(law.controller, "none"), run.duration, out, force, output)
     new_file(out, "output file", force=force)
     loaded = load_fault(fault)
     if loaded.friction.state_names:

@@ -5,24 +5,18 @@ its argument or for those within a bound; a load v(t) changes slowly; a disturba
 bounded size. The law measures Cx at every sample, and noise.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from fractions import Fraction
-from math import ceil
 from types import MappingProxyType
 from typing import Any, Self
 
-from flint import fmpq, fmpq_mat
-
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError, require_known
+from quakedesign.errors import ParameterError
 from quakedesign.exact import rational, shortly
 from quakedesign.fault import BlockChain, Fault
-from quakedesign.fault.units import exact_value
-from quakedesign.plant.of_fault import uncertain_plant
+from quakedesign.plant.block_plant import block_parts
 from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad, unit
-from quakedesign.plant.ranges import FaultPlant
-from quakedesign.text import counted
 
 Slopes = tuple[Any, Any] | Callable[[Fraction], tuple[Any, Any]]
 
@@ -196,9 +190,9 @@ class UncertainPlant:
         """Strips of a fault with springs between neighbours, each with its own friction of the box and disturbance.
 
         States: slip errors [m], then slip-rate errors [m/s] of all blocks; controls: pressures of the wells [Pa].
-        With a well for each block the errors are those from the reference, and all are measured. With one well for all
-        the slip error of a block is that from its balance under the pressure that holds the mean slip at the reference;
-        the means of slip and slip rate are measured.
+        With an independent well for each block the errors are those from the reference, and all are measured. With
+        fewer wells the slip error of a block is that from its balance under the pressures that hold an average of the
+        slips for each well at the reference; these averages of slip and slip rate are measured.
 
         Parameters
         ----------
@@ -215,9 +209,10 @@ class UncertainPlant:
         Raises
         ------
         ParameterError
-            Also where the balance under one well may not be unique, although no mode escapes.
+            For wells that do not act independently.
         """
-        return cls(**block_parts(fault, blocks, wells, coupling))
+        parts = block_parts(fault, blocks, wells, coupling)
+        return cls(**parts | {"sectors": {name: Sector(**one) for name, one in parts["sectors"].items()}})
 
     @property
     def sizes(self) -> tuple[int, int]:
@@ -274,171 +269,7 @@ class UncertainPlant:
 
 
 # ----------------------------------------------------------------------
-# Several blocks of a fault. About r(t), or with one well about their balance x*(t) under the pressure p*(t) for which
-# the mean of x* is r, block i has e1′ = e2 + (r′ − x*′) and
-# e2′ = s·e1 + K(e1₋ − 2e1 + e1₊) − w·e2 + βb(p − p*) + φ − w·r′ − r″
-# with chords s, w and β of the friction of block i in the ranges of the fault. With a well for each block x* = r.
-#
-# With one well let x*′ = r′(1 + ξ), where ξ has the mean 0, and b·p*′ = r′·q. As all forces balance, s(1 + ξ) − KΛξ +
-# βq = 0 in every block, Λ the Laplacian of the chain, so (KΛ − s0)ξ = P[(s − s0)(1 + ξ) + (β − β0)q] with the
-# projection P that takes the mean away, and mean(s(1 + ξ)) + mean(β)q = 0. With R the largest absolute row sum of
-# (KΛ − s0)⁻¹P and X = max|ξ|: |q| ≤ S(1 + X), S = max|s|, as β ≥ 1, and X ≤ R·c·(1 + X), c = δs + δβ·S. Where R·c < 1,
-# X ≤ Rc/(1 − Rc), and the balance is a Lipschitz function of r. The mean of all forces is that of one block whose
-# coefficient is the mean of μ at x*, so σ′ − p* lies in the range of one block whose friction weakens and strengthens
-# 1 + X times as fast; from any bound of X a better one follows.
-
-_STEEP = Fraction(10**9)  # of friction that may have any coefficient at once
-_TURNS = 6
-_GRID = 10**4
-
-
-def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupling: Any) -> dict[str, Any]:
-    """Fields of the plant of several blocks."""
-    if isinstance(fault, BlockChain):
-        if blocks is not None or coupling is not None or wells != "each":
-            raise ParameterError(
-                "blocks, wells and coupling of a fault of several blocks are its own. Received values. Omit these."
-            )
-        return _chain_parts(fault)
-    require_known(wells, ("each", "one"), "wells")
-    if blocks is None or not 2 <= blocks <= MOST // 2:
-        raise ParameterError(f"blocks must be 2 to {MOST // 2}. Received {blocks}.")
-    task, N = uncertain_plant(fault), blocks
-    elastic = task.shear_modulus * N**2 / (task.density * rational(fault.length) ** 2)
-    K = elastic if coupling is None else exact_value(coupling, "1/s^2", "coupling")
-    if K <= 0:
-        raise ParameterError(f"coupling of blocks must be positive. Received {shortly(K)} 1/s^2.")
-    springs = [(a, b, K) for i in range(N - 1) for a, b in ((i, i + 1), (i + 1, i))]
-    if wells == "each":
-        return _parts([task] * N, springs, [unit(N, i) for i in range(N)], f"{N} blocks of {task.name}, {N} wells")
-    if any(task.spreads):
-        raise ParameterError(
-            f"one well for several blocks needs blocks whose constants are known, box paper. Received {task.name} "
-            "with spreads. Use fault.with_box('paper')."
-        )
-    balanced = _balanced(task, N, K)
-    return _parts([task] * N, springs, [(Fraction(1),)] * N, f"{N} blocks of {task.name}, one well", balanced)
-
-
-def _chain_parts(chain: BlockChain) -> dict[str, Any]:
-    """The same of blocks that differ, with as many wells, or of blocks that are alike under one well."""
-    N, m = len(chain.blocks), len(chain.wells)
-    if m == 1 and chain.alike:
-        return block_parts(chain.faults[0], N, "one", chain.springs[0][2]) | {"name": f"{chain.name}, one well"}
-    shares = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in chain.shares])
-    if m < N or shares.det() == 0:
-        raise ParameterError(
-            f"a guarantee of {N} blocks needs a well for each block whose pressures are independent, or one well for "
-            f"blocks that are alike. Received {counted(m, 'well')}{'' if m < N else ' that act on fewer blocks'}"
-            f"{', and blocks that differ' if m == 1 else ''}. Add wells, or make all blocks alike."
-        )
-    tasks = [uncertain_plant(fault) for fault in chain.faults]
-    return _parts(tasks, chain.springs, chain.shares, f"{chain.name}, {N} blocks, {m} wells")
-
-
-def _parts(
-    tasks: Sequence[FaultPlant],
-    springs: Iterable[tuple[int, int, Fraction]],
-    share: Sequence[Row],
-    name: str,
-    balanced: tuple[tuple[Fraction, Fraction], Any, Fraction] | None = None,
-) -> dict[str, Any]:
-    """Fields of a plant of blocks and wells; with one well, ranges of slope and damping and X about the balance."""
-    N, m, zero, differ = len(tasks), len(share[0]), Fraction(0), Fraction(0) if balanced is None else balanced[2]
-    size = 2 * N
-    slopes = [task.slip_chord if balanced is None else balanced[0] for task in tasks]
-    dampings = [task.rate_chord if balanced is None else balanced[1] for task in tasks]
-    pulls = [[zero] * size for _ in range(N)]
-    for i, j, K in springs:
-        pulls[i][j], pulls[i][i] = pulls[i][j] + K, pulls[i][i] - K
-    for i, damping in enumerate(dampings):
-        pulls[i][N + i] = -(damping[0] + damping[1]) / 2
-    rate = [unit(size, N + i) for i in range(N)]
-    sectors, disturbances, moving = {}, {}, []
-    loads: dict[str, Any] = {}
-    for i, task in enumerate(tasks):
-        half, place = (dampings[i][1] - dampings[i][0]) / 2, i + 1
-        sectors[f"slope of block {place}"] = Sector(entry=rate[i], row=unit(size, i), slopes=slopes[i])
-        if half:
-            sectors[f"damping of block {place}"] = Sector(entry=rate[i], row=rate[i], slopes=(-half, half))
-        acts = (*[zero] * size, *(task.authority * v for v in share[i]))
-        sectors[f"input gain of block {place}"] = Sector(entry=rate[i], row=acts, slopes=(0, task.beta[1] - 1))
-        first, second = task.reference_rates
-        force = max(map(abs, dampings[i])) * first + second + task.amplitude
-        disturbances[f"force on block {place}"] = (rate[i], force)
-        moving.append(max(map(abs, slopes[i])) * (1 + differ) * first / task.authority)
-    if differ:
-        for i, task in enumerate(tasks):
-            disturbances[f"balance of block {i + 1}"] = (unit(size, i), task.reference_rates[0] * differ)
-    if m == 1:
-        loads["pressure 1"] = ((Fraction(1),), None, moving[0])
-    else:  # pressures of the wells that hold block i against a pressure of 1
-        inverse = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in share]).inv().tolist()
-        for i in range(N):
-            held = tuple(Fraction(int(row[i].p), int(row[i].q)) for row in inverse)
-            loads[f"pressure {i + 1}"] = (held, None, moving[i])
-    mean, acting = Fraction(1, N), zip(tasks, share, strict=True)
-    order = ("slope", "damping", "input")
-    return {
-        "A": [*rate, *pulls],
-        "B": [(zero,) * m] * N + [tuple(task.authority * v for v in row) for task, row in acting],
-        "C": [[mean] * N + [zero] * N, [zero] * N + [mean] * N] if m == 1 else None,
-        "sectors": dict(sorted(sectors.items(), key=lambda item: order.index(item[0].split()[0]))),
-        "disturbances": disturbances,
-        "loads": loads,
-        "outputs": {
-            **{f"slip error {i + 1}": unit(size, i) for i in range(N)},
-            **{f"slip-rate error {i + 1}": rate[i] for i in range(N)},
-        },
-        "controls": tuple(f"pressure {k + 1}" for k in range(m)),
-        "name": name,
-    }
-
-
-def _balanced(task: FaultPlant, blocks: int, K: Fraction) -> tuple[tuple[Fraction, Fraction], Any, Fraction]:
-    """Ranges of slope and damping under one well, and X; 0 where a mode escapes at the steepest slope anyway."""
-    differ: Fraction | None = None
-    slope = damping = task.slip_chord
-    for _ in range(_TURNS):
-        steep = _STEEP if differ is None else 1 + differ
-        law = task.friction
-        faster = replace(law, weakening=law.weakening * steep, strengthening=law.strengthening * steep)
-        stress = replace(task, friction=faster).stress
-        slope, damping = task.slip_slopes(stress), task.rate_slopes(stress)
-        s0, half = (slope[0] + slope[1]) / 2, (slope[1] - slope[0]) / 2
-        rows = [[-s0 * (i == j) for j in range(blocks)] for i in range(blocks)]
-        for i in range(blocks - 1):
-            for a, b in ((i, i + 1), (i + 1, i)):
-                rows[a][a] += K
-                rows[a][b] -= K
-        away = [[v + (1 + abs(s0)) for v in row] for row in rows]  # the same but for the mean
-        inverse = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in away]).inv()
-        mean = fmpq(1, blocks)
-        project = fmpq_mat([[fmpq(int(i == j)) - mean for j in range(blocks)] for i in range(blocks)])
-        found = (inverse * project).tolist()
-        reach = max(sum((abs(Fraction(int(v.p), int(v.q))) for v in row), Fraction(0)) for row in found)
-        least = 2 * K * (1 - _cosine(blocks)[1])  # of the modes that differ, from below
-        share = reach * (half + (task.beta[1] - 1) / 2 * max(map(abs, slope)))
-        if share >= 1 or least <= s0:
-            if differ is not None:
-                break
-            if 2 * K * (1 - _cosine(blocks)[0]) <= slope[1]:  # a mode escapes, and nothing is proved
-                return slope, damping, Fraction(0)
-            raise ParameterError(
-                f"the balance of {blocks} blocks under one well must be unique for every friction of the box. Received "
-                f"springs of {shortly(K)} 1/s^2, for which this is not proved. Give stiffer springs, or a well each."
-            )
-        better = Fraction(ceil(share / (1 - share) * _GRID), _GRID)
-        if differ is not None and better >= differ:
-            break
-        differ = better
-    return slope, damping, differ or Fraction(0)
-
-
-def _cosine(blocks: int) -> tuple[Fraction, Fraction]:
-    """Bounds of cos(π/blocks), 3.14159265 < π < 3.14159266."""
-    x, y = Fraction(314159266, 10**8) / blocks, Fraction(314159265, 10**8) / blocks
-    return 1 - x**2 / 2 + x**4 / 24 - x**6 / 720, 1 - y**2 / 2 + y**4 / 24 - y**6 / 720 + y**8 / 40320
+# Fields in exact numbers.
 
 
 def _frozen(values: dict[str, Any]) -> Mapping[str, Any]:

@@ -12,6 +12,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import rational
 from quakedesign.fault import BlockChain
+from quakedesign.plant.block_plant import averages
 from quakedesign.symbolic.casadi_printer import to_casadi
 
 SUBSTEPS = 8
@@ -106,7 +107,8 @@ class _Period:
         began = count * step
         r, moved = reference(began)
         errors = ca.vertcat(x - r, v - moved)
-        seen = errors if told == 2 * N else ca.vertcat(ca.sum1(x) / N - r, ca.sum1(v) / N - moved)
+        weights = ca.DM(np.array(averages(chain.shares), dtype=float))
+        seen = errors if told == 2 * N else ca.vertcat(ca.mtimes(weights, x) - r, ca.mtimes(weights, v) - moved)
         F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
         p = (ca.mtimes(H, z) if q else 0) + ca.mtimes(D, seen)
         z = ca.mtimes(F, z) + ca.mtimes(G, seen) if q else z
@@ -155,7 +157,7 @@ def simulate_blocks(
     ----------
     chain : BlockChain
     law : MatrixLaw
-        Of errors of all blocks, or of the means of slip and slip rate; without delay.
+        Of errors of all blocks, or of the averages of slip and slip rate that each well measures; without delay.
     duration : float, optional
         [s]; the operation time unless given.
     substeps : int

@@ -14,9 +14,13 @@ from typing import Any
 import numpy as np
 
 from quakedesign.errors import ParameterError
+from quakedesign.exact import UpperBound, rational
 from quakedesign.fault import BlockChain
-from quakedesign.plant import uncertain_plant
-from quakedesign.text import counted
+from quakedesign.plant import UncertainPlant, uncertain_plant
+from quakedesign.simulation.block_run import BlockRun, simulate_blocks, whole_periods
+from quakedesign.synthesis import guarantee
+from quakedesign.synthesis.guarantee import BLOCK_LAWS
+from quakedesign.text import counted, quantity
 
 _SAME = 1e-6  # poles that are one, relative to the largest
 _UNREACHED = 1e-9  # of a mode's vectors
@@ -171,3 +175,62 @@ def chain_dict(chain: BlockChain) -> dict[str, Any]:
     springs = [{"block": i + 1, "pulled_by": j + 1, "stiffness_over_mass": float(K)} for i, j, K in chain.springs]
     shares = [[float(v) for v in row] for row in chain.shares]
     return {"fault": chain.name, "blocks": blocks, "wells": list(chain.wells), "shares": shares, "springs": springs}
+
+
+# ----------------------------------------------------------------------
+# A designed law, its proof and a run.
+
+
+def farthest_balance(chain: BlockChain) -> UpperBound | None:
+    """How far from the reference a block may be at balance [m], under fewer wells than blocks; else None."""
+    plant, task = UncertainPlant.from_blocks(chain), uncertain_plant(chain.fault)
+    moves = [size for name, (_, size) in plant.disturbances.items() if name.startswith("balance")]
+    return UpperBound(max(moves) / task.reference_rates[0] * task.target_slip) if moves else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChainRun:
+    """What is proved of a designed law, and a run with it; no run where nothing is proved."""
+
+    chain: BlockChain
+    controller: str
+    found: Any
+    run: BlockRun | None
+
+    def row(self) -> list[str]:
+        """Largest values of all blocks for a table: law, proved slip rate and slip, those of the run, pressures."""
+        if self.run is None:
+            return [self.controller, "none", *[""] * 5]
+        N = len(self.chain.blocks)
+        outputs = self.found.claims.outputs
+        slips, rates = UpperBound(max(outputs[:N])), UpperBound(max(outputs[N:]))
+        worst = (self.run.slip_rate_error.max(), self.run.slip_error.max())
+        ends = (self.run.pressure.min(), self.run.pressure.max())
+        return [
+            self.controller,
+            rates.quantity("m/s"),
+            slips.quantity("m"),
+            *(quantity(float(v), unit) for v, unit in zip(worst, ("m/s", "m"), strict=True)),
+            *(quantity(float(v), "Pa") for v in ends),
+        ]
+
+
+def run_of_chain(chain: BlockChain, controller: str = BLOCK_LAWS[0], duration: float | None = None) -> ChainRun:
+    """Design a law for several blocks, prove it, and run it on the stick–slip plant.
+
+    Parameters
+    ----------
+    chain : BlockChain
+    controller : str
+        ``centralised`` or ``decentralised``.
+    duration : float, optional
+        [s]; the operation time unless given.
+
+    Raises
+    ------
+    ParameterError
+    """
+    whole_periods(chain, rational(chain.fault.sampling_time), duration)  # is refused before the long search
+    found: Any = guarantee(chain, controller)
+    run = simulate_blocks(chain, found.law, duration=duration) if found.proved else None
+    return ChainRun(chain=chain, controller=controller, found=found, run=run)

@@ -71,6 +71,8 @@ def _asked(question: Callable[[], Found]) -> Found | QuakedesignError:
 
 
 PLANTS = ("printed", "stick-slip")
+BLOCK_LAWS = ("centralised", "decentralised")
+"""Of several blocks: the pressure of each well depends on all measurements, or on those of its own."""
 _PUMP = ("saturation", "withdrawal", "rate_limit")
 _OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", *_PUMP)
 
@@ -102,7 +104,8 @@ def guarantee(
         Of the second and third, peaks of its outputs for a law or gains; law, gains, step, delay and lag apply.
         Several blocks (`UncertainPlant.from_blocks`, `load_chain`) have a law that is designed unless one is given.
     controller : str, type of Controller, or SampledLaw
-        ``elqr``, or a sliding mode, ``cta`` or ``dia``; or a user's law.
+        ``elqr``, or a sliding mode, ``cta`` or ``dia``; or a user's law. Of several blocks ``centralised`` (default),
+        or ``decentralised``: the pressure of each well depends on its own measurements alone.
     setup : LoopSetup
         Sampling, delay, lag, diffusion path, noise, jitter, pump and initial errors. A user's law has its own T_s.
     law : SampledLaw or control.StateSpace, optional
@@ -155,12 +158,13 @@ def guarantee(
         fault = UncertainPlant.from_blocks(fault)
     if isinstance(fault, UncertainPlant):
         usual = (plant, objective, scheme, disturbance_class) == (PLANTS[0], OBJECTIVES[0], None, CLASSES[0])
-        if not usual or controller != "elqr" or stress is not None or exact_value(spread, "", "spread"):
+        named = isinstance(controller, str) and controller in ("elqr", *BLOCK_LAWS)
+        if not usual or not named or stress is not None or exact_value(spread, "", "spread"):
             raise ParameterError(
                 "an uncertain plant is guaranteed with a law or gains alone. Received controller, objective, scheme, "
                 "class, plant, stress or spread. Omit these."
             )
-        return guarantee_plant(fault, law, gains, setup)
+        return guarantee_plant(fault, law, gains, setup, decentralised=controller == BLOCK_LAWS[1])
     fault = with_accepted_fit(fault, accept_poor_fit)
     if law is not None and not isinstance(law, Controller):
         raise ParameterError(

@@ -20,7 +20,9 @@ _KNOWN = {"step", "delay", "lag"}
 _UNSEEN = 1e-9
 
 
-def guarantee_plant(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup) -> PlantGuarantee | NoGuarantee:
+def guarantee_plant(
+    plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup, *, decentralised: bool = False
+) -> PlantGuarantee | NoGuarantee:
     """Peaks of a plant's outputs under a law, a gain matrix, or a law that is designed for several blocks.
 
     Parameters
@@ -31,6 +33,8 @@ def guarantee_plant(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetu
         u = −gains·y, with the step of the setup.
     setup : LoopSetup
         Step, delay and lag.
+    decentralised : bool
+        Of a law that is designed: whether the pressure of each well depends on its own measurements alone.
 
     Raises
     ------
@@ -42,7 +46,7 @@ def guarantee_plant(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetu
             f"of the plant. Received {', '.join(sorted(unknown))}. Omit these."
         )
     around = plant.behind(setup.lag) if setup.lag else plant
-    exact, notes = _law_of(around, law, gains, setup)
+    exact, notes = _law_of(around, law, gains, setup, decentralised)
     radius, mode = escaping(around, exact)
     if radius >= 1:
         shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[: _shown(around)], 9))
@@ -61,7 +65,9 @@ def _shown(plant: UncertainPlant) -> int:
     return len(plant.A) // 2 if any("block" in name for name in plant.sectors) else len(plant.A)
 
 
-def _law_of(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup) -> tuple[MatrixLaw, tuple[str, ...]]:
+def _law_of(
+    plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup, decentralised: bool
+) -> tuple[MatrixLaw, tuple[str, ...]]:
     """A law in exact numbers, and what was changed for it."""
     given: Any = gains if hasattr(gains, "shape") else list(gains)
     empty = len(given) == 0
@@ -74,7 +80,7 @@ def _law_of(plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup) -> tu
         if setup.step is None:
             raise ParameterError("gains of an uncertain plant need a step. Received none. Give step='0.1 s', say.")
         if empty:
-            return block_law(plant, setup.step), ()
+            return block_law(plant, setup.step, decentralised=decentralised), ()
         rows = exact_matrix(np.atleast_2d(np.asarray(given, dtype=object)), "gains")
         feedback = tuple(tuple(-v for v in row) for row in rows)
         output: tuple[Any, ...] = ((),) * len(feedback)

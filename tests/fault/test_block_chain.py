@@ -61,6 +61,15 @@ def test_a_load_is_held_by_the_pressures_that_hold_its_block_alone():
         assert held == [int(i == j) for j in range(3)]
 
 
+def test_with_fewer_wells_each_measures_an_average_by_its_shares():
+    plant = qd.UncertainPlant.from_blocks(replace(CHAIN, wells=(1000.0, 4000.0)))
+    # shares (1, 0), (5/12, 7/12), (0, 1) in columns of sums 17/12 and 19/12
+    first, second = (F(12, 17), F(5, 17), F(0)), (F(0), F(7, 19), F(12, 19))
+    none = (F(0),) * 3
+    assert plant.C == ((*first, *none), (*second, *none), (*none, *first), (*none, *second))
+    assert [load.control for load in plant.loads.values()] == [(1, 0), (0, 1)]
+
+
 def without(text, start):
     """The text without the lines from one on, up to an empty line."""
     before, _, after = text.partition(start)
@@ -130,7 +139,7 @@ def test_friction_with_a_state_is_refused(tmp_path):
 
 
 def test_what_takes_one_block_refuses_the_file_and_says_what_takes_it():
-    with pytest.raises(ScenarioError, match="Use the commands fault, design, guarantee, simulate or limits"):
+    with pytest.raises(ScenarioError, match="Use the commands fault, design, guarantee, compare, simulate or limits"):
         qd.load_fault(PATH)
     with pytest.raises(ScenarioError, match="no \\[\\[block\\]\\]"):
         parse_fault(TEXT, "text")
@@ -139,9 +148,17 @@ def test_what_takes_one_block_refuses_the_file_and_says_what_takes_it():
 @pytest.mark.parametrize(
     ("chain", "given", "said"),
     [
-        (replace(CHAIN, wells=(1000.0,)), {}, "Received 1 well, and blocks that differ"),
-        (replace(CHAIN, wells=(1000.0, 4000.0)), {}, "Received 2 wells"),
-        (replace(CHAIN, wells=(100.0, 200.0, 300.0)), {}, "3 wells that act on fewer blocks"),
+        (replace(CHAIN, wells=(100.0, 200.0)), {}, "wells that act independently. Received 2 wells for 3 blocks"),
+        (
+            replace(CHAIN, wells=(100.0, 200.0, 300.0)),
+            {},
+            "3 wells for 3 blocks, of which some act on the same",
+        ),
+        (
+            replace(CHAIN, wells=(2500.0,), fault=CHAIN.fault.with_box("ten-percent")),
+            {},
+            "fewer wells than blocks need blocks whose constants are known, box paper",
+        ),
         (CHAIN, {"blocks": 3}, "are its own"),
         (CHAIN, {"wells": "one"}, "are its own"),
         (CHAIN, {"coupling": 12}, "are its own"),

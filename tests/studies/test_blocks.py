@@ -1,7 +1,9 @@
 """May one block stand for a fault: as a value, and as a command."""
 
 import json
+from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,37 +48,93 @@ def test_answers_are_told_in_lines_and_numbers():
     assert answer.to_dict()["blocks"][0]["verdict"] == "undecided"
 
 
+CHAIN = qd.load_chain(Path(__file__).parents[1] / "data" / "three_blocks.toml")
+SHORT = replace(CHAIN.fault, length=4500.0)
+ALIKE = replace(CHAIN, fault=SHORT, blocks=(replace(CHAIN.blocks[0], length=1500.0),) * 3, wells=(2250.0,))
+CASES = {"alike, one well": ALIKE, "one well": replace(CHAIN, wells=(2500.0,)), "two": replace(CHAIN, wells=(1e3, 4e3))}
+
+
+def numbers(chain):
+    """What a balance depends on, in floats, beside what is derived of it: X, Q [Pa/m] and slopes."""
+    plant, tasks = qd.UncertainPlant.from_blocks(chain), [uncertain_plant(fault) for fault in chain.faults]
+    first = float(tasks[0].reference_rates[0])
+    pulls = np.zeros((3, 3))
+    for i, j, K in chain.springs:
+        pulls[i, j], pulls[i, i] = float(K), pulls[i, i] - float(K)
+    weights = np.array([[float(v) for v in row[:3]] for row in plant.C[: len(chain.wells)]])
+    moves = np.array([float(v) for name, (_, v) in plant.disturbances.items() if "balance" in name]) / first
+    pressures = np.array([float(load.rate) for load in plant.loads.values()]) / first
+    slopes = np.array([[float(v) for v in one.slopes] for name, one in plant.sectors.items() if "slope" in name])
+    return tasks, pulls, np.array(chain.shares, dtype=float), weights, moves, pressures, slopes
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_balances_of_random_slopes_and_coefficients_stay_within_their_bounds(case):
+    """Linear equations for slopes, gains and coefficients at random ends of their ranges."""
+    tasks, pulls, shares, weights, moves, pressures, slopes = numbers(CASES[case])
+    m, random = len(weights), np.random.default_rng(7)
+    largest, reached, steepest = np.zeros(3), np.zeros(m), slopes[:, 1] * 0
+    n, k = (np.array([float(getattr(t, name)[0]) for t in tasks]) for name in ("area_per_mass", "stiffness"))
+    k = k - np.array([float(t.growths[0]) for t in tasks])
+    law = [t.friction for t in tasks]
+    least, most, static, weakening = (
+        np.array([float(getattr(one, name)) for one in law]) for name in ("least", "largest", "static", "weakening")
+    )
+    normal = np.array([float(t.normal_stress) for t in tasks])
+    for _ in range(400):
+        s = np.where(random.random(3) < 0.5, *slopes.T)
+        force = np.where(random.random(3) < 0.5, least, most) * n
+        rows = np.block([[np.diag(s) + pulls, force[:, None] * shares], [weights, np.zeros((m, m))]])
+        found = np.linalg.solve(rows, [*-s, *[0] * m])
+        largest, reached = np.maximum(largest, abs(found[:3])), np.maximum(reached, abs(found[3:]))
+        mu = np.where(random.random(3) < 0.5, least, most)
+        rows = np.block([[pulls - np.diag(k), (n * mu)[:, None] * shares], [weights, np.zeros((m, m))]])
+        slip = random.choice([0, float(tasks[0].target_slip)])
+        p = np.linalg.solve(rows, [*(n * (mu - static) * normal), *[slip] * m])[3:]
+        steepest = np.maximum(steepest, n * weakening * (normal - shares @ p) - k)
+    assert (largest <= moves).all()
+    assert (reached <= pressures).all()
+    assert (largest > 0.3 * moves).all()
+    assert (reached > 0.3 * pressures).all()
+    if case != "alike, one well":  # there any coefficient at any slip is more than the friction can have
+        assert (steepest <= slopes[:, 1]).all()
+        assert (steepest > 0.8 * slopes[:, 1]).all()
+
+
 @pytest.mark.slow
-def test_the_balance_of_blocks_under_one_well_stays_within_its_bounds():
+@pytest.mark.parametrize("case", CASES)
+def test_the_balance_of_blocks_under_fewer_wells_stays_within_its_bounds(case):
     """Balances of random piecewise linear friction laws of the box, by Newton's method, beside what is derived."""
-    blocks = 3
-    plant, task = qd.UncertainPlant.from_blocks(REAL, blocks, wells="one"), uncertain_plant(REAL)
-    first = float(task.reference_rates[0])
-    differ = float(plant.disturbances["balance of block 1"][1]) / first
-    slopes = [float(v) for v in plant.sectors["slope of block 1"].slopes]
-    k, N = (float(ends[0]) for ends in (task.stiffness, task.area_per_mass))
-    static, least, stress, K = float(task.friction.static), float(task.friction.least), float(task.normal_stress), 4.32
-    steepest, random, worst = float(task.friction.weakening), np.random.default_rng(4), 0.0
+    tasks, pulls, shares, weights, moves, pressures, slopes = numbers(CASES[case])
+    m, blocks, random, worst = len(weights), 3, np.random.default_rng(4), np.zeros(3)
+    k = np.array([float(t.stiffness[0] - t.growths[0]) for t in tasks])
+    N = np.array([float(t.area_per_mass[0]) for t in tasks])
+    static, least, steepest = (
+        np.array([float(getattr(t.friction, name)) for t in tasks]) for name in ("static", "least", "weakening")
+    )
+    stress, target = np.array([float(t.normal_stress) for t in tasks]), float(tasks[0].target_slip)
     for _ in range(40):
         # each block weakens at its own slip, as steeply as it may
-        starts, falls = random.uniform(0, 0.5, blocks), random.uniform(0, static - least, blocks)
+        starts, falls = random.uniform(0, 0.5, blocks), random.uniform(0, static - least)
         mu = lambda x, starts=starts, falls=falls: static - np.clip(steepest * (x - starts), 0, falls)  # noqa: E731
-        chain = K * (2 * np.eye(blocks) - np.eye(blocks, k=1) - np.eye(blocks, k=-1))
-        chain[0, 0] = chain[-1, -1] = K
-        before, x, p = None, np.zeros(blocks), 0.0
-        for r in np.linspace(0, float(task.target_slip), 400)[1:]:
+        before, x, p = None, np.zeros(blocks), np.zeros(m)
+        for r in np.linspace(0, target, 400)[1:]:
             for _ in range(60):
-                force = -(k - float(task.growths[0])) * x - chain @ x + N * (static * stress - mu(x) * (stress - p))
-                tangent = (mu(x + 1e-9) - mu(x)) / 1e-9
-                slope = -k + float(task.growths[0]) - N * tangent * (stress - p)
-                jacobian = np.block([[np.diag(slope) - chain, (N * mu(x))[:, None]], [np.ones((1, blocks)), 0]])
-                move = np.linalg.solve(jacobian, -np.r_[force, x.sum() - blocks * r])
-                x, p = x + move[:-1], p + move[-1]
-                if np.abs(move[:-1]).max() < 1e-13:
+                normal = stress - shares @ p
+                force = pulls @ x - k * x + N * (static * stress - mu(x) * normal)
+                slope = -k - N * (mu(x + 1e-9) - mu(x)) / 1e-9 * normal
+                jacobian = np.block(
+                    [[np.diag(slope) + pulls, (N * mu(x))[:, None] * shares], [weights, np.zeros((m, m))]]
+                )
+                move = np.linalg.solve(jacobian, -np.r_[force, weights @ x - r])
+                x, p = x + move[:blocks], p + move[blocks:]
+                if np.abs(move[:blocks]).max() < 1e-13:
                     break
-            assert slopes[0] * (1 + 1e-6) <= slope.min() * 1.0 + 1e-9 or slope.min() >= slopes[0] - 1e-6
-            assert slope.max() <= slopes[1] + 1e-6
+            assert (slopes[:, 0] - 1e-6 <= slope).all()
+            assert (slope <= slopes[:, 1] + 1e-6).all()
             if before is not None:
-                worst = max(worst, np.abs((x - before) / (float(task.target_slip) / 399) - 1).max())
-            before = x
-    assert 0.1 * differ < worst <= differ
+                worst = np.maximum(worst, np.abs((x - before[0]) / (target / 399) - 1))
+                assert (np.abs(p - before[1]) / (target / 399) <= pressures * (1 + 1e-6)).all()
+            before = x, p
+    assert (worst <= moves).all()
+    assert (worst > 0.1 * moves).all()

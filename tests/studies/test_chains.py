@@ -1,6 +1,7 @@
 """Limits of several blocks beside closed forms and a run of a mode, and the commands that take such a file."""
 
 import json
+import re
 from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
@@ -141,19 +142,21 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
         def to_dict(self):
             return {"verdict": "proved", "sentence": self.sentence(), "notes": list(self.notes)}
 
-    monkeypatch.setattr("quakedesign.synthesis.guarantee", lambda *_, **__: Proved())
+    for place in ("synthesis", "studies.chains"):
+        monkeypatch.setattr(f"quakedesign.{place}.guarantee", lambda *_, **__: Proved())
     assert run("guarantee", PATH) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "plant: three-blocks, 3 blocks, 3 wells, any constants of box paper, without stick" in told
     assert "units: slip m, slip rate m/s, disturbance m/s^2, pressure Pa, rate of a load Pa/s" in told
-    assert "one pressure" not in told
+    assert "in balance" not in told
     alone = PATH.read_text().split("[[block]]")[0] + '[[block]]\nlength = "2.5 km"\n' * 2
     (tmp_path / "blocks.toml").write_text(alone + '[[well]]\nposition = "1 km"\n')
     assert run("guarantee", tmp_path / "blocks.toml") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "2 blocks, 1 well," in told
     assert "disturbance m/s^2, the second m/s," in told
-    assert "slip errors count from where each block is in balance under the one pressure" in told
+    assert "slip errors count from where each block is in balance under these pressures" in told
+    assert re.search(r"within 0\.\d+ m of the reference at every time", told)
     assert run("guarantee", PATH, "--json") == 0
     notes = json.loads(capsys.readouterr().out)["notes"]
     assert notes[0] == "a note"
@@ -203,13 +206,13 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
     [
         (("guarantee", PATH, "--delay", "20 ms"), "Received --delay. Omit these."),
         (("guarantee", PATH, PATH), "takes one fault of several blocks at a time. Received more faults"),
-        (("guarantee", PATH, "--delay", "20 ms"), "the options --box, --force, --json, --out, --step."),
+        (("guarantee", PATH, "--delay", "20 ms"), "the options --box, --controller, --force, --json, --out, --step."),
         (("limits", PATH, "--pressure", "1 MPa"), "Received --pressure"),
-        (("simulate", PATH, "--controller", "cta"), "Received --controller"),
-        (("design", PATH, "--controller", "cta"), "Received --controller"),
-        (("compare", PATH), "Use the commands fault, design, guarantee, simulate or limits"),
-        (("export", PATH), "Use the commands fault, design, guarantee, simulate or limits"),
-        (("derive", PATH), "Use the commands fault, design, guarantee, simulate or limits"),
+        (("simulate", PATH, "--controller", "cta"), "must be one of centralised, decentralised. Received 'cta'"),
+        (("design", PATH, "--controller", "decentralized"), "Did you mean decentralised?"),
+        (("compare", PATH, "--objective", "peak"), "Received --objective"),
+        (("export", PATH), "Use the commands fault, design, guarantee, compare, simulate or limits"),
+        (("derive", PATH), "Use the commands fault, design, guarantee, compare, simulate or limits"),
     ],
 )
 def test_what_does_not_take_it_says_so_in_one_line(arguments, said, capsys):
@@ -218,8 +221,26 @@ def test_what_does_not_take_it_says_so_in_one_line(arguments, said, capsys):
     assert said in " ".join(error.split())
 
 
-def test_two_wells_for_three_blocks_are_refused_with_a_remedy(tmp_path, capsys):
+def test_wells_that_act_alike_are_refused_with_a_remedy(tmp_path, capsys):
     path = tmp_path / "blocks.toml"
-    path.write_text(PATH.read_text().replace('[[well]]\nposition = "2.5 km"\n', ""))
+    path.write_text(PATH.read_text().replace('"2.5 km"', '"0.9 km"').replace('"1 km"', '"0.5 km"'))
     assert run("guarantee", path) == 2
-    assert "Add wells, or make all blocks alike" in " ".join(capsys.readouterr().err.split())
+    assert "Move or omit wells" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.slow
+def test_laws_are_compared_side_by_side(tmp_path, capsys):
+    path = tmp_path / "blocks.toml"
+    text = PATH.read_text().replace('[[well]]\nposition = "2.5 km"\n', "")
+    path.write_text(text.replace('"184.17 hour"', '"1 hour"').replace('"785 mm"', '"1 mm"'))
+    assert run("compare", path) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert max(map(len, told)) <= 80
+    rows = {line.split()[0]: line for line in told if line.startswith(("centralised", "decentralised"))}
+    assert len(rows) == 2
+    assert run("compare", path, "--controller", "decentralised", "--json") == 0
+    (one,) = json.loads(capsys.readouterr().out).values()
+    proved = max(F(v) for name, v in one["guarantee"]["peaks"].items() if name.startswith("slip-rate"))
+    assert proved > max(one["run"]["max_slip_rate_error"])
+    shown = float(re.search(r"([0-9.]+) µm/s", rows["decentralised"])[1])
+    assert proved * 10**6 <= F(str(shown)) <= proved * F(101, 100) * 10**6

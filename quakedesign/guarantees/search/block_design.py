@@ -1,7 +1,8 @@
-"""Laws for several blocks of a fault, with a well each or with one well, chosen by an estimate of what is proved.
+"""Laws for several blocks of a fault and their wells, chosen by an estimate of what is proved.
 
-A well each: linear-quadratic feedback of all errors, with an estimate of the disturbance of every block from the
-innovation of its slip rate. One well: a law of the means, as for one block.
+Linear-quadratic feedback of what is measured, with an estimate of the disturbance from the innovation of the slip
+rates: of all blocks where each has a well, else of averages, one for each well. In a decentralised law each well has
+the same for its own slip and slip rate.
 """
 
 from fractions import Fraction
@@ -29,22 +30,29 @@ _FORGET, _LEFT = 400, 1e-4  # periods that an estimate follows at most, share th
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def block_law(plant: UncertainPlant, step: Fraction) -> MatrixLaw:
+def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = False) -> MatrixLaw:
     """A law for a plant of `UncertainPlant.from_blocks`, by a search with the estimate of its slip-rate errors.
+
+    Parameters
+    ----------
+    plant : UncertainPlant
+    step : Fraction
+        T_s [s].
+    decentralised : bool
+        Whether the pressure of each well depends on its own measurements alone.
 
     Raises
     ------
     ParameterError
     """
     part, scale = linear_part(plant, {}), np.array(_START)
-    made = _for_one_well if len(plant.controls) == 1 else _for_every_well
 
     def cost(x: np.ndarray) -> float:
         values = scale * np.exp(x)
         if values[2] >= 1:
             return 1e3
         try:
-            found = estimate(part, made(part, step, values))
+            found = estimate(part, _law_of(part, step, values, decentralised))
         except ValueError:  # a mode that grows beyond floating point, or no solution of the equation of Riccati
             return 1e3
         return found[0] if found[0] >= 1 else float(np.log(found[1])) - 100
@@ -55,7 +63,7 @@ def block_law(plant: UncertainPlant, step: Fraction) -> MatrixLaw:
     options = {"maxfev": most, "xatol": 1e-2, "fatol": 1e-3, "initial_simplex": simplex}
     best = minimize(cost, np.zeros(len(_STEPS)), method="Nelder-Mead", options=options)
     try:
-        return made(part, step, scale * np.exp(best.x))
+        return _law_of(part, step, scale * np.exp(best.x), decentralised)
     except ValueError:
         raise ParameterError(
             "a law for several blocks is designed where floating point holds what grows within one step. Received a "
@@ -93,30 +101,24 @@ def _feedback(A: np.ndarray, G: np.ndarray, x: np.ndarray) -> np.ndarray:
     return gain
 
 
-def _for_every_well(part: LinearPart, step: Fraction, x: np.ndarray) -> MatrixLaw:
-    """Feedback of all errors, in exact numbers: π⁺ = Pe, d⁺ = d + M(e2 − π), p = −g⁻¹(Ke + d⁺)."""
-    count = len(part.A) // 2
+def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> MatrixLaw:
+    """Feedback of what is measured, in exact numbers: π⁺ = Pe, d⁺ = d + M(e2 − π), p = −g⁻¹(Ke + d⁺).
+
+    What is measured are all errors, or averages Ce of them for each well, of which Te are the errors of all blocks.
+    """
+    blocks, count = len(part.A) // 2, len(part.C) // 2
     A, B = _middle(part)
-    phi, reach = _held(A, np.vstack([np.zeros((count, count)), np.eye(count)]), float(step))
-    K = _feedback(phi, reach, x)
+    weights = np.array(part.C, dtype=float)[:count, :blocks]
+    spread = B[blocks:] @ np.linalg.inv(weights @ B[blocks:]) if count < blocks else np.eye(blocks)
+    own = np.kron(np.eye(2), weights) @ A @ np.kron(np.eye(2), spread)
+    gain = weights @ B[blocks:] * x[3]
+    if alone:  # each well knows what it measures itself, and takes the others for a disturbance
+        own, gain = own * np.kron(np.ones((2, 2)), np.eye(count)), np.diag(np.diag(gain))
+    phi, reach = _held(own, np.vstack([np.zeros((count, count)), np.eye(count)]), float(step))
+    K = _feedback(phi, reach, x * (1, 1, 1, 1, not alone))
     feedback = _rounded(K)
     learned = _rounded(float(x[2]) * np.linalg.inv(reach[count:]))
     expected = _rounded(phi[count:] - reach[count:] @ np.array(feedback, dtype=float))
-    return _law(step, _rounded(B[count:] * x[3]), feedback, learned, expected)
-
-
-def _for_one_well(part: LinearPart, step: Fraction, x: np.ndarray) -> MatrixLaw:
-    """The same for the means of slip and slip rate, of which springs are no part."""
-    count = len(part.A) // 2
-    A, B = _middle(part)
-    mean = np.kron(np.eye(2), np.ones((1, count)) / count)
-    own = mean @ A @ np.kron(np.eye(2), np.ones((count, 1)))
-    gain = B[count:].mean(keepdims=True) * x[3]
-    phi, reach = _held(own, np.array([[0.0], [1.0]]), float(step))
-    K = _feedback(phi, reach, x)
-    feedback = _rounded(K)
-    learned = _rounded(float(x[2]) / reach[1:])
-    expected = _rounded(phi[1:] - reach[1:] @ np.array(feedback, dtype=float))
     return _law(step, _rounded(gain), feedback, learned, expected)
 
 

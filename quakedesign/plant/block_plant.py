@@ -1,0 +1,302 @@
+"""Uncertain plants of several blocks of a fault under their wells.
+
+With as many independent wells as blocks, errors are those from the reference r(t). With fewer wells, only an average of
+the slips for each well can follow r: with weights C, of which each row adds up to 1, errors of the slips are those from
+their balance x*(t) under pressures p* of the wells with Cx* = r. Block i then has e1′ = e2 + (r′ − x*′) and
+e2′ = s·e1 + ΣK(e1_j − e1) − w·e2 + βb·S(p − p*) + φ − w·r′ − r″, where s, w and β are chords of its friction in their
+ranges and S are the shares of the wells.
+
+**Balance.** Let N = σ′ − Sp* of each block. Its forces are n(μ*σ′ − μN) − kx* + ΣK(x*_j − x*) = 0, n the area per
+mass. With μ = μ0 + δ, |δ| ≤ h, these equations and Cx* = r give N = N0(r) + Gδ, δ = nhN at most, with G from the
+inverse of a matrix of numbers: |N − N0| ≤ |G|nh|N| bounds N, and s and w with it.
+
+With x*′ = r′(1 + ξ) and p*′ = r′q the derivative of the forces is s(1 + ξ) + ΣK(ξ_j − ξ) + βb·Sq = 0, and Cξ = 0.
+With s = s0 + δs and β = β0 + δβ let F bound |δs(1 + ξ) + δβb·Sq|. The inverse of the matrix with s0 and β0 bounds
+|1 + ξ| and b|Sq| by A + B·F; with the half-widths F ≤ f + M·F. Where M·F + f < F for a positive F, the spectral radius
+of M is below 1 (Collatz and Wielandt), no matrix of the ranges is singular, the balance is a Lipschitz function of r
+(Clarke), and |ξ| ≤ X and |q| ≤ Q follow from F.
+
+With one well and blocks that are alike, the mean of all forces is that of one block whose coefficient is the mean of μ
+at x*: N then lies in the range of one block whose friction weakens and strengthens 1 + X times as fast.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import ceil
+from typing import Any
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+
+from quakedesign.errors import ParameterError, require_known
+from quakedesign.exact import rational, shortly
+from quakedesign.fault import BlockChain, Fault
+from quakedesign.fault.units import exact_value
+from quakedesign.plant.of_fault import uncertain_plant
+from quakedesign.plant.plant_values import MOST, Matrix, Row, unit
+from quakedesign.plant.ranges import FaultPlant, Range
+from quakedesign.text import counted
+
+_STEEP = Fraction(10**9)  # of friction that may have any coefficient at once
+_LOST = Fraction(10**9)  # X and Q where no balance is proved: nothing of use can be proved with them
+_TURNS = 6
+_GRID = 10**4
+_DIGITS = 6  # of middles
+_WIDER = 1 + 1e-9
+
+Spring = tuple[int, int, Fraction]
+
+
+def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupling: Any) -> dict[str, Any]:
+    """Fields of the plant of several blocks."""
+    if isinstance(fault, BlockChain):
+        if blocks is not None or coupling is not None or wells != "each":
+            raise ParameterError(
+                "blocks, wells and coupling of a fault of several blocks are its own. Received values. Omit these."
+            )
+        N, m = len(fault.blocks), len(fault.wells)
+        tasks = [uncertain_plant(one) for one in fault.faults]
+        return _parts(tasks, fault.springs, fault.shares, f"{fault.name}, {N} blocks, {counted(m, 'well')}")
+    require_known(wells, ("each", "one"), "wells")
+    if blocks is None or not 2 <= blocks <= MOST // 2:
+        raise ParameterError(f"blocks must be 2 to {MOST // 2}. Received {blocks}.")
+    task = uncertain_plant(fault)
+    elastic = task.shear_modulus * blocks**2 / (task.density * rational(fault.length) ** 2)
+    K = elastic if coupling is None else exact_value(coupling, "1/s^2", "coupling")
+    if K <= 0:
+        raise ParameterError(f"coupling of blocks must be positive. Received {shortly(K)} 1/s^2.")
+    springs = [(a, b, K) for i in range(blocks - 1) for a, b in ((i, i + 1), (i + 1, i))]
+    shares = [unit(blocks, i) for i in range(blocks)] if wells == "each" else [(Fraction(1),)] * blocks
+    held = f"{blocks} wells" if wells == "each" else "one well"
+    return _parts([task] * blocks, springs, shares, f"{blocks} blocks of {task.name}, {held}")
+
+
+def _parts(tasks: Sequence[FaultPlant], springs: Iterable[Spring], shares: Sequence[Row], name: str) -> dict[str, Any]:
+    """Fields of a plant of blocks and wells."""
+    N, m, zero = len(tasks), len(shares[0]), Fraction(0)
+    size, springs = 2 * N, list(springs)
+    inverse, weights = _inverse(shares) if m == N else None, None
+    if inverse is None:
+        weights = _averages(tasks, shares)
+        balance = _balance(tasks, springs, shares, weights)
+        slopes, dampings = balance.slopes, balance.dampings
+    else:
+        slopes, dampings = [task.slip_chord for task in tasks], [task.rate_chord for task in tasks]
+    pulls = [[zero] * size for _ in range(N)]
+    for i, j, K in springs:
+        pulls[i][j], pulls[i][i] = pulls[i][j] + K, pulls[i][i] - K
+    for i, damping in enumerate(dampings):
+        pulls[i][N + i] = -(damping[0] + damping[1]) / 2
+    rate = [unit(size, N + i) for i in range(N)]
+    sectors, disturbances, first = {}, {}, tasks[0].reference_rates[0]
+    for i, task in enumerate(tasks):
+        half, place = (dampings[i][1] - dampings[i][0]) / 2, i + 1
+        sectors[f"slope of block {place}"] = dict(entry=rate[i], row=unit(size, i), slopes=slopes[i])
+        if half:
+            sectors[f"damping of block {place}"] = dict(entry=rate[i], row=rate[i], slopes=(-half, half))
+        acts = (*[zero] * size, *(task.authority * v for v in shares[i]))
+        sectors[f"input gain of block {place}"] = dict(entry=rate[i], row=acts, slopes=(zero, task.beta[1] - 1))
+        force = max(map(abs, dampings[i])) * first + task.reference_rates[1] + task.amplitude
+        disturbances[f"force on block {place}"] = (rate[i], force)
+    if inverse is None:
+        held = [unit(m, k) for k in range(m)]
+        moving = [rate * first for rate in balance.pressures]
+        for i, moved in enumerate(balance.moves):
+            disturbances[f"balance of block {i + 1}"] = (unit(size, i), moved * first)
+    else:  # pressures of the wells that hold block i against a pressure of 1
+        held = [tuple(row[i] for row in inverse) for i in range(N)]
+        moving = [max(map(abs, s)) * first / task.authority for s, task in zip(slopes, tasks, strict=True)]
+    order = ("slope", "damping", "input")
+    return {
+        "A": [*rate, *pulls],
+        "B": [(zero,) * m] * N
+        + [tuple(task.authority * v for v in row) for task, row in zip(tasks, shares, strict=True)],
+        "C": weights and [*((*row, *[zero] * N) for row in weights), *((*[zero] * N, *row) for row in weights)],
+        "sectors": dict(sorted(sectors.items(), key=lambda item: order.index(item[0].split()[0]))),
+        "disturbances": disturbances,
+        "loads": {f"pressure {i + 1}": (one, None, v) for i, (one, v) in enumerate(zip(held, moving, strict=True))},
+        "outputs": {
+            **{f"slip error {i + 1}": unit(size, i) for i in range(N)},
+            **{f"slip-rate error {i + 1}": rate[i] for i in range(N)},
+        },
+        "controls": tuple(f"pressure {k + 1}" for k in range(m)),
+        "name": name,
+    }
+
+
+def averages(shares: Sequence[Row]) -> Matrix:
+    """Weights of the blocks [-] in what each well measures: its shares, so that each row adds up to 1."""
+    columns = list(zip(*shares, strict=True))
+    return tuple(tuple(v / (sum(column) or 1) for v in column) for column in columns)
+
+
+def _averages(tasks: Sequence[FaultPlant], shares: Sequence[Row]) -> Matrix:
+    N, m = len(shares), len(shares[0])
+    found = averages(shares)
+    through = [[sum((c * shares[i][k] for i, c in enumerate(row)), Fraction(0)) for k in range(m)] for row in found]
+    if _inverse(through) is None:
+        raise ParameterError(
+            f"a guarantee of several blocks needs wells that act independently. Received {counted(m, 'well')} for "
+            f"{N} blocks, of which some act on the same blocks in the same proportion. Move or omit wells."
+        )
+    if any(any(task.spreads) for task in tasks):
+        raise ParameterError(
+            f"fewer wells than blocks need blocks whose constants are known, box paper. Received {tasks[0].name} "
+            "with spreads. Use fault.with_box('paper'), or a well for each block."
+        )
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Balance:
+    """Ranges of s and w of every block, X of every block [-], and Q of every well [Pa/m]."""
+
+    slopes: list[Range]
+    dampings: list[Range]
+    moves: list[Fraction]
+    pressures: list[Fraction]
+
+
+def _balance(
+    tasks: Sequence[FaultPlant], springs: Sequence[Spring], shares: Sequence[Row], weights: Matrix
+) -> _Balance:
+    """The balance of blocks under fewer wells."""
+    alike = len(weights) == 1 and all(task == tasks[0] for task in tasks)
+    found: _Balance | None = None
+    for _ in range(_TURNS if alike else 1):
+        if alike:
+            law, steep = tasks[0].friction, _STEEP if found is None else 1 + max(found.moves)
+            faster = replace(law, weakening=law.weakening * steep, strengthening=law.strengthening * steep)
+            stresses = [replace(tasks[0], friction=faster).stress] * len(tasks)
+        else:
+            stresses = _stresses(tasks, springs, shares, weights)
+        better = _moving(tasks, springs, shares, weights, stresses)
+        if found is not None and max(better.moves) >= max(found.moves):
+            break
+        found = better
+        if max(found.moves) >= _LOST:
+            break
+    assert found is not None
+    return found
+
+
+def _balancing(
+    diagonal: Sequence[Fraction], springs: Sequence[Spring], acting: Sequence[Row], weights: Matrix
+) -> "list[list[Fraction]] | None":
+    """Inverse of [[diagonal + springs, acting], [weights, 0]]; None of a singular matrix."""
+    N, m = len(diagonal), len(weights)
+    rows = [[Fraction(0)] * N + list(acting[i]) for i in range(N)] + [[*row, *[Fraction(0)] * m] for row in weights]
+    for i, value in enumerate(diagonal):
+        rows[i][i] += value
+    for i, j, K in springs:
+        rows[i][j] += K
+        rows[i][i] -= K
+    return _inverse(rows)
+
+
+def _stresses(
+    tasks: Sequence[FaultPlant], springs: Sequence[Spring], shares: Sequence[Row], weights: Matrix
+) -> list[Range]:
+    """Ranges of σ′ − Sp* [Pa] of every block at balance; wide where none are found."""
+    N, m = len(tasks), len(weights)
+    area = [task.area_per_mass[0] for task in tasks]
+    middle = [(task.friction.least + task.friction.largest) / 2 for task in tasks]
+    half = [(task.friction.largest - task.friction.least) / 2 for task in tasks]
+    stiff = [task.growths[0] - task.stiffness[0] for task in tasks]
+    acting = [tuple(a * mu * v for v in row) for a, mu, row in zip(area, middle, shares, strict=True)]
+    inverse = _balancing(stiff, springs, acting, weights)
+    if inverse is None:
+        return [(-_LOST, _LOST)] * N
+    pushed = [
+        a * (mu - task.friction.static) * task.normal_stress for a, mu, task in zip(area, middle, tasks, strict=True)
+    ]
+    ends = []
+    for slip in (Fraction(0), tasks[0].target_slip):
+        right = [*pushed, *[slip] * m]
+        p = [_dot(row, right) for row in inverse[N:]]
+        ends.append([task.normal_stress - _dot(row, p) for task, row in zip(tasks, shares, strict=True)])
+    largest = [max(map(abs, pair)) for pair in zip(*ends, strict=True)]
+    reach = _through(shares, inverse[N:], N)
+    gains = [[abs(v) * a * h for v, a, h in zip(row, area, half, strict=True)] for row in reach]
+    apart = _closed(gains, [_dot(row, largest) for row in gains])
+    if apart is None:
+        return [(-_LOST, _LOST)] * N
+    return [(min(pair) - d, max(pair) + d) for *pair, d in zip(*ends, apart, strict=True)]
+
+
+def _moving(
+    tasks: Sequence[FaultPlant],
+    springs: Sequence[Spring],
+    shares: Sequence[Row],
+    weights: Matrix,
+    stresses: Sequence[Range],
+) -> _Balance:
+    """X and Q by ranges of σ′ − Sp* [Pa]."""
+    N, m = len(tasks), len(weights)
+    slopes = [task.slip_slopes(stress) for task, stress in zip(tasks, stresses, strict=True)]
+    dampings = [task.rate_slopes(stress) for task, stress in zip(tasks, stresses, strict=True)]
+    lost = _Balance(slopes=slopes, dampings=dampings, moves=[_LOST] * N, pressures=[_LOST] * m)
+    s, half_s = zip(*map(_middle, slopes), strict=True)
+    beta, half_beta = zip(*(_middle(task.beta) for task in tasks), strict=True)
+    force = [tuple(task.authority * v for v in row) for task, row in zip(tasks, shares, strict=True)]
+    acting = [tuple(b * v for v in row) for b, row in zip(beta, force, strict=True)]
+    inverse = _balancing(s, springs, acting, weights)
+    if inverse is None:
+        return lost
+    right = [*(-v for v in s), *[Fraction(0)] * m]
+    still = [_dot(row, right) for row in inverse]  # ξ and q with δs = δβ = 0
+    gain_slip = [[abs(v) for v in row[:N]] for row in inverse[:N]]
+    gain_force = [[abs(v) for v in row] for row in _through(force, inverse[N:], N)]
+    at_rest = [abs(1 + v) for v in still[:N]]
+    pushed = [abs(_dot(row, still[N:])) for row in force]
+    gains = [
+        [hs * a + hb * b for a, b in zip(rows[0], rows[1], strict=True)]
+        for hs, hb, *rows in zip(half_s, half_beta, gain_slip, gain_force, strict=True)
+    ]
+    first = [hs * a + hb * b for hs, hb, a, b in zip(half_s, half_beta, at_rest, pushed, strict=True)]
+    F = _closed(gains, first)
+    if F is None:
+        return lost
+    moves = [_up(abs(v) + _dot(row, F)) for v, row in zip(still[:N], gain_slip, strict=True)]
+    pressures = [abs(v) + _dot([abs(g) for g in row[:N]], F) for v, row in zip(still[N:], inverse[N:], strict=True)]
+    return replace(lost, moves=moves, pressures=[Fraction(ceil(v)) for v in pressures])
+
+
+def _closed(gains: Sequence[Sequence[Fraction]], first: Sequence[Fraction]) -> list[Fraction] | None:
+    """F > 0 with first + gains·F < F, exactly; from floats, None where none is found."""
+    matrix = np.array(gains, dtype=float)
+    if not np.isfinite(matrix).all() or max(abs(np.linalg.eigvals(matrix))) >= 1:
+        return None
+    own = np.array(first, dtype=float)
+    own = own * _WIDER + 1e-9 * max(own.max(), 1e-300)
+    found = [rational(float(v)) for v in np.linalg.solve(np.eye(len(own)) - _WIDER * matrix, own)]
+    holds = all(v > 0 and f + _dot(row, found) < v for v, f, row in zip(found, first, gains, strict=True))
+    return found if holds else None
+
+
+def _middle(ends: Range) -> tuple[Fraction, Fraction]:
+    """About the middle, and how far the range goes from there."""
+    middle = rational(f"{float(sum(ends)) / 2:.{_DIGITS}g}")
+    return middle, max(ends[1] - middle, middle - ends[0])
+
+
+def _up(value: Fraction) -> Fraction:
+    return Fraction(ceil(value * _GRID), _GRID)
+
+
+def _dot(row: Iterable[Fraction], values: Iterable[Fraction]) -> Fraction:
+    return sum((a * b for a, b in zip(row, values, strict=False) if a and b), Fraction(0))
+
+
+def _through(rows: Sequence[Row], columns: Sequence[Sequence[Fraction]], count: int) -> list[list[Fraction]]:
+    """Product of two matrices, its first columns."""
+    return [[_dot(row, (line[j] for line in columns)) for j in range(count)] for row in rows]
+
+
+def _inverse(rows: Sequence[Sequence[Fraction]]) -> "list[list[Fraction]] | None":
+    """Rows of the inverse; None of a singular matrix."""
+    matrix = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows])
+    if matrix.det() == 0:
+        return None
+    return [[Fraction(int(v.p), int(v.q)) for v in row] for row in matrix.inv().tolist()]
