@@ -56,6 +56,13 @@ def _scope(chain: "BlockChain") -> list[str]:
 
     blocks, wells = counted(len(chain.blocks), "block"), counted(len(chain.wells), "well")
     pushed, meant = "m/s^2", "the load of a pressure is the pressure that balances the blocks on the reference"
+    if chain.ages:
+        return [
+            f"plant: {chain.name}, {blocks}, {wells}, its constants as they are, from steady sliding; the plan of the "
+            "reference reaches the fault as it is",
+            "units: slip and log state as named, pull and pressure Pa; disturbance: that of ln(v/V), and of the state; "
+            "bounds of |y| are those of log state and pull",
+        ]
     if (far := farthest_balance(chain)) is not None:
         pushed += ", the second m/s"
         meant = (
@@ -80,6 +87,14 @@ def _lines(found: Any, chain: "BlockChain") -> list[str]:
     return [*found.lines(), *_scope(chain)] if found.proved else [found.sentence()]
 
 
+def _require_no_state(chain: "BlockChain", command: str) -> None:
+    if chain.ages:
+        raise ParameterError(
+            f"{command} of several blocks needs friction of slip and slip rate alone. Received "
+            f"{chain.blocks[0].friction.name}. Use guarantee with --lag and --stress."
+        )
+
+
 def show_chain(chain: "BlockChain", output: Output) -> int:
     """The command `fault`."""
     from quakedesign.studies.chains import chain_dict, chain_lines
@@ -92,6 +107,7 @@ def chain_limits(chain: "BlockChain", output: Output) -> int:
     """The command `limits`."""
     from quakedesign.studies import chains
 
+    _require_no_state(chain, "limits")
     found = chains.chain_limits(chain)
     output.show(found.to_dict(), found.lines())
     return 0
@@ -113,16 +129,29 @@ def block_law(named: str, usual: str) -> str:
 
 
 def guarantee_chain(
-    chain: "BlockChain", controller: str, step: Any, out: Path | None, force: bool, output: Output
+    chain: "BlockChain",
+    controller: str,
+    step: Any,
+    sliding: dict[str, Any] | None,
+    out: Path | None,
+    force: bool,
+    output: Output,
 ) -> int:
-    """The command `guarantee`."""
+    """The command `guarantee`; `sliding` are lag and stress of blocks in slow sliding."""
     from quakedesign.guarantees.exact.guarantee_files import save_guarantee
     from quakedesign.synthesis import guarantee
 
     law = block_law(controller, "elqr")
     if out is not None:
         new_file(out, "certificate file", force=force)
-    found: Any = guarantee(chain, law, step=step)
+    if sliding is None:
+        found: Any = guarantee(chain, law, step=step)
+    elif controller != "elqr":
+        raise ParameterError("blocks in slow sliding have one kind of law. Received a controller. Omit --controller.")
+    else:
+        with progress() as tell:
+            tell("design and proof", 0.0)
+            found = guarantee(chain, step=step, **sliding)
     if out is not None and found.proved:
         with made_folder(out.parent):
             save_guarantee(found, out)
@@ -140,6 +169,7 @@ def compare_chain(chain: "BlockChain", controller: str, output: Output) -> int:
     from quakedesign.studies.chains import run_of_chain
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
 
+    _require_no_state(chain, "compare")
     laws = BLOCK_LAWS if controller == "all" else (block_law(controller, "all"),)
     with progress() as tell:
         runs = []
@@ -182,6 +212,7 @@ def run_chain(
     from quakedesign.report.folder import prepare
     from quakedesign.studies.chains import run_of_chain
 
+    _require_no_state(chain, "a run")
     if out is not None:
         prepare(out, force=force)
         require_room(out)

@@ -114,10 +114,12 @@ def guarantee(
     from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
 
-    if (
-        chain := several_blocks(fault, globals()["guarantee"], options, ("step", "out", "controller"), box)
-    ) is not None:
-        return guarantee_chain(chain, controller, step, out, force, output)
+    known = ("step", "out", "controller", "stress", "lag")
+    if (chain := several_blocks(fault, globals()["guarantee"], options, known, box)) is not None:
+        sliding = {"stress": stress, "lag": around.setup().lag}
+        if not chain.ages and any(sliding.values()):
+            raise ParameterError("--lag and --stress of several blocks need friction with a state. Omit these options.")
+        return guarantee_chain(chain, controller, step, sliding if chain.ages else None, out, force, output)
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)

@@ -86,10 +86,10 @@ class BlockChain:
                 "wells, and place each on the fault where no other is."
             )
         for place, block in enumerate(self.blocks, 1):
-            if block.friction.state_names:
+            if bool(block.friction.state_names) != self.ages:
                 raise ParameterError(
-                    "a fault of several blocks needs a friction law of slip and slip rate alone. Received "
-                    f"{block.friction.name} in block {place}. Choose another law, or a fault of one block."
+                    "blocks of a fault need friction with a state in all of them, or in none. Received "
+                    f"{self.blocks[0].friction.name} in block 1 and {block.friction.name} in block {place}. Change one."
                 )
 
     @property
@@ -138,6 +138,11 @@ class BlockChain:
             replace(self.fault, friction=b.friction, effective_normal_stress=b.effective_normal_stress)
             for b in self.blocks
         )
+
+    @property
+    def ages(self) -> bool:
+        """Whether friction has a state, as rate-and-state friction."""
+        return bool(self.blocks[0].friction.state_names)
 
     @property
     def alike(self) -> bool:

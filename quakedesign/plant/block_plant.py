@@ -131,21 +131,31 @@ def averages(shares: Sequence[Row]) -> Matrix:
     return tuple(tuple(v / (sum(column) or 1) for v in column) for column in columns)
 
 
-def _averages(tasks: Sequence[FaultPlant], shares: Sequence[Row]) -> Matrix:
+def require_independent(shares: Sequence[Row]) -> None:
+    """Reject wells of which some act on the same blocks in the same proportion.
+
+    Raises
+    ------
+    ParameterError
+    """
     N, m = len(shares), len(shares[0])
-    found = averages(shares)
-    through = [[sum((c * shares[i][k] for i, c in enumerate(row)), Fraction(0)) for k in range(m)] for row in found]
+    weights = averages(shares)
+    through = [[sum((c * shares[i][k] for i, c in enumerate(row)), Fraction(0)) for k in range(m)] for row in weights]
     if _inverse(through) is None:
         raise ParameterError(
             f"a guarantee of several blocks needs wells that act independently. Received {counted(m, 'well')} for "
             f"{N} blocks, of which some act on the same blocks in the same proportion. Move or omit wells."
         )
+
+
+def _averages(tasks: Sequence[FaultPlant], shares: Sequence[Row]) -> Matrix:
+    require_independent(shares)
     if any(any(task.spreads) for task in tasks):
         raise ParameterError(
             f"fewer wells than blocks need blocks whose constants are known, box paper. Received {tasks[0].name} "
             "with spreads. Use fault.with_box('paper'), or a well for each block."
         )
-    return found
+    return averages(shares)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,8 +13,10 @@ from quakedesign.fault.units import exact_value
 from quakedesign.guarantees import CLASSES, OBJECTIVES, LoopAnswer, NoGuarantee
 from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
 from quakedesign.guarantees.search.linear_design import nearest_setup
+from quakedesign.guarantees.search.sliding_block_design import sliding_block_guarantee
 from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer, answer_stick_slip
 from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
@@ -102,7 +104,8 @@ def guarantee(
     ----------
     fault : Fault, BlockChain or UncertainPlant
         Of the second and third, peaks of its outputs for a law or gains; law, gains, step, delay and lag apply.
-        Several blocks (`UncertainPlant.from_blocks`, `load_chain`) have a law that is designed unless one is given.
+        Several blocks (`UncertainPlant.from_blocks`, `load_chain`) have a law that is designed unless one is given;
+        with rate-and-state friction they slide slowly, and lag and stress are given.
     controller : str, type of Controller, or SampledLaw
         ``elqr``, or a sliding mode, ``cta`` or ``dia``; or a user's law. Of several blocks ``centralised`` (default),
         or ``decentralised``: the pressure of each well depends on its own measurements alone.
@@ -155,6 +158,16 @@ def guarantee(
     require_known(plant, PLANTS, "plant")
     if isinstance(fault, BlockChain):
         setup = setup if law is not None or setup.step else setup.with_given(step=rational(fault.fault.sampling_time))
+        if fault.ages:
+            usual = (law, tuple(gains), controller) == (None, (), "elqr") and not exact_value(spread, "", "spread")
+            if not usual or stress is None or setup.given().keys() - {"step", "lag"}:
+                raise ParameterError(
+                    "blocks in slow sliding are guaranteed with a designed law, a lag and a stress: give stress, lag "
+                    "and, if you like, step; omit all else"
+                )
+            blocks = SlidingBlocks(chain=fault, lag=setup.lag, stress=exact_value(stress, "Pa", "stress"))
+            assert setup.step is not None
+            return sliding_block_guarantee(blocks, setup.step)
         fault = UncertainPlant.from_blocks(fault)
     if isinstance(fault, UncertainPlant):
         usual = (plant, objective, scheme, disturbance_class) == (PLANTS[0], OBJECTIVES[0], None, CLASSES[0])

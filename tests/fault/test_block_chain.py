@@ -127,14 +127,14 @@ def test_a_well_that_is_no_number_is_named_in_python():
         replace(CHAIN, wells=(float("nan"),))
 
 
-def test_friction_with_a_state_is_refused(tmp_path):
+def test_friction_with_a_state_beside_friction_without_one_is_refused(tmp_path):
     state = (
         'law = "rate-and-state-aging"\nreference_coefficient = 0.6\ndirect_effect = 0.01\nevolution_effect = 0.015\n'
         'critical_slip = "1 mm"\nreference_rate = "1 um/s"\nslowest_rate = "1e-12 m/s"\nfastest_rate = "1 m/s"\n'
     )
     path = tmp_path / "blocks.toml"
     path.write_text(TEXT.split('law = "linear')[0] + state + "\n" + TEXT.split('"300 mm"\n')[1])
-    with pytest.raises(QuakedesignError, match=r"law of slip and slip rate alone.* in block 3. Choose another law"):
+    with pytest.raises(QuakedesignError, match=r"with a state in all of them, or in none.* in block 3. Change one"):
         load_chain(path)
 
 

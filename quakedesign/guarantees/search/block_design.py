@@ -55,7 +55,7 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
             found = estimate(part, _law_of(part, step, values, decentralised))
         except ValueError:  # a mode that grows beyond floating point, or no solution of the equation of Riccati
             return 1e3
-        return found[0] if found[0] >= 1 else float(np.log(found[1])) - 100
+        return found[0] if found[1] is None else float(np.log(found[1][blocks:].max())) - 100
 
     blocks = len(part.A) // 2
     simplex = np.vstack([np.zeros(len(_STEPS)), np.diag(_STEPS)])
@@ -159,8 +159,13 @@ def _rounded(values: np.ndarray) -> tuple[Row, ...]:
     return tuple(tuple(rational(f"{v:.{_DIGITS}g}") for v in row) for row in values)
 
 
-def estimate(part: LinearPart, law: MatrixLaw) -> tuple[float, float]:
-    """Small gain of a loop without delay in floats, and the largest bound of the outputs' second half."""
+def estimate(
+    part: LinearPart, law: MatrixLaw, slowest: float = _SLOWEST, forget: int = _FORGET
+) -> tuple[float, np.ndarray | None]:
+    """Small gain of a loop without delay in floats, and bounds of outputs and controls; None where it does not close.
+
+    Not followed are loops with an eigenvalue of a period above `slowest`, or for more than `forget` periods.
+    """
     loop = part.loop(law)
     flow, rows = np.array(loop.flow, dtype=float), np.array(loop.rows, dtype=float)
     jump, time = np.array(loop.segments[0][0], dtype=float), float(loop.segments[0][1])
@@ -171,13 +176,13 @@ def estimate(part: LinearPart, law: MatrixLaw) -> tuple[float, float]:
     powers = [np.linalg.matrix_power(expm(flow * h), i) for i in range(pieces + 1)]
     period = powers[-1] @ jump
     radius = float(max(abs(np.linalg.eigvals(period))))
-    if radius > _SLOWEST:
-        return 1e2 * radius, np.inf
+    if radius > slowest:
+        return 1e2 * radius, None
     widths = [h / 2, *[h] * (pieces - 1), h / 2]
     columns = np.hstack([power @ entries * width for power, width in zip(powers, widths, strict=True)])
     now = np.vstack([rows @ power @ jump for power in powers])
     sums = np.zeros((len(now), len(kinds)))
-    for _ in range(_FORGET):
+    for _ in range(forget):
         added = np.abs(now @ columns).reshape(len(now), pieces + 1, -1).sum(axis=1)
         sums += added
         if (added <= _LEFT * sums).all():
@@ -196,8 +201,8 @@ def estimate(part: LinearPart, law: MatrixLaw) -> tuple[float, float]:
     matrix = halves[:, None] * gains[span, first:]
     small = float(max(abs(np.linalg.eigvals(matrix))))
     if small >= 1:
-        return small, np.inf
+        return small, None
     own = np.array([float(size) for _, size in part.disturbances] + [float(load.rate) for load in part.loads])
     numbers = np.linalg.solve(np.eye(len(halves)) - matrix, halves * (gains[span, :first] @ own))
-    bounds = gains[:count, :first] @ own + gains[:count, first:] @ numbers
-    return small, float(bounds[count // 2 :].max())
+    bounds = gains[:, :first] @ own + gains[:, first:] @ numbers
+    return small, np.delete(bounds, span)

@@ -1,0 +1,233 @@
+"""Several blocks with rate-and-state friction that slide slowly under their wells, as an uncertain plant.
+
+Each block obeys the equations of `sliding_small_gain`, whose symbols are used here, and springs pull it towards its
+neighbours: with q the pressures of the wells beside the plan Kr/μ*, behind a lag, S their shares, and
+w = −Kx + Σk(x_j − x) + μ*Sq,
+
+    y·B = ŝ − Nbz + w,  B = Na + HV·f/y,    x′ = V(f − ω),    z′ = −ρ(f + g),    q′ = (u − q)/lag.
+
+On |y| ≤ Y and |z| ≤ Z let f = γy and g = ηz, γ and η between the chords. So f = −γα·z + γκ·(w + ŝ) with α = Nb/B and
+κ = 1/B. While |u| ≤ Q, also |Sq| ≤ Q, and N lies between σ′ − P − Q and σ′ + Q, P the largest planned pressure, which
+gives ranges of α and κ. The plant below has the sectors γα and η of z and γκ of w, which hold for |z| ≤ Z and |w| ≤ W,
+and disturbances of the size sup(γκ)·sup|ŝ|. From these claims Y = sup α·Z + sup κ·(W + sup|ŝ|) follows.
+
+|ŝ| is at most the shear stress, what inertia adds, sup|r|/λ₀ with |w′| ≤ (K + 2Σk)V(e^Y − 1 + swing) + μ*q̇ in place of
+K|x′| + μ*|q′|, q̇ = 2Q/lag, and what the rounding of μ* leaves. y, z, w and q are continuous and 0 at
+first, and u is decided by samples before it acts: where smaller bounds follow from the claims Z, W and Q, none is ever
+reached. ∎
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from quakedesign.arguments import checked_dataclass
+from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.exact import UpperBound, rational, shortly
+from quakedesign.fault import BlockChain
+from quakedesign.guarantees.exact.sliding_small_gain import chords, exponential
+from quakedesign.plant import Sector, SlidingPlant, UncertainPlant, slow_sliding_plant
+from quakedesign.plant.block_plant import averages, require_independent
+from quakedesign.plant.plant_values import MOST, Row, unit
+from quakedesign.plant.sliding_plant import Range
+from quakedesign.text import counted
+
+MOST_SLIDING = MOST // 3
+_LARGEST = 3  # Y, as of one block
+_TURNS = 30
+_WIDER = Fraction(1001, 1000)
+_OUTWARD = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockClaims:
+    """Claimed bounds of absolute values, of all blocks, for all t ≥ 0.
+
+    Attributes
+    ----------
+    log_state : Fraction
+        Z: logarithm of θ over D/V [-].
+    pull : Fraction
+        W: what springs and wells pull [Pa].
+    push : Fraction
+        Q: pressure asked for at a well beside the plan [Pa]; those in the blocks are means of its past.
+    """
+
+    log_state: Fraction
+    pull: Fraction
+    push: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Ranges:
+    """Ranges of γα [-], γκ [1/Pa] and η [-], sup|ŝ| [Pa] and Y [-]."""
+
+    by_state: Range
+    by_pull: Range
+    ageing: Range
+    stress: Fraction
+    log_rate: Fraction
+
+
+@checked_dataclass(frozen=True, kw_only=True)
+class SlidingBlocks:
+    """Blocks in slow sliding, a lag behind all wells, and the bound of the shear stress on every block.
+
+    Attributes
+    ----------
+    chain : BlockChain
+        Of one steady friction coefficient; alike where there are fewer wells than blocks.
+    lag : Fraction
+        [s].
+    stress : Fraction
+        [Pa].
+
+    Raises
+    ------
+    ParameterError, UnsupportedError
+    """
+
+    chain: BlockChain
+    lag: Fraction
+    stress: Fraction
+
+    def __post_init__(self) -> None:
+        N, m = len(self.chain.blocks), len(self.chain.wells)
+        if N > MOST_SLIDING:
+            raise ParameterError(f"blocks in slow sliding must be 2 to {MOST_SLIDING}. Received {N}. Join blocks.")
+        if self.lag <= 0 or self.stress <= 0:
+            raise ParameterError(
+                "blocks in slow sliding need a positive lag and a positive bound of the shear stress. Received "
+                f"{shortly(self.lag)} s and {shortly(self.stress)} Pa. Give both."
+            )
+        for place, task in enumerate(self.tasks, 1):
+            if task.state_law != "ageing" or task.regularised:
+                raise UnsupportedError(
+                    "blocks in slow sliding need rate-and-state-aging friction. Received "
+                    f"{self.chain.blocks[place - 1].friction.name} in block {place}. Change the law."
+                )
+        if len({task.ranges["coefficient"] for task in self.tasks}) > 1:
+            raise UnsupportedError(
+                "blocks in slow sliding need one steady friction coefficient at the rate of the task, so that all need "
+                "the same pressure. Received different ones. Change reference_coefficient of the blocks."
+            )
+        require_independent(self.chain.shares)
+        if m < N and not self.chain.alike:
+            raise UnsupportedError(
+                f"fewer wells than blocks in slow sliding need blocks that are alike. Received {counted(m, 'well')} "
+                f"and {N} blocks that differ. Add wells."
+            )
+
+    @cached_property
+    def tasks(self) -> tuple[SlidingPlant, ...]:
+        """Slow sliding of each block by itself."""
+        return tuple(slow_sliding_plant(fault, self.stress) for fault in self.chain.faults)
+
+    @cached_property
+    def springs(self) -> tuple[Row, ...]:
+        """Pull on every block (rows) per slip of every block [Pa/m], that of the far end included."""
+        N, inertia = len(self.tasks), self.tasks[0].inertia
+        rows = [[-task.stiffness * (i == j) for j in range(N)] for i, task in enumerate(self.tasks)]
+        for i, j, K in self.chain.springs:
+            rows[i][j] += K * inertia
+            rows[i][i] -= K * inertia
+        return tuple(map(tuple, rows))
+
+    @property
+    def size(self) -> int:
+        """States of the plant."""
+        return 2 * len(self.tasks) + len(self.chain.wells)
+
+    @cached_property
+    def unit_push(self) -> Fraction:
+        """A pressure of the size of those of the law [Pa]."""
+        return self.tasks[0].ranges["normal_stress"][0] / 50
+
+    def log_rate(self, claims: BlockClaims) -> UpperBound | None:
+        """Y of all blocks [-] by claims; None where a block may open, or Y is beyond 3."""
+        found = [self._ranges(i, claims) for i in range(len(self.tasks))]
+        return None if None in found else UpperBound(max(one.log_rate for one in found if one is not None))
+
+    def _ranges(self, i: int, claims: BlockClaims) -> _Ranges | None:
+        task, Z, (mu_low, mu) = self.tasks[i], claims.log_state, self.tasks[i].ranges["coefficient"]
+        a, b = task.ranges["direct_effect"][1], task.ranges["evolution_effect"][1]
+        low, high = task.normal_stress(claims.push)
+        if low <= 0 or Z > _LARGEST:
+            return None
+        moved = 2 * claims.push / self.lag
+        ageing = task.rate / task.ranges["critical_slip"][0]
+        off = (mu - mu_low) / 2
+        rounding = off * (claims.push + task.stiffness * task.distance / mu_low)
+        damping, pulls, aged = task.radiation * task.rate, sum(map(abs, self.springs[i])), exponential(Z)
+        Y = Z
+        for _ in range(_TURNS):
+            if Y > _LARGEST:
+                return None
+            grown, (least, most) = exponential(Y), chords(Y)
+            fastest = ageing * max(grown - 1 / aged, aged - 1 / grown)
+            change = (task.pressure_per_slip * task.fastest + moved) * (a * Y + b * Z) + high * b * fastest
+            change += pulls * task.rate * (grown - 1 + task.swing) + mu * moved
+            stress = task.stress + rounding + change * task.inertia * task.rate * grown / (low * a)
+            alpha = b / (a + damping * most / low), b / (a + damping * least / high)
+            kappa = 1 / (high * a + damping * most), 1 / (low * a + damping * least)
+            needed = alpha[1] * Z + kappa[1] * (claims.pull + stress)
+            if needed <= Y:
+                by_state = _outward(least * alpha[0], most * alpha[1])
+                by_pull = _outward(least * kappa[0], most * kappa[1])
+                ageings = _outward(*chords(Z))
+                return _Ranges(by_state=by_state, by_pull=by_pull, ageing=ageings, stress=stress, log_rate=Y)
+            Y = _outward(needed, needed * _WIDER)[1]
+        return None
+
+    def plant(self, claims: BlockClaims) -> UncertainPlant | None:
+        """The plant by claims, or None where `log_rate` is.
+
+        States: slip errors over D, logarithms of states, pressures of wells over `unit_push` [-]; controls [Pa].
+        """
+        N, m, V, size, zero = len(self.tasks), len(self.chain.wells), self.tasks[0].rate, self.size, Fraction(0)
+        sectors, disturbances, pulls = {}, {}, []
+        slip = [task.ranges["critical_slip"][0] for task in self.tasks]
+        for i, task in enumerate(self.tasks):
+            found, place = self._ranges(i, claims), i + 1
+            if found is None:
+                return None
+            mu, D = sum(task.ranges["coefficient"]) / 2, task.ranges["critical_slip"][0]
+            ageing = V / D
+            state = unit(size, N + i)
+            slips = tuple(ageing * (a - b) for a, b in zip(unit(size, i), state, strict=True))
+            ages = tuple(-ageing * v for v in state)
+            scaled = (k * one.ranges["critical_slip"][0] for k, one in zip(self.springs[i], self.tasks, strict=True))
+            pull = (*scaled, *[zero] * N, *(mu * self.unit_push * v for v in self.chain.shares[i]))
+            pulls.append(pull)
+            sectors[f"rate of block {place} by its state"] = Sector(
+                entry=tuple(-v for v in slips), row=state, slopes=found.by_state, within=claims.log_state
+            )
+            sectors[f"rate of block {place} by its pull"] = Sector(
+                entry=slips, row=pull, slopes=found.by_pull, within=claims.pull
+            )
+            sectors[f"ageing of block {place}"] = Sector(
+                entry=ages, row=state, slopes=found.ageing, within=claims.log_state
+            )
+            disturbances[f"stress on block {place}"] = (slips, found.by_pull[1] * found.stress)
+            if task.swing:
+                disturbances[f"reference of block {place}"] = (unit(size, i), ageing * task.swing)
+        weights = averages(self.chain.shares) if m < N else tuple(unit(N, i) for i in range(N))
+        return UncertainPlant(
+            A=[(zero,) * size] * (2 * N) + [tuple(-v / self.lag for v in unit(size, 2 * N + k)) for k in range(m)],
+            B=[(zero,) * m] * (2 * N) + [tuple(v / self.lag / self.unit_push for v in unit(m, k)) for k in range(m)],
+            C=[(*(c * d for c, d in zip(row, slip, strict=True)), *[zero] * (N + m)) for row in weights],
+            sectors=sectors,
+            disturbances=disturbances,
+            outputs={
+                **{f"slip error {i + 1}": tuple(slip[i] * v for v in unit(size, i)) for i in range(N)},
+                **{f"log state {i + 1}": unit(size, N + i) for i in range(N)},
+                **{f"pull {i + 1}": pull for i, pull in enumerate(pulls)},
+            },
+            controls=tuple(f"pressure {k + 1}" for k in range(m)),
+            name=f"{self.chain.name}, {N} blocks, {counted(m, 'well')}",
+        )
+
+
+def _outward(low: Fraction, high: Fraction) -> Range:
+    """Few digits that enclose a range of positive numbers."""
+    return tuple(rational(f"{float(v) * (1 + s * _OUTWARD):.10g}") for v, s in ((low, -1), (high, 1)))  # type: ignore[return-value]

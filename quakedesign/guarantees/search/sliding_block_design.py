@@ -1,0 +1,192 @@
+"""Laws for blocks in slow sliding: the slips of the blocks, or an average for each well, are measured.
+
+Linear-quadratic feedback of a Kalman filter of slips, states of friction, pressures and a constant pressure error of
+each well, with weights from a search with the estimate of what is proved.
+"""
+
+from dataclasses import replace
+from fractions import Fraction
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+from scipy.optimize import minimize
+
+from quakedesign.exact import LowerBound, UpperBound, float_above, rational
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.guarantees.exact.plant_loop import MatrixLaw
+from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
+from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.search.block_design import estimate
+from quakedesign.guarantees.search.plant_search import linear_part, plant_guarantee
+from quakedesign.plant.block_plant import averages
+
+_STARTS = ((100.0, 100.0, 1e-2, 1e-9), (10.0, 100.0, 1e-4, 1e-9), (1000.0, 100.0, 1e-4, 1e-6), (100.0, 1.0, 1e-4, 1e-6))
+"""Weight of the pressure, of the slip error, and variances of the pressure error and of the measured slip, scaled."""
+_SPREAD = 2.0  # of the first simplex, in logarithms
+_EVALUATIONS = 60
+_SLOWEST, _FORGET = 0.985, 1000  # eigenvalue of a period, and periods: a loop that forgets later takes long to prove
+_SMALL = (0.02, 0.02)  # claims that the search begins with: logarithms of rate and state
+_TURNS = 14
+_ROOM = 1.03
+_LOST = 100.0
+_DIGITS = 10
+
+
+def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuarantee | NoGuarantee:
+    """Design a law for blocks in slow sliding and prove it, or say why none is proved.
+
+    Parameters
+    ----------
+    blocks : SlidingBlocks
+    step : Fraction
+        T_s [s].
+    """
+    search = _WeightSearch(blocks, step)
+    x = min((np.log(start) for start in _STARTS), key=search.log_rate)
+    simplex = np.vstack([x, x + _SPREAD * np.eye(len(x))])
+    options = {"maxfev": _EVALUATIONS, "initial_simplex": simplex, "xatol": 0.05, "fatol": 1e-4}
+    law, claims, small = search.closed(minimize(search.log_rate, x, method="Nelder-Mead", options=options).x)
+    if claims is None or law is None:
+        if small >= _LOST / 2:
+            return NoGuarantee(
+                reason="no law is found whose loop forgets soon enough: with fewer wells than blocks, modes that no "
+                "well reaches must decay within some 60 T_s. Lengthen T_s, or add wells",
+                small_gain=None,
+            )
+        reason = f"no bounds of slip rate and state close: small gain {small:.3g}. Reduce the stress"
+        return NoGuarantee(reason=reason, small_gain=UpperBound(rational(f"{small:.6g}")))
+    for _ in range(3):
+        claims = _grown(claims, _ROOM)
+        plant, rate = blocks.plant(claims), blocks.log_rate(claims)
+        if plant is None or rate is None:
+            break
+        found = plant_guarantee(plant, law)
+        if isinstance(found, PlantGuarantee) and max(found.claims.controls) < claims.push:
+            return replace(found, notes=(_told(blocks, rate),))
+    return NoGuarantee(reason="the bounds that an estimate finds are not proved", small_gain=None)
+
+
+def _told(blocks: SlidingBlocks, rate: UpperBound) -> str:
+    V = blocks.tasks[0].rate
+    grown = float_above(V) * float(np.exp(float_above(rate))) * (1 + 1e-12)
+    return (
+        f"so the slip rate of every block stays at most {UpperBound(rational(grown)):.4g} m/s, |ln(v/V)| <= {rate:.3g} "
+        f"with V = {UpperBound(V):.4g} m/s, under any shear stress of at most {LowerBound(blocks.stress):.4g} Pa on "
+        "every block"
+    )
+
+
+def _grown(claims: BlockClaims, by: float) -> BlockClaims:
+    return BlockClaims(
+        **{name: rational(f"{float(getattr(claims, name)) * by:.6g}") for name in ("log_state", "pull", "push")}
+    )
+
+
+class _WeightSearch:
+    """Laws by four weights, and what an estimate finds of them."""
+
+    def __init__(self, blocks: SlidingBlocks, step: Fraction) -> None:
+        self.blocks, self.step = blocks, step
+        task, shares = blocks.tasks[0], np.array(blocks.chain.shares, dtype=float)
+        N, m = shares.shape
+        self.slip, self.push = float(task.ranges["critical_slip"][0]), float(blocks.unit_push)
+        weights = np.array(averages(blocks.chain.shares), dtype=float) if m < N else np.eye(N)
+        spread = shares @ np.linalg.inv(weights @ shares) if m < N else np.eye(N)
+        self.mean = np.block([[np.kron(np.eye(2), weights), np.zeros((2 * m, m))], [np.zeros((m, 2 * N)), np.eye(m)]])
+        self.back = np.block([[np.kron(np.eye(2), spread), np.zeros((2 * N, m))], [np.zeros((m, 2 * m)), np.eye(m)]])
+        self.count = m
+        stress = float(blocks.stress)
+        b = float(task.ranges["evolution_effect"][0]) * float(task.ranges["normal_stress"][0])
+        first = max(stress / b, _SMALL[1])
+        self.small = BlockClaims(
+            log_state=rational(f"{first / 5:.3g}"),
+            pull=rational(f"{stress:.3g}"),
+            push=rational(f"{9 * stress:.3g}"),
+        )
+
+    def log_rate(self, x: np.ndarray) -> float:
+        """Y of the claims that close, or how far it is from that."""
+        _, claims, small = self.closed(x)
+        rate = None if claims is None else self.blocks.log_rate(claims)
+        return 10 + small if rate is None else float(rate)
+
+    def closed(self, x: np.ndarray) -> tuple[MatrixLaw | None, BlockClaims | None, float]:
+        """Law, claims from which smaller bounds follow, and small gain."""
+        claims, law, small, N = self.small, None, _LOST, len(self.blocks.tasks)
+        for _ in range(_TURNS):
+            part = self._part(claims)
+            law = None if part is None else law or self._law(part, x)
+            if part is None or law is None:
+                return None, None, small
+            small, bounds = estimate(part, law, _SLOWEST, _FORGET)
+            if bounds is None:
+                return law, None, small
+            reached = {
+                "log_state": bounds[N : 2 * N].max(),
+                "pull": bounds[2 * N : 3 * N].max(),
+                "push": bounds[3 * N :].max(),
+            }
+            if all(v <= getattr(claims, name) for name, v in reached.items()):
+                return law, claims, small
+            told = {
+                name: rational(f"{max(v * _ROOM, float(getattr(claims, name))):.6g}") for name, v in reached.items()
+            }
+            claims = BlockClaims(**told)
+        return law, None, small
+
+    def _part(self, claims: BlockClaims) -> Any:
+        plant = self.blocks.plant(claims)
+        return None if plant is None else linear_part(plant, {})
+
+    def _log_rates(self, part: Any) -> np.ndarray:
+        """Rows of ln(v/V) of the blocks, without the stress, with middles of the sectors."""
+        size = len(part.A)
+        rows = [
+            sum(np.array(one.row[:size], dtype=float) * float(sum(one.slopes)) / 2 * sign for one, sign in pair)
+            for pair in zip(zip(part.sectors[::3], repeat(-1)), zip(part.sectors[1::3], repeat(1)), strict=True)
+        ]
+        return np.array(rows)
+
+    def _law(self, part: Any, x: np.ndarray) -> MatrixLaw | None:
+        """Feedback of the estimate, in exact numbers; None where an equation of Riccati has no solution."""
+        pressure, slip, drift, noise = np.exp(x)
+        A, m = np.array(part.A, dtype=float), self.count
+        for sector in part.sectors:
+            entry, row = np.array(sector.entry, dtype=float), np.array(sector.row, dtype=float)[: len(A)]
+            A = A + float(sum(sector.slopes)) / 2 * np.outer(entry, row)
+        A, B = self.mean @ A @ self.back, self.mean @ np.array(part.B, dtype=float)
+        stressed = self.mean @ np.array([entry for entry, _ in part.disturbances], dtype=float).T
+        stressed = stressed * [float(size) for _, size in part.disturbances]
+        k, T = len(A), float(self.step)
+        whole = np.block([[A, B * self.push, B], [np.zeros((2 * m, k + 2 * m))]])
+        held = expm(whole * T)
+        As, Bs = held[: k + m, : k + m], held[: k + m, k + m :]
+        Bs = Bs * self.push
+        C = np.hstack([np.eye(m), np.zeros((m, k))])
+        entered = np.vstack([stressed, np.zeros((m, stressed.shape[1]))])
+        covariance = entered @ entered.T * T**2 + np.diag(np.r_[np.zeros(k), np.full(m, drift)]) + 1e-14 * np.eye(k + m)
+        rates = self.mean[:m, : len(self.blocks.tasks)] @ self._log_rates(part) @ self.back
+        aims = rates.T @ rates + np.diag(np.r_[np.full(m, slip), np.zeros(2 * m)])
+        try:
+            P = solve_discrete_are(As[:k, :k], Bs[:k], aims, pressure * np.eye(m))
+            K = np.linalg.solve(pressure * np.eye(m) + Bs[:k].T @ P @ Bs[:k], Bs[:k].T @ P @ As[:k, :k])
+            S = solve_discrete_are(As.T, C.T, covariance, noise * np.eye(m))
+            L = S @ C.T @ np.linalg.inv(C @ S @ C.T + noise * np.eye(m))
+        except (ValueError, np.linalg.LinAlgError):
+            return None
+        K = np.hstack([K, np.eye(m)])
+        rest, moved = np.eye(k + m) - L @ C, As - Bs @ K
+        return MatrixLaw(
+            step=self.step,
+            delay=Fraction(0),
+            update=_rounded(moved @ rest),
+            measured=_rounded(moved @ L / self.slip),
+            output=_rounded(-K @ rest * self.push),
+            feedback=_rounded(-K @ L * self.push / self.slip),
+        )
+
+
+def _rounded(values: np.ndarray) -> Any:
+    return tuple(tuple(rational(f"{v:.{_DIGITS}g}") for v in row) for row in values)

@@ -1,0 +1,184 @@
+"""Blocks in slow sliding beside their nonlinear equations, and runs of these beside what is proved."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction as F
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import quakedesign as qd
+from quakedesign.cli import main
+from quakedesign.errors import QuakedesignError
+from quakedesign.guarantees.exact.guarantee_files import guarantee_document
+from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
+
+PATH = Path(__file__).parents[2] / "data" / "three_sliding_blocks.toml"
+CHAIN = qd.load_chain(PATH)
+V, D, A, B, MU, STRESS, LAG = 1e-6, 8e-3, 0.01, 0.015, 0.6, 50e6, 800.0
+RADIATION = 1.0405e15 / 15e3**2 * V
+K, SPRING = 32.04e9 / 15e3, 32.04e9 * 15e3 / 5e3**2
+CLAIMS = BlockClaims(log_state=F("0.02"), pull=F(30000), push=F(200000))
+BLOCKS = SlidingBlocks(chain=CHAIN, lag=F(800), stress=F(10000))
+
+
+def log_rate(normal, z, force):
+    """The y of a block by its balance of forces, N(ay + bz) + HV(e^y − 1) = force."""
+    y = np.zeros_like(force)
+    for _ in range(50):
+        y = y - (normal * (A * y + B * z) + RADIATION * np.expm1(y) - force) / (normal * A + RADIATION * np.exp(y))
+    return y
+
+
+def test_rates_of_slip_and_state_lie_within_the_sectors():
+    plant, bound = BLOCKS.plant(CLAIMS), float(BLOCKS.log_rate(CLAIMS))
+    random, count = np.random.default_rng(3), 20000
+    ends = [float(v) for v in (CLAIMS.log_state, CLAIMS.pull, 10000)]
+    z, w, s = (end * random.choice([-1, 1], count) * random.choice([1, 1, 0.3], count) for end in ends)
+    normal = STRESS - np.where(random.random(count) < 0.5, K / MU + 2e5, -2e5)
+    y = log_rate(normal, z, w + s)
+    assert np.abs(y).max() <= bound
+    assert np.abs(y).max() > 0.8 * bound
+    first, second, third = (
+        [float(v) for v in plant.sectors[name].slopes]
+        for name in ("rate of block 1 by its state", "rate of block 1 by its pull", "ageing of block 1")
+    )
+    low = np.minimum(-first[0] * z, -first[1] * z) + np.minimum(second[0] * (w + s), second[1] * (w + s))
+    high = np.maximum(-first[0] * z, -first[1] * z) + np.maximum(second[0] * (w + s), second[1] * (w + s))
+    assert (low <= np.expm1(y)).all()
+    assert (np.expm1(y) <= high).all()
+    aged = -np.expm1(-z) / z
+    assert third[0] <= aged.min()
+    assert aged.max() <= third[1]
+    # a disturbance is what the stress adds to f at most
+    (entry, size) = plant.disturbances["stress on block 1"]
+    assert float(size) >= second[1] * 10000
+    assert [float(v) for v in entry[:4]] == pytest.approx([V / D, 0, 0, -V / D])
+
+
+def test_the_linear_part_is_that_of_the_springs_and_the_lag():
+    plant = BLOCKS.plant(CLAIMS)
+    unit = float(BLOCKS.unit_push)
+    pull = [float(v) for v in plant.sectors["rate of block 1 by its pull"].row]
+    assert pull[:3] == pytest.approx([-(K + SPRING) * D, SPRING * D, 0])
+    assert pull[6:9] == pytest.approx([MU * unit, 0, 0])
+    assert [float(v) for v in plant.A[6]] == pytest.approx([0] * 6 + [-1 / LAG, 0, 0])
+    assert float(plant.B[6][0]) == pytest.approx(1 / LAG / unit)
+    assert plant.sectors["rate of block 1 by its pull"].within == CLAIMS.pull
+
+
+def test_inertia_is_a_stress_of_less_than_a_pascal_and_grows_with_the_mass():
+    light = float(BLOCKS.plant(CLAIMS).disturbances["stress on block 2"][1])
+    dense = replace(CHAIN.fault, density=2670e3, shear_modulus=32.04e9)
+    heavy = SlidingBlocks(chain=replace(CHAIN, fault=dense), lag=F(800), stress=F(10000)).plant(CLAIMS)
+    by_pull = float(BLOCKS.plant(CLAIMS).sectors["rate of block 2 by its pull"].slopes[1])
+    assert 10000 < light / by_pull < 10001
+    extra = float(heavy.disturbances["stress on block 2"][1]) / by_pull - 10000
+    assert extra == pytest.approx(1000 * (light / by_pull - 10000), rel=0.05)
+
+
+def test_claims_under_which_a_block_may_open_give_no_plant():
+    assert BLOCKS.plant(replace(CLAIMS, push=F(48 * 10**6))) is None
+    assert BLOCKS.log_rate(replace(CLAIMS, pull=F(10**8))) is None
+
+
+def nonlinear_run(law, shares, weights, stress, seed, periods, plan=K / MU):
+    """Largest slip error, |y|, |z| and pressures of the nonlinear blocks under switching stresses."""
+    random, N, step = np.random.default_rng(seed), 3, float(law.step)
+    F_, G, H, D_ = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
+    laplacian = SPRING * np.array([[-1, 1, 0], [1, -2, 1], [0, 1, -1.0]])
+    x, z, q, memory = np.zeros(N), np.zeros(N), np.zeros(len(shares.T)), np.zeros(len(F_))
+    largest, period = np.zeros((4, N)), random.uniform(3, 40)
+    for k in range(periods):
+        seen = weights @ x
+        u = H @ memory + D_ @ seen
+        memory = F_ @ memory + G @ seen
+        s = stress * np.sign(np.sin(2 * np.pi * (k / period + np.array([0, random.choice([0, 0.5]), 0]))))
+
+        def rates(t, state, s=s, u=u, began=k * step):
+            x, z, q = state[:3], state[3:6], state[6:]
+            normal = STRESS - plan * V * (began + t) - shares @ q
+            y = log_rate(normal, z, s - K * x + laplacian @ x + MU * shares @ q)
+            f = np.expm1(y)
+            return np.r_[V * f, -V / D * (f - np.expm1(-z)), (u - q) / LAG]
+
+        run = solve_ivp(rates, (0, step), np.r_[x, z, q], method="LSODA", rtol=1e-8, atol=1e-12)
+        x, z, q = run.y[:3, -1], run.y[3:6, -1], run.y[6:, -1]
+        normal = STRESS - plan * V * (k + 1) * step - shares @ q
+        y = log_rate(normal, z, s - K * x + laplacian @ x + MU * shares @ q)
+        largest[:3] = np.maximum(largest[:3], np.abs([x, y, z]))
+        largest[3, : len(u)] = np.maximum(largest[3, : len(u)], np.abs(u))
+    return largest
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("wells", "stress", "step", "most"),
+    [((2500.0, 7500.0, 12500.0), "10000", "400", 0.08), ((2500.0, 12500.0), "1000", "1600", 0.05)],
+    ids=["three wells", "two wells"],
+)
+def test_nonlinear_blocks_stay_within_what_is_proved_and_both_checkers_decide(wells, stress, step, most, checker):
+    chain = replace(CHAIN, wells=wells)
+    found = qd.guarantee(chain, stress=stress, lag="800", step=step)
+    assert found.proved
+    document = guarantee_document(found)
+    assert checker.check(json.dumps(document)).verdict == "proved"
+    told = float(found.notes[0].split("|ln(v/V)| <= ")[1].split()[0])
+    assert told <= most
+    shares = np.array(chain.shares, dtype=float)
+    weights = np.eye(3) if len(wells) == 3 else (shares / shares.sum(axis=0)).T
+    worst = np.max([nonlinear_run(found.law, shares, weights, float(stress), i, 400) for i in range(3)], axis=0)
+    bounds = np.array([float(v) for v in found.claims.outputs])
+    assert (worst[0] <= bounds[:3]).all()
+    assert worst[1].max() <= told
+    assert worst[1].max() > 0.3 * told
+    assert (worst[2] <= bounds[3:6]).all()
+    assert worst[3].max() <= float(max(found.claims.controls))
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as stop:
+        main([*map(str, arguments)])
+    return stop.value.code
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("guarantee", PATH), "give stress, lag and, if you like, step"),
+        (("guarantee", PATH, "--stress", "10 kPa"), "positive lag and a positive bound of the shear stress"),
+        (("guarantee", PATH, "--stress", "10 kPa", "--lag", "800 s", "--delay", "1 s"), "Received --delay"),
+        (("simulate", PATH), "a run of several blocks needs friction of slip and slip rate alone"),
+        (("design", PATH, "--out", "unwritten"), "Use guarantee with --lag and --stress"),
+        (("compare", PATH), "Use guarantee with --lag and --stress"),
+        (("limits", PATH), "Use guarantee with --lag and --stress"),
+        (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--controller", "decentralised"), "one kind of law"),
+        (("guarantee", PATH.with_name("three_blocks.toml"), "--lag", "1 s"), "need friction with a state"),
+    ],
+)
+def test_what_does_not_apply_is_refused_in_one_line(arguments, said, capsys):
+    assert run(*arguments) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert not Path("unwritten").exists()
+
+
+def changed(place, **values):
+    blocks = list(CHAIN.blocks)
+    friction = replace(blocks[place].friction, **values)
+    return tuple(replace(one, friction=friction) if i == place else one for i, one in enumerate(blocks))
+
+
+@pytest.mark.parametrize(
+    ("chain", "said"),
+    [
+        (replace(CHAIN, blocks=changed(1, reference_coefficient=0.61)), "one steady friction coefficient"),
+        (replace(CHAIN, blocks=changed(1, critical_slip=7e-3), wells=(2500.0,)), "need blocks that are alike"),
+        (replace(CHAIN, wells=(1000.0, 2000.0)), "wells that act independently"),
+        (replace(CHAIN, blocks=changed(1, stress_sensitivity=0.1)), "stress_sensitivity 0"),
+    ],
+)
+def test_blocks_that_are_not_covered_are_refused(chain, said):
+    with pytest.raises(QuakedesignError, match=said):
+        SlidingBlocks(chain=chain, lag=F(800), stress=F(10000))
