@@ -60,8 +60,8 @@ def _scope(chain: "BlockChain") -> list[str]:
         return [
             f"plant: {chain.name}, {blocks}, {wells}, its constants as they are, from steady sliding; the plan of the "
             "reference reaches the fault as it is",
-            "units: slip and log state as named, pull and pressure Pa; disturbance: that of ln(v/V), and of the state; "
-            "bounds of |y| are those of log state and pull",
+            "units: slip m, log state (ln of the state over D_c/V) 1, pull and pressure beside the "
+            "plan MPa; |y| is bounded for log states and pulls; a disturbance is the rate over V that the stress adds",
         ]
     if (far := farthest_balance(chain)) is not None:
         pushed += ", the second m/s"

@@ -15,7 +15,7 @@ from .matrices import BITS, Fixed, exponential, fixed, unit
 from .reading import Row, entries, keys, lower, matrix, need, number, row, upper
 
 MOST, MOST_LAW, MOST_LOOP, MOST_PIECES, MOST_PERIODS = 40, 48, 96, 64, 8
-AT_ONCE, LEFT, FAINT = 8, 1024, 60  # periods in columns, share that is left of sums, bits by which none is 0
+AT_ONCE, LEFT, FAINT = (8, 256), 1024, 60  # periods in columns, share that is left of sums, bits by which none is 0
 MOST_WORK = 12 * 10**8
 BEYOND = 64  # times as many periods as may be followed, within which the map of one that forgets is small
 SWEEPS = 8  # in which units are chosen
@@ -368,24 +368,22 @@ class Sums:
         ends = [0]
         for width in widths:
             ends.append(ends[-1] + width)
-        turned = [now]
-        for _ in range(AT_ONCE - 1):
-            turned.append(period * turned[-1])
-        groups = [[(t, a, b) for t in range(AT_ONCE)] for a, b in pairwise(ends)]
-        groups += [[(t, ends[-1], len(now.rows[0]))] for t in range(AT_ONCE)] if starts else []
+        turned, leap = [now], period  # products of few powers: of many maps, one after another, all digits are lost
+        while len(turned) < AT_ONCE[0] or (len(turned) < AT_ONCE[1] and not shrinks(leap)):
+            turned, leap = turned + [leap * one for one in turned], leap * leap
+        at_once = len(turned)
+        groups = [[(t, a, b) for t in range(at_once)] for a, b in pairwise(ends)]
+        groups += [[(t, ends[-1], len(now.rows[0]))] for t in range(at_once)] if starts else []
         lines = [[v for group in groups for t, a, b in group for v in turned[t].rows[j][a:b]] for j in range(self.size)]
         columns = Fixed(lines, max(one.error for one in turned))
         lengths = [sum(b - a for _, a, b in group) for group in groups]
-        leap = period
-        for _ in range(AT_ONCE.bit_length() - 1):
-            leap = leap * leap
-        known, height, done, until = rows, len(rows.rows), 0, AT_ONCE
-        require_fading(leap, height * self.size * (len(now.rows[0]) + self.size))
+        known, height, done, until = rows, len(rows.rows), 0, at_once
+        require_fading(leap, at_once, height * self.size * (len(now.rows[0]) + self.size))
         totals, free = [[0] * len(widths) for _ in rows.rows], [0] * height
         while True:
             work = until * height * self.size * (len(now.rows[0]) + self.size)
             need(work <= MOST_WORK, "the nominal loop must be stable, and forget its past soon")
-            for _ in range((until - done) // AT_ONCE):
+            for _ in range((until - done) // at_once):
                 for r, found in enumerate(grouped(known, columns, lengths)):
                     totals[r] = [a + b for a, b in zip(totals[r], found, strict=False)]
                     free[r] = max([free[r], *found[len(widths) :]])
@@ -516,9 +514,14 @@ def raised(part: list[int]) -> list[int]:
     return [v + faint for v in part]
 
 
-def require_fading(leap: Fixed, work: int) -> None:
+def shrinks(leap: Fixed) -> bool:
+    """Whether a map makes every vector smaller by its largest entry."""
+    return max(map(sum, leap.size().rows)) < 1 << BITS
+
+
+def require_fading(leap: Fixed, periods: int, work: int) -> None:
     """Refuse a map of some periods none of whose powers is small, far beyond those that are followed."""
-    power, periods = leap, AT_ONCE
+    power = leap
     while max(map(max, power.size().rows)) >> BITS:
         need(periods * work <= BEYOND * MOST_WORK, "the nominal loop must be stable, and forget its past soon")
         need(max(map(max, power.size().rows)) >> BITS + 80 == 0, "the nominal loop must be stable")

@@ -33,6 +33,7 @@ from quakedesign.plant.sliding_plant import Range
 from quakedesign.text import counted
 
 MOST_SLIDING = MOST // 3
+MPA = 10**6  # Pa, unit of pressures and pulls of the plant
 _LARGEST = 3  # Y, as of one block
 _TURNS = 30
 _WIDER = Fraction(1001, 1000)
@@ -138,11 +139,6 @@ class SlidingBlocks:
         """States of the plant."""
         return 2 * len(self.tasks) + len(self.chain.wells)
 
-    @cached_property
-    def unit_push(self) -> Fraction:
-        """A pressure of the size of those of the law [Pa]."""
-        return self.tasks[0].ranges["normal_stress"][0] / 50
-
     def log_rate(self, claims: BlockClaims) -> UpperBound | None:
         """Y of all blocks [-] by claims; None where a block may open, or Y is beyond 3."""
         found = [self._ranges(i, claims) for i in range(len(self.tasks))]
@@ -182,7 +178,7 @@ class SlidingBlocks:
     def plant(self, claims: BlockClaims) -> UncertainPlant | None:
         """The plant by claims, or None where `log_rate` is.
 
-        States: slip errors over D, logarithms of states, pressures of wells over `unit_push` [-]; controls [Pa].
+        States: slip errors over D [-], logarithms of states [-], pressures of wells [MPa]; controls [MPa].
         """
         N, m, V, size, zero = len(self.tasks), len(self.chain.wells), self.tasks[0].rate, self.size, Fraction(0)
         sectors, disturbances, pulls = {}, {}, []
@@ -197,24 +193,24 @@ class SlidingBlocks:
             slips = tuple(ageing * (a - b) for a, b in zip(unit(size, i), state, strict=True))
             ages = tuple(-ageing * v for v in state)
             scaled = (k * one.ranges["critical_slip"][0] for k, one in zip(self.springs[i], self.tasks, strict=True))
-            pull = (*scaled, *[zero] * N, *(mu * self.unit_push * v for v in self.chain.shares[i]))
+            pull = (*(v / MPA for v in scaled), *[zero] * N, *(mu * v for v in self.chain.shares[i]))
             pulls.append(pull)
             sectors[f"rate of block {place} by its state"] = Sector(
                 entry=tuple(-v for v in slips), row=state, slopes=found.by_state, within=claims.log_state
             )
             sectors[f"rate of block {place} by its pull"] = Sector(
-                entry=slips, row=pull, slopes=found.by_pull, within=claims.pull
+                entry=slips, row=pull, slopes=tuple(MPA * v for v in found.by_pull), within=claims.pull / MPA
             )
             sectors[f"ageing of block {place}"] = Sector(
                 entry=ages, row=state, slopes=found.ageing, within=claims.log_state
             )
-            disturbances[f"stress on block {place}"] = (slips, found.by_pull[1] * found.stress)
+            disturbances[f"stress on block {place}"] = (slips, _outward(*[found.by_pull[1] * found.stress] * 2)[1])
             if task.swing:
                 disturbances[f"reference of block {place}"] = (unit(size, i), ageing * task.swing)
         weights = averages(self.chain.shares) if m < N else tuple(unit(N, i) for i in range(N))
         return UncertainPlant(
             A=[(zero,) * size] * (2 * N) + [tuple(-v / self.lag for v in unit(size, 2 * N + k)) for k in range(m)],
-            B=[(zero,) * m] * (2 * N) + [tuple(v / self.lag / self.unit_push for v in unit(m, k)) for k in range(m)],
+            B=[(zero,) * m] * (2 * N) + [tuple(v / self.lag for v in unit(m, k)) for k in range(m)],
             C=[(*(c * d for c, d in zip(row, slip, strict=True)), *[zero] * (N + m)) for row in weights],
             sectors=sectors,
             disturbances=disturbances,

@@ -45,8 +45,8 @@ def linear_part(plant: UncertainPlant, bounds: dict[str, Fraction]) -> LinearPar
     )
 
 
-def plant_guarantee(plant: UncertainPlant, law: MatrixLaw) -> PlantGuarantee | NoGuarantee:
-    """Peaks of a plant under a law, or why none are proved.
+def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = None) -> PlantGuarantee | NoGuarantee:
+    """Peaks of a plant under a law, or why none are proved; `pieces` of a flow by its size unless given.
 
     Raises
     ------
@@ -60,9 +60,9 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw) -> PlantGuarantee | N
         loop = part.loop(law)
         if reason := _unstable(part, loop):
             return NoGuarantee(reason=reason, small_gain=None)
-        pieces = pieces_of(loop)
+        cut = pieces or pieces_of(loop)
         try:
-            found = response_bounds(loop, pieces)
+            found = response_bounds(loop, cut)
         except ParameterError as error:
             return NoGuarantee(reason=str(error), small_gain=None)
         inputs = _numbers(plant, part, found)
@@ -72,7 +72,7 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw) -> PlantGuarantee | N
         reached = {name: rows[list(plant.sectors).index(name)] for name in free}
         left = [name for name in free if reached[name] >= bounds[name]]
         if not left:
-            return _claimed(plant, part, law, pieces, found, inputs)
+            return _claimed(plant, part, law, cut, found, inputs)
         for name in left:
             bounds[name] = _rounded(reached[name] * _WIDER)
     name = free[0]

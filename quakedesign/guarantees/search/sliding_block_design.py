@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from quakedesign.exact import LowerBound, UpperBound, float_above, rational
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
-from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
+from quakedesign.guarantees.exact.sliding_blocks import MPA, BlockClaims, SlidingBlocks
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.search.block_design import estimate
 from quakedesign.guarantees.search.plant_search import linear_part, plant_guarantee
@@ -29,6 +29,7 @@ _EVALUATIONS = 60
 _SLOWEST, _FORGET = 0.985, 1000  # eigenvalue of a period, and periods: a loop that forgets later takes long to prove
 _SMALL = (0.02, 0.02)  # claims that the search begins with: logarithms of rate and state
 _TURNS = 14
+_PIECES = 8  # of a period, which is short beside the times of the plant
 _ROOM = 1.03
 _LOST = 100.0
 _DIGITS = 10
@@ -62,8 +63,8 @@ def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuara
         plant, rate = blocks.plant(claims), blocks.log_rate(claims)
         if plant is None or rate is None:
             break
-        found = plant_guarantee(plant, law)
-        if isinstance(found, PlantGuarantee) and max(found.claims.controls) < claims.push:
+        found = plant_guarantee(plant, law, _PIECES)
+        if isinstance(found, PlantGuarantee) and max(found.claims.controls) * MPA < claims.push:
             return replace(found, notes=(_told(blocks, rate),))
     return NoGuarantee(reason="the bounds that an estimate finds are not proved", small_gain=None)
 
@@ -91,7 +92,7 @@ class _WeightSearch:
         self.blocks, self.step = blocks, step
         task, shares = blocks.tasks[0], np.array(blocks.chain.shares, dtype=float)
         N, m = shares.shape
-        self.slip, self.push = float(task.ranges["critical_slip"][0]), float(blocks.unit_push)
+        self.slip = float(task.ranges["critical_slip"][0])
         weights = np.array(averages(blocks.chain.shares), dtype=float) if m < N else np.eye(N)
         spread = shares @ np.linalg.inv(weights @ shares) if m < N else np.eye(N)
         self.mean = np.block([[np.kron(np.eye(2), weights), np.zeros((2 * m, m))], [np.zeros((m, 2 * N)), np.eye(m)]])
@@ -125,8 +126,8 @@ class _WeightSearch:
                 return law, None, small
             reached = {
                 "log_state": bounds[N : 2 * N].max(),
-                "pull": bounds[2 * N : 3 * N].max(),
-                "push": bounds[3 * N :].max(),
+                "pull": bounds[2 * N : 3 * N].max() * MPA,
+                "push": bounds[3 * N :].max() * MPA,
             }
             if all(v <= getattr(claims, name) for name, v in reached.items()):
                 return law, claims, small
@@ -160,10 +161,9 @@ class _WeightSearch:
         stressed = self.mean @ np.array([entry for entry, _ in part.disturbances], dtype=float).T
         stressed = stressed * [float(size) for _, size in part.disturbances]
         k, T = len(A), float(self.step)
-        whole = np.block([[A, B * self.push, B], [np.zeros((2 * m, k + 2 * m))]])
+        whole = np.block([[A, B, B], [np.zeros((2 * m, k + 2 * m))]])
         held = expm(whole * T)
         As, Bs = held[: k + m, : k + m], held[: k + m, k + m :]
-        Bs = Bs * self.push
         C = np.hstack([np.eye(m), np.zeros((m, k))])
         entered = np.vstack([stressed, np.zeros((m, stressed.shape[1]))])
         covariance = entered @ entered.T * T**2 + np.diag(np.r_[np.zeros(k), np.full(m, drift)]) + 1e-14 * np.eye(k + m)
@@ -183,8 +183,8 @@ class _WeightSearch:
             delay=Fraction(0),
             update=_rounded(moved @ rest),
             measured=_rounded(moved @ L / self.slip),
-            output=_rounded(-K @ rest * self.push),
-            feedback=_rounded(-K @ L * self.push / self.slip),
+            output=_rounded(-K @ rest),
+            feedback=_rounded(-K @ L / self.slip),
         )
 
 

@@ -1,9 +1,7 @@
 """Peaks of uncertain plants: independent runs inside, other discretisations of the norms, forged files refused."""
 
-import importlib.util
 import json
 import re
-import sys
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -24,16 +22,6 @@ from quakedesign.guarantees.exact.plant_loop import response_bounds
 
 CHECK = Path(__file__).parents[3] / "proofs" / "check.py"
 REAL = qd.load_fault("real-fault")
-
-
-@pytest.fixture(scope="module")
-def checker():
-    specification = importlib.util.spec_from_file_location("check_plants", CHECK)
-    module = importlib.util.module_from_spec(specification)
-    sys.modules["check_plants"] = module
-    specification.loader.exec_module(module)
-    yield module
-    del sys.modules["check_plants"]
 
 
 def lqr(A, B, step, Q, R):
