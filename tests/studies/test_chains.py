@@ -206,7 +206,7 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
     [
         (("guarantee", PATH, "--delay", "20 ms"), "Received --delay. Omit these."),
         (("guarantee", PATH, PATH), "takes one fault of several blocks at a time. Received more faults"),
-        (("guarantee", PATH, "--delay", "20 ms"), "the options --box, --controller, --force, --json, --lag, --out, --step, --stress."),
+        (("guarantee", PATH, "--delay", "20 ms"), "the options --box, --controller, --force, --json, --lag, --out"),
         (("limits", PATH, "--pressure", "1 MPa"), "Received --pressure"),
         (("simulate", PATH, "--controller", "cta"), "must be one of centralised, decentralised. Received 'cta'"),
         (("design", PATH, "--controller", "decentralized"), "Did you mean decentralised?"),
