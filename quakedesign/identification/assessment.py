@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from quakedesign.identification.experiment import TREND
+from quakedesign.identification.experiment import TREND, TREND_IN_TIME
 from quakedesign.identification.fitting import Fit, weighed
 from quakedesign.identification.loading import Loading
 from quakedesign.identification.record import Record, scatter
@@ -19,6 +19,7 @@ from quakedesign.identification.sliding_experiment import START_STATE
 SEVERAL = 2.0  # times the noise: residuals as large are no noise
 _PEAK = 10.0  # critical slips after a change of rate
 _FADED = 5.0  # critical slips
+_TREND_UNITS = {TREND: "1/m", TREND_IN_TIME: "1/s"}
 _DRIFT = 4.0  # deviations by which a trend may change at the last change of rate
 DECISIVE = 10.0  # of AIC, by which a trend is beyond doubt
 EXPLAINS, EXPLAINS_NOT, CANNOT_TELL = "explains the record", "does not explain the record", "cannot tell"
@@ -86,17 +87,22 @@ def checks_of(
     return tuple(checks), factor
 
 
+def in_doubt(excess: float, shift: float | None) -> bool:
+    """Whether a fit with another trend counts for the sign: its AIC is not much higher, or the trend may begin late."""
+    return excess < DECISIVE or shift is not None
+
+
 def sign_check(
-    difference: Any, other: Any, excess: float, shift: float | None = None, unsteady: str = ""
+    difference: Any, others: Mapping[str, tuple[Any, float]], shift: float | None = None, unsteady: str = ""
 ) -> Check | None:
-    """Whether a - b has one sign, with a trend and, unless its AIC is higher by `DECISIVE` (`excess`), without.
+    """Whether a - b has one sign, with the trend that is taken and with others that are about as likely.
 
     Parameters
     ----------
-    difference, other : ParameterEstimate or None
-        a - b of the fit, and of that with or without the trend.
-    excess : float
-        By how much the AIC without a trend is higher.
+    difference : ParameterEstimate or None
+        a - b of the fit.
+    others : mapping
+        a - b of fits with another trend or none, and by how much their AIC is higher, by what they are.
     shift : float or None
         By how much a - b changes if the trend begins with the first change of rate [-]; None where the beginning has
         it too.
@@ -105,16 +111,18 @@ def sign_check(
     """
     if difference is None:
         return None
-    ends = [difference.low, difference.high]
-    doubtful = other is not None and (excess < DECISIVE or shift is not None)
-    if doubtful:
-        ends = [min(ends[0], other.low), max(ends[1], other.high)]
-    ends = [ends[0] + min(shift or 0.0, 0.0), ends[1] + max(shift or 0.0, 0.0)]
-    told = "negative: friction weakens with rate" if ends[1] < 0 else "positive: friction strengthens with rate"
-    trend = f", with and without a trend (AIC {excess:+.3g} without)" if other is not None else ""
-    passed = bool(ends[0] > 0 or ends[1] < 0) and not unsteady
-    why = ": the trend may begin with the change of rate, as slow evolution does" if shift is not None else trend
-    said = f"a - b is {told}{trend if doubtful else ''}" if passed else f"the sign of a - b is open{unsteady or why}"
+    told = [difference, *(other for other, _ in others.values())]
+    low, high = min(each.low for each in told), max(each.high for each in told)
+    low, high = low + min(shift or 0.0, 0.0), high + max(shift or 0.0, 0.0)
+    trends = "".join(f", also {what} (AIC {excess:+.3g})" for what, (_, excess) in others.items())
+    passed = bool(low > 0 or high < 0) and not unsteady
+    if passed:
+        sign = "negative: friction weakens with rate" if high < 0 else "positive: friction strengthens with rate"
+        said = f"a - b is {sign}{trends}"
+    else:
+        late = ": the trend may begin with the change of rate, as slow evolution does"
+        between = f": from {low:.2g} to {high:.2g}{trends}"
+        said = f"the sign of a - b is open{unsteady or (late if shift is not None else between)}"
     return Check(name="sign", passed=passed, value=difference.value, limit=0.0, sentence=said)
 
 
@@ -153,8 +161,7 @@ def _beginning(values: Mapping[str, float], loading: Loading) -> Check:
     if off:
         older = float(np.exp(values[START_STATE]))
         told = f"does not begin in steady sliding: the state is {older:.3g} times as old, which is fitted"
-    if TREND in values:
-        told += f", on a trend of {values[TREND]:.3g} 1/m"
+    told += "".join(f", on a trend of {values[n]:.3g} {u}" for n, u in _TREND_UNITS.items() if n in values)
     return _within("beginning", off, 0.0, f"the record {told}")
 
 

@@ -9,7 +9,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky, cholesky_banded, solve_triangular
+from scipy.linalg import cho_solve_banded, cholesky, cholesky_banded
+from scipy.linalg.lapack import dtrtri
 from scipy.optimize import minimize
 
 _LEAST_GAIN = 3.0  # of the log-likelihood, for two parameters: AIC with a margin of 1
@@ -40,6 +41,11 @@ class CorrelatedNoise:
         size = noise * self.share**0.5
         return {"size": size, "size_unit": "", "length": self.length, "length_unit": "s" if self.of_time else "m"}
 
+    @property
+    def pieces(self) -> float:
+        """Independent ones of the noise that fades; at least 4."""
+        return max(float(np.ptp(self.along)) / (2 * self.length), 4.0) if self.share else np.inf
+
     @cached_property
     def covariance(self) -> "np.ndarray":
         """Of all samples."""
@@ -53,7 +59,8 @@ class CorrelatedNoise:
 
         The inverse of the covariance has both (Martin 1992, Commun. Stat. Theory Methods 21, 1183).
         """
-        inverse, beside = np.linalg.inv(self.covariance[np.ix_(kept, kept)]), self.covariance[:, kept]
+        whitener, beside = self.whitener(kept)[:, kept], self.covariance[:, kept]
+        inverse = whitener.T @ whitener
         told = beside @ inverse
         off = residuals - told @ residuals[kept]
         variance = np.diag(self.covariance) - np.sum(told * beside, axis=1)
@@ -63,10 +70,17 @@ class CorrelatedNoise:
 
     def whitener(self, kept: "np.ndarray") -> "np.ndarray":
         """Matrix that makes residuals independent with the variance of one measurement, without what is not kept."""
-        factor = cholesky(self.covariance[np.ix_(kept, kept)], lower=True)
-        whole = np.zeros((int(kept.sum()), len(kept)))
-        whole[:, kept] = solve_triangular(factor, np.eye(len(factor)), lower=True)
-        return whole
+        if kept.tobytes() not in self._whiteners:
+            factor = cholesky(self.covariance[np.ix_(kept, kept)], lower=True)
+            whole = np.zeros((int(kept.sum()), len(kept)))
+            whole[:, kept] = dtrtri(factor, lower=1)[0]
+            self._whiteners[kept.tobytes()] = whole
+        return self._whiteners[kept.tobytes()]
+
+    @cached_property
+    def _whiteners(self) -> "dict[bytes, np.ndarray]":
+        """Those that were made, by the samples that are kept."""
+        return {}
 
 
 def restricted_likelihood(

@@ -110,7 +110,7 @@ def holding(law: FrictionLaw, values: Mapping[str, float]) -> FrictionLaw:
     return law._holding({**told, **values})
 
 
-TREND = "trend"
+TREND, TREND_IN_TIME = "trend", "trend_in_time"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,18 +148,18 @@ class Widened(Experiment):
 
 @dataclass(frozen=True, kw_only=True)
 class Trended(Widened):
-    """An experiment whose friction changes with the displacement of the load point, `path` [m], as well [1/m]."""
+    """An experiment whose friction changes with displacement [m] or time [s], `along`, as well [1/m or 1/s]."""
 
-    path: "np.ndarray"
+    along: "np.ndarray"
 
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
         """Friction of the experiment and the trend."""
-        friction: np.ndarray = self.whole.friction(self.own(fitted)) + fitted[-1] * self.path
+        friction: np.ndarray = self.whole.friction(self.own(fitted)) + fitted[-1] * self.along
         return friction
 
     def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
-        """Derivatives; that by the trend is the path."""
-        return np.column_stack([self.whole.slopes(self.own(fitted)), self.path])
+        """Derivatives; that by the trend is what it is along."""
+        return np.column_stack([self.whole.slopes(self.own(fitted)), self.along])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,13 +200,11 @@ def delayed(whole: Any, after: "np.ndarray", most: "np.ndarray") -> Experiment:
     return Delayed(whole=whole, after=after, coordinates=(*whole.coordinates, *delays))
 
 
-def trended(whole: Experiment, path: "np.ndarray", size: float) -> Trended:
-    """An experiment with a trend, of at most ten times a friction over the whole path."""
-    most = 10 * size / float(np.ptp(path))
-    trend = Coordinate(
-        name=TREND, unit="1/m", low=-most, high=most, start=(-1e-3 * most, 1e-3 * most), logarithmic=False
-    )
-    return Trended(whole=whole, path=path, coordinates=(*whole.coordinates, trend))
+def trended(whole: Experiment, along: "np.ndarray", size: float, name: str = TREND) -> Trended:
+    """An experiment with a trend, of at most ten times a friction over the whole way."""
+    most, unit = 10 * size / float(np.ptp(along)), "1/m" if name == TREND else "1/s"
+    trend = Coordinate(name=name, unit=unit, low=-most, high=most, start=(-1e-3 * most, 1e-3 * most), logarithmic=False)
+    return Trended(whole=whole, along=along, coordinates=(*whole.coordinates, trend))
 
 
 @dataclass(frozen=True, kw_only=True)

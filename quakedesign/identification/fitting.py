@@ -119,18 +119,35 @@ class Fit:
         return (squares - self.squares) / (self.noise**2 * self.correlation)
 
     def threshold(self, count: int) -> float:
-        """`excess` that so many parameters jointly stay below with the confidence of `CONFIDENCE` (Fisher's F)."""
-        return float(count * stats.f.ppf(CONFIDENCE, count, self.freedom))
+        """`excess` that so many parameters jointly stay below with the confidence of `CONFIDENCE` (Fisher's F).
+
+        The size of noise that fades is known from as many samples as the record has pieces of twice its length.
+        """
+        freedom = min(self.freedom, self.correlated.pieces if self.correlated is not None else math.inf)
+        return float(count * stats.f.ppf(CONFIDENCE, count, freedom))
 
     def distance(self, fitted: "np.ndarray") -> float:
         """`excess` of given coordinates, infinite where there is no such experiment."""
         squares = float(np.sum(weighed(self.weights, self.measured - self.experiment.friction(fitted)) ** 2))
         return self.excess(squares) if np.isfinite(squares) else np.inf
 
+    def along(self, place: int) -> "np.ndarray":
+        """Moves of all coordinates, to first order, with one of them by 1 and the others at their best."""
+        slopes, others = self._slopes, np.arange(len(self.fitted)) != place
+        scale = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+        moves = np.ones(len(self.fitted))
+        found = np.linalg.lstsq(slopes[:, others] / scale[others], -slopes[:, place] / scale[place], rcond=1e-9)[0]
+        moves[others] = found * scale[place] / scale[others]
+        return moves
+
+    @cached_property
+    def _slopes(self) -> "np.ndarray":
+        return weighed(self.weights, _finite(self.experiment.slopes(self.fitted)))
+
     @cached_property
     def deviations(self) -> "np.ndarray":
         """Standard deviations of what is fitted, from the slopes; infinite where these say nothing."""
-        slopes = weighed(self.weights, _finite(self.experiment.slopes(self.fitted)))
+        slopes = self._slopes
         scale = np.linalg.norm(slopes, axis=0)
         scale[scale == 0] = 1
         values, turn = np.linalg.svd(slopes / scale, full_matrices=False)[1:]
@@ -436,8 +453,7 @@ def _next(below: tuple[float, float], above: tuple[float, float], wanted: float)
 
 def _distance(fit: Fit, place: int, step: float, near: _ProfilePlace) -> tuple[float, _ProfilePlace]:
     """Root of the excess with one coordinate moved and all others at their best, and where that is."""
-    start = near.fitted.copy()
-    start[place] = fit.fitted[place] + step
+    start = near.fitted + fit.along(place) * (fit.fitted[place] + step - near.fitted[place])
     logarithmic = [c.logarithmic for c in fit.experiment.coordinates]
     if np.max(np.abs(start - near.resolved_at)[logarithmic], initial=0) > _FAR:
         near = replace(near, experiment=near.experiment.resolved(start, fit.accuracy), resolved_at=start)

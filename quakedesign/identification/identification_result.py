@@ -231,7 +231,7 @@ class Identification:
                 "correlation": fit.correlation,
                 "correlated": None if fit.correlated is None else fit.correlated.to_dict(fit.noise),
             },
-            "measurements": int(np.sum(fit.counts)),
+            "measurements": round(float(np.sum(fit.counts))),
             "rival": None if self.rival is None else asdict(self.rival),
             "box": {name: [_finite(end) for end in ends] for name, ends in self.box.items()},
             "outliers": [{"time": o.time, "time_unit": "s", "size": o.size, "size_unit": ""} for o in self.outliers],

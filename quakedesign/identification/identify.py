@@ -12,12 +12,28 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from quakedesign.errors import RecordError
+from quakedesign.errors import RecordError, UnknownNameError, require_known
 from quakedesign.fault import FrictionLaw, friction_law
 from quakedesign.fault.model import require_positive, require_seed
-from quakedesign.identification.assessment import DECISIVE, Assessment, checks_of, sign_check, unsteady_beginning
+from quakedesign.identification.assessment import (
+    DECISIVE,
+    Assessment,
+    checks_of,
+    in_doubt,
+    sign_check,
+    unsteady_beginning,
+)
 from quakedesign.identification.correlated_noise import CorrelatedNoise, noise_of
-from quakedesign.identification.experiment import DELAY, TREND, Coordinate, Difference, Experiment, delayed, trended
+from quakedesign.identification.experiment import (
+    DELAY,
+    TREND,
+    TREND_IN_TIME,
+    Coordinate,
+    Difference,
+    Experiment,
+    delayed,
+    trended,
+)
 from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, advantage, fit, interval, minimised, settled
 from quakedesign.identification.identification_result import Identification, ParameterEstimate, Rival, estimate
 from quakedesign.identification.loading import Loading, prepared
@@ -32,7 +48,7 @@ from quakedesign.identification.weakening_experiment import START, Drawn, Measur
 _EFFECTS = {"low": 1e-5, "high": 1.0, "start": (2e-3, 3e-2)}
 _SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}
 _MODERATE = 1e3
-_NUISANCE = {TREND, START_STATE}
+_NUISANCE = {TREND, TREND_IN_TIME, START_STATE}
 _START = tuple(
     Coordinate(name=name, unit="", low=-most, high=most, start=(-1e-3, 1e-3), logarithmic=False)
     for name, most in ((START_STATE, 5.0), (START_RATE, 2.0))
@@ -57,7 +73,8 @@ def set_up(
 ) -> Setup:
     """The experiment of a record as `prepared` gives it, by what its law depends on and what was measured.
 
-    `nuisance` is what is fitted besides law and stiffness: `TREND`, `START_STATE` (with `START_RATE`).
+    `nuisance` is what is fitted besides law and stiffness: `TREND` or `TREND_IN_TIME`, `START_STATE` (with
+    `START_RATE`).
 
     Raises
     ------
@@ -78,12 +95,13 @@ def set_up(
 
 
 def _with_trend(setup: Setup, record: Record, nuisance: Collection[str]) -> Setup:
-    """An experiment with a trend in the displacement, where that is fitted."""
+    """An experiment with a trend in displacement or time, where that is fitted."""
     path = record.load_point if record.load_point is not None else record.slip
-    if TREND not in nuisance or path is None or not np.ptp(path[setup.used]) > 0:
-        return setup
     size = float(np.max(np.abs(record.friction)))
-    return replace(setup, experiment=trended(setup.experiment, path[setup.used] - path[0], size))
+    for name, along in ((TREND, path), (TREND_IN_TIME, record.time)):
+        if name in nuisance and along is not None and np.ptp(along[setup.used]) > 0:
+            return replace(setup, experiment=trended(setup.experiment, along[setup.used] - along[0], size, name))
+    return setup
 
 
 def _coordinate(name: str, law: type[FrictionLaw], record: Record, path: float) -> Coordinate:
@@ -225,6 +243,9 @@ _LEAST_NEAR = 2  # searches, where the first begins near the fit of a similar la
 _EFFECTS_OF = ("direct_effect", "evolution_effect", SECOND_EFFECT)
 _MOST_BETTER = 10
 _MOST_MOVES = 4  # of the times of changes of rate, which a delay moves to first order
+_TRENDS = {TREND: "with a trend in displacement", TREND_IN_TIME: "with a trend in time"}
+_ONE_TREND = {"displacement": {TREND}, "time": {TREND_IN_TIME}}
+TREND_CHOICES = "auto", *_ONE_TREND, "none"
 _STAYS = 0.5  # deviations: a delay as small needs no move
 _UNFELT = 0.1  # deviations of the whole record by which an error of a rate moves friction unseen
 _UNSEEN = 1e-5  # of the range of friction
@@ -238,6 +259,7 @@ def identify(
     normal_stress: float | None = None,
     rates: Sequence[float] = (),
     states: int = 1,
+    trend: str = "auto",
     seed: int = 0,
 ) -> Identification:
     """Friction parameters of a laboratory record, each with its profile likelihood at 95 %.
@@ -265,6 +287,8 @@ def identify(
         Of the load point [m/s], one after the other, where they are known; from its displacement unless given.
     states : int
         1, or 2 for a second evolution effect with its own slip; no fault file holds two.
+    trend : str
+        ``"displacement"``, ``"time"`` or ``"none"``; chosen by likelihood by default.
     seed : int
         Of the draw of the starts.
 
@@ -292,11 +316,26 @@ def identify(
         found = read_record(record, normal_stress=normal_stress)
     if len(found.time) < 2 or not np.ptp(found.friction) > 0:
         raise RecordError("a record must have samples in which friction changes. Received none. Give a longer one.")
+    require_known(trend, TREND_CHOICES, "trend", UnknownNameError)
     kinds = [
         friction_law(name) if states == 1 else with_two_states(name) for name in ([law] if law else [AGEING, SLIP])
     ]
-    means, loading = prepared(found, rates)
-    return _Choice(record=means, raw=found, loading=loading, stiffness=stiffness, seed=seed).identified(kinds)
+    return identified_as(found, kinds, stiffness=stiffness, rates=rates, trend=trend, seed=seed)
+
+
+def identified_as(
+    record: Record,
+    kinds: Sequence[type[FrictionLaw]],
+    *,
+    stiffness: float | None = None,
+    rates: Sequence[float] = (),
+    trend: str = "auto",
+    seed: int = 0,
+) -> Identification:
+    """`identify` by given laws, of which the likeliest is taken."""
+    means, loading = prepared(record, rates)
+    choice = _Choice(record=means, raw=record, loading=loading, stiffness=stiffness, trend=trend, seed=seed)
+    return choice.identified(kinds)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -308,6 +347,10 @@ class _Fitted:
     best: Fit
 
 
+Alternatives = dict[str, tuple[_Fitted, float]]
+"""Fits with other trends and by how much their AIC is higher, by what they are."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Choice:
     """Which law, which nuisance parameters and which noise a record has."""
@@ -317,29 +360,29 @@ class _Choice:
     loading: Loading | None
     stiffness: float | None
     seed: int
+    trend: str = "auto"
     told: "np.ndarray | None" = None  # when pieces begin by the load point alone [s]
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
         """Profiles about the best fit, and tests of it."""
-        choice, better, rival, other, excess = self.chosen(kinds)
+        choice, better, rival, others = self.chosen(kinds)
         found = replace(choice._profiled(better), rival=rival)
-        return replace(found, assessment=choice._assessed(found, other, excess))
+        return replace(found, assessment=choice._assessed(found, others))
 
-    def chosen(
-        self, kinds: Sequence[type[FrictionLaw]]
-    ) -> "tuple[_Choice, _Fitted, Rival | None, _Fitted | None, float]":
+    def chosen(self, kinds: Sequence[type[FrictionLaw]]) -> "tuple[_Choice, _Fitted, Rival | None, Alternatives]":
         """The best law, with trend and unsteady beginning where these are likelier.
 
         After the choice with the times of changes of rate that friction shows, and before the law that it was preferred
-        to, the fit with or without a trend that was not taken, and by how much the AIC without is higher.
+        to, and the fits with other trends.
         """
+        first = _ONE_TREND.get(self.trend, {TREND} if self.trend == "auto" else set())
         fits: list[_Fitted] = []
         for kind in kinds:
             try:
                 near = fits[0].best if fits else None
                 if len(kind.state_names) > 1:  # which a trend helps to stand for each other
                     near = self._fitted(kind, (), None).best
-                fits.append(self._fitted(kind, {TREND}, near))
+                fits.append(self._fitted(kind, first, near))
             except RecordError:  # which no spring holds without a jump
                 if not fits:
                     raise
@@ -371,7 +414,7 @@ class _Choice:
         record, loading = prepared(self.raw, (), pieces)
         return replace(self, record=record, loading=loading, told=told)
 
-    def _chosen(self, fits: "list[_Fitted]") -> "tuple[_Choice, _Fitted, Rival | None, _Fitted | None, float]":
+    def _chosen(self, fits: "list[_Fitted]") -> "tuple[_Choice, _Fitted, Rival | None, Alternatives]":
         better = min(fits, key=lambda fitted: fitted.best.squares)
         noise = self._noise(better)
         fits = [replace(each, best=_settled(each.best, noise)) for each in fits]
@@ -383,30 +426,47 @@ class _Choice:
         better = self._extended(better)
         better = replace(better, best=_settled(better.best, self._noise(better)))
         better = self._without_start(better)
-        better, other, excess = self._trend(better)
-        return self, replace(better, best=_settled(better.best, self._noise(better))), rival, other, excess
+        better, others = self._trend(better)
+        return self, replace(better, best=_settled(better.best, self._noise(better))), rival, others
 
-    def _trend(self, fitted: _Fitted) -> tuple[_Fitted, _Fitted | None, float]:
-        """The fit with or without a trend that is taken, the other one, and by how much the AIC without is higher."""
-        if TREND not in _nuisance(fitted):
-            return fitted, None, 0.0
-        without, squares = self._among(fitted, _nuisance(fitted) - {TREND})
-        excess = fitted.best.excess(squares)
-        taken, other = (fitted, without) if _needed(fitted.best, squares) else (without, fitted)
-        return _again(taken) if taken is without else taken, other, excess - 2
+    def _trend(self, fitted: _Fitted) -> "tuple[_Fitted, Alternatives]":
+        """The fit with the trend that is taken or without one, and the others.
 
-    def _assessed(self, found: Identification, other: _Fitted | None, excess: float) -> Assessment:
+        A trend in time takes the place of one in displacement where its AIC is lower by `DECISIVE`.
+        """
+        own, rest = next(iter(_nuisance(fitted) & _TRENDS.keys()), ""), _nuisance(fitted) - _TRENDS.keys()
+        names = {"", own} if self.trend in _ONE_TREND else {"", *_TRENDS}
+        found = {
+            name: self._among(fitted, {*rest, name} - {""}) if name != own else (fitted, fitted.best.squares)
+            for name in sorted(names)
+        }
+        aic = {name: fitted.best.excess(squares) + 2 * bool(name) for name, (_, squares) in found.items()}
+        taken = own
+        if self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE:
+            taken = TREND_IN_TIME
+        if taken and not _needed(found[taken][0].best, found[""][1]):
+            taken = ""
+        others = {
+            _TRENDS.get(name, "without a trend"): (found[name][0], aic[name] - aic[taken])
+            for name in found
+            if name != taken
+        }
+        better = found[taken][0]
+        return better if better is fitted else _again(better), others
+
+    def _assessed(self, found: Identification, others: "Alternatives") -> Assessment:
         """Tests of what was taken for granted, and what the record leaves open."""
         values = found.fit.experiment.outward(found.fit.fitted)
         checks, factor = checks_of(found.fit, self.raw, self.record, found.used, self.loading, values)
-        doubted, shift = None, self._late_trend(found)
-        if other is not None and found.difference is not None and (excess < DECISIVE or shift is not None):
-            try:
-                doubted = _difference(other.best, jointly=False)
-            except BetterFit:  # whose valley leads elsewhere: its sign is open
-                doubted = replace(found.difference, low=-math.inf, high=math.inf)
+        shift, doubted = self._late_trend(found), {}
+        for said, (other, excess) in others.items():
+            if found.difference is not None and in_doubt(excess, shift):
+                try:
+                    doubted[said] = _difference(other.best, jointly=False), excess
+                except BetterFit:  # whose valley leads elsewhere: its sign is open
+                    doubted[said] = replace(found.difference, low=-math.inf, high=math.inf), excess
         off = unsteady_beginning(found.difference, values, self.loading) if self.loading is not None else ""
-        sign = sign_check(found.difference, doubted, excess, shift, off)
+        sign = sign_check(found.difference, doubted, shift, off)
         told = [*found.untold(), *([sign.sentence] if sign is not None and not sign.passed else [])]
         checks = (*checks, *([sign] if sign is not None else []))
         return Assessment(checks=checks, factor=factor, open=tuple(told), experiments=tuple(found.experiments(sign)))

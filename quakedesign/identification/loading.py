@@ -171,7 +171,9 @@ class Loading:
         begins, rates = self.pieces.begins, self.pieces.rates
         ends = np.append(begins[1:], np.inf)
         off = self.pieces.noise / np.maximum(np.abs(np.diff(rates)), 1e-300)
-        period = (record.time[-1] - record.time[0]) / float(np.sum(record.counts if record.counts is not None else 1.0))
+        period = (record.time[-1] - record.time[0]) / float(
+            len(record.time) if record.counts is None else np.sum(record.counts)
+        )
         known = self.pieces.rough or off.size == 0
         hidden = [
             i for i in range(len(off)) if not known and self.pieces.large_changes[i] and off[i] > _TIMELY * period

@@ -31,6 +31,7 @@ COLUMNS = {
     "normal_stress": "Pa",
     "normal_force": "N",
     "slip": "m",
+    "weight": "",
 }
 """Every known column and its SI unit."""
 
@@ -78,7 +79,7 @@ class Record:
     normal_unit : str
         ``"Pa"``, ``"N"`` or nothing.
     counts : ndarray or None
-        Of how many measurements every sample is the mean; of one by default.
+        Of how many measurements every sample is the mean, or its weight; one by default.
     load_rates : ndarray or None
         Rates of the load point from each sample on [m/s], where these were recorded in place of its displacement.
     remarks : tuple of str
@@ -146,8 +147,23 @@ def read_record(
     """
     given, remarks = _given(read_columns(path), columns)
     given, told = _measured(given)
-    given = _window(given, begin, end)
-    return _record(Path(path).stem, given, normal_stress, (*remarks, *told))
+    given, left = _weighted(_window(given, begin, end))
+    return _record(Path(path).stem, given, normal_stress, (*remarks, *told, *left))
+
+
+def _weighted(given: "dict[str, np.ndarray]") -> "tuple[dict[str, np.ndarray], list[str]]":
+    """Samples that have a weight, with a mean weight of 1, and how many have none."""
+    if "weight" not in given:
+        return given, []
+    weight = given["weight"]
+    if np.any(weight < 0) or np.sum(weight > 0) < 2:
+        raise RecordError(
+            f"weight must be positive, or 0 for what is left out. Received {np.min(weight):.6g} to "
+            f"{np.max(weight):.6g}. Write 1/variance of friction, in any unit."
+        )
+    given = {name: column[weight > 0] for name, column in given.items()}
+    lost = f"{int(np.sum(weight == 0))} samples of weight 0 left out"
+    return given | {"weight": given["weight"] / np.mean(given["weight"])}, [lost] * bool(np.any(weight == 0))
 
 
 def _given(found: Sequence[Column], wanted: str) -> "tuple[dict[str, np.ndarray], list[str]]":
@@ -323,6 +339,7 @@ def _record(name: str, given: "dict[str, np.ndarray]", normal_stress: float | No
         normal=normal,
         normal_unit=unit,
         load_rates=rates,
+        counts=given.get("weight"),
         remarks=(*remarks, *turned),
         origin=float(time[0]),
     )
@@ -503,10 +520,11 @@ def thinned(record: Record, begins: "np.ndarray | None" = None, *, follow: bool 
     edges = _halved(
         record, np.union1d(windows, _spikes(record.friction, scatter(record.time, record.friction))), follow
     )
-    counts = np.diff(edges)
+    weights = np.ones(count, dtype=int) if record.counts is None else record.counts
+    counts = np.add.reduceat(weights, edges[:-1])
 
     def means(values: "np.ndarray") -> "np.ndarray":
-        found: np.ndarray = values[0] + np.add.reduceat(values - values[0], edges[:-1]) / counts
+        found: np.ndarray = values[0] + np.add.reduceat(weights * (values - values[0]), edges[:-1]) / counts
         return found
 
     return replace(

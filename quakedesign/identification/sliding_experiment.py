@@ -11,10 +11,11 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy.linalg import solve_banded
 
 from quakedesign.fault import FrictionLaw
 from quakedesign.identification.experiment import Coordinate, Experiment, fitted_quantities, holding
-from quakedesign.symbolic.casadi_printer import to_casadi
+from quakedesign.symbolic.casadi_printer import to_casadi, vectorised
 from quakedesign.symbolic.plant import x1
 from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
 
@@ -104,18 +105,25 @@ class SlidingExperiment(Experiment):
 
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
         """Friction coefficient [-] at every sample, sliding steadily at the first."""
-        states = self._states(fitted)[:, self._sampled]
-        friction: np.ndarray = self._readings["friction"](states, np.asarray(fitted)).full().ravel()
-        return friction
+        return self._build["friction"](self._states(fitted)[:, self._sampled], np.asarray(fitted)[:, None])[0]
 
     def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
-        """Derivatives from the variational equations of the steps themselves: exact for what `friction` computes."""
-        q = np.asarray(fitted)
-        start = self._build["start_with_slopes"](q).full()
-        found = self._accumulated[1](start, self._inputs, np.tile(q[:, None], self._inputs.shape[1])).full()
-        sampled = np.hstack([start, found])[:, self._sampled]
-        read: np.ndarray = self._readings["slopes"](sampled, q).full().T
-        return read
+        """Derivatives from the variational equations of the steps themselves: exact for what `friction` computes.
+
+        Those of one step are found for all at once; a banded linear system joins them.
+        """
+        q, states = np.asarray(fitted)[:, None], self._states(fitted)
+        size, count = len(states), len(q)
+        each = self._build["step_slopes"](states[:, :-1], self._inputs, q).reshape(size + count, size, -1)
+        bands = np.zeros((2 * size, states.size))
+        bands[0] = 1
+        for after, before in np.ndindex(size, size):
+            bands[size + after - before, before : states.size - size : size] = -each[before, after]
+        moved = np.vstack([self._build["start_slopes"](q[:, 0]).full(), each[size:].T.reshape(-1, count)])
+        moved = solve_banded((2 * size - 1, 0), bands, moved, check_finite=False).reshape(-1, size, count)
+        read = self._build["friction_slopes"](states[:, self._sampled], q)
+        slopes: np.ndarray = read[size:].T + np.einsum("it,tij->tj", read[:size], moved[self._sampled])
+        return slopes
 
     def rates(self, fitted: "np.ndarray") -> "np.ndarray":
         """Slip rate [m/s] at every sample."""
@@ -163,7 +171,7 @@ class SlidingExperiment(Experiment):
         q = np.asarray(fitted)
         if q.tobytes() not in self._latest:
             start = self._build["start"](q).full()
-            found = self._accumulated[0](start, self._inputs, np.tile(q[:, None], self._inputs.shape[1])).full()
+            found = self._accumulated(start, self._inputs, np.tile(q[:, None], self._inputs.shape[1])).full()
             self._latest.clear()
             self._latest[q.tobytes()] = np.hstack([start, found])
         return self._latest[q.tobytes()]
@@ -185,19 +193,8 @@ class SlidingExperiment(Experiment):
         return np.vstack([np.concatenate(self.steps), between])
 
     @cached_property
-    def _accumulated(self) -> tuple[Any, Any]:
-        length = self._inputs.shape[1]
-        return tuple(self._build[name].mapaccum(length) for name in ("step", "step_with_slopes"))
-
-    @cached_property
-    def _readings(self) -> dict[str, Any]:
-        """Functions of all samples at once, the coordinates shared."""
-        readings = {}
-        for name in ("friction", "slopes"):
-            one = self._build[f"{name}_of_state"]
-            states, q = ca.MX.sym("states", one.size1_in(0), len(self._sampled)), ca.MX.sym("q", one.size1_in(1))
-            readings[name] = ca.Function(name, [states, q], [one.map(len(self._sampled))(states, q)])
-        return readings
+    def _accumulated(self) -> Any:
+        return self._build["step"].mapaccum(self._inputs.shape[1])
 
     @cached_property
     def _build(self) -> dict[str, Any]:
@@ -236,23 +233,23 @@ def _built(
     model = _Model(law, names, stiffness, linear)
     count, size = len(names), 1 + len(law.state_names)
     q, u = ca.SX.sym("q", count), ca.SX.sym("u", 4)
-    y, slopes = ca.SX.sym("y", size), ca.SX.sym("slopes", size, count)
+    y = ca.SX.sym("y", size)
     after, error = step(lambda at: model.field(at, u, q), y, u[0])
-    moved = ca.jacobian(after, y) @ slopes + ca.jacobian(after, q)
-    start = model.start(first_rate, q)
-    read = model.friction(y, q)
-    read_slope = ca.jacobian(read, y) @ slopes + ca.jacobian(read, q)
-    whole = ca.vertcat(y, ca.vec(slopes))
+    start, read = model.start(first_rate, q), model.friction(y, q)
     outputs = {
         "step": ([y, u, q], [after]),
-        "step_with_slopes": ([whole, u, q], [ca.vertcat(after, ca.vec(moved))]),
         "trial": ([y, u, q], [after, ca.sum2(ca.fabs(ca.jacobian(read, y)) * ca.fabs(error.T))]),
         "start": ([q], [start]),
-        "start_with_slopes": ([q], [ca.vertcat(start, ca.vec(ca.jacobian(start, q)))]),
-        "friction_of_state": ([y, q], [read]),
-        "slopes_of_state": ([whole, q], [read_slope.T]),
+        "start_slopes": ([q], [ca.jacobian(start, q)]),
+        "step_slopes": ([y, u, q], [ca.jacobian(after, ca.vertcat(y, q))]),
+        "friction": ([y, q], [read]),
+        "friction_slopes": ([y, q], [ca.jacobian(read, ca.vertcat(y, q))]),
     }
-    return {name: ca.Function(name, inputs, ca.cse(found)) for name, (inputs, found) in outputs.items()}
+    built = {
+        name: ca.Function(name, into, [ca.densify(each) for each in ca.cse(found)])
+        for name, (into, found) in outputs.items()
+    }
+    return built | {name: vectorised(built[name]) for name in ("step_slopes", "friction", "friction_slopes")}
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ def _warnings(identification: Identification) -> list[str]:
 
 def _samples(identification: Identification) -> str:
     fit = identification.fit
-    kept, all_ = int(fit.kept.sum()), int(np.sum(fit.counts))
+    kept, all_ = int(fit.kept.sum()), round(float(np.sum(fit.counts)))
     return f"{kept} samples" if all_ == len(fit.counts) else f"one of {all_} samples, taken as {len(fit.counts)} means"
 
 

@@ -175,3 +175,60 @@ def _operations(library: Any, asinh: Any, atan: Any, choose: Any, both: Any, eit
     other = {expm1: library.expm1, sp.asinh: asinh, sp.sinh: library.sinh, sp.cosh: library.cosh, sp.atan: atan}
     logic = {sp.Piecewise: choose, sp.And: lambda *c: reduce(both, c), sp.Or: lambda *c: reduce(either, c)}
     return _powers(library) | other | logic
+
+
+# ----------------------------------------------------------------------
+# Functions of CasADi at many points at once.
+
+
+def vectorised(function: Any) -> Callable[..., "np.ndarray"]:
+    """A Function of SX at many points at once, in NumPy: some times as fast as `Function.map`.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        Of dense inputs, with one dense output.
+
+    Returns
+    -------
+    callable
+        Of arrays of shape (numbers of an input, points), or (numbers, 1) for what all points share; gives the numbers
+        of the output, column by column, in shape (numbers, points).
+    """
+    steps = []
+    for k in range(function.n_instructions()):
+        code, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+        if code not in (ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT) and code not in _INSTRUCTIONS:
+            raise ParameterError(f"an instruction must be one of the known ones. Received number {code} of CasADi.")
+        steps.append((code, out, function.instruction_constant(k) if code == ca.OP_CONST else into))
+
+    def evaluated(*inputs: "np.ndarray") -> "np.ndarray":
+        work: list[Any] = [0.0] * function.sz_w()
+        found = np.empty((function.nnz_out(0), max(each.shape[1] for each in inputs)))
+        with np.errstate(all="ignore"):
+            for code, out, into in steps:
+                if code == ca.OP_CONST:
+                    work[out[0]] = into
+                elif code == ca.OP_INPUT:
+                    work[out[0]] = inputs[into[0]][into[1]]
+                elif code == ca.OP_OUTPUT:
+                    found[out[1]] = work[into[0]]
+                else:
+                    work[out[0]] = _INSTRUCTIONS[code](*(work[place] for place in into))
+        return found
+
+    return evaluated
+
+
+_NAMED = {"NEG": "negative", "SQ": "square", "INV": "reciprocal", "NOT": "logical_not", "AND": "logical_and"}
+_NAMED |= {"ADD": "add", "SUB": "subtract", "MUL": "multiply", "DIV": "divide", "POW": "power", "CONSTPOW": "power"}
+_NAMED |= {"ASINH": "arcsinh", "ATAN": "arctan", "LT": "less", "LE": "less_equal", "EQ": "equal", "OR": "logical_or"}
+_NAMED |= {
+    n: n.lower() for n in "EXP LOG SQRT FABS FMAX FMIN SIGN SIN COS TAN TANH SINH COSH LOG1P EXPM1 HYPOT".split()
+}
+_INSTRUCTIONS: dict[int, Callable[..., Any]] = {
+    **{getattr(ca, f"OP_{name}"): getattr(np, ours) for name, ours in _NAMED.items()},
+    ca.OP_ASSIGN: lambda x: x,
+    ca.OP_TWICE: lambda x: x + x,
+    ca.OP_IF_ELSE_ZERO: lambda condition, x: np.where(condition, x, 0.0),
+}

@@ -165,6 +165,7 @@ KINDS = {
 
 ONE_STEP = ((30.0, 1 * MICRON), (25.0, 10 * MICRON))
 DRIFT = 2e-4
+TRUE_TREND = -25.0  # 1/m
 
 
 def _step(**more):
@@ -194,13 +195,18 @@ def _with(record, draw, kind):
     """A record with one trouble of laboratories."""
     count = len(record.time)
     if kind == "trend":
-        return replace(record, friction=record.friction - 25 * record.load_point)
+        return replace(record, friction=record.friction + TRUE_TREND * record.load_point)
+    if kind == "trend over slip":
+        return replace(record, friction=record.friction - record.slip)
     if kind == "noisy load point":
         return replace(record, load_point=record.load_point + 0.3 * MICRON * draw.standard_normal(count))
+    if kind == "very noisy load point":
+        return replace(record, load_point=record.load_point + 20 * MICRON * draw.standard_normal(count))
     if kind == "correlated transducer":
         return replace(record, load_point=record.load_point + 0.45 * MICRON * shared(draw, count, 0.9))
     if kind == "correlated friction":
-        return replace(record, friction=record.friction + 5e-4 * shared(draw, count, 0.9))
+        size = 3e-3 if record.load_point is None or record.load_point[-1] > 1e-3 else 5e-4
+        return replace(record, friction=record.friction + size * shared(draw, count, 0.9))
     if kind == "drifting normal stress":
         return replace(record, normal=NORMAL * (1 + DRIFT * record.time))
     if kind == "unsteady beginning":
@@ -223,13 +229,30 @@ TROUBLES = {
     "uneven sampling": cache(_step),
     "rate column": cache(_step),
 }
-"""Experiments with one trouble each; `troubled` gives a record."""
+"""Velocity steps with one trouble each; `troubled` gives a record."""
+
+
+def _holds():
+    return sliding("rate-and-state-aging", HOLDS, stiffness_given=False)
+
+
+OTHER_TROUBLES = {
+    "slide-hold-slide, trend": cache(_holds),
+    "slide-hold-slide, noisy load point": cache(_holds),
+    "slide-hold-slide, correlated friction": cache(_holds),
+    "measured slip, trend over slip": weakening,
+    "measured slip, correlated friction": weakening,
+    "behind a spring, trend": drawn,
+    "behind a spring, very noisy load point": drawn,
+    "behind a spring, correlated friction": drawn,
+}
+"""The other experiments, each with one trouble."""
 
 
 def troubled(kind, seed):
     """A record with a trouble, and the truth that its fit must hold, but for the trend and the beginning."""
-    made = TROUBLES[kind]()
-    record = _with(made.noisy(seed), np.random.default_rng(10_000 + seed), kind)
+    made = (TROUBLES | OTHER_TROUBLES)[kind]()
+    record = _with(made.noisy(seed), np.random.default_rng(10_000 + seed), kind.rpartition(", ")[2])
     truth = dict(made.truth)
     if kind == "two states":
         truth |= {"second_effect": -0.003, "second_slip": 60 * MICRON}

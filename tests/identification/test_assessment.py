@@ -10,7 +10,7 @@ import pytest
 
 from quakedesign.errors import ParameterError, RecordError
 from quakedesign.fault import fault_toml, load_fault, parse_fault, with_accepted_fit
-from quakedesign.identification.assessment import sign_check
+from quakedesign.identification.assessment import in_doubt, sign_check
 from quakedesign.identification.fault_file import identified_fault, next_command, poor_fit
 from quakedesign.identification.identification_result import ParameterEstimate
 from quakedesign.identification.identify import identify
@@ -55,7 +55,7 @@ def test_a_record_without_a_trend_has_none_and_its_sign_holds_with_one():
     assert "trend" not in found.estimates
     (sign,) = [check for check in found.assessment.checks if check.name == "sign"]
     assert sign.passed
-    assert "negative: friction weakens with rate, with and without a trend" in sign.sentence
+    assert "negative: friction weakens with rate, also with a trend in displacement (AIC" in sign.sentence
     assert poor_fit(found) == ""
 
 
@@ -114,16 +114,20 @@ def test_a_drift_that_dies_out_and_looks_like_an_unsteady_beginning_leaves_the_s
 )
 def test_a_sign_must_hold_with_what_a_late_trend_adds(low, high, shift, passed):
     told = estimate_between(low, high)
-    assert sign_check(told, None, 0.0, shift).passed == passed
-    assert not sign_check(told, None, 0.0, shift, ": the beginning is not steady").passed
+    assert sign_check(told, {}, shift).passed == passed
+    assert not sign_check(told, {}, shift, ": the beginning is not steady").passed
 
 
-def test_the_fit_with_or_without_a_trend_counts_unless_it_is_worse_by_ten():
+def test_a_fit_with_another_trend_counts_unless_it_is_worse_by_ten():
     told, other = estimate_between(0.001, 0.003), estimate_between(-0.003, -0.001)
-    assert not sign_check(told, other, 9.9).passed
-    assert sign_check(told, other, 10.0).passed
-    assert not sign_check(told, other, 10.0, 0.0).passed
-    assert sign_check(None, None, 0.0) is None
+    assert [in_doubt(9.9, None), in_doubt(10.0, None), in_doubt(10.0, 0.0)] == [True, False, True]
+    check = sign_check(told, {"without a trend": (other, 9.9)})
+    assert not check.passed
+    assert check.sentence == "the sign of a - b is open: from -0.003 to 0.003, also without a trend (AIC +9.9)"
+    agreeing = sign_check(told, {"with a trend in time": (estimate_between(0.002, 0.004), 1.0)})
+    assert agreeing.passed
+    assert agreeing.sentence.endswith("strengthens with rate, also with a trend in time (AIC +1)")
+    assert sign_check(None, {}) is None
 
 
 def estimate_between(low, high):

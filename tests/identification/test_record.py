@@ -149,3 +149,17 @@ def test_the_same_record_is_read_in_its_own_units(tmp_path):
     path.write_text(path.read_text(encoding="utf-8").replace("4.9e-07", "1e24"), encoding="utf-8")
     with pytest.raises(RecordError, match="the largest load_point_rate"):
         read_record(path)
+
+
+def test_a_column_of_weights_counts_samples_and_leaves_out_those_of_weight_0(tmp_path):
+    lines = ["time [s], load_point_displacement [um], friction, weight"]
+    lines += [f"{t}, {t}, {0.6 + 0.001 * t}, {w}" for t, w in enumerate((2, 1, 0, 3))]
+    path = tmp_path / "weighted.csv"
+    path.write_text("\n".join(lines))
+    record = read_record(path)
+    assert record.time.tolist() == [0, 1, 3]
+    assert record.counts.tolist() == [1, 0.5, 1.5]
+    assert "1 samples of weight 0 left out" in record.remarks
+    path.write_text("\n".join([*lines[:2], "1, 1, 0.6, -1"]))
+    with pytest.raises(RecordError, match=r"weight must be positive, or 0 for what is left out. Received -1 to 2"):
+        read_record(path)

@@ -175,3 +175,25 @@ def test_readings_in_steps_are_known():
     assert reading_step(np.round(0.15 * time, 1)) == pytest.approx(0.1)
     assert reading_step(np.round(0.01 * time, 1)) == pytest.approx(0.1)
     assert reading_step(np.where(time < 5, time, 5 + 3 * (time - 5))) < 1e-5
+
+
+def test_means_of_weighted_samples_are_weighted_means():
+    """Doubtful samples that are off move a mean by their share of the weights."""
+    draw = np.random.default_rng(0)
+    count = 4000
+    bad = np.arange(count) % 2 == 1
+    record = Record(
+        name="weighted",
+        time=np.arange(count) * 0.1,
+        friction=0.6 + 1e-4 * draw.standard_normal(count) + 0.01 * bad,
+        load_point=np.arange(count) * 1e-7,
+        slip=None,
+        normal=np.ones(count),
+        normal_unit="",
+        counts=np.where(bad, 0.002, 1.998),
+    )
+    found = thinned(record)
+    assert float(np.sum(found.counts)) == pytest.approx(count)
+    long = found.counts > 5
+    off = found.friction[long] - (0.6 + 0.01 * 0.001)
+    assert np.max(np.abs(off) / (1e-4 * np.sqrt(2 / found.counts[long]))) < 4.5

@@ -4,7 +4,7 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic import AbsolutePower, SignedPower
-from quakedesign.symbolic.casadi_printer import to_casadi, to_numpy
+from quakedesign.symbolic.casadi_printer import to_casadi, to_numpy, vectorised
 
 x, y = sp.symbols("x y", real=True)
 POINTS = np.array([-2.5, -1.0, -1e-3, 0.0, 1e-9, 0.4, 3.0])
@@ -86,3 +86,26 @@ def test_at_a_kink_the_derivative_is_that_of_the_branch_that_motion_enters(expre
     for point in np.random.default_rng(1).normal(size=(50, 2)):
         ours, theirs, _ = both(point)
         assert float(ours) == float(theirs)
+
+
+@pytest.mark.parametrize("expression", EXPRESSIONS, ids=str)
+def test_a_function_at_many_points_at_once_is_the_function_at_each(expression):
+    import casadi as ca
+
+    a, b = ca.SX.sym("a", 2), ca.SX.sym("b")
+    (value,) = to_casadi([expression], {x: a[0] + a[1], y: b})
+    table = ca.densify(ca.jacobian(ca.vertcat(value, ca.exp(value) / 2), ca.vertcat(a, b)))
+    one = ca.Function("one", [a, b], [table])
+    points = np.random.default_rng(0).uniform(0.1, 2.0, (2, 6))
+    found = vectorised(one)(points, np.array([[0.3]]))
+    assert found.shape == (6, 6)
+    for told, point in zip(found.T, points.T, strict=True):
+        assert told == pytest.approx(one(point, 0.3).full().ravel(order="F"), rel=1e-13, abs=1e-13)
+
+
+def test_an_instruction_that_numpy_lacks_is_named():
+    import casadi as ca
+
+    a = ca.SX.sym("a")
+    with pytest.raises(ParameterError, match=r"must be one of the known ones\. Received number \d+ of CasADi"):
+        vectorised(ca.Function("one", [a], [ca.erf(a)]))
