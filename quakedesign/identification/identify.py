@@ -303,24 +303,21 @@ def identify(
     UnknownNameError
         For a law that does not exist.
     """
-    require_seed(seed)
-    require_positive(stiffness=1.0 if stiffness is None else stiffness)
     require_positive(normal_stress=1.0 if normal_stress is None else normal_stress)
-    if states not in (1, 2):
-        raise RecordError(f"states must be 1 or 2. Received {states}. Take 2 where one does not explain the record.")
     if isinstance(record, Record):
         if normal_stress is not None:
             raise RecordError("normal_stress is for a file. Received it with a Record. Put it into the record.")
         found = record
     else:
         found = read_record(record, normal_stress=normal_stress)
-    if len(found.time) < 2 or not np.ptp(found.friction) > 0:
-        raise RecordError("a record must have samples in which friction changes. Received none. Give a longer one.")
-    require_known(trend, TREND_CHOICES, "trend", UnknownNameError)
-    kinds = [
-        friction_law(name) if states == 1 else with_two_states(name) for name in ([law] if law else [AGEING, SLIP])
-    ]
-    return identified_as(found, kinds, stiffness=stiffness, rates=rates, trend=trend, seed=seed)
+    return identified_as(found, kinds_of(law, states), stiffness=stiffness, rates=rates, trend=trend, seed=seed)
+
+
+def kinds_of(law: str | None, states: int) -> list[type[FrictionLaw]]:
+    """Laws that are fitted: the one that was asked for, or the ageing and the slip law."""
+    if states not in (1, 2):
+        raise RecordError(f"states must be 1 or 2. Received {states}. Take 2 where one does not explain the record.")
+    return [friction_law(name) if states == 1 else with_two_states(name) for name in ([law] if law else [AGEING, SLIP])]
 
 
 def identified_as(
@@ -333,6 +330,11 @@ def identified_as(
     seed: int = 0,
 ) -> Identification:
     """`identify` by given laws, of which the likeliest is taken."""
+    require_seed(seed)
+    require_positive(stiffness=1.0 if stiffness is None else stiffness)
+    require_known(trend, TREND_CHOICES, "trend", UnknownNameError)
+    if len(record.time) < 2 or not np.ptp(record.friction) > 0:
+        raise RecordError("a record must have samples in which friction changes. Received none. Give a longer one.")
     means, loading = prepared(record, rates)
     choice = _Choice(record=means, raw=record, loading=loading, stiffness=stiffness, trend=trend, seed=seed)
     return choice.identified(kinds)
@@ -366,7 +368,7 @@ class _Choice:
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
         """Profiles about the best fit, and tests of it."""
         choice, better, rival, others = self.chosen(kinds)
-        found = replace(choice._profiled(better), rival=rival)
+        found = replace(profiled(better.best, choice.record, better.setup, self.seed), rival=rival)
         return replace(found, assessment=choice._assessed(found, others))
 
     def chosen(self, kinds: Sequence[type[FrictionLaw]]) -> "tuple[_Choice, _Fitted, Rival | None, Alternatives]":
@@ -568,34 +570,36 @@ class _Choice:
         told = replace(best, experiment=other.best.experiment, fitted=at)
         return replace(other, best=told), squares
 
-    def _profiled(self, fitted: _Fitted) -> Identification:
-        """Profiles about the best fit; about a better one if a profile comes upon it."""
-        setup, best = fitted.setup, fitted.best
-        for _ in range(_MOST_BETTER):
-            try:
-                estimates = _estimates(best)
-                difference = _difference(best)
-                break
-            except BetterFit as better:
-                best = settled(replace(best, fitted=better.fitted, agreeing=1), FitSearch())
-        else:
-            raise RecordError(
-                "a record must have one best fit. Received one whose fit gets better wherever it is followed. Give the "
-                "stiffness, or a record with more steps."
-            )
-        pair = [name for name in _EFFECTS_OF if name in estimates]
-        if difference is not None and difference.identified and not any(estimates[name].identified for name in pair):
-            estimates |= {name: _open(estimates[name]) for name in pair}
-        return Identification(
-            record=self.record,
-            fit=best,
-            used=setup.used,
-            estimates=estimates,
-            difference=difference,
-            law=best.experiment.best_law(best.fitted),
-            notes=(*setup.notes, *best.experiment.remarks(best.fitted, best.noise)),
-            seed=self.seed,
+
+def profiled(
+    best: Fit, record: Record, setup: Setup, seed: int, names: Collection[str] | None = None
+) -> Identification:
+    """Profiles about the best fit, of parameters by name or all; about a better fit if a profile comes upon it."""
+    for _ in range(_MOST_BETTER):
+        try:
+            estimates = _estimates(best, names)
+            difference = _difference(best)
+            break
+        except BetterFit as better:
+            best = settled(replace(best, fitted=better.fitted, agreeing=1), FitSearch())
+    else:
+        raise RecordError(
+            "a record must have one best fit. Received one whose fit gets better wherever it is followed. Give the "
+            "stiffness, or a record with more steps."
         )
+    pair = [name for name in _EFFECTS_OF if name in estimates]
+    if difference is not None and difference.identified and not any(estimates[name].identified for name in pair):
+        estimates |= {name: _open(estimates[name]) for name in pair}
+    return Identification(
+        record=record,
+        fit=best,
+        used=setup.used,
+        estimates=estimates,
+        difference=difference,
+        law=best.experiment.best_law(best.fitted),
+        notes=(*setup.notes, *best.experiment.remarks(best.fitted, best.noise)),
+        seed=seed,
+    )
 
 
 def _needed(best: Fit, squares: float, fewer: int = 1) -> bool:
@@ -620,8 +624,8 @@ def _settled(best: Fit, noise: CorrelatedNoise | None) -> Fit:
     return settled(replace(best, correlated=noise), FitSearch())
 
 
-def _estimates(best: Fit) -> dict[str, ParameterEstimate]:
-    """Estimates of all coordinates, those of the law first.
+def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, ParameterEstimate]:
+    """Estimates of coordinates by name or all, those of the law first.
 
     Where a law has both effects, profiles are followed in coordinates that hold their difference: where a record tells
     only that, the valley of equal fits is straight in them.
@@ -629,7 +633,7 @@ def _estimates(best: Fit) -> dict[str, ParameterEstimate]:
     names = [c.name for c in best.experiment.coordinates]
     effects = [names.index(name) for name in _EFFECTS_OF if name in names]
     if len(effects) < 2:
-        return {name: _estimate(best, i) for i, name in enumerate(names)}
+        return {name: _estimate(best, i) for i, name in enumerate(names) if wanted is None or name in wanted}
     direct, *others = effects
     others_turned = _Turned(best, direct, tuple(others))
     first_turned = _Turned(best, others[0], (direct,)) if len(others) == 1 else None
@@ -638,6 +642,7 @@ def _estimates(best: Fit) -> dict[str, ParameterEstimate]:
         if i == direct
         else others_turned.estimate(i)
         for i, name in enumerate(names)
+        if wanted is None or name in wanted
     }
 
 

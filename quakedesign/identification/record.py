@@ -151,6 +151,17 @@ def read_record(
     return _record(Path(path).stem, given, normal_stress, (*remarks, *told, *left))
 
 
+def part(record: Record, inside: "np.ndarray", name: str) -> Record:
+    """Samples of a record, as a record of its own that begins with the first of them."""
+    columns = ("time", "friction", "load_point", "slip", "normal", "counts", "load_rates")
+    values = {n: None if getattr(record, n) is None else getattr(record, n)[inside] for n in columns}
+    begun = float(values["time"][0]) if np.any(inside) else 0.0  # type: ignore[index]
+    values["time"] = values["time"] - begun  # type: ignore[operator]
+    if values["load_point"] is not None:
+        values["load_point"] = values["load_point"] - values["load_point"][:1]
+    return replace(record, name=name, origin=record.origin + begun, **values)
+
+
 def _weighted(given: "dict[str, np.ndarray]") -> "tuple[dict[str, np.ndarray], list[str]]":
     """Samples that have a weight, with a mean weight of 1, and how many have none."""
     if "weight" not in given:

@@ -1,0 +1,224 @@
+"""Several steps of one experiment: each by itself, and one law for all of them.
+
+The common fit shares the parameters of the law and the stiffness. Level, trend, beginning and delays are those of each
+step, and so is its noise: samples count in its deviations.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from quakedesign.errors import RecordError
+from quakedesign.fault import FrictionLaw
+from quakedesign.identification.assessment import Assessment, Check, sign_check
+from quakedesign.identification.experiment import Coordinate, Experiment
+from quakedesign.identification.fitting import Fit, minimised, weighed
+from quakedesign.identification.identification_result import Identification
+from quakedesign.identification.identify import Setup, identified_as, kinds_of, profiled
+from quakedesign.identification.loading import prepared
+from quakedesign.identification.record import Record, part
+from quakedesign.identification.sliding_experiment import STIFFNESS
+
+_LEVEL = "reference_coefficient"
+_UNLIKELY = 0.01  # probability below which steps do not have one law
+_ROUNDS = 3  # in which steps of the simulation and the common fit follow each other
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steps:
+    """Identifications of several steps, and that of one law for all.
+
+    Attributes
+    ----------
+    steps : tuple of Identification
+    common : Identification
+        Of the parameters that all share; samples of its fit are in deviations of the noise of each step.
+    probability : float
+        Of steps that differ as much as these by chance, if one law holds for all (Fisher's F).
+    """
+
+    steps: tuple[Identification, ...]
+    common: Identification
+    probability: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that JSON can hold; SI units. That of the common fit, and every step under `steps`."""
+        steps = [{"record": step.record.name, **step.to_dict()} for step in self.steps]
+        return {**self.common.to_dict(), "probability": self.probability, "steps": steps}
+
+
+def cut(record: Record) -> list[Record]:
+    """Parts of a record, one a large change of the rate of loading, from midway to midway between these.
+
+    Raises
+    ------
+    RecordError
+        When there are fewer than two such changes.
+    """
+    _, loading = prepared(record)
+    begins = np.empty(0) if loading is None else loading.steps
+    if len(begins) < 2:
+        raise RecordError(
+            f"a record that is cut into steps must have two changes of rate by a quarter. Received {len(begins)}. Name "
+            "the windows: --steps '0 s to 60 s, 60 s to 120 s'."
+        )
+    ends = [-np.inf, *((begins[1:] + begins[:-1]) / 2).tolist(), np.inf]
+    inside = [(record.time >= low) & (record.time < high) for low, high in pairwise(ends)]
+    return [part(record, each, f"{record.name}, step {i}") for i, each in enumerate(inside, start=1)]
+
+
+def identify_steps(
+    records: Sequence[Record],
+    law: str | None = None,
+    *,
+    stiffness: float | None = None,
+    rates: Sequence[float] = (),
+    states: int = 1,
+    trend: str = "auto",
+    seed: int = 0,
+) -> Steps:
+    """Friction parameters of every step, those that all steps share, and whether one law explains all.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        One a step, at least two, none of whose samples is in another.
+    law, stiffness, rates, states, trend, seed
+        As for `identify`; `rates` are those of every step.
+
+    Returns
+    -------
+    Steps
+
+    Raises
+    ------
+    RecordError
+        When a record does not suit the law, or a step has no law with a state.
+    """
+    if len(records) < 2:
+        raise RecordError(f"several steps must be at least 2. Received {len(records)}. Use identify for one.")
+    more: dict[str, Any] = {"stiffness": stiffness, "rates": rates, "trend": trend, "seed": seed}
+    kinds = kinds_of(law, states)
+    steps = [identified_as(record, kinds, **more) for record in records]
+    worse = {kind.name: sum(s.rival.excess for s in steps if s.rival and s.rival.law == kind.name) for kind in kinds}
+    kind = min(kinds, key=lambda each: worse[each.name])
+    steps = [
+        step if step.law.name == kind.name else identified_as(record, [kind], **more)
+        for step, record in zip(steps, records, strict=True)
+    ]
+    best, shared, excess = _common(steps)
+    names = [*shared, _LEVEL]
+    notes = tuple(f"step {i}: {note}" for i, step in enumerate(steps, start=1) for note in step.notes[:2])
+    setup = Setup(experiment=best.experiment, used=np.ones(len(best.measured), dtype=bool), notes=notes)
+    name = " + ".join(step.record.name for step in steps)
+    counted = np.arange(float(len(best.measured)))
+    whole = replace(steps[0].record, name=name, time=counted, friction=best.measured, load_point=None, slip=None)
+    common = profiled(best, whole, setup, seed, names)
+    count = len(shared) * (len(steps) - 1)
+    freedom = sum(step.fit.freedom for step in steps)
+    probability = float(stats.f.sf(excess / count, count, freedom))
+    common = replace(common, assessment=_assessed(common, steps, probability))
+    return Steps(steps=tuple(steps), common=common, probability=probability)
+
+
+def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
+    """The common fit, the names that it shares, and by how much its squares exceed those of the steps' own fits."""
+    fits = [step.fit for step in steps]
+    told = [fit.experiment.coordinates for fit in fits]
+    quantities = steps[0].law.quantities()
+    shared = [c.name for c in told[0] if (c.name in quantities and c.name != _LEVEL) or c.name == STIFFNESS]
+    coordinates: list[Coordinate] = [c for c in told[0] if c.name in shared]
+    places, starts = [], []
+    for i, (fit, own) in enumerate(zip(fits, told, strict=True)):
+        others = [c for c in own if c.name not in shared]
+        at = [shared.index(c.name) if c.name in shared else len(coordinates) + others.index(c) for c in own]
+        places.append(np.array(at))
+        coordinates += [replace(c, name=c.name if i == 0 else f"{c.name} (step {i + 1})") for c in others]
+        starts += [value for value, c in zip(fit.fitted.tolist(), own, strict=True) if c.name not in shared]
+    rows = [[[c.name for c in own].index(name) for name in shared] for own in told]
+    values = np.array([fit.fitted[row] for fit, row in zip(fits, rows, strict=True)])
+    sharp = np.array([np.maximum(fit.deviations[row] ** -2.0, 1e-12) for fit, row in zip(fits, rows, strict=True)])
+    start = np.array([*(np.sum(sharp * values, axis=0) / np.sum(sharp, axis=0)), *starts])
+    joint = _Joint(
+        parts=tuple(fit.experiment for fit in fits),
+        places=tuple(places),
+        weights=tuple(fit.weights / fit.noise for fit in fits),
+        accuracies=tuple(fit.accuracy for fit in fits),
+        coordinates=tuple(coordinates),
+    )
+    measured = joint.joined([fit.measured for fit in fits])
+    ones = np.ones(len(measured))
+    best = Fit(experiment=joint, fitted=start, measured=measured, counts=ones, kept=ones > 0, agreeing=1, starts=1)
+    for _ in range(_ROUNDS):
+        finer = best.experiment.resolved(best.fitted, best.accuracy)
+        fitted, _ = minimised(finer, measured, ones, best.fitted)
+        best = replace(best, experiment=finer, fitted=fitted)
+    own = sum(fit.squares / fit.noise**2 for fit in fits)
+    return best, shared, max(best.squares - own, 0.0) / max(fit.correlation for fit in fits)
+
+
+def _assessed(common: Identification, steps: Sequence[Identification], probability: float) -> Assessment:
+    """Whether one law explains all steps, and whether a - b has one sign in it and in a step at least."""
+    told = "explains" if probability >= _UNLIKELY else "does not explain"
+    said = f"one set of parameters {told} all steps (chance {probability:.2g})"
+    one = Check(name="common", passed=probability >= _UNLIKELY, value=probability, limit=_UNLIKELY, sentence=said)
+    signs = [check for step in steps for check in step.assessment.checks if check.name == "sign"]
+    sign = sign_check(common.difference, {})
+    if sign is not None:
+        with_it = [check for check in signs if check.passed and check.value * sign.value > 0]
+        against = [check for check in signs if check.passed and check.value * sign.value < 0]
+        sure = bool(sign.passed and with_it and not against)
+        sign = sign if sure else replace(sign, passed=False, sentence="the sign of a - b is open: steps do not agree")
+    checks = (one, *([sign] if sign is not None else []))
+    return Assessment(
+        checks=checks,
+        factor=max(step.assessment.factor for step in steps),
+        open=(*common.untold(), *(check.sentence for check in checks if not check.passed)),
+        experiments=tuple(common.experiments(sign)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Joint(Experiment):
+    """Steps with shared coordinates; samples are made independent, in deviations of the noise of their step."""
+
+    parts: tuple[Experiment, ...]
+    places: tuple["np.ndarray", ...]  # of the coordinates of each step among those of all
+    weights: tuple["np.ndarray", ...]
+    accuracies: tuple[float, ...]
+    coordinates: tuple[Coordinate, ...]
+
+    @property
+    def law(self) -> FrictionLaw:  # type: ignore[override]
+        """That of the first step."""
+        return self.parts[0].law
+
+    def joined(self, values: Sequence["np.ndarray"]) -> "np.ndarray":
+        """Values of the samples of each step, weighed."""
+        return np.concatenate([weighed(w, v) for w, v in zip(self.weights, values, strict=True)])
+
+    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Friction of all steps, weighed."""
+        return self.joined([each.friction(fitted[at]) for each, at in zip(self.parts, self.places, strict=True)])
+
+    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Derivatives of `friction`; those in the coordinates of other steps are 0."""
+        rows = []
+        for each, weights, at in zip(self.parts, self.weights, self.places, strict=True):
+            own = weighed(weights, np.nan_to_num(each.slopes(fitted[at]), posinf=0, neginf=0))
+            rows.append(np.zeros((len(own), len(self.coordinates))))
+            rows[-1][:, at] = own
+        return np.vstack(rows)
+
+    def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
+        """That of the first step."""
+        return self.parts[0].best_law(fitted[self.places[0]])
+
+    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "_Joint":
+        """With each step resolved for its own noise."""
+        told = zip(self.parts, self.places, self.accuracies, strict=True)
+        return replace(self, parts=tuple(each.resolved(fitted[at], fine) for each, at, fine in told))
