@@ -187,20 +187,23 @@ def init(
 def identify(
     data: Path,
     /,
-    *,
+    *more: Path,
     law: str | None = None,
     stiffness: str | None = None,
     normal_stress: Pascals | None = None,
     columns: str = "",
     begin: Annotated[str | None, Parameter(name="--from")] = None,
     end: Annotated[str | None, Parameter(name="--to")] = None,
+    steps: str = "",
     rates: str = "",
     states: Whole = 1,
+    trend: Literal["auto", "displacement", "time", "none"] = "auto",
     seed: Whole = 0,
     fault: FaultName = "lab-fault",
     out: Path | None = None,
     figure: Path | None = None,
     force: Force = False,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
     output: Output = PLAIN,
 ) -> int:
     """Identify friction parameters, with confidence regions, from a laboratory record.
@@ -214,7 +217,10 @@ def identify(
     data
         Text with headings and units, such as 'time [s], load_point_displacement [um], shear_stress [MPa],
         normal_stress [MPa]' (load_point_rate, shear_force, normal_force, friction and slip are accepted too); any sign
-        between columns; xlook's text and reduced binary; vectors of a MATLAB file.
+        between columns; xlook's text and reduced binary; vectors of a MATLAB file. A column weight (1/variance of
+        friction, in any unit) says how much each sample counts.
+    more
+        Further files, each a step of the same experiment: every step is fitted by itself, and one law to all.
     law
         Friction law. By default rate-and-state-aging and rate-and-state-slip are fitted and the better one is taken;
         others are regularised-rate-and-state, exponential-slip-weakening and linear-slip-weakening.
@@ -229,11 +235,16 @@ def identify(
         Where the part to fit begins: a time ('8110 s') or a load-point displacement ('1600 um') of the file.
     end
         Where it ends.
+    steps
+        Windows of a file that are steps of their own, such as '0 s to 60 s, 60 s to 120 s', or auto, which cuts
+        midway between changes of rate.
     rates
         Rates of the load point one after the other, such as '1 um/s, 10 um/s', where they are known; from its
         displacement by default.
     states
         2 for friction with a second state, which may explain what one does not; no fault file holds it.
+    trend
+        Along what friction drifts: displacement, time or none; chosen by likelihood by default.
     seed
         Seed of the random starting points.
     fault
@@ -242,12 +253,14 @@ def identify(
         Fault file to write; its friction covers the whole confidence region where a fault file can express that.
     figure
         Figure of data, fit and residuals to write: .svg, .png or .pdf.
+    verbose
+        Also print every test, the noise, the searches and what was assumed.
     """
     from quakedesign.errors import RecordError
     from quakedesign.fault import load_fault
     from quakedesign.identification.fault_file import law_remarks, next_command, other_parts, save_fault, task_remarks
     from quakedesign.identification.identify import identify as fitted
-    from quakedesign.identification.record import read_record
+    from quakedesign.identification.several_steps import identify_steps, read_steps
     from quakedesign.report.identification_page import identification_lines, require_format, save_figure
 
     for path, what in ((out, "fault file"), (figure, "figure")):
@@ -255,11 +268,19 @@ def identify(
     if figure is not None:
         require_format(figure)
     require_different({"--out": out, "--figure": figure, "the record": data, "--fault": Path(fault)})
+    for each in more:
+        require_different({"--out": out, "--figure": figure, "the record": each})
     around = load_fault(fault)
-    record = read_record(data, normal_stress=normal_stress, columns=columns, begin=begin, end=end)
-    spring = None if stiffness is None else in_unit(stiffness, record.stiffness_unit, "stiffness")
+    records = [
+        record
+        for path in (data, *more)
+        for record in read_steps(path, steps, normal_stress=normal_stress, columns=columns, begin=begin, end=end)
+    ]
+    spring = None if stiffness is None else in_unit(stiffness, records[0].stiffness_unit, "stiffness")
     speeds = [in_unit(part.strip(), "m/s", "rates") for part in rates.split(",") if part.strip()]
-    identification = fitted(record, law, stiffness=spring, rates=speeds, states=states, seed=seed)
+    how: dict[str, Any] = {"stiffness": spring, "rates": speeds, "states": states, "trend": trend, "seed": seed}
+    found = fitted(records[0], law, **how) if len(records) == 1 else identify_steps(records, law, **how)
+    identification = getattr(found, "common", found)
     file, unwritten = (out, "") if out is not None else (None, "")
     if out is not None:
         try:
@@ -268,7 +289,7 @@ def identify(
             file, unwritten = None, f"not written: {out}: {refused}"
     written = [path for path in (figure, file) if path is not None]
     if figure is not None:
-        save_figure(identification, figure)
+        save_figure(found, figure)
     told = law_remarks(identification, around)
     told += [f"written: {', '.join(map(str, written))}"] if written else []
     if file is not None:
@@ -276,8 +297,9 @@ def identify(
         told += [*task_remarks(identification, around), f"next: {next_command(identification, file)}"]
     told += [unwritten] if unwritten else []
     places = {"figure": figure, "file": file}
-    facts = identification.to_dict() | {name: None if path is None else str(path) for name, path in places.items()}
-    output.show(facts, [*identification_lines(identification), *told])
+    facts = found.to_dict() | {name: None if path is None else str(path) for name, path in places.items()}
+    told += [] if verbose else ["tests, noise and assumptions: --verbose"]
+    output.show(facts, [*identification_lines(found, verbose=verbose), *told])
     return 0 if identification.explained else 1
 
 

@@ -7,6 +7,7 @@ step, and so is its noise: samples count in its deviations.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,9 @@ from quakedesign.identification.fitting import Fit, minimised, weighed
 from quakedesign.identification.identification_result import Identification
 from quakedesign.identification.identify import Setup, identified_as, kinds_of, profiled
 from quakedesign.identification.loading import prepared
-from quakedesign.identification.record import Record, part
+from quakedesign.identification.record import Record, part, read_record
 from quakedesign.identification.sliding_experiment import STIFFNESS
+from quakedesign.text import counted, shown
 
 _LEVEL = "reference_coefficient"
 _UNLIKELY = 0.01  # probability below which steps do not have one law
@@ -49,6 +51,35 @@ class Steps:
         """Everything that JSON can hold; SI units. That of the common fit, and every step under `steps`."""
         steps = [{"record": step.record.name, **step.to_dict()} for step in self.steps]
         return {**self.common.to_dict(), "probability": self.probability, "steps": steps}
+
+
+def read_steps(
+    path: str | Path, steps: str = "", *, begin: str | None = None, end: str | None = None, **how: Any
+) -> list[Record]:
+    """Records of the steps of a file: windows ``0 s to 60 s, 60 s to 120 s``, or as `cut` gives them with ``auto``.
+
+    One of the whole file by default. `how` is that of `read_record`.
+
+    Raises
+    ------
+    RecordError
+        As `read_record`, and for windows of another form or beside `begin` and `end`.
+    """
+    if steps in ("", "auto"):
+        record = read_record(path, begin=begin, end=end, **how)
+        return cut(record) if steps else [record]
+    if begin is not None or end is not None:
+        raise RecordError(
+            f"--from and --to are for one window. Received them beside --steps {shown(steps)}. Omit them."
+        )
+    found = []
+    for window in (each.strip() for each in steps.split(",")):
+        ends = window.split(" to ")
+        if len(ends) != 2:
+            raise RecordError(f"--steps must name windows as 0 s to 60 s, 60 s to 120 s. Received {shown(window)}.")
+        record = read_record(path, begin=ends[0].strip(), end=ends[1].strip(), **how)
+        found.append(replace(record, name=f"{record.name} {window}"))
+    return found
 
 
 def cut(record: Record) -> list[Record]:
@@ -114,9 +145,9 @@ def identify_steps(
     names = [*shared, _LEVEL]
     notes = tuple(f"step {i}: {note}" for i, step in enumerate(steps, start=1) for note in step.notes[:2])
     setup = Setup(experiment=best.experiment, used=np.ones(len(best.measured), dtype=bool), notes=notes)
-    name = " + ".join(step.record.name for step in steps)
-    counted = np.arange(float(len(best.measured)))
-    whole = replace(steps[0].record, name=name, time=counted, friction=best.measured, load_point=None, slip=None)
+    name = f"{steps[0].record.name} and {counted(len(steps) - 1, 'more step')}"
+    places = np.arange(float(len(best.measured)))
+    whole = replace(steps[0].record, name=name, time=places, friction=best.measured, load_point=None, slip=None)
     common = profiled(best, whole, setup, seed, names)
     count = len(shared) * (len(steps) - 1)
     freedom = sum(step.fit.freedom for step in steps)

@@ -9,11 +9,13 @@ import numpy as np
 
 from quakedesign.errors import OutputError
 from quakedesign.files import write_whole
-from quakedesign.identification.assessment import CANNOT_TELL, EXPLAINS_NOT
-from quakedesign.identification.experiment import TREND
+from quakedesign.identification.assessment import CANNOT_TELL, EXPLAINS, EXPLAINS_NOT
+from quakedesign.identification.experiment import Trended
 from quakedesign.identification.fitting import Fit, weighed
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
+from quakedesign.identification.several_steps import Steps
 from quakedesign.report.drawing import FORMATS, NATURAL, SMALL, figure, figure_bytes, finish
+from quakedesign.text import PREFIXES, power_of, quantity
 
 _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _MOST_OUTLIERS = 8
@@ -23,34 +25,79 @@ _LAGS = 40
 _SHORT, _LONG = 2e-7, 0.01  # D_c [m] that no gouge of a laboratory has
 
 
-def identification_lines(identification: Identification) -> list[str]:
-    """For people, within 80 columns: what was not told first."""
-    fit, assessment = identification.fit, identification.assessment
-    head = [f"{identification.record.name}: {identification.law.name} {assessment}"]
-    if assessment.verdict == CANNOT_TELL:
-        head = [f"{identification.record.name}: {identification.law.name}, {assessment}"]
-        head += [f"- {said}" for said in assessment.open]
-        head += [f"- would tell: {said}" for said in assessment.experiments]
-    elif assessment.verdict == EXPLAINS_NOT:
-        head += [f"- {said}" for said in identification.untold()]
-        head += [f"- try: {'; '.join(identification.to_try())}"]
-    head += [f"{'' if check.passed else 'NOT '}passed: {check.sentence}" for check in assessment.checks]
-    head += [""]
-    columns = f"{'parameter':24}{'value':>12}{'95 %: from':>14}{'to':>12}  unit"
-    shown = [*identification.estimates.values(), *([identification.difference] if identification.difference else [])]
-    rate = getattr(identification.law, "reference_rate", None)
-    tail = [
-        f"noise {fit.noise:.3g} of friction in {_samples(identification)}; of {fit.starts} searches from different "
-        f"starts (seed {identification.seed}) {fit.agreeing} end in this fit"
-        f"{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
-        *([str(identification.rival)] if identification.rival else []),
-        *_warnings(identification),
-        *_outliers(identification),
-        *([] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]),
-        f"assumed: {'; '.join(identification.notes)}",
-        *([f"read: {'; '.join(identification.record.remarks)}"] if identification.record.remarks else []),
+def identification_lines(found: Identification | Steps, *, verbose: bool = False) -> list[str]:
+    """For people, within 80 columns: the answer, a table, and what to do next; with `verbose` all that was tested."""
+    if isinstance(found, Steps):
+        each = [line for step in found.steps for line in identification_lines(step, verbose=True)]
+        table = [_STEP_HEAD, *(_step_row(i, step) for i, step in enumerate(found.steps, start=1))][: 1 + _MOST_STEPS]
+        more = len(found.steps) - _MOST_STEPS
+        table += [f"and {more} more: --verbose"] * (more > 0)
+        told = identification_lines(found.common)
+        head = told.index(_HEAD) - 1
+        said = f"All together: {found.common.assessment.checks[0].sentence}."
+        return [*told[:head], "", *table, "", *_wrapped([said]), *told[head + 1 :], *(each if verbose else [])]
+    assessment, law = found.assessment, found.law.name
+    reason = f": {assessment.open[0]}" if assessment.verdict == CANNOT_TELL else ""
+    joined = "," if assessment.verdict == CANNOT_TELL else ""
+    answer = f"{found.record.name}: {law}{joined} {assessment}{reason}."
+    sign = next((check for check in assessment.checks if check.name == "sign" and check.passed), None)
+    if sign is not None and assessment.verdict == EXPLAINS and found.difference is not None:
+        told = "weakens" if found.difference.value < 0 else "strengthens"
+        answer += f" Friction {told} with rate: a - b = {_number(found.difference)}."
+    said = [f"open too: {each}" for each in assessment.open[1:4] if reason]
+    said += [f"would tell: {each}" for each in assessment.experiments if assessment.verdict == CANNOT_TELL]
+    said += [f"- {each}" for each in found.untold() if assessment.verdict == EXPLAINS_NOT]
+    said += [f"try: {'; '.join(found.to_try())}"] * (assessment.verdict == EXPLAINS_NOT)
+    said += [
+        f"not passed: {check.sentence}" for check in assessment.checks if not check.passed and check.name != "sign"
     ]
-    return [*_wrapped(head), columns, *map(_row, shown), "", *_wrapped(tail)]
+    shown = [*found.estimates.values(), *([found.difference] if found.difference else [])]
+    said += [*_warnings(found), *_outliers(found), *_read(found, verbose)]
+    return [
+        *_wrapped([answer, ""]),
+        _HEAD,
+        *map(_row, shown),
+        "",
+        *_wrapped([*said, *(_more(found) if verbose else [])]),
+    ]
+
+
+_HEAD = f"{'parameter':24}{'value':>11}{'95 % interval':>25}  unit"
+_STEP_HEAD = f"{'step':5}{'a':>10}{'b':>10}{'a - b':>10}{'D_c':>10}{'k':>14}  verdict"
+_MOST_STEPS = 14
+_PREFIXED = ("m", "s", "Pa/m", "N/m")
+_COLUMNS = {"direct_effect": 10, "evolution_effect": 10, "difference": 10, "critical_slip": 10, "stiffness": 14}
+
+
+def _step_row(number: int, step: Identification) -> str:
+    """Values of a step; a question mark behind those without an interval."""
+    told = {**step.estimates, "difference": step.difference}
+    cells = []
+    for name, width in _COLUMNS.items():
+        one = told.get(name)
+        value = "" if one is None else quantity(one.value, one.unit) if one.unit else f"{one.value:.3g}"
+        cells.append(f"{value}{'' if one is None or one.identified else '?'}".rjust(width))
+    return f"{number:<5}{''.join(cells)}  {step.assessment.verdict.replace(' the record', '')}"
+
+
+def _more(found: Identification) -> list[str]:
+    """Tests that passed, noise and searches, what was assumed."""
+    fit = found.fit
+    return [
+        *(f"passed: {check.sentence}" for check in found.assessment.checks if check.passed),
+        f"noise {fit.noise:.3g} of friction in {_samples(found)}; of {fit.starts} searches from different starts "
+        f"(seed {found.seed}) {fit.agreeing} end in this fit"
+        f"{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
+        *([str(found.rival)] if found.rival else []),
+        *_reference(found),
+        f"assumed: {'; '.join(found.notes)}",
+    ]
+
+
+def _read(found: Identification, verbose: bool) -> list[str]:
+    """What was decided when the record was read; what was left out at least."""
+    told = [each for each in found.record.remarks if verbose or " is read as " not in each]
+    return [f"read: {'; '.join(told)}"] if told else []
 
 
 def _wrapped(told: list[str]) -> list[str]:
@@ -61,8 +108,26 @@ def _row(estimate: ParameterEstimate) -> str:
     name = estimate.name
     if " - " in name:
         name = "difference a - b" if name.count(" - ") == 1 else "difference a - b - b2"
-    low, high = (f"{end:.5g}" if math.isfinite(end) else "?" for end in (estimate.low, estimate.high))
-    return f"{name:24}{estimate.value:>12.5g}{low:>14}{high:>12}  {estimate.unit or '-'}"
+    value, ends, unit = _cells(estimate)
+    return f"{name:24}{value:>11}{ends:>25}  {unit or '-'}"
+
+
+def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
+    """Value, interval and unit with its prefix, in as many digits as the interval calls for."""
+    power = power_of(estimate.value) if estimate.unit in _PREFIXED else 0
+    wide = estimate.high - estimate.low
+    told = math.isfinite(wide) and wide > 0
+    digits = min(max(2 + math.ceil(math.log10(max(abs(estimate.value), wide) / wide)), 3), 6) if told else 3
+    value, low, high = (
+        f"{round(end / 10.0**power, 12):.{digits}g}" if math.isfinite(end) else "?"
+        for end in (estimate.value, estimate.low, estimate.high)
+    )
+    return value, f"{low} … {high}", f"{PREFIXES[power]}{estimate.unit}"
+
+
+def _number(estimate: ParameterEstimate) -> str:
+    value, ends, _ = _cells(estimate)
+    return f"{value} ({ends})"
 
 
 def _warnings(identification: Identification) -> list[str]:
@@ -87,6 +152,11 @@ def _samples(identification: Identification) -> str:
     return f"{kept} samples" if all_ == len(fit.counts) else f"one of {all_} samples, taken as {len(fit.counts)} means"
 
 
+def _reference(identification: Identification) -> list[str]:
+    rate = getattr(identification.law, "reference_rate", None)
+    return [] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]
+
+
 def _outliers(identification: Identification) -> list[str]:
     if not identification.outliers:
         return []
@@ -95,8 +165,46 @@ def _outliers(identification: Identification) -> list[str]:
     return [f"outliers left out: {told}{f', and {more} smaller' if more > 0 else ''}"]
 
 
+def steps_figure(found: Steps) -> Any:
+    """A panel a step with its own fit and the common one, and the regions of a and b of all.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    joint, at = found.common.fit.experiment, found.common.fit.fitted
+    count = len(found.steps)
+    names = [f"step {i}" for i in range(count)] + [""] * (count % 2)
+    rows = [names[i : i + 2] for i in range(0, len(names), 2)] + [["region", "region"]]
+    drawing, axes = figure(0, 1.7 * len(rows) + 1.2, mosaic=[[n or "." for n in row] for row in rows])
+    for i, step in enumerate(found.steps):
+        axis, path = axes[f"step {i}"], step.record.load_point
+        way = step.record.time[step.used] if path is None else path[step.used] * 1e6
+        _friction(axis, step, way, slice(None))
+        axis.plot(
+            way,
+            joint.parts[i].friction(at[joint.places[i]]),
+            color=_OUTLIER,
+            linewidth=1.0,
+            label="common fit",  # type: ignore[attr-defined]
+            linestyle=(0, (5, 2)),
+        )
+        axis.set_title(f"{i + 1}: {step.record.name}", fontsize=SMALL)
+        axis.set_xlabel("time [s]" if path is None else "displacement of the load point [um]", fontsize=SMALL)
+        _region(axes["region"], step, f"{i + 1}", f"C{i}")
+    _region(axes["region"], found.common, "all", "black")
+    axes["region"].legend(fontsize=SMALL - 1, frameon=False, ncols=4)
+    said = next(check.sentence for check in found.common.assessment.checks if check.name == "common")
+    return finish(drawing, said, [], "regions of 95 % of two parameters", legend=axes["step 0"])
+
+
 def identification_figure(identification: Identification) -> Any:
-    """Friction with fit and trend, rate of the load point, every step, residuals, their correlation, a joint region."""
+    """Friction with fit and trend, rate of the load point, every step, residuals, their correlation, a joint region.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     record, used, fit = identification.record, identification.used, identification.fit
     along = record.load_point if record.load_point is not None else record.slip
     way = record.time[used] if along is None else along[used] * 1e6
@@ -139,6 +247,11 @@ def identification_figure(identification: Identification) -> Any:
         axes[f"step {i}"].set_title(f"step at {way[place]:.4g} um", fontsize=SMALL)
     _correlation(axes["correlation"], fit)
     _region(axes["region"], identification)
+    boxes = [(e.low, e.high) for e in (identification.estimates[name] for name in _pair(fit))]
+    for box, line in zip(boxes, (axes["region"].axvline, axes["region"].axhline), strict=True):
+        for end in box:
+            if math.isfinite(end):
+                line(end, color=NATURAL, linewidth=0.6, linestyle=(0, (4, 2)))
     note = f"dashed: twice the noise, {fit.noise:.3g}; crosses beyond eight times it stand at its edge"
     title = f"{record.name}: {identification.law.name} {identification.assessment}"
     return finish(drawing, title, [], note, legend=axes["friction"])
@@ -152,12 +265,12 @@ def _steps(rates: "np.ndarray") -> list[int]:
 
 
 def _friction(axis: Any, identification: Identification, way: "np.ndarray", part: slice) -> None:
-    fit, values = identification.fit, identification.fit.experiment.outward(identification.fit.fitted)
+    fit = identification.fit
     simulated = fit.measured - fit.residuals
     axis.plot(way[part], fit.measured[part], ".", color=_MEASURED, markersize=2, label="measured")
     axis.plot(way[part], simulated[part], color=_FITTED, linewidth=1.2, label=f"fitted: {identification.law.name}")
-    if TREND in values:
-        line = simulated[0] + values[TREND] * 1e-6 * (way - way[0])
+    if isinstance(fit.experiment, Trended):
+        line = simulated[0] + fit.fitted[-1] * (fit.experiment.along - fit.experiment.along[0])
         axis.plot(way[part], line[part], color=NATURAL, linewidth=0.8, linestyle=(0, (4, 2)), label="trend")
     left = np.flatnonzero(~fit.kept[part]) + (part.start or 0)
     if len(left):
@@ -182,12 +295,17 @@ def _correlation(axis: Any, fit: Fit) -> None:
     axis.legend(fontsize=SMALL - 1, frameon=False)
 
 
-def _region(axis: Any, identification: Identification) -> None:
-    """Region of 95 % of two parameters by the slopes of the fit, in the box of their profiles."""
-    fit, names = identification.fit, [c.name for c in identification.fit.experiment.coordinates]
-    pair: list[str] = [name for name in ("direct_effect", "evolution_effect") if name in names]
-    pair = pair if len(pair) == 2 else names[:2]
-    places = [names.index(name) for name in pair]
+def _pair(fit: Fit) -> list[str]:
+    """The two parameters whose region is drawn."""
+    names = [c.name for c in fit.experiment.coordinates]
+    pair = [name for name in ("direct_effect", "evolution_effect") if name in names]
+    return pair if len(pair) == 2 else names[:2]
+
+
+def _region(axis: Any, identification: Identification, label: str = "", colour: str = _FITTED) -> None:
+    """Region of 95 % of two parameters by the slopes of the fit."""
+    fit, pair = identification.fit, _pair(identification.fit)
+    places = [[c.name for c in fit.experiment.coordinates].index(name) for name in pair]
     slopes = weighed(fit.weights, np.nan_to_num(fit.experiment.slopes(fit.fitted), posinf=0, neginf=0))
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
     spread = (np.linalg.pinv((slopes / size).T @ (slopes / size)) / np.outer(size, size))[np.ix_(places, places)]
@@ -198,25 +316,31 @@ def _region(axis: Any, identification: Identification) -> None:
         np.array([fit.experiment.coordinates[place].outward(fit.fitted[place] + v) for v in row])
         for place, row in zip(places, around.tolist(), strict=True)
     )
-    axis.plot(x, y, color=_FITTED, linewidth=1.0)
-    axis.plot(*(identification.estimates[name].value for name in pair), "+", color=_FITTED)
+    axis.plot(x, y, color=colour, linewidth=1.0, label=label)
+    axis.plot(*(identification.estimates[name].value for name in pair), "+", color=colour)
     axis.locator_params(axis="x", nbins=4)
-    boxes = [(e.low, e.high) for e in (identification.estimates[name] for name in pair)]
-    for box, line in zip(boxes, (axis.axvline, axis.axhline), strict=True):
-        for end in box:
-            if math.isfinite(end):
-                line(end, color=NATURAL, linewidth=0.6, linestyle=(0, (4, 2)))
     for name, told in zip(pair, (axis.set_xlabel, axis.set_ylabel), strict=True):
         told(f"{name} [{identification.estimates[name].unit or '-'}]", fontsize=SMALL)
 
 
 def require_format(path: Path) -> None:
-    """Refuse a figure of another format than SVG, PNG or PDF."""
+    """Refuse a figure of another format than SVG, PNG or PDF.
+
+    Raises
+    ------
+    OutputError
+    """
     if path.suffix[1:] not in FORMATS:
         raise OutputError(f"a figure must end in .{', .'.join(FORMATS)}. Received {path}. Write {path.stem}.svg, say.")
 
 
-def save_figure(identification: Identification, path: Path) -> None:
-    """Write the figure, whole or not at all, without a date so that the same figure is the same file."""
+def save_figure(identification: Identification | Steps, path: Path) -> None:
+    """Write the figure, whole or not at all, without a date so that the same figure is the same file.
+
+    Raises
+    ------
+    OutputError
+    """
     require_format(path)
-    write_whole(path, figure_bytes(identification_figure(identification), path.suffix[1:], path.stem))
+    draw: Any = steps_figure if isinstance(identification, Steps) else identification_figure
+    write_whole(path, figure_bytes(draw(identification), path.suffix[1:], path.stem))

@@ -47,7 +47,11 @@ def test_a_trend_is_a_parameter_and_leaves_the_sign(trended):
     assert trend.high - trend.low < 10
     assert 0 < difference.low < 0.004 < difference.high
     assert trended.assessment.verdict == "explains the record"
-    assert "a - b is positive" in " ".join(identification_lines(trended))
+    lines = identification_lines(trended)
+    assert "explains the record. Friction strengthens with rate: a - b = 0.00" in " ".join(map(str.strip, lines))
+    assert "passed: a - b is positive" in " ".join(identification_lines(trended, verbose=True))
+    assert len(lines) < 40
+    assert max(map(len, lines)) <= 80
 
 
 def test_a_record_without_a_trend_has_none_and_its_sign_holds_with_one():

@@ -250,9 +250,9 @@ def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(wea
     assert "reference_coefficient 0.6 at 1e-06 m/s is 0.63454 at 1e-09 m/s, as the file says it" in task_remarks(
         found, patch
     )
-    assert "that of steady sliding at 1e-06 m/s" in " ".join(identification_lines(found))
+    assert "that of steady sliding at 1e-06 m/s" in " ".join(identification_lines(found, verbose=True))
     assert "aging fits worse: squares 2 times as large, AIC higher by 300" in " ".join(
-        " ".join(identification_lines(found)).split()
+        " ".join(identification_lines(found, verbose=True)).split()
     )
     (said,) = law_remarks(found, patch)
     assert "crustal-patch names rate-and-state-aging, the record prefers rate-and-state-slip" in said

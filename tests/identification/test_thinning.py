@@ -103,7 +103,7 @@ def test_a_long_record_is_fitted_by_its_means_and_says_so():
     assert len(found.fit.counts) < 500
     assert found.fit.noise == pytest.approx(made.noise, rel=0.1)
     assert found.to_dict()["measurements"] == found.record.counts[found.used].sum()
-    told = " ".join(" ".join(identification_lines(found)).split())
+    told = " ".join(" ".join(identification_lines(found, verbose=True)).split())
     assert f"of friction in one of {found.fit.counts.sum()} samples, taken as {len(found.fit.counts)} means" in told
 
 
