@@ -19,7 +19,8 @@ _FEWEST = 8  # samples
 _MOST_PIECES = 40
 _PATIENCE = 4  # pieces that may explain nothing before the search ends
 _TIMELY = 0.01  # of a sampling period, by which the time of a change may be off unseen
-_MOST_DELAYS = 3
+_MOST_DELAYS = 4
+_HELD, _SLOW = 3.0, 0.05  # deviations of a rate about 0, and their share of the largest rate: less is a hold
 _LARGE_CHANGE = 1.25  # of rate, that is a step and no wandering
 _LEAST_CHANGE = 0.03  # of the faster rate: friction feels it by 3 % of a or b
 _ODDS = 4.0  # times log n: what a new piece must improve a fit by, in variances
@@ -92,8 +93,11 @@ def straight_pieces(time: "np.ndarray", position: "np.ndarray", scatter: float, 
     begins = np.concatenate([[time[0]], t[0] + knots * span])
     nearest = time[np.clip(np.searchsorted(time, begins - 1e-6 * span / len(time)), 0, len(time) - 1)]
     begins = np.where(np.abs(begins - nearest) < 1e-4 * span / len(time), nearest, begins)
-    rates = np.where(np.abs(rates) < 1e-9 * np.max(np.abs(rates)), 0.0, rates)
-    errors = _rate_errors(u, y - line, knots) / np.maximum(np.abs(rates), 1e-300)
+    errors = _rate_errors(u, y - line, knots)
+    most = float(np.max(np.abs(rates)))
+    held = (np.abs(rates) < _HELD * errors) & (_HELD * errors < _SLOW * most) & (np.arange(len(rates)) > 0)
+    rates = np.where(held | (np.abs(rates) < 1e-9 * most), 0.0, rates)
+    errors = np.where(rates == 0, 0.0, errors / np.maximum(np.abs(rates), 1e-300))
     found = Pieces(begins=begins, rates=rates * size / span, noise=0.0, rough=bool(rough), errors=errors)
     return replace(found, noise=float(np.std(position - found.position(time))))
 

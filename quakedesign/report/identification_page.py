@@ -9,13 +9,13 @@ import numpy as np
 
 from quakedesign.errors import OutputError
 from quakedesign.files import write_whole
-from quakedesign.identification.assessment import CANNOT_TELL, EXPLAINS, EXPLAINS_NOT
-from quakedesign.identification.experiment import Trended
+from quakedesign.identification.assessment import CANNOT_TELL, EXPLAINS_NOT
+from quakedesign.identification.experiment import DELAY, Trended
 from quakedesign.identification.fitting import Fit, weighed
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
 from quakedesign.identification.several_steps import Steps
 from quakedesign.report.drawing import FORMATS, NATURAL, SMALL, figure, figure_bytes, finish
-from quakedesign.text import PREFIXES, power_of, quantity
+from quakedesign.text import PREFIXES, plain, power_of, quantity
 
 _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _MOST_OUTLIERS = 8
@@ -41,17 +41,17 @@ def identification_lines(found: Identification | Steps, *, verbose: bool = False
     joined = "," if assessment.verdict == CANNOT_TELL else ""
     answer = f"{found.record.name}: {law}{joined} {assessment}{reason}."
     sign = next((check for check in assessment.checks if check.name == "sign" and check.passed), None)
-    if sign is not None and assessment.verdict == EXPLAINS and found.difference is not None:
+    if sign is not None and assessment.verdict != EXPLAINS_NOT and found.difference is not None:
         told = "weakens" if found.difference.value < 0 else "strengthens"
         answer += f" Friction {told} with rate: a - b = {_number(found.difference)}."
     said = [f"open too: {each}" for each in assessment.open[1:4] if reason]
     said += [f"would tell: {each}" for each in assessment.experiments if assessment.verdict == CANNOT_TELL]
     said += [f"- {each}" for each in found.untold() if assessment.verdict == EXPLAINS_NOT]
     said += [f"try: {'; '.join(found.to_try())}"] * (assessment.verdict == EXPLAINS_NOT)
-    said += [
-        f"not passed: {check.sentence}" for check in assessment.checks if not check.passed and check.name != "sign"
-    ]
-    shown = [*found.estimates.values(), *([found.difference] if found.difference else [])]
+    failed = [check.sentence for check in assessment.checks if not check.passed]
+    said += [f"not passed: {sentence}" for sentence in failed if sentence not in assessment.open]
+    shown = [each for each in found.estimates.values() if verbose or not each.name.startswith(DELAY)]
+    shown += [found.difference] if found.difference else []
     said += [*_warnings(found), *_outliers(found), *_read(found, verbose)]
     return [
         *_wrapped([answer, ""]),
@@ -119,7 +119,7 @@ def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
     told = math.isfinite(wide) and wide > 0
     digits = min(max(2 + math.ceil(math.log10(max(abs(estimate.value), wide) / wide)), 3), 6) if told else 3
     value, low, high = (
-        f"{round(end / 10.0**power, 12):.{digits}g}" if math.isfinite(end) else "?"
+        plain(end / 10.0**power, digits) if math.isfinite(end) else "?"
         for end in (estimate.value, estimate.low, estimate.high)
     )
     return value, f"{low} … {high}", f"{PREFIXES[power]}{estimate.unit}"

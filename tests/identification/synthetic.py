@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cache
+from zlib import crc32
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -252,7 +253,8 @@ OTHER_TROUBLES = {
 def troubled(kind, seed):
     """A record with a trouble, and the truth that its fit must hold, but for the trend and the beginning."""
     made = (TROUBLES | OTHER_TROUBLES)[kind]()
-    record = _with(made.noisy(seed), np.random.default_rng(10_000 + seed), kind.rpartition(", ")[2])
+    own = crc32(kind.encode())
+    record = _with(made.noisy((own, seed)), np.random.default_rng((own, seed, 1)), kind.rpartition(", ")[2])
     truth = dict(made.truth)
     if kind == "two states":
         truth |= {"second_effect": -0.003, "second_slip": 60 * MICRON}
