@@ -256,6 +256,8 @@ def identify(
     verbose
         Also print every test, the noise, the searches and what was assumed.
     """
+    from textwrap import wrap
+
     from quakedesign.errors import RecordError
     from quakedesign.fault import load_fault
     from quakedesign.identification.fault_file import law_remarks, next_command, other_parts, save_fault, task_remarks
@@ -294,8 +296,10 @@ def identify(
     told += [f"written: {', '.join(map(str, written))}"] if written else []
     if file is not None:
         told.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
-        told += [*task_remarks(identification, around), f"next: {next_command(identification, file)}"]
+        told += task_remarks(identification, around)
     told += [unwritten] if unwritten else []
+    told = [line for each in told for line in wrap(each, 80, subsequent_indent="  ", break_long_words=False)]
+    told += [f"next: {next_command(identification, file)}"] if file is not None else []
     places = {"figure": figure, "file": file}
     facts = found.to_dict() | {name: None if path is None else str(path) for name, path in places.items()}
     told += [] if verbose else ["tests, noise and assumptions: --verbose"]

@@ -10,3 +10,6 @@ from .identification_result import ParameterEstimate as ParameterEstimate
 from .identify import identify as identify
 from .record import Record as Record
 from .record import read_record as read_record
+from .several_steps import Steps as Steps
+from .several_steps import identify_steps as identify_steps
+from .several_steps import read_steps as read_steps

@@ -207,6 +207,9 @@ def _moved(law: FrictionLaw, moved: FrictionLaw) -> list[str]:
 
 def next_command(identification: Identification, path: str | Path) -> str:
     """The command that designs for a fault file of a record, for all constants that the record allows."""
+    difference = identification.difference
+    if identification.explained and difference is not None and difference.low > 0:
+        return "none is needed: friction strengthens with rate, so that the fault creeps without control"
     if not covers(identification.law) and (vague := _too_vague(identification)):
         return (
             f"none that covers the record, which is too vague: {vague}. Measure more, or design for the best fit alone"

@@ -49,7 +49,9 @@ def test_text_keeps_within_80_columns_and_says_what_is_not_from_the_record(recor
     assert "does not explain the record: residuals are" in " ".join(out.split())
     assert "not from the record" not in out
     written = run(capsys, *told, "--out", str(tmp_path / "own.toml"))[1]
-    assert "from lab-fault, not from the record: normal stress, size, task, T_s, disturbance" in written
+    assert "from lab-fault, not from the record: normal stress, size, task, T_s, disturbance" in " ".join(
+        written.split()
+    )
     assert "try: --figure, which shows where; another --law; one step alone" in " ".join(written.split())
     assert "next: none: the fit does not explain the record" in written
     exponential = (*told[:2], "exponential-slip-weakening", *told[3:], "--out", str(tmp_path / "better.toml"))
@@ -109,3 +111,22 @@ def test_nor_is_the_fault(record, capsys, tmp_path):
     assert code == 2
     assert "--out and --fault must be different files" in err
     assert load_fault(tmp_path / "own.toml").name == "lab-fault"
+
+
+def test_files_of_several_steps_are_fitted_together_and_one_with_trend_in_time_by_itself(tmp_path, capsys):
+    """Two files that cannot be fitted by one law without a state; options reach both."""
+    rows = [f"{t / 10}, {t / 10}, {0.6 + 0.0001 * (t % 3)}" for t in range(60)]
+    paths = [tmp_path / name for name in ("one.csv", "two.csv")]
+    for path in paths:
+        path.write_text("\n".join(["time [s], load_point_displacement [um], friction", *rows]))
+    code, _, err = run(capsys, *paths, "--law", "rate-and-state-sli")
+    assert code == 2
+    assert "friction law must be one of" in err
+    code, _, err = run(capsys, paths[0], "--steps", "0 s to 2 s, 2 s")
+    assert code == 2
+    assert "--steps must name windows" in err
+    assert "auto" in run(capsys, paths[0], "--trend", "never")[2]
+    for option in ("--out", "--figure"):
+        code, _, err = run(capsys, *paths, option, paths[1], "--force")
+        assert code == 2
+        assert "must" in err

@@ -50,6 +50,7 @@ def test_a_trend_is_a_parameter_and_leaves_the_sign(trended):
     lines = identification_lines(trended)
     assert "explains the record. Friction strengthens with rate: a - b = 0.00" in " ".join(map(str.strip, lines))
     assert "passed: a - b is positive" in " ".join(identification_lines(trended, verbose=True))
+    assert next_command(trended, "file.toml").startswith("none is needed: friction strengthens with rate")
     assert len(lines) < 40
     assert max(map(len, lines)) <= 80
 
