@@ -281,8 +281,9 @@ def identify(
     spring = None if stiffness is None else in_unit(stiffness, records[0].stiffness_unit, "stiffness")
     speeds = [in_unit(part.strip(), "m/s", "rates") for part in rates.split(",") if part.strip()]
     how: dict[str, Any] = {"stiffness": spring, "rates": speeds, "states": states, "trend": trend, "seed": seed}
-    found = fitted(records[0], law, **how) if len(records) == 1 else identify_steps(records, law, **how)
-    identification = getattr(found, "common", found)
+    several = identify_steps(records, law, **how) if len(records) > 1 else None
+    identification = fitted(records[0], law, **how) if several is None else several.common
+    found = several or identification
     file, unwritten = (out, "") if out is not None else (None, "")
     if out is not None:
         try:

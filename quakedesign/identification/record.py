@@ -8,6 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -154,9 +155,9 @@ def read_record(
 def part(record: Record, inside: "np.ndarray", name: str) -> Record:
     """Samples of a record, as a record of its own that begins with the first of them."""
     columns = ("time", "friction", "load_point", "slip", "normal", "counts", "load_rates")
-    values = {n: None if getattr(record, n) is None else getattr(record, n)[inside] for n in columns}
-    begun = float(values["time"][0]) if np.any(inside) else 0.0  # type: ignore[index]
-    values["time"] = values["time"] - begun  # type: ignore[operator]
+    values: dict[str, Any] = {n: None if getattr(record, n) is None else getattr(record, n)[inside] for n in columns}
+    begun = float(values["time"][0]) if np.any(inside) else 0.0
+    values["time"] = values["time"] - begun
     if values["load_point"] is not None:
         values["load_point"] = values["load_point"] - values["load_point"][:1]
     return replace(record, name=name, origin=record.origin + begun, **values)

@@ -188,8 +188,8 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
         finer = best.experiment.resolved(best.fitted, best.accuracy)
         fitted, _ = minimised(finer, measured, ones, best.fitted)
         best = replace(best, experiment=finer, fitted=fitted)
-    own = sum(fit.squares / fit.noise**2 for fit in fits)
-    return best, shared, max(best.squares - own, 0.0) / max(fit.correlation for fit in fits)
+    alone = sum(fit.squares / fit.noise**2 for fit in fits)
+    return best, shared, max(best.squares - alone, 0.0) / max(fit.correlation for fit in fits)
 
 
 def _assessed(common: Identification, steps: Sequence[Identification], probability: float) -> Assessment:

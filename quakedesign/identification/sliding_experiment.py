@@ -105,7 +105,9 @@ class SlidingExperiment(Experiment):
 
     def friction(self, fitted: "np.ndarray") -> "np.ndarray":
         """Friction coefficient [-] at every sample, sliding steadily at the first."""
-        return self._build["friction"](self._states(fitted)[:, self._sampled], np.asarray(fitted)[:, None])[0]
+        states = self._states(fitted)[:, self._sampled]
+        friction: np.ndarray = self._build["friction"](states, np.asarray(fitted)[:, None])[0]
+        return friction
 
     def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
         """Derivatives from the variational equations of the steps themselves: exact for what `friction` computes.

@@ -30,35 +30,35 @@ def identification_lines(found: Identification | Steps, *, verbose: bool = False
     if isinstance(found, Steps):
         each = [line for step in found.steps for line in identification_lines(step, verbose=True)]
         table = [_STEP_HEAD, *(_step_row(i, step) for i, step in enumerate(found.steps, start=1))][: 1 + _MOST_STEPS]
-        more = len(found.steps) - _MOST_STEPS
-        table += [f"and {more} more: --verbose"] * (more > 0)
-        told = identification_lines(found.common)
-        head = told.index(_HEAD) - 1
+        left = len(found.steps) - _MOST_STEPS
+        table += [f"and {left} more: --verbose"] * (left > 0)
+        common = identification_lines(found.common)
+        head = common.index(_HEAD) - 1
         said = f"All together: {found.common.assessment.checks[0].sentence}."
-        return [*told[:head], "", *table, "", *_wrapped([said]), *told[head + 1 :], *(each if verbose else [])]
+        return [*common[:head], "", *table, "", *_wrapped([said]), *common[head + 1 :], *(each if verbose else [])]
     assessment, law = found.assessment, found.law.name
     reason = f": {assessment.open[0]}" if assessment.verdict == CANNOT_TELL else ""
     joined = "," if assessment.verdict == CANNOT_TELL else ""
     answer = f"{found.record.name}: {law}{joined} {assessment}{reason}."
     sign = next((check for check in assessment.checks if check.name == "sign" and check.passed), None)
     if sign is not None and assessment.verdict != EXPLAINS_NOT and found.difference is not None:
-        told = "weakens" if found.difference.value < 0 else "strengthens"
-        answer += f" Friction {told} with rate: a - b = {_number(found.difference)}."
-    said = [f"open too: {each}" for each in assessment.open[1:4] if reason]
-    said += [f"would tell: {each}" for each in assessment.experiments if assessment.verdict == CANNOT_TELL]
-    said += [f"- {each}" for each in found.untold() if assessment.verdict == EXPLAINS_NOT]
-    said += [f"try: {'; '.join(found.to_try())}"] * (assessment.verdict == EXPLAINS_NOT)
+        does = "weakens" if found.difference.value < 0 else "strengthens"
+        answer += f" Friction {does} with rate: a - b = {_number(found.difference)}."
+    more = [f"open too: {each}" for each in assessment.open[1:4] if reason]
+    more += [f"would tell: {each}" for each in assessment.experiments if assessment.verdict == CANNOT_TELL]
+    more += [f"- {each}" for each in found.untold() if assessment.verdict == EXPLAINS_NOT]
+    more += [f"try: {'; '.join(found.to_try())}"] * (assessment.verdict == EXPLAINS_NOT)
     failed = [check.sentence for check in assessment.checks if not check.passed]
-    said += [f"not passed: {sentence}" for sentence in failed if sentence not in assessment.open]
+    more += [f"not passed: {sentence}" for sentence in failed if sentence not in assessment.open]
     shown = [each for each in found.estimates.values() if verbose or not each.name.startswith(DELAY)]
     shown += [found.difference] if found.difference else []
-    said += [*_warnings(found), *_outliers(found), *_read(found, verbose)]
+    more += [*_warnings(found), *_outliers(found), *_read(found, verbose)]
     return [
         *_wrapped([answer, ""]),
         _HEAD,
         *map(_row, shown),
         "",
-        *_wrapped([*said, *(_more(found) if verbose else [])]),
+        *_wrapped([*more, *(_more(found) if verbose else [])]),
     ]
 
 
@@ -172,7 +172,8 @@ def steps_figure(found: Steps) -> Any:
     -------
     matplotlib.figure.Figure
     """
-    joint, at = found.common.fit.experiment, found.common.fit.fitted
+    joint: Any = found.common.fit.experiment
+    at = found.common.fit.fitted
     count = len(found.steps)
     names = [f"step {i}" for i in range(count)] + [""] * (count % 2)
     rows = [names[i : i + 2] for i in range(0, len(names), 2)] + [["region", "region"]]
@@ -186,7 +187,7 @@ def steps_figure(found: Steps) -> Any:
             joint.parts[i].friction(at[joint.places[i]]),
             color=_OUTLIER,
             linewidth=1.0,
-            label="common fit",  # type: ignore[attr-defined]
+            label="common fit",
             linestyle=(0, (5, 2)),
         )
         axis.set_title(f"{i + 1}: {step.record.name}", fontsize=SMALL)
@@ -298,7 +299,7 @@ def _correlation(axis: Any, fit: Fit) -> None:
 def _pair(fit: Fit) -> list[str]:
     """The two parameters whose region is drawn."""
     names = [c.name for c in fit.experiment.coordinates]
-    pair = [name for name in ("direct_effect", "evolution_effect") if name in names]
+    pair: list[str] = [name for name in ("direct_effect", "evolution_effect") if name in names]
     return pair if len(pair) == 2 else names[:2]
 
 
