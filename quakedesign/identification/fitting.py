@@ -21,6 +21,7 @@ from quakedesign.identification.experiment import Experiment
 CONFIDENCE = 0.95
 _SHARE_OF_NOISE = 3e-3
 _ALONE = 0.4  # of an outlier, what lies beside it on the same side: more is a peak that is not explained
+_UNFELT = 1e-7  # of the largest slope, below which one is rounding
 _SHARE_OF_EXCESS = 2e-3  # by which a search may still get better when it ends
 
 
@@ -133,11 +134,12 @@ class Fit:
 
     def along(self, place: int) -> "np.ndarray":
         """Moves of all coordinates, to first order, with one of them by 1 and the others at their best."""
-        slopes, others = self._slopes, np.arange(len(self.fitted)) != place
-        scale = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
-        moves = np.ones(len(self.fitted))
-        found = np.linalg.lstsq(slopes[:, others] / scale[others], -slopes[:, place] / scale[place], rcond=1e-9)[0]
-        moves[others] = found * scale[place] / scale[others]
+        slopes, moves = self._slopes, np.zeros(len(self.fitted))
+        scale = np.linalg.norm(slopes, axis=0)
+        others = (scale > _UNFELT * np.max(scale)) & (np.arange(len(scale)) != place)
+        moves[others] = np.linalg.lstsq(slopes[:, others] / scale[others], -slopes[:, place], rcond=_UNFELT)[0]
+        moves[others] /= scale[others]
+        moves[place] = 1
         return moves
 
     @cached_property

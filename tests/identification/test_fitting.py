@@ -312,3 +312,21 @@ def test_the_advantage_is_of_the_samples_that_both_count():
     vars(one)["correlation"], vars(other)["correlation"] = 2.0, 3.0
     assert advantage(one, other) == pytest.approx((2.0, 3 / 2 * np.log(2)), rel=1e-12)
     assert advantage(other, one) == pytest.approx((0.5, -3 / 2 * np.log(2)), rel=1e-12)
+
+
+def test_a_move_along_a_valley_leaves_what_is_not_felt():
+    """With columns (1, 1, 0 but for rounding) of slopes, moving the second by 1 moves the first by -1 and no other."""
+    from types import SimpleNamespace
+
+    slopes = np.array([[1.0, 1.0, 1e-17], [2.0, 2.0, -1e-17], [3.0, 3.0, 0.0], [4.0, 4.0, 0.0]])
+    experiment = SimpleNamespace(slopes=lambda fitted: slopes, friction=lambda fitted: np.zeros(4))
+    told = Fit(
+        experiment=experiment,
+        fitted=np.zeros(3),
+        measured=np.ones(4),
+        counts=np.ones(4),
+        kept=np.ones(4, dtype=bool),
+        agreeing=1,
+        starts=1,
+    )
+    assert told.along(1) == pytest.approx([-1.0, 1.0, 0.0])
