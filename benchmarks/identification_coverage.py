@@ -1,6 +1,6 @@
 """How often regions of `identify` hold the truth, and how often the sign of a - b is told wrongly.
 
-Run with ``python benchmarks/identification_coverage.py``; half an hour of one core. ``--kinds trend 'rate column'``
+Run with ``python benchmarks/identification_coverage.py``; 50 minutes of one core. ``--kinds trend 'rate column'``
 takes some kinds. The records are those of `tests/identification/synthetic.py`, simulated by SciPy with equations of
 their own, each with one trouble of laboratories; the seed of a record is its number. ``--results FILE`` keeps a line
 for every record and goes on where it ended.
