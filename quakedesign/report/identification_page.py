@@ -82,14 +82,14 @@ def _step_row(number: int, step: Identification) -> str:
 
 def _more(found: Identification) -> list[str]:
     """Tests that passed, noise and searches, what was assumed."""
-    fit = found.fit
+    fit, rate = found.fit, getattr(found.law, "reference_rate", None)
     return [
         *(f"passed: {check.sentence}" for check in found.assessment.checks if check.passed),
         f"noise {fit.noise:.3g} of friction in {_samples(found)}; of {fit.starts} searches from different starts "
         f"(seed {found.seed}) {fit.agreeing} end in this fit"
         f"{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
         *([str(found.rival)] if found.rival else []),
-        *_reference(found),
+        *([] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]),
         f"assumed: {'; '.join(found.notes)}",
     ]
 
@@ -152,11 +152,6 @@ def _samples(identification: Identification) -> str:
     return f"{kept} samples" if all_ == len(fit.counts) else f"one of {all_} samples, taken as {len(fit.counts)} means"
 
 
-def _reference(identification: Identification) -> list[str]:
-    rate = getattr(identification.law, "reference_rate", None)
-    return [] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]
-
-
 def _outliers(identification: Identification) -> list[str]:
     if not identification.outliers:
         return []
@@ -166,12 +161,7 @@ def _outliers(identification: Identification) -> list[str]:
 
 
 def steps_figure(found: Steps) -> Any:
-    """A panel a step with its own fit and the common one, and the regions of a and b of all.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """A panel a step with its own fit and the common one, and the regions of a and b of all."""
     joint: Any = found.common.fit.experiment
     at = found.common.fit.fitted
     count = len(found.steps)
@@ -200,12 +190,7 @@ def steps_figure(found: Steps) -> Any:
 
 
 def identification_figure(identification: Identification) -> Any:
-    """Friction with fit and trend, rate of the load point, every step, residuals, their correlation, a joint region.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Friction with fit and trend, rate of the load point, every step, residuals, their correlation, a joint region."""
     record, used, fit = identification.record, identification.used, identification.fit
     along = record.load_point if record.load_point is not None else record.slip
     way = record.time[used] if along is None else along[used] * 1e6
@@ -325,23 +310,13 @@ def _region(axis: Any, identification: Identification, label: str = "", colour: 
 
 
 def require_format(path: Path) -> None:
-    """Refuse a figure of another format than SVG, PNG or PDF.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse a figure of another format than SVG, PNG or PDF."""
     if path.suffix[1:] not in FORMATS:
         raise OutputError(f"a figure must end in .{', .'.join(FORMATS)}. Received {path}. Write {path.stem}.svg, say.")
 
 
 def save_figure(identification: Identification | Steps, path: Path) -> None:
-    """Write the figure, whole or not at all, without a date so that the same figure is the same file.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Write the figure, whole or not at all, without a date so that the same figure is the same file."""
     require_format(path)
     draw: Any = steps_figure if isinstance(identification, Steps) else identification_figure
     write_whole(path, figure_bytes(draw(identification), path.suffix[1:], path.stem))
