@@ -62,7 +62,7 @@ def identification_lines(found: Identification | Steps, *, verbose: bool = False
     ]
 
 
-_HEAD = f"{'parameter':24}{'value':>11}{'95 % interval':>25}  unit"
+_HEAD = f"{'parameter':22}{'value':>13}{'95 % interval':>27}  unit"
 _STEP_HEAD = f"{'step':5}{'a':>10}{'b':>10}{'a - b':>10}{'D_c':>10}{'k':>14}  verdict"
 _MOST_STEPS = 14
 _PREFIXED = ("m", "s", "Pa/m", "N/m")
@@ -109,7 +109,7 @@ def _row(estimate: ParameterEstimate) -> str:
     if " - " in name:
         name = "difference a - b" if name.count(" - ") == 1 else "difference a - b - b2"
     value, ends, unit = _cells(estimate)
-    return f"{name:24}{value:>11}{ends:>25}  {unit or '-'}"
+    return f"{name:22}{value:>13}{ends:>27}  {unit or '-'}"
 
 
 def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
