@@ -25,7 +25,7 @@ def bearing():
         disturbances={"shock": ([0, 1], 5)},
         outputs={"place [m]": [1, 0], "speed [m/s]": [0, 1]},
     )
-    vertices = [(A + [[0, 0], [200 * a, 0]], B * (1 + b / 10)) for a, b in product((-1, 1), repeat=2)]
+    vertices = [(A + np.array([[0, 0], [200 * a, 0]]), B * (1 + b / 10)) for a, b in product((-1, 1), repeat=2)]
     return plant, vertices, np.array([[0], [5]]), (np.diag([1e4, 1]), 0.01), {"step": "0.001", "delay": "0.0003"}
 
 
@@ -41,7 +41,7 @@ def converter():
         disturbances={"current": ([0, 1 / C], 0.05)},
         outputs={"current [A]": [1, 0], "voltage [V]": [0, 1]},
     )
-    vertices = [(A + [[0, 0], [0, half * a]], B * (1 + b / 10)) for a, b in product((-1, 1), repeat=2)]
+    vertices = [(A + np.array([[0, 0], [0, half * a]]), B * (1 + b / 10)) for a, b in product((-1, 1), repeat=2)]
     return plant, vertices, np.array([[0], [0.05 / C]]), (np.eye(2), 100.0), {"step": "2e-5"}
 
 
