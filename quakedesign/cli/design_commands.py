@@ -69,8 +69,9 @@ class DesignOptions(WellOptions):
     published_scheme
         Scheme of the runs of published gains, see --scheme.
     plant
-        Plant of the runs: stick-slip (by default; friction holds the fault at rest), or printed (the paper's,
-        continued to negative slip rates). Not for rate-and-state faults, which never rest.
+        Plant of the runs and of the e-LQR's guarantee: stick-slip (friction holds the fault at rest), or printed (the
+        paper's, continued to negative slip rates). By default stick-slip; the guarantee is on the plant without stick
+        where it has no proof on this one. Not for rate-and-state faults, which never rest.
     whole_task
         Rate-and-state faults: simulate the whole task instead of 500 D_c/V of it. The proof covers the whole task in
         either case.

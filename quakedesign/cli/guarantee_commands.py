@@ -55,7 +55,7 @@ def guarantee(
     measured: Literal["slip-and-rate", "slip", "differentiator"] = "slip-and-rate",
     around: SetupOptions = _IDEAL,
     disturbance_class: DisturbanceClass = "amplitude",
-    plant: Literal["printed", "stick-slip"] = "printed",
+    plant: Literal["stick-slip", "printed"] | None = None,
     stress: ExactPascals | None = None,
     spread: str = "0",
     box: Box = None,
@@ -94,8 +94,9 @@ def guarantee(
     disturbance_class
         amplitude: any disturbance of the fault's amplitude; rate: also with the fault's rate of change, starting at 0.
     plant
-        printed: the plant without stick, continued to negative slip rates; stick-slip: friction holds the fault at
-        rest, and it never slips backward (e-LQR, exact measurements, a pressure that acts at once).
+        stick-slip: friction holds the fault at rest, and it never slips backward (designed e-LQR, exact slip rate, a
+        pressure that acts at once); printed: the plant without stick, continued to negative slip rates. By default the
+        first where it has a proof, else the second.
     stress
         Rate-and-state faults (slow sliding, e-LQR through a diffusion path or a lag): bound of the shear stress
         disturbance, such as '25 kPa'; by default the largest that the design withstands.

@@ -85,6 +85,8 @@ class LoopAnswer:
         Gains, scale and settings of a sliding mode that runs in the scheme ``compensated``.
     notes : tuple of str or None
         Of a user's law: what was changed when its floats became exact numbers; None for others.
+    not_at_rest : str
+        Why there is no guarantee on the stick–slip plant, where one was searched for.
     """
 
     fault: Fault
@@ -96,6 +98,7 @@ class LoopAnswer:
     nearest: tuple[str, Guarantee] | None = None
     compensation: Compensation | None = None
     notes: tuple[str, ...] | None = None
+    not_at_rest: str = ""
 
     @property
     def proved(self) -> bool:
@@ -104,7 +107,8 @@ class LoopAnswer:
 
     def lines(self) -> list[str]:
         """Lines of text: the guarantee first, then the worst case found, then what was changed in the law."""
-        return [*self._lines(), *(self.notes or ())]
+        tried = [f"not proved on the stick-slip plant: {self.not_at_rest}"] if self.not_at_rest else []
+        return [*self._lines(), *tried, *(self.notes or ())]
 
     def _lines(self) -> list[str]:
         if not self.found.proved:
@@ -212,6 +216,11 @@ class LoopAnswer:
         return smallest_peak(self.found.task, step, held.delay, slip_noise=held.slip_noise, rate_noise=rate_noise)
 
     @property
+    def least_slip_rate(self) -> LowerBound | None:
+        """Slip-rate error [m/s] that no controller goes below at the same T_s; None if unknown."""
+        return None if self.limit is None else self.limit.slip_rate_error
+
+    @property
     def leaves_with_stick(self) -> bool:
         """Whether the stick–slip plant exceeds the claims in the worst case found."""
         if not self.found.proved or self.worst_with_stick is None:
@@ -236,6 +245,7 @@ class LoopAnswer:
                 "shorter": shorter,
                 "nearest": self.nearest and _nearest(*self.nearest),
                 **({} if self.notes is None else {"notes": list(self.notes)}),
+                **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             }
         bounds, held = self.found.bounds(), self.found.held
         small = None if isinstance(bounds, NoGuarantee) else float_above(bounds.small_gain)
@@ -255,6 +265,7 @@ class LoopAnswer:
             "pump": None if held.pump is None else held.pump.to_dict(),
             "law": _law(held.law),
             **({} if self.notes is None else {"notes": list(self.notes)}),
+                **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
 

@@ -3,11 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 from quakedesign.errors import ParameterError
-from quakedesign.exact import rational
+from quakedesign.exact import LowerBound, rational
 from quakedesign.fault import Fault
+from quakedesign.guarantees.exact.impossibility import smallest_stick_slip_rate
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip, design_stick_slip, worst_stick_slip
@@ -32,16 +33,30 @@ class StickSlipAnswer:
     fault: Fault
     found: StickSlipGuarantee | NoGuarantee
     worst: WorstStickSlip | None = None
+    compensation: ClassVar[None] = None
 
     @property
     def proved(self) -> bool:
         """Whether there is a guarantee."""
         return self.found.proved
 
+    @property
+    def least_slip_rate(self) -> LowerBound | None:
+        """Slip rate [m/s] that the fault reaches at this T_s under every controller; None without a guarantee."""
+        return smallest_stick_slip_rate(self.found.task, self.found.held.step) if self.found.proved else None
+
+    def limit_lines(self) -> list[str]:
+        """Performance limit at the same T_s, as text; empty if unknown."""
+        least = self.least_slip_rate
+        if least is None or not self.found.proved:
+            return []
+        step = f"{float(self.found.held.step):.6g} s"
+        return [f"no controller with zero-order hold over T_s = {step} keeps the slip rate below {least.quantity('m/s')}"]
+
     def lines(self) -> list[str]:
-        """For people: the sentence first, then the worst case found."""
+        """For people: the sentence first, then the worst case found and the performance limit."""
         if not self.found.proved:
-            return [self.found.sentence(), "the plant without stick may have a guarantee: omit --plant"]
+            return [self.found.sentence(), "the plant without stick may have a guarantee: use --plant printed"]
         healing = self.found.covered_healing()
         said = [
             f"proved: {self.found.sentence()}",
@@ -53,7 +68,7 @@ class StickSlipAnswer:
                 f"{quantity(self.worst.behind, 'm')} behind and {quantity(self.worst.ahead, 'm')} ahead of the "
                 "reference"
             )
-        return said
+        return said + self.limit_lines()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
@@ -63,15 +78,21 @@ class StickSlipAnswer:
         return {
             "verdict": "proved",
             "sentence": self.found.sentence(),
-            "plant": "stick-slip",
+            "plant": self.found.plant,
+            "slip_error": self.found.claims.slip_error.exact,
             **self.found.claims.to_dict(),
             "covered_healing": float(self.found.covered_healing()),
             "worst_found": worst
             and {"slip_rate": worst.slip_rate, "slip_behind": worst.behind, "slip_ahead": worst.ahead},
+            "limit": None if (least := self.least_slip_rate) is None else {"slip_rate": least.exact},
             "step": str(self.found.held.step),
             **{name: str(size) for name, size in self.found.held.noise.items()},
             "law": {name: str(getattr(law, name)) for name in GAIN_UNITS},
         }
+
+
+TAKEN = frozenset({"step", "slip_noise"})
+"""Quantities of a loop setup that the theorem knows."""
 
 
 def answer_stick_slip(
@@ -99,12 +120,10 @@ def answer_stick_slip(
     ParameterError
         For another quantity of the setup.
     """
-    if unknown := setup.given().keys() - {"step", "slip_noise"}:
+    if unknown := setup.given().keys() - TAKEN:
         raise ParameterError(
             "a guarantee on the stick-slip plant is proved for an exact slip rate, bounded noise of the slip and a "
-            "pressure that acts at once. "
-            f""
-            f"Received {', '.join(sorted(unknown))}. Omit the quantity, or omit plant."
+            f"pressure that acts at once. Received {', '.join(sorted(unknown))}. Omit the quantity, or omit plant."
         )
     task = uncertain_plant(fault)
     step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)
@@ -114,4 +133,9 @@ def answer_stick_slip(
             progress(said, done)
 
     found = design_stick_slip(task, step, objective=objective, slip_noise=setup.slip_noise, tell=tell)
+    return attacked_stick_slip(fault, found)
+
+
+def attacked_stick_slip(fault: Fault, found: StickSlipGuarantee | NoGuarantee) -> StickSlipAnswer:
+    """A guarantee with the worst case found on its loop."""
     return StickSlipAnswer(fault=fault, found=found, worst=worst_stick_slip(found) if found.proved else None)

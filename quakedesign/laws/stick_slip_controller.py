@@ -1,7 +1,7 @@
 """The sampled law for friction that sticks as a controller that simulations run."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
@@ -27,6 +27,8 @@ class StickSlipController(Controller):
     law : StickSlipLaw
     step : Fraction
         T_s [s].
+    sticks : bool
+        Whether the predicted slip rate and the innovation at rest are cut off; without, the law is linear.
     """
 
     name: ClassVar[str] = "stick-slip"
@@ -38,12 +40,18 @@ class StickSlipController(Controller):
     gains: Mapping[str, Fraction] = field(default_factory=dict, init=False)
     law: StickSlipLaw
     step: Fraction
+    sticks: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gains", MappingProxyType({name: getattr(self.law, name) for name in GAIN_UNITS}))
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
-        return partial(type(self), law=self.law, step=self.step), ()
+        return partial(type(self), law=self.law, step=self.step, sticks=self.sticks), ()
+
+    @property
+    def while_moving(self) -> "StickSlipController":
+        """The linear law that it is while the fault slides and its target rate is positive."""
+        return replace(self, sticks=False)
 
     @property
     def sampling(self) -> Sampling:
@@ -66,11 +74,12 @@ class StickSlipController(Controller):
         slip, rate = signals.slip, signals.slip_rate
         innovation = slip - last_slip - period * (last_rate + predicted) / 2
         lowest = -period * predicted / 2 - to_sympy(law.rest_slip)
-        stopped = sp.Piecewise((sp.Max(innovation, lowest), rate <= 0), (innovation, True))
-        level += to_sympy(law.level_gain) * (rate - predicted) + to_sympy(law.slip_gain) * stopped
+        if self.sticks:
+            innovation = sp.Piecewise((sp.Max(innovation, lowest), rate <= 0), (innovation, True))
+        level += to_sympy(law.level_gain) * (rate - predicted) + to_sympy(law.slip_gain) * innovation
         target = rate - signals.slip_rate_error - to_sympy(law.return_rate) * signals.slip_error
         pressure = -to_sympy(law.rate_gain) * rate + to_sympy(law.target_gain) * target - level
-        return pressure, (level, sp.Max(target, 0), rate, slip)
+        return pressure, (level, sp.Max(target, 0) if self.sticks else target, rate, slip)
 
     @classmethod
     def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:

@@ -115,11 +115,11 @@ def designed_comparison(
     options : mapping, optional
         Of `quakedesign.design`, such as ``objective`` and ``continuous``.
     whole_task, plant : bool, str
-        As of `compare`.
+        As of `compare`; the plant also of `quakedesign.design`.
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """
     for name in filter(None, schemes.values()):
         simulation_scheme(name)
     shown: dict[str, Any] = {"whole_task": whole_task, "plant": plant, **schemes}
-    return compare(fault, designs_of(fault, names, tell, options), progress=tell, **shown)
+    return compare(fault, designs_of(fault, names, tell, {**(options or {}), "plant": plant}), progress=tell, **shown)

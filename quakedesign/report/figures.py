@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quakedesign.fault import Fault
-from quakedesign.guarantees import Guarantee
+from quakedesign.guarantees import Guarantee, SlidingGuarantee
 from quakedesign.report.drawing import (
     INDUCED,
     NATURAL,
@@ -350,9 +350,8 @@ def _levels(entry: "Entry") -> "Iterator[tuple[float, str, str, str]]":
     if entry.answer.worst is not None:
         worst = worst_slip_rate(entry.answer.worst, entry.guaranteed)
         yield worst, f"worst case found: {quantity(worst, 'm/s')}", "dotted", INDUCED
-    limit = getattr(entry.answer, "limit", None)
-    if limit is not None:
-        least = limit.slip_rate_error
+    least = getattr(entry.answer, "least_slip_rate", None)
+    if least is not None:
         yield float(least), f"limit of every controller: {least.quantity('m/s')}", "dashdot", "#777777"
 
 
@@ -410,16 +409,18 @@ def error_figure(comparison: "Compared") -> Any:
 
 def _proved_bounds(slip: Any, rate: Any, entries: "Sequence[Entry]") -> None:
     """Lines at the proved bounds of both errors; laws with the same bounds share a line."""
-    bounds: dict[tuple[float, float], str] = {}
+    bounds: dict[tuple[float, float], tuple[str, str]] = {}
     for entry in entries:
-        if isinstance(entry.guaranteed, Guarantee):
-            claims = entry.guaranteed.claims
-            bounds.setdefault((float(claims.slip_error), float(claims.slip_rate_error)), colour(entry.design.name))
-    label = "proved for the plant without stick"
-    for (of_slip, of_rate), shade in bounds.items():
-        slip.axhline(of_slip, color=shade, linestyle=":", linewidth=1.4, label=label)
+        found = entry.guaranteed
+        if found is not None and not isinstance(found, SlidingGuarantee):
+            label = "proved for the plant without stick" if isinstance(found, Guarantee) else "proved"
+            ends = float(found.claims.slip_error), float(found.slip_rate_error)
+            bounds.setdefault(ends, (colour(entry.design.name), label))
+    named = set[str]()
+    for (of_slip, of_rate), (shade, label) in bounds.items():
+        slip.axhline(of_slip, color=shade, linestyle=":", linewidth=1.4, label="" if label in named else label)
         rate.axhline(of_rate, color=shade, linestyle=":", linewidth=1.4)
-        label = ""
+        named.add(label)
 
 
 _SHOWN = {

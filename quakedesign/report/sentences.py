@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault
-from quakedesign.guarantees import ContinuousPeaks, NoGuarantee
+from quakedesign.guarantees import ContinuousPeaks, Guarantee, NoGuarantee
 from quakedesign.laws import control_laws
 from quakedesign.linear.robust_stability import Analysis
 from quakedesign.linear.sampled_stability import HeldLoop
@@ -27,7 +27,7 @@ from quakedesign.synthesis import Design
 from quakedesign.text import lasting
 
 if TYPE_CHECKING:
-    from quakedesign.guarantees import Guarantee, SlidingGuarantee
+    from quakedesign.guarantees import SlidingGuarantee, StickSlipGuarantee
     from quakedesign.studies.runs import StateRun
 
 
@@ -50,7 +50,7 @@ def grade(entry: "Entry") -> str:
     return f"{reach}; UNSTABLE if p is held over T_s" if _unstable_if_held(entry) else reach
 
 
-def _guaranteed(found: "Guarantee | SlidingGuarantee") -> str:
+def _guaranteed(found: "Guarantee | SlidingGuarantee | StickSlipGuarantee") -> str:
     return f"guaranteed: slip rate <= {found.peak_slip_rate:.3g} m/s, slip error <= {found.claims.slip_error:.3g} m"
 
 
@@ -327,9 +327,10 @@ def _verdict(design: Design, run: Trajectory | None) -> list[str]:
     """Of the sampled loop or in continuous time, with the reason where it is not positive."""
     if design.verdict is Verdict.PROVED:
         lasts = "for all t >= 0" if design.runs is None or not design.runs.proved else design.runs.lasts
-        plant = "for the loop that ran"
-        if run is not None and run.provenance["plant"] == STICK_SLIP:
-            plant = "for this sampled loop on the plant without stick"
+        plant, proved = "for the loop that ran", getattr(design.runs, "plant", Guarantee.plant)
+        if run is not None and run.provenance["plant"] != proved:
+            other = "stick-slip plant" if proved == STICK_SLIP else "plant without stick"
+            plant = f"for this sampled loop on the {other}"
         return [f"proved {plant}, {lasts}" if _sampled(design) else "proved in continuous time"]
     unsaid = {Verdict.REFUTED: "a counterexample checks in exact arithmetic", Verdict.UNDECIDED: "no certificate"}
     return _because(design.verdict, design.details.get("reason", unsaid[design.verdict]))

@@ -8,8 +8,9 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from quakedesign.exact import Bound, UpperBound
-from quakedesign.guarantees import Guarantee, SlidingGuarantee
+from quakedesign.guarantees import Guarantee, SlidingGuarantee, StickSlipGuarantee
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
+from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
 from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines
 from quakedesign.studies.comparison import pressure_extremes
 from quakedesign.studies.runs import StateRun
@@ -103,7 +104,7 @@ def _row(entry: "Entry") -> Row:
     pressure: tuple[Bound | float, Bound | float] | None = seen
     if isinstance(found, SlidingGuarantee):
         pressure = found.valve_pressures
-    elif isinstance(found, Guarantee):
+    elif found is not None:
         pressure = found.claims.pressures[-1]
     label = entry.label.removesuffix(" (designed)").replace(" (published)", ", published")
     return Row(
@@ -119,12 +120,14 @@ def _row(entry: "Entry") -> Row:
     )
 
 
-def worst_slip_rate(worst: WorstFound | WorstSliding, found: Guarantee | SlidingGuarantee | None) -> float:
+def worst_slip_rate(
+    worst: WorstFound | WorstSliding | WorstStickSlip, found: Guarantee | SlidingGuarantee | StickSlipGuarantee | None
+) -> float:
     """Slip rate [m/s] of the worst case found; of its error where no more is followed."""
     if isinstance(worst, WorstSliding):
         assert isinstance(found, SlidingGuarantee)
         return float(found.task.rate) * exp(worst.log_rate)
-    return worst.slip_rate_error
+    return worst.slip_rate if isinstance(worst, WorstStickSlip) else worst.slip_rate_error
 
 
 def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
@@ -151,12 +154,12 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
 
 
 def _with_stick(answer: object) -> Iterator[str]:
-    """Worst case found where friction holds the fault at rest, and which command looks for a proof there."""
-    seen = getattr(answer, "worst_with_stick", None)
+    """Worst case found where friction holds the fault at rest, and why there is no proof there."""
+    seen, why = getattr(answer, "worst_with_stick", None), getattr(answer, "not_at_rest", "")
     if seen is not None:
         yield (
             f"worst case found on the stick-slip plant: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
-            f"{quantity(seen.slip_rate_error, 'm/s')}; guarantee --plant stick-slip looks for a law with a proof there"
+            f"{quantity(seen.slip_rate_error, 'm/s')}{f'; no proof there: {why}' if why else ''}"
         )
 
 

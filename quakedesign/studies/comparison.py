@@ -20,9 +20,12 @@ from quakedesign.guarantees import (
     LoopAnswer,
     NoGuarantee,
     SlidingGuarantee,
+    StickSlipAnswer,
+    StickSlipGuarantee,
     attacked,
 )
 from quakedesign.guarantees.guarantee_result import SlidingAnswer
+from quakedesign.guarantees.stick_slip_answer import attacked_stick_slip
 from quakedesign.laws import Controller, published
 from quakedesign.linear.riccati import vertex_poles
 from quakedesign.linear.sampled_stability import HeldLoop
@@ -72,7 +75,7 @@ class Entry:
         For a linear law: what is decided when p is held over T_s, see `Design.held_loop`.
     peaks : mapping of str to ContinuousPeaks
         For a designed linear law that is proved: peaks in continuous time by class; no class without any.
-    answer : LoopAnswer, SlidingAnswer or None
+    answer : LoopAnswer, SlidingAnswer, StickSlipAnswer or None
         For a designed law: what is guaranteed of it with p held over T_s, see `Design.guarantee`, and the worst found.
     """
 
@@ -85,15 +88,15 @@ class Entry:
     variants: tuple[Variant, ...] = ()
     held: HeldLoop | None = None
     peaks: Mapping[str, ContinuousPeaks] = field(default_factory=dict)
-    answer: LoopAnswer | SlidingAnswer | None = None
+    answer: LoopAnswer | SlidingAnswer | StickSlipAnswer | None = None
 
     @property
-    def guarantee(self) -> Guarantee | SlidingGuarantee | NoGuarantee | None:
+    def guarantee(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee | None:
         """Of the loop with p held over T_s."""
         return self.answer.found if self.answer else None
 
     @property
-    def guaranteed(self) -> Guarantee | SlidingGuarantee | None:
+    def guaranteed(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | None:
         """The guarantee, if there is one."""
         return None if isinstance(self.guarantee, NoGuarantee) else self.guarantee
 
@@ -202,11 +205,14 @@ def behind_path(fault: Fault) -> dict[str, str]:
     return {name: why for name in designable(fault) if name != "elqr"}
 
 
-def _answer(fault: Fault, design: Design) -> LoopAnswer | SlidingAnswer | None:
+def _answer(fault: Fault, design: Design) -> LoopAnswer | SlidingAnswer | StickSlipAnswer | None:
     found = design.guarantee
     if isinstance(found, SlidingGuarantee):
         return design.sliding
-    return replace(attacked(fault, found), compensation=design.compensation)
+    if isinstance(found, StickSlipGuarantee):
+        return attacked_stick_slip(fault, found)
+    tried = str(design.details.get("not_at_rest", ""))
+    return replace(attacked(fault, found), compensation=design.compensation, not_at_rest=tried)
 
 
 def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, whole: bool) -> Compared:

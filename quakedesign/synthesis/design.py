@@ -21,6 +21,7 @@ from quakedesign.guarantees import (
     Guarantee,
     NoGuarantee,
     SlidingGuarantee,
+    StickSlipGuarantee,
 )
 from quakedesign.guarantees.guarantee_result import SlidingAnswer
 from quakedesign.guarantees.search.defaults import REACH
@@ -63,7 +64,7 @@ class Design:
         What synthesis decided: exact numbers as texts.
     setup : LoopSetup
         For which a sampled law is designed.
-    runs : Guarantee, SlidingGuarantee or NoGuarantee, optional
+    runs : Guarantee, SlidingGuarantee, StickSlipGuarantee or NoGuarantee, optional
         What was proved of the loop that runs while it was designed; None to find it when `guarantee` is asked for.
     sliding : SlidingAnswer, optional
         For friction with a state: the law as it runs, with its rock, and the task that it is designed for.
@@ -80,7 +81,7 @@ class Design:
     domain: Domain | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
     setup: LoopSetup = IDEAL
-    runs: Guarantee | SlidingGuarantee | NoGuarantee | None = None
+    runs: Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee | None = None
     sliding: SlidingAnswer | None = None
     disturbance_class: str = CLASSES[0]
 
@@ -156,7 +157,7 @@ class Design:
         return method_of(type(law)).certified_peaks(self.fault, law, disturbance_class)
 
     @property
-    def guarantee(self) -> Guarantee | SlidingGuarantee | NoGuarantee:
+    def guarantee(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee:
         """Guarantee of the sampled law with zero-order hold, or the reason why there is none.
 
         A law of samples has its own T_s, a sliding mode of samples runs in the scheme ``compensated``; the integrals of
@@ -174,7 +175,7 @@ class Design:
     def compensation(self) -> Compensation | None:
         """A sampled sliding mode with its guarantee; None for another law."""
         law, found = self.controller, self.guarantee
-        if law is None or law.sampling is None or isinstance(found, SlidingGuarantee):
+        if law is None or law.sampling is None or isinstance(found, SlidingGuarantee | StickSlipGuarantee):
             return None
         return method_of(type(law)).compensation(law, found)
 
@@ -212,6 +213,7 @@ def design(
     feedforward: str = "none",
     objective: str = "tracking",
     continuous: bool = False,
+    plant: str | None = None,
     stress: Quantity | None = None,
     spread: Quantity = 0,
     disturbance_class: str = CLASSES[0],
@@ -252,6 +254,9 @@ def design(
         ``"tracking"`` for small errors under slow disturbances, ``"peak"`` for the smallest guaranteed slip-rate error.
     continuous : bool
         The paper's design in continuous time.
+    plant : str, optional
+        ``printed`` for a guarantee on the plant without stick; unless given an e-LQR has one on the stick–slip plant
+        where it can be proved.
     stress : str, float or Fraction, optional
         Of rate-and-state friction: bound of the shear stress disturbance [Pa]; the largest that the design withstands
         unless given.
@@ -298,12 +303,15 @@ def design(
     added = NONE if feedforward == NONE.name else feed_forward(feedforward, fault, least_authority(fault))
     require_known(objective, OBJECTIVES, "objective")
     require_known(disturbance_class, CLASSES, "class")
+    if plant is not None:
+        require_known(plant, (StickSlipGuarantee.plant, Guarantee.plant), "plant")
     if continuous and objective != OBJECTIVES[0]:
         raise ParameterError(
             f"the objective of a design in continuous time must be {OBJECTIVES[0]}. Received {objective!r}. "
             "Omit objective, or continuous."
         )
     told: Any = {"objective": objective, "continuous": continuous, "disturbance_class": disturbance_class}
+    told |= {"plant": plant}
     told["setup"] = replace(setup, diffusion=Fraction(0)) if fault.friction.state_names else setup
     told |= {"tell": progress} if progress else {}
     return law.design(GainProblem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **told))

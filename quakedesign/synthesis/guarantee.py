@@ -10,7 +10,7 @@ from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.exact import exact_text, rational
 from quakedesign.fault import BlockChain, Fault, with_accepted_fit
 from quakedesign.fault.units import exact_value
-from quakedesign.guarantees import CLASSES, OBJECTIVES, LoopAnswer, NoGuarantee
+from quakedesign.guarantees import CLASSES, OBJECTIVES, Guarantee, LoopAnswer, NoGuarantee, StickSlipGuarantee
 from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
@@ -23,6 +23,7 @@ from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
 from quakedesign.plant import FaultPlant, UncertainPlant, uncertain_plant
 from quakedesign.synthesis.method import Wanted, method_of
+from quakedesign.synthesis.state_feedback import may_stick
 from quakedesign.synthesis.plant_guarantees import guarantee_plant
 
 Found = TypeVar("Found")
@@ -72,7 +73,7 @@ def _asked(question: Callable[[], Found]) -> Found | QuakedesignError:
         return refused
 
 
-PLANTS = ("printed", "stick-slip")
+STICK_SLIP, PRINTED = PLANTS = StickSlipGuarantee.plant, Guarantee.plant
 BLOCK_LAWS = ("centralised", "decentralised")
 """Of several blocks: the pressure of each well depends on all measurements, or on those of its own."""
 _PUMP = ("saturation", "withdrawal", "rate_limit")
@@ -91,7 +92,7 @@ def guarantee(
     disturbance_class: str = CLASSES[0],
     stress: Quantity | None = None,
     spread: Quantity = 0,
-    plant: str = PLANTS[0],
+    plant: str | None = None,
     progress: Callable[[str, float], None] | None = None,
     accept_poor_fit: bool = False,
     **given: Quantity | None,
@@ -129,9 +130,10 @@ def guarantee(
     spread : str, float or Fraction
         Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
     plant : str
-        ``printed``: the plant without stick, its friction continued to negative slip rates; ``stick-slip``: friction
-        holds the fault at rest and it never slips backward. The second designs an e-LQR with a
-        prediction that is never negative (`StickSlipLaw`), for exact measurements and a pressure that acts at once.
+        ``stick-slip``: friction holds the fault at rest and it never slips backward; an e-LQR is designed whose
+        predicted slip rate is never negative (`StickSlipLaw`), for an exact slip rate and a pressure that acts at once.
+        ``printed``: the plant without stick, its friction continued to negative slip rates. Unless given the first
+        where it applies and has a proof, else the second.
     progress : callable, optional
         Called with what a search for rate-and-state friction or the stick–slip plant does, and the fraction done [-].
     accept_poor_fit : bool
@@ -155,7 +157,8 @@ def guarantee(
         For a controller that does not apply to the friction.
     """
     setup = setup.with_given(**given)
-    require_known(plant, PLANTS, "plant")
+    if plant is not None:
+        require_known(plant, PLANTS, "plant")
     if isinstance(fault, BlockChain):
         setup = setup if law is not None or setup.step else setup.with_given(step=rational(fault.fault.sampling_time))
         if fault.ages:
@@ -170,7 +173,7 @@ def guarantee(
             return sliding_block_guarantee(blocks, setup.step)
         fault = UncertainPlant.from_blocks(fault)
     if isinstance(fault, UncertainPlant):
-        usual = (plant, objective, scheme, disturbance_class) == (PLANTS[0], OBJECTIVES[0], None, CLASSES[0])
+        usual = plant in (None, PRINTED) and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])
         named = isinstance(controller, str) and controller in ("elqr", *BLOCK_LAWS)
         if not usual or not named or stress is not None or exact_value(spread, "", "spread"):
             raise ParameterError(
@@ -188,7 +191,7 @@ def guarantee(
     elif law is not None and controller != "elqr":
         raise ParameterError("law and controller are the same argument. Received both. Omit controller.")
     if law is not None:
-        usual = (plant, objective, tuple(gains), scheme) == (PLANTS[0], OBJECTIVES[0], (), None)
+        usual = plant in (None, PRINTED) and (objective, tuple(gains), scheme) == (OBJECTIVES[0], (), None)
         if not usual or exact_value(spread, "", "spread") or stress is not None or fault.friction.state_names:
             raise ParameterError(
                 "a user's law is guaranteed as it is, for friction without a state and the plant printed. Received "
@@ -199,7 +202,7 @@ def guarantee(
         task = uncertain_plant(fault, rate_limited=disturbance_class == "rate")
         return method_of(type(law)).given(fault, task, law, setup)
     assert not isinstance(controller, Controller)
-    if plant == PLANTS[1]:
+    if plant == STICK_SLIP:
         if fault.friction.state_names:
             raise ParameterError(
                 f"friction with a state never rests, so that the stick-slip plant is no other. Received "
@@ -241,7 +244,13 @@ def guarantee(
     require_known(disturbance_class, CLASSES, "class")
     task, family = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
     wanted = Wanted(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
-    return _sampled(fault, task, family, wanted)
+    without = ""
+    if plant is None and not wanted.gains and scheme is None and may_stick(family, setup, disturbance_class):
+        sticking = answer_stick_slip(fault, setup, objective=objective, progress=progress)
+        if isinstance(sticking.found, StickSlipGuarantee):
+            return sticking
+        without = sticking.found.reason
+    return replace(_sampled(fault, task, family, wanted), not_at_rest=without)
 
 
 def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> LoopAnswer:

@@ -25,6 +25,7 @@ from quakedesign.guarantees import (
     LoopAnswer,
     NoGuarantee,
     SlidingGuarantee,
+    StickSlipGuarantee,
     best_guarantee,
 )
 from quakedesign.guarantees.search.adversary import worst_found
@@ -86,6 +87,8 @@ class GainProblem(Generic[Designed]):
         Of friction with a state.
     disturbance_class : str
         ``amplitude`` or ``rate``, of the disturbances that a guarantee is about.
+    plant : str or None
+        ``printed`` for a guarantee on the plant without stick alone.
     tell : callable
         Called with what a long search is doing, and the fraction done [-].
     """
@@ -98,6 +101,7 @@ class GainProblem(Generic[Designed]):
     setup: LoopSetup = IDEAL
     sliding: SlowSlidingDesign = field(default_factory=SlowSlidingDesign)
     disturbance_class: str = CLASSES[0]
+    plant: str | None = None
     tell: Callable[[str, float], None] = lambda what, done: None
 
     @property
@@ -131,7 +135,7 @@ class GainProblem(Generic[Designed]):
         controller: Controller,
         certificate: Certificate | None = None,
         *,
-        runs: Guarantee | SlidingGuarantee | NoGuarantee | None = None,
+        runs: Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee | None = None,
         premises: tuple[Premise, ...] = (),
         **more: Any,
     ) -> Designed:

@@ -15,6 +15,7 @@ from quakedesign.guarantees import (
     Held,
     LoopAnswer,
     NoGuarantee,
+    StickSlipGuarantee,
     attacked,
     best_guarantee,
     certified_peaks,
@@ -25,7 +26,9 @@ from quakedesign.guarantees.exact.impossibility import hopeless
 from quakedesign.guarantees.guarantee_result import GAINS, answer_sliding
 from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
-from quakedesign.laws import summed_integrals
+from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
+from quakedesign.guarantees.stick_slip_answer import TAKEN
+from quakedesign.laws import Controller, summed_integrals
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.laws.feed_forward import NONE
 from quakedesign.linear.linear_problem import FeedbackLoop, LinearProblem, Matrix
@@ -129,9 +132,25 @@ def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
     return tuple(rational(v, f"k{i}") for i, v in enumerate(gains, 1))
 
 
+def may_stick(law: type[Controller], setup: LoopSetup, disturbance_class: str) -> bool:
+    """Whether a design is one that the theorem of the stick–slip plant takes, which does not use a bounded change."""
+    return law is ExtendedLQR and not setup.given().keys() - TAKEN and disturbance_class == CLASSES[0]
+
+
 def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
+    """On the stick–slip plant where that is proved, else on the plant without stick."""
     fault = problem.fault
     step, task, setup = rational(fault.sampling_time), problem.task, problem.setup
+    without: dict[str, Any] = {}
+    if problem.plant != Guarantee.plant and may_stick(law, setup, problem.disturbance_class):
+        sticking = design_stick_slip(
+            task, step, objective=problem.objective, slip_noise=setup.slip_noise, tell=problem.tell
+        )
+        if isinstance(sticking, StickSlipGuarantee):
+            details = {"objective": problem.objective, "step": str(step), "reason": None, "measured": setup.measured}
+            details |= {name: str(value) for name, value in sticking.held.noise.items()}
+            return problem.judged(sticking.controller, name=law.name, details=details, runs=sticking)
+        without = {"not_at_rest": sticking.reason}
     around: Any = setup.around()
     most = rational(fault.effective_normal_stress)
     if beyond := hopeless(task, most, around.get("delay", Fraction(0)), setup.diffusion):
@@ -146,6 +165,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
         "reason": found.reason or None,
         "measured": setup.measured,
         **{name: str(value) for name, value in (*held.noise.items(), *held.path.items()) if value},
+        **without,
     }
     return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=found.premises())
 

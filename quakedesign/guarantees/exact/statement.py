@@ -226,6 +226,11 @@ class Guarantee:
         return self.claims.peak_slip_rate
 
     @property
+    def slip_rate_error(self) -> UpperBound:
+        """Bound of the slip-rate error [m/s], for all t ≥ 0."""
+        return self.claims.slip_rate_error
+
+    @property
     def loop(self) -> PeriodicLoop:
         """Nominal error loop."""
         return self.held.loop(self.task)

@@ -55,6 +55,11 @@ class StickSlipGuarantee:
         return self.claims.peak_slip_rate
 
     @property
+    def slip_rate_error(self) -> UpperBound:
+        """Slip rate less that of the reference, absolute value [m/s]: both are at least 0."""
+        return UpperBound(max(self.claims.peak_slip_rate, self.task.reference_rates[0]))
+
+    @property
     def controller(self) -> "StickSlipController":
         """The law for `simulate`."""
         return laws.StickSlipController(law=self.held.law, step=self.held.step)

@@ -240,6 +240,16 @@ class StickSlipClaims:
     least_pressure: LowerBound
     largest_pressure: UpperBound
 
+    @property
+    def slip_error(self) -> UpperBound:
+        """Slip less reference, absolute value [m]."""
+        return max(self.slip_behind, self.slip_ahead)
+
+    @property
+    def pressures(self) -> tuple[tuple[LowerBound, UpperBound], ...]:
+        """In the fault [Pa], as `Claims.pressures`."""
+        return ((self.least_pressure, self.largest_pressure),)
+
     def rounded(self) -> "StickSlipClaims":
         """Rounded outward to four digits."""
         return StickSlipClaims(

@@ -713,6 +713,11 @@ class WorstStickSlip:
     ahead: float
     slip_rate: float
 
+    @property
+    def slip_error(self) -> float:
+        """Larger of both [m]."""
+        return max(self.behind, self.ahead)
+
 
 def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstStickSlip:
     """Worst case of courses from rest that are continued, period by period, from the states that lie farthest out.
