@@ -265,7 +265,7 @@ class LoopAnswer:
             "pump": None if held.pump is None else held.pump.to_dict(),
             "law": _law(held.law),
             **({} if self.notes is None else {"notes": list(self.notes)}),
-                **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
+            **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
 

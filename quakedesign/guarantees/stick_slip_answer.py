@@ -51,7 +51,9 @@ class StickSlipAnswer:
         if least is None or not self.found.proved:
             return []
         step = f"{float(self.found.held.step):.6g} s"
-        return [f"no controller with zero-order hold over T_s = {step} keeps the slip rate below {least.quantity('m/s')}"]
+        return [
+            f"no controller with zero-order hold over T_s = {step} keeps the slip rate below {least.quantity('m/s')}"
+        ]
 
     def lines(self) -> list[str]:
         """For people: the sentence first, then the worst case found and the performance limit."""

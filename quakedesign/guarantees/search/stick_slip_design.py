@@ -1,8 +1,9 @@
 """Designs with a guarantee on the stick–slip plant: gains by the states that disturbances reach, then a polytope."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
@@ -49,6 +50,7 @@ TUNINGS = tuple(
 _FEW, _MANY = (150, 1e-3), (250, 1e-4)  # vertices kept, and change of extents, in comparisons and for a polytope
 _ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of one: they only propose
 _FACETS = 130  # of the first polytope
+_TRIED_EACH = 3  # turns after which all multipliers are tried again
 _PERIODS, _TURNS, _REFINED = 4, 110, (8, 15, 22, 29)  # in which a policy is followed; turns; those that add facets
 _TINY = 1e-12  # of a height: rounding
 _LITTLE = 1.01  # of a height that one step to where a policy leads may make of it
@@ -63,7 +65,9 @@ _MARGINS = 2e-6, 2e-5  # by which the last polytope is larger than the images th
 _FAR = 30  # times the first extents, from where on a set counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried: of a size, and of the present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
+_SNAPPED = 1e-3  # of e1's factor: largest factor of the slip that counts as 0
 _TRIED = 3  # laws for which a polytope is searched
+_INSIDE = 1e-4  # distance from all facets, of the size of a set, of a point that counts as inside
 _DIGITS = 7
 _ROOM = Fraction(3, 2)  # of extents, where ranges of the plant are taken before the polytope is known
 
@@ -316,23 +320,31 @@ def _normals(points: np.ndarray, count: int) -> np.ndarray:
     return np.asarray(np.vstack([axes, kept]) / size)
 
 
-def _corners(constraints: list[Constraint], size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Vertices of a polytope, the constraints that meet there, and the rows of all; None for an empty polytope."""
+def _corners(
+    constraints: list[Constraint], size: np.ndarray, inside: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Vertices of a polytope, the constraints that meet there, and the rows of all; None for an empty polytope.
+
+    A point that is probably inside saves a linear program.
+    """
     rows = np.array([row for row, _ in constraints], dtype=float) * size
     ends = np.array([end for _, end in constraints], dtype=float)
     length = np.linalg.norm(rows, axis=1)
     rows, ends = rows / length[:, None], ends / length
     dimension = rows.shape[1]
-    centre = linprog(
-        [*np.zeros(dimension), -1.0],
-        A_ub=np.column_stack([rows, np.ones(len(rows))]),
-        b_ub=ends,
-        bounds=[*[(None, None)] * dimension, (0, None)],
-    )
-    if centre.status or centre.x[-1] < 1e-9:
-        return None
+    centre = None if inside is None else inside / size
+    if centre is None or (ends - rows @ centre).min() < _INSIDE:
+        found = linprog(
+            [*np.zeros(dimension), -1.0],
+            A_ub=np.column_stack([rows, np.ones(len(rows))]),
+            b_ub=ends,
+            bounds=[*[(None, None)] * dimension, (0, None)],
+        )
+        if found.status or found.x[-1] < 1e-9:
+            return None
+        centre = found.x[:dimension]
     try:
-        meet = HalfspaceIntersection(np.column_stack([rows, -ends]), centre.x[:dimension], qhull_options="QJ")
+        meet = HalfspaceIntersection(np.column_stack([rows, -ends]), centre, qhull_options="QJ")
     except QhullError:
         return None
     finite = np.isfinite(meet.intersections).all(axis=1)
@@ -363,6 +375,15 @@ def _dyadic(value: float) -> Fraction:
     return Fraction(int(np.round(mantissa * 2**40))) * Fraction(2) ** (int(exponent) - 40)
 
 
+@lru_cache(maxsize=64)
+def _wide_ranges(task: FaultPlant, held: SampledStickSlip, size: tuple[float, ...]) -> Ranges:
+    """For states of a size."""
+    law, (slip, rate, level) = held.law, (_ROOM * short(v, 4) for v in size)
+    most = law.target_gain * (law.return_rate * slip + _ROOM * (task.reference_rates[0] + held.told))
+    most = most + law.rate_gain * rate + level + held.push_noise
+    return ranges(task, slip, (-most, most), rate * held.step)
+
+
 @dataclass
 class _Images:
     """Largest values of normals after a period, as `moves` times heights and a constant, and their linear functions."""
@@ -387,6 +408,7 @@ class _Growing:
     margin: float = _MARGINS[0]
     turn: int = 0
     last: _Images | None = None
+    centres: dict[int, np.ndarray] = field(default_factory=dict)
 
     @property
     def facets(self) -> np.ndarray:
@@ -400,11 +422,8 @@ class _Growing:
         return np.array([max(box[0], box[3]), box[1], max(box[2], box[4])])
 
     def exact_ranges(self) -> Ranges:
-        """Of the plant, a little wide."""
-        law, size = self.held.law, [short(float(v), 4) for v in self.size]
-        most = law.target_gain * (law.return_rate * size[0] + self.task.reference_rates[0] + self.held.told)
-        most = _ROOM * (most + law.rate_gain * size[1] + size[2]) + self.held.push_noise
-        return ranges(self.task, _ROOM * size[0], (-most, most), _ROOM * size[1] * self.held.step)
+        """Of the plant, a little wide; sizes of two digits, as these ranges take a while."""
+        return _wide_ranges(self.task, self.held, tuple(float(f"{float(v):.1e}") for v in self.size))
 
     def images(self) -> "_Images | None":
         """Largest value of every normal after a period, with the best multipliers; None where a set is empty."""
@@ -412,13 +431,15 @@ class _Growing:
         facets = [tuple(Fraction(float(v)) for v in row) for row in self.facets]
         sizes = np.append(self.size, self.size[1] * float(self.held.step))
         corners = []
-        for lines in polytopes(self.task, self.held, facets, found):
+        for place, lines in enumerate(polytopes(self.task, self.held, facets, found)):
             tall = len(lines[0][0])
-            at = _corners(lines, sizes[:tall])
+            at = _corners(lines, sizes[:tall], self.centres.get(place))
             if at is None and tall == 3:
                 return None
+            if at is not None:
+                self.centres[place] = at[0].mean(axis=0)
             corners.append(at)
-        tried, period = self._tried(), Period.of(FLOATS, self.task, self.held, found)
+        tried, period = self._tried(self.turn % _TRIED_EACH == 1), Period.of(FLOATS, self.task, self.held, found)
         tops = self._tops(period, corners, tried)
         best, row = tops.argmin(axis=0), np.arange(len(facets))
         self.multipliers = np.column_stack(
@@ -426,14 +447,14 @@ class _Growing:
         )
         return self._images(period, corners)
 
-    def _tried(self) -> np.ndarray:
-        """Multipliers of every facet that are tried: the present ones, some near them, and a grid."""
+    def _tried(self, many: bool) -> np.ndarray:
+        """Multipliers of every facet that are tried: the present ones, some near them, and if `many` a grid."""
         law = self.held.law
         n2, n3 = self.normals[:, 1:].T
         plain = n2 + n3 * float(law.level_gain)
         size = np.maximum(np.abs(plain), np.abs(n3) * float(law.target_gain))
         tried = [self.multipliers * np.array([rate, 1, rate, 1, 1]) for rate in _NEAR]
-        for share in (0.0, 1.0):
+        for share in (0.0, 1.0) if many else ():
             fixed = np.full(len(n2), share)
             tried += [np.column_stack([rate * size, fixed, rate * size, fixed, fixed]) for rate in _RATE_SHARES]
             tried.append(np.column_stack([np.maximum(-plain, 0), fixed, -n2, fixed, fixed]))
@@ -504,6 +525,7 @@ class _Growing:
             self.turn = turn + 1
             if turn in _REFINED and self.last is not None:
                 self.refine(self.last)
+            self.normals = self._neutral(self.normals, self.exact_ranges().chord[1])
             after = self.images()
             if after is None or (self.size > _FAR * first).any():
                 return False
@@ -538,11 +560,18 @@ class _Growing:
         return heights
 
     def _neutral(self, normals: np.ndarray, chord: Fraction) -> np.ndarray:
-        """With as much of y as the image of a slow slide has, so that a fault that rests does not raise them."""
+        """With as much of y and d as the image of a slow slide has, so that a fault that rests does not raise them.
+
+        Images tend to a normal with 0 as largest factor of ξ, which rounding or another range of slopes makes positive.
+        Then the bound of what 1/β lacks of its chord counts, and their heights would grow without end.
+        """
         law, half = self.held.law, float(self.held.step) / 2
         slip, level = float(law.slip_gain), float(law.level_gain)
         n1, n2, n3 = normals.T
         most = float(chord / self.task.authority)
+        largest = n1 + n3 * (slip - most)
+        near = (n1 > 0) & (n3 < 0) & (largest > -_SNAPPED / 10 * n1) & (largest < 2 * _SNAPPED * n1)
+        n3 = np.where(near, -n1 * (1 + _SNAPPED) / (slip - most), n3)
         needed = -n3 * slip * half * (1 + _WIDER)
         slow = (n3 < 0) & (n1 + n3 * (slip - most) < 0) & (needed + n3 * level < 0)
         slow &= n2 > _NEARLY * needed
