@@ -715,7 +715,7 @@ class Verifier:
         self.last = facets + 2 if slice_number == 1 else None  # e1 <= max r'/c, after y >= 0 and e1 >= 0
         self.bases = np.array(bases)
         self.floats = _ball_middle(self.rows * self.sizes)
-        lengths = np.linalg.norm(self.floats, axis=1)
+        self.lengths = lengths = np.linalg.norm(self.floats, axis=1)
         solvable = np.abs(np.linalg.det((self.floats / lengths[:, None])[self.bases])) > _FLAT
         self.bases = self.bases[solvable]
         if not len(self.bases):
@@ -729,8 +729,16 @@ class Verifier:
 
     def proposed(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constraints at the best vertex and their multipliers, in floats; a negative one shows a better vertex."""
-        bases = self.bases[(scaled @ self.vertices.T).argmax(axis=1)]
-        return bases, np.linalg.solve(self.floats[bases].swapaxes(-1, -2), scaled[..., None])[..., 0]
+        values = scaled @ self.vertices.T
+        bases = self.bases[values.argmax(axis=1)]
+        shares = np.linalg.solve(self.floats[bases].swapaxes(-1, -2), scaled[..., None])[..., 0]
+        for row in np.flatnonzero((shares * self.lengths[bases]).min(axis=1) < -_NEAR * np.abs(scaled).max(axis=1)):
+            top = values[row].max()  # where more constraints meet than name a vertex, another name may be the right one
+            near = np.flatnonzero(values[row] >= top - _NEAR * abs(top))
+            tried = np.linalg.solve(self.floats[self.bases[near]].swapaxes(-1, -2), scaled[row][:, None])[..., 0]
+            best = (tried * self.lengths[self.bases[near]]).min(axis=1).argmax()
+            bases[row], shares[row] = self.bases[near[best]], tried[best]
+        return bases, shares
 
     def largest(self, factors: np.ndarray, constants: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
         """Upper bounds of c·z + k, of rationals or balls, and of 1 + (c − n)·z + k where `which` names facets.

@@ -409,6 +409,7 @@ class _Growing:
     turn: int = 0
     last: _Images | None = None
     centres: dict[int, np.ndarray] = field(default_factory=dict)
+    touching: np.ndarray = field(default_factory=lambda: np.arange(5))
 
     @property
     def facets(self) -> np.ndarray:
@@ -439,6 +440,8 @@ class _Growing:
             if at is not None:
                 self.centres[place] = at[0].mean(axis=0)
             corners.append(at)
+        self.touching = np.unique(np.concatenate([np.arange(5), *(at[1].ravel() for at in corners if at is not None)]))
+        self.touching = self.touching[self.touching < len(facets)]
         tried, period = self._tried(self.turn % _TRIED_EACH == 1), Period.of(FLOATS, self.task, self.held, found)
         tops = self._tops(period, corners, tried)
         best, row = tops.argmin(axis=0), np.arange(len(facets))
@@ -580,12 +583,15 @@ class _Growing:
 
     def refine(self, last: _Images) -> None:
         """Add normals: what the facets that grow most are images of. Heights start again from what is reached."""
+        growth, factors = last.growth[self.touching], last.factors[self.touching]
+        for name in ("normals", "heights", "least", "multipliers"):
+            setattr(self, name, getattr(self, name)[self.touching])
         size, chord = self.size, self.exact_ranges().chord[1]
         known = self.normals * size
         widths = np.linalg.norm(known, axis=1)
         known, more = known / widths[:, None], list[np.ndarray]()
-        for place in (last.growth / widths).argsort()[::-1]:
-            normal = last.factors[place] * size * (1, 1 + _WIDER * np.sign(last.factors[place][1]), 1)
+        for place in (growth / widths).argsort()[::-1]:
+            normal = factors[place] * size * (1, 1 + _WIDER * np.sign(factors[place][1]), 1)
             length = np.linalg.norm(normal)
             if length and (known @ normal).max() < _ALIKE * length and len(self.normals) + len(more) < _MOST:
                 known = np.vstack([known, normal / length])
