@@ -23,8 +23,8 @@ from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
 from quakedesign.plant import FaultPlant, UncertainPlant, uncertain_plant
 from quakedesign.synthesis.method import Wanted, method_of
-from quakedesign.synthesis.state_feedback import may_stick
 from quakedesign.synthesis.plant_guarantees import guarantee_plant
+from quakedesign.synthesis.state_feedback import may_stick
 
 Found = TypeVar("Found")
 

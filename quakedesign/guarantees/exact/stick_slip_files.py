@@ -23,18 +23,22 @@ _OF_LOOP = ("step", "slip_noise")
 
 def stick_slip_document(claim: StickSlipGuarantee) -> dict[str, Any]:
     """Loop and set."""
-    reach = claim.reach
     return {
         "loop": {
             **{name: exact_text(getattr(claim.held, name)) for name in _OF_LOOP},
             **{name: exact_text(getattr(claim.held.law, name)) for name in GAIN_UNITS},
         },
-        "set": {
-            "facets": [texts(row) for row in reach.facets],
-            "multipliers": [texts(row) for row in reach.multipliers],
-            "sliding": [[list(basis) for basis in line] for line in reach.sliding],
-            "resting": [[list(basis) for basis in line] for line in reach.resting],
-        },
+        "set": set_document(claim.reach),
+    }
+
+
+def set_document(reach: StickSlipPolytope) -> dict[str, Any]:
+    """An invariant set."""
+    return {
+        "facets": [texts(row) for row in reach.facets],
+        "multipliers": [texts(row) for row in reach.multipliers],
+        "sliding": [[list(basis) for basis in line] for line in reach.sliding],
+        "resting": [[list(basis) for basis in line] for line in reach.resting],
     }
 
 
@@ -49,7 +53,22 @@ def read_stick_slip(raw: Any, task: FaultPlant, claims: Callable[[type], Any]) -
     need(task.change is None, "a bounded change of the disturbance is not used where the fault sticks")
     loop = read_exactly(raw["loop"], (*_OF_LOOP, *GAIN_UNITS))
     law = StickSlipLaw(**{name: loop[name] for name in GAIN_UNITS})
-    given = with_keys(raw["set"], {"facets", "multipliers", "sliding", "resting"})
+    return StickSlipGuarantee(
+        task=task,
+        held=SampledStickSlip(law=law, **{name: loop[name] for name in _OF_LOOP}),
+        reach=read_set(raw["set"]),
+        claims=claims(StickSlipClaims),
+    )
+
+
+def read_set(raw: Any) -> StickSlipPolytope:
+    """Invariant set from parsed entries.
+
+    Raises
+    ------
+    CertificateError, ParameterError
+    """
+    given = with_keys(raw, {"facets", "multipliers", "sliding", "resting"})
     facets, multipliers = (
         tuple(read_row(row, name, length=length) for row in listed(given[name], name, MOST_FACETS))
         for name, length in (("facets", 3), ("multipliers", 5))
@@ -58,12 +77,7 @@ def read_stick_slip(raw: Any, task: FaultPlant, claims: Callable[[type], Any]) -
         tuple(_vertices(line, length) for line in listed(given[name], name, length=count))
         for name, length, count in (("sliding", 3, SLICES), ("resting", 4, len(COMBINATIONS)))
     )
-    return StickSlipGuarantee(
-        task=task,
-        held=SampledStickSlip(law=law, **{name: loop[name] for name in _OF_LOOP}),
-        reach=StickSlipPolytope(facets=facets, multipliers=multipliers, sliding=sliding, resting=resting),
-        claims=claims(StickSlipClaims),
-    )
+    return StickSlipPolytope(facets=facets, multipliers=multipliers, sliding=sliding, resting=resting)
 
 
 def _vertices(raw: Any, length: int) -> tuple[tuple[int, ...], ...]:

@@ -12,8 +12,10 @@ from scipy.linalg import LinAlgError, expm
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
+from quakedesign.cache import search_once
 from quakedesign.errors import ParameterError
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.stick_slip_files import read_set, set_document
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import (
     COMBINATIONS,
@@ -38,16 +40,12 @@ from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.ranges import FaultPlant
 
 Tell = Callable[[str, float], None]
-TUNINGS = tuple(
-    (level, slip, back, 1.3)
-    for level, slip, back in (
-        *((0.5, 0.5, back) for back in (0.3, 0.5, 0.1)),
-        (0.7, 0.5, 0.3),
-        *((0.3, 0.3, back) for back in (0.3, 0.1)),
-    )
-)
+TUNINGS = {
+    "tracking": ((0.5, 0.5, 0.3, 1.3), (0.7, 0.5, 0.3, 1.3), (0.5, 0.5, 0.5, 1.3)),
+    "peak": ((0.3, 0.5, 0.1, 1.3), (0.5, 0.5, 0.1, 1.3), (0.5, 0.5, 0.3, 1.3)),
+}
 """Shares of the innovations that the estimate takes, of the slip error that a period takes back, and the input gain."""
-_FEW, _MANY = (150, 1e-3), (250, 1e-4)  # vertices kept, and change of extents, in comparisons and for a polytope
+_VERTICES, _SETTLED = 250, 1e-4  # of the reached states that are kept, and change of their extents at the end
 _ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of one: they only propose
 _FACETS = 130  # of the first polytope
 _TRIED_EACH = 3  # turns after which all multipliers are tried again
@@ -66,7 +64,6 @@ _FAR = 30  # times the first extents, from where on a set counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried: of a size, and of the present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
 _SNAPPED = 1e-3  # of e1's factor: largest factor of the slip that counts as 0
-_TRIED = 3  # laws for which a polytope is searched
 _INSIDE = 1e-4  # distance from all facets, of the size of a set, of a point that counts as inside
 _DIGITS = 7
 _ROOM = Fraction(3, 2)  # of extents, where ranges of the plant are taken before the polytope is known
@@ -250,9 +247,9 @@ class _Reach:
             now = np.maximum(end, 0)
         return moved, now, now <= 0
 
-    def hull(self, kept: tuple[int, float], tell: Tell) -> np.ndarray | None:
+    def hull(self, tell: Tell) -> np.ndarray | None:
         """Vertices of the hull of all states that are reached from rest; None where it grows without bound."""
-        (most, settled), points = kept, _at_first(self.held)
+        points = _at_first(self.held)
         directions = np.random.default_rng(0).standard_normal((1500, 3))
         first, before = None, np.zeros(6)
         for turn in range(_ROUNDS):
@@ -268,10 +265,10 @@ class _Reach:
             first = size if first is None else first
             if (size > _FAR * first).any():
                 return None
-            if len(points) > most:
-                points = _extreme(points, directions, most)
+            if len(points) > _VERTICES:
+                points = _extreme(points, directions, _VERTICES)
             extent = np.concatenate([points.max(axis=0), -points.min(axis=0)])
-            if np.all(np.abs(extent - before) <= settled * np.tile(size, 2)):
+            if np.all(np.abs(extent - before) <= _SETTLED * np.tile(size, 2)):
                 break
             before = extent
             tell("states that disturbances reach", turn / _ROUNDS)
@@ -660,15 +657,30 @@ def proved(
     task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda said, done: None
 ) -> StickSlipGuarantee | NoGuarantee:
     """Guarantee of a law with a polytope that is searched for it, or what speaks against one."""
-    none = NoGuarantee(reason="no polytope was found that the loop never leaves", small_gain=None)
+    fresh = list[StickSlipGuarantee | NoGuarantee]()
+
+    def search() -> dict[str, Any]:
+        fresh.append(_searched(task, held, tell))
+        return {"set": set_document(fresh[0].reach)} if fresh[0].proved else {"reason": fresh[0].reason}
+
+    kept = search_once(search, "polytope of a stick-slip law", task, held)
+    if fresh:
+        return fresh[0]
+    if "reason" in kept:
+        return NoGuarantee(reason=kept["reason"], small_gain=None)
+    return stick_slip_guarantee(task, held, read_set(kept["set"]))
+
+
+def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlipGuarantee | NoGuarantee:
+    found: StickSlipGuarantee | NoGuarantee
+    found = NoGuarantee(reason="no polytope was found that the loop never leaves", small_gain=None)
     try:
-        points = _Reach.of(task, held).hull(_MANY, tell)
+        points = _Reach.of(task, held).hull(tell)
         if points is None:
             return NoGuarantee(reason="the states that disturbances reach grow without bound", small_gain=None)
         normals = _normals(points, _FACETS)
         heights = (normals @ points.T).max(axis=1)
         growing = _Growing(task, held, normals, heights, np.zeros((len(normals), 5)), heights, points)
-        found: StickSlipGuarantee | NoGuarantee = none
         for growing.margin in _MARGINS:
             if not growing.grown(tell) or (reach := growing.exact()) is None:
                 return found
@@ -688,9 +700,7 @@ def design_stick_slip(
     slip_noise: Fraction = Fraction(0),
     tell: Tell = lambda said, done: None,
 ) -> StickSlipGuarantee | NoGuarantee:
-    """Gains with a guarantee on the stick–slip plant.
-
-    Tunings are compared by the states that disturbances reach; the best few are tried in order until one is proved.
+    """Gains with a guarantee on the stick–slip plant: the first tuning of an objective that has one.
 
     Parameters
     ----------
@@ -698,7 +708,7 @@ def design_stick_slip(
     step : Fraction
         T_s [s].
     objective : str
-        ``tracking``: smallest slip error; ``peak``: smallest slip rate.
+        ``tracking``: small slip error; ``peak``: small slip rate.
     slip_noise : Fraction
         Bound of the measurement error of the slip [m].
     tell : callable
@@ -706,26 +716,13 @@ def design_stick_slip(
     """
     if not task.amplitude:
         return NoGuarantee(reason="the stick-slip theorem needs a disturbance above 0 m/s^2", small_gain=None)
-    candidates = []
-    for tuning in TUNINGS:
-        held = tuned(task, step, tuning, slip_noise)
-        try:
-            points = _Reach.of(task, held).hull(_FEW, tell)
-        except (ParameterError, LinAlgError, QhullError) as error:
-            return NoGuarantee(reason=str(error), small_gain=None)
-        if points is not None:
-            candidates.append((np.abs(points[:, 0]).max(), points[:, 1].max(), held))
-    if not candidates:
-        return NoGuarantee(reason="no tuning of the law keeps the states bounded", small_gain=None)
-    slips, rates = (np.array([entry[i] for entry in candidates]) for i in (0, 1))
-    tracking = np.argsort(slips / slips.min() + 2 * rates / rates.min(), kind="stable")
-    best = tracking if objective == "tracking" else [*np.argsort(rates, kind="stable")[: _TRIED - 1], tracking[0]]
-    result: StickSlipGuarantee | NoGuarantee = NoGuarantee(reason="no law was tried", small_gain=None)
-    for place in best[:_TRIED]:
-        result = proved(task, candidates[place][2], tell)
-        if result.proved:
-            break
-    return result
+    none = list[StickSlipGuarantee | NoGuarantee]()
+    for tuning in TUNINGS[objective]:
+        found = proved(task, tuned(task, step, tuning, slip_noise), tell)
+        if found.proved:
+            return found
+        none.append(found)
+    return none[0]
 
 
 # ----------------------------------------------------------------------
