@@ -70,11 +70,17 @@ def _answer(comparison: "Compared", best: "Entry | None") -> str:
     if peak and natural.outcome.kind == "earthquake":
         ratio = UpperBound(100 * Fraction(found.peak_slip_rate) / Fraction(peak))
         share = f" ({ratio:.2g} % of the natural earthquake's {quantity(peak, 'm/s')})"
+    first = f"On the plant without stick, with the {best.label}," if _without_stick(best) else f"With the {best.label}"
+    sticks = ", whether the fault slides or sticks" if isinstance(found, StickSlipGuarantee) else ""
     return (
-        f"{name}: {best.design.other_step_first or 'guaranteed'}. With the {best.label} the slip rate never exceeds "
-        f"{found.peak_slip_rate.quantity('m/s')}{share}, and the slip stays within "
+        f"{name}: {best.design.other_step_first or 'guaranteed'}. {first} the slip rate never exceeds "
+        f"{found.peak_slip_rate.quantity('m/s')}{share}{sticks}, and the slip stays within "
         f"{found.claims.slip_error.quantity('m')} of the reference"
     )
+
+
+def _without_stick(entry: "Entry") -> bool:
+    return isinstance(entry.guaranteed, Guarantee)
 
 
 def _conditions(designed: Sequence["Entry"], best: "Entry | None") -> str:
@@ -104,7 +110,7 @@ def _row(entry: "Entry") -> Row:
     pressure: tuple[Bound | float, Bound | float] | None = seen
     if isinstance(found, SlidingGuarantee):
         pressure = found.valve_pressures
-    elif found is not None:
+    elif isinstance(found, Guarantee | StickSlipGuarantee):
         pressure = found.claims.pressures[-1]
     label = entry.label.removesuffix(" (designed)").replace(" (published)", ", published")
     return Row(
@@ -142,6 +148,10 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
             yield f"{entry.label}: {grade(entry)}"
         if assumed := entry.design.details.get("assumed"):
             yield f"{entry.label} assumes {assumed}"
+    if others := [
+        e.design.title for e in designed if _without_stick(e) and best is not None and not _without_stick(best)
+    ]:
+        yield f"{', '.join(others)}: proved on the plant without stick"
     yield from _alike(designed)
     published: dict[str, list[str]] = {}
     for entry in comparison.of("published"):

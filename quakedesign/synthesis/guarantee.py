@@ -250,7 +250,8 @@ def guarantee(
         if isinstance(sticking.found, StickSlipGuarantee):
             return sticking
         without = sticking.found.reason
-    return replace(_sampled(fault, task, family, wanted), not_at_rest=without)
+    answer = _sampled(fault, task, family, wanted)
+    return replace(answer, not_at_rest=without) if without else answer
 
 
 def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> LoopAnswer:

@@ -121,7 +121,7 @@ def test_what_is_asked_is_what_was_typed(prove):
         "stress": "3",
         "disturbance_class": "rate",
         "spread": "0.1",
-        "plant": "printed",
+        "plant": None,
     }
 
 

@@ -44,9 +44,30 @@ def call(capsys):
 
 
 @pytest.mark.slow
-def test_a_designed_loop_with_its_file(call, tmp_path):
+def test_a_designed_loop_of_the_stick_slip_plant_with_its_file(call, tmp_path):
+    """By default; the bounds that are asked for, and those of an adversary below them."""
     path = tmp_path / "loop.json"
     code, out, _ = call("real-fault", "--json", "--out", str(path))
+    found = json.loads(out)
+    assert (code, found["verdict"], found["certificate"]) == (0, "proved", str(path))
+    assert (found["plant"], found["class"]) == ("stick-slip", "amplitude")
+    assert "on the plant without stick" not in found["sentence"]
+    assert "whether the fault slides or sticks" in found["sentence"]
+    assert F(found["peak_slip_rate"]) <= F(19, 10**5)
+    assert F(found["slip_error"]) == F(found["slip_ahead"]) <= F(37, 10**6)
+    assert F(found["slip_behind"]) <= F(21, 10**6)
+    seen, limit = found["worst_found"], F(found["limit"]["slip_rate"])
+    assert F(1, 10**4) < limit < F(found["peak_slip_rate"])
+    assert 0.65 * float(F(found["peak_slip_rate"])) < seen["slip_rate"] < F(found["peak_slip_rate"])
+    assert 0 < seen["slip_behind"] < F(found["slip_behind"])
+    assert 0 < seen["slip_ahead"] < F(found["slip_ahead"])
+    assert check_files([path], "real-fault")[str(path)][0] == "proved"
+
+
+@pytest.mark.slow
+def test_a_designed_loop_with_its_file(call, tmp_path):
+    path = tmp_path / "loop.json"
+    code, out, _ = call("real-fault", "--plant", "printed", "--json", "--out", str(path))
     found = json.loads(out)
     assert (code, found["verdict"], found["certificate"]) == (0, "proved", str(path))
     assert (found["measured"], found["slip_noise"], found["rate_noise"]) == ("slip-and-rate", "0", "0")
@@ -100,7 +121,7 @@ def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks():
         sizes.append(np.abs(states).max())
     assert found.grows_at_rest == pytest.approx(0.184 * 20 / np.log(sizes[-1] / sizes[-21]), rel=1e-6)
     assert found.lines()[1].startswith("NOT for a fault that sticks: by itself the law is unstable")
-    held = qd.guarantee(fault)
+    held = qd.guarantee(fault, plant="printed")
     assert held.proved
     assert held.grows_at_rest is None  # it has an integral, and grows no faster than a line
     assert not any("NOT" in line for line in held.lines())
@@ -360,7 +381,7 @@ def test_a_pump_is_asked_for_no_more_than_it_can_do(call):
     assert (code, json.loads(out)["pump"]) == (0, {"least": "-15000000", "largest": "15000000"})
     code, out, _ = call(*given, "--withdrawal", "14 MPa")
     assert (code, json.loads(out)["verdict"]) == (1, "undecided")
-    assert "which a pump of -14 MPa to 15 MPa cannot all hold" in json.loads(out)["reason"]
+    assert "which a pump of -14 MPa to 15 MPa cannot all supply" in json.loads(out)["reason"]
     code, _, err = call("real-fault", "--withdrawal", "14 MPa")
     assert (code, "withdrawal needs saturation" in err) == (2, True)
 

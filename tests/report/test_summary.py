@@ -129,13 +129,14 @@ def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthqu
     assert "earthquake" not in stable.answer
 
 
-def test_the_worst_case_on_the_stick_slip_plant_is_reported_with_the_command_that_proves_it(monkeypatch):
+def test_the_worst_case_on_the_stick_slip_plant_is_reported_with_why_nothing_is_proved_there(monkeypatch):
     one = entry("A (designed)", "3e-4", "1e-5")
     one.answer.worst_with_stick = SimpleNamespace(slip_error=1.2e-6, slip_rate_error=3e-5)
+    one.answer.not_at_rest = "T_s is too long"
     (note,) = (note for note in summary(compared(monkeypatch, one)).notes if "stick-slip" in note)
     assert note == (
-        "worst case found on the stick-slip plant: slip error 1.2 µm, slip-rate error 30 µm/s; guarantee --plant "
-        "stick-slip looks for a law with a proof there"
+        "worst case found on the stick-slip plant: slip error 1.2 µm, slip-rate error 30 µm/s; no proof there: T_s is "
+        "too long"
     )
 
 

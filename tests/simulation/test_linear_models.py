@@ -88,7 +88,9 @@ def test_margins_of_a_sampled_loop_are_where_its_poles_and_its_nyquist_curve_say
     assert found.gain_reduction == pytest.approx(unstable_from(loop, 0.03), rel=1e-6)
     curve = loop(np.exp(1j * np.linspace(1e-3, np.pi, 100_001)))
     assert found.modulus_margin == pytest.approx(np.abs(1 + curve).min(), rel=1e-6)
-    assert found.phase_margin == pytest.approx(control.stability_margins(loop)[1], rel=1e-3)
+    crossings = np.flatnonzero(np.diff(np.abs(curve) > 1))
+    angles = np.degrees(np.abs(np.angle(-curve[crossings])))  # poles at 0 blur those of python-control
+    assert found.phase_margin == pytest.approx(angles.min(), rel=1e-3)
 
 
 @few("gain", [0.5, 1.25, 4.0], every=2)

@@ -63,6 +63,7 @@ _MARGINS = 2e-6, 2e-5  # by which the last polytope is larger than the images th
 _FAR = 30  # times the first extents, from where on a set counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried: of a size, and of the present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
+_SHRUNK, _LITTLE_LESS = 40, 1e-4  # times that a set is replaced by its image; decrease of its extents that ends it
 _SNAPPED = 1e-3  # of e1's factor: largest factor of the slip that counts as 0
 _INSIDE = 1e-4  # distance from all facets, of the size of a set, of a point that counts as inside
 _DIGITS = 7
@@ -532,6 +533,7 @@ class _Growing:
             after.growth, self.last = after.tops - self.heights, after
             margin = self.margin * np.linalg.norm(self.normals * np.abs(self.size), axis=1)
             if np.all(after.tops <= self.heights - margin / 4):
+                self._shrink(after, margin)
                 return True
             own = after.tops - after.moves @ self.heights + margin
             late = turn > _REFINED[-1] + _FOLLOWED
@@ -544,6 +546,19 @@ class _Growing:
                 self.heights = np.where(changed, np.maximum(least, after.moves @ self.heights + own), self.heights)
             tell("a polytope that the loop never leaves", turn / _TURNS)
         return False
+
+    def _shrink(self, after: _Images, margin: np.ndarray) -> None:
+        """Replace a set by its image, which it holds and which therefore holds its own, while that is much smaller."""
+        for _ in range(_SHRUNK):
+            self.turn += 1  # of multipliers
+            before, self.heights = self.heights, np.minimum(self.heights, np.maximum(self.least, after.tops + margin))
+            found = self.images()
+            if found is None or not np.all(found.tops <= self.heights - margin / 4):  # rounding
+                self.heights = before
+                return
+            if np.all(self.heights[:5] > (1 - _LITTLE_LESS) * before[:5]):
+                return
+            after = found
 
     def _settled(self, moves: np.ndarray, own: np.ndarray, changed: np.ndarray) -> np.ndarray | None:
         """Heights that this policy keeps, where only `changed` ones move and none by much; None if there are none."""
@@ -687,8 +702,10 @@ def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlip
             found = stick_slip_guarantee(task, held, reach)
             if found.proved:
                 break
-    except (ParameterError, LinAlgError, QhullError) as error:
+    except ParameterError as error:
         return NoGuarantee(reason=str(error), small_gain=None)
+    except (ArithmeticError, ValueError, LinAlgError, QhullError):
+        return NoGuarantee(reason="numbers of the loop are too far apart for a search in floats", small_gain=None)
     return found
 
 
@@ -718,7 +735,11 @@ def design_stick_slip(
         return NoGuarantee(reason="the stick-slip theorem needs a disturbance above 0 m/s^2", small_gain=None)
     none = list[StickSlipGuarantee | NoGuarantee]()
     for tuning in TUNINGS[objective]:
-        found = proved(task, tuned(task, step, tuning, slip_noise), tell)
+        try:
+            held = tuned(task, step, tuning, slip_noise)
+        except (ParameterError, ArithmeticError, ValueError):
+            return NoGuarantee(reason="no gains of this size are floats", small_gain=None)
+        found = proved(task, held, tell)
         if found.proved:
             return found
         none.append(found)

@@ -291,7 +291,7 @@ def test_the_first_words_are_that_nothing_is_guaranteed_at_the_step_that_was_ask
     monkeypatch.setattr(state_feedback, "design_at", lambda *_: shorter)
     for search in ("continued", "nearest_setup"):
         monkeypatch.setattr(state_feedback, search, lambda *_, **__: None)
-    found = qd.guarantee(load_fault("real-fault"), step=F("0.5"))
+    found = qd.guarantee(load_fault("real-fault"), step=F("0.5"), plant="printed")
     assert not found.proved
     assert found.lines()[:2] == [
         "not guaranteed at T_s = 0.5 s: small gain 2", f"with T_s = 0.184 s: {shorter.sentence()}"
