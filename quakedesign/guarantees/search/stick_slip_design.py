@@ -41,7 +41,7 @@ from quakedesign.plant.ranges import FaultPlant
 
 Tell = Callable[[str, float], None]
 TUNINGS = {
-    "tracking": ((0.5, 0.5, 0.3, 1.3), (0.7, 0.5, 0.3, 1.3), (0.5, 0.5, 0.5, 1.3)),
+    "tracking": ((0.95, 0.85, 0.165, 1.27), (0.5, 0.5, 0.3, 1.3), (0.7, 0.5, 0.3, 1.3), (0.5, 0.5, 0.5, 1.3)),
     "peak": ((0.3, 0.5, 0.1, 1.3), (0.5, 0.5, 0.1, 1.3), (0.5, 0.5, 0.3, 1.3)),
 }
 """Shares of the innovations that the estimate takes, of the slip error that a period takes back, and the input gain."""
@@ -49,7 +49,7 @@ _VERTICES, _SETTLED = 250, 1e-4  # of the reached states that are kept, and chan
 _ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of one: they only propose
 _FACETS = 130  # of the first polytope
 _TRIED_EACH = 3  # turns after which all multipliers are tried again
-_PERIODS, _TURNS, _REFINED = 4, 110, (8, 15, 22, 29)  # in which a policy is followed; turns; those that add facets
+_PERIODS, _TURNS, _REFINED = 4, 80, (8, 15, 22, 29)  # in which a policy is followed; turns; those that add facets
 _TINY = 1e-12  # of a height: rounding
 _LITTLE = 1.01  # of a height that one step to where a policy leads may make of it
 _NEARLY = 0.93  # of the factor of y that keeps a facet where it is in a slow slide
@@ -63,7 +63,7 @@ _MARGINS = 2e-6, 2e-5  # by which the last polytope is larger than the images th
 _FAR = 30  # times the first extents, from where on a set counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried: of a size, and of the present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
-_SHRUNK, _LITTLE_LESS = 40, 1e-4  # times that a set is replaced by its image; decrease of its extents that ends it
+_SHRUNK, _LITTLE_LESS = 60, 2e-5  # times that a set is replaced by its image; decrease of its extents that ends it
 _SNAPPED = 1e-3  # of e1's factor: largest factor of the slip that counts as 0
 _INSIDE = 1e-4  # distance from all facets, of the size of a set, of a point that counts as inside
 _DIGITS = 7

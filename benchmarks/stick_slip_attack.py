@@ -1,0 +1,155 @@
+"""Attack certificates of the kind `stick_slip` with a simulator of its own: NumPy and the numbers of the file alone.
+
+    python benchmarks/stick_slip_attack.py proofs/certificates/stick_slip_real-fault.json
+
+Friction is any function of the slip with the slopes of the file, the disturbance turns within periods, and r' is any
+number of its range in each period. For every facet the courses that come nearest to it are continued. Printed are the
+largest facet value, which the file says never exceeds 1, and the largest values over the claims.
+"""
+
+import json
+import sys
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+SUBSTEPS, BRANCHES = 48, 24
+
+
+def numbers(raw):
+    """Floats of the texts of a table."""
+    return {name: float(Fraction(v)) for name, v in raw.items() if isinstance(v, str) and name != "name"}
+
+
+@dataclass
+class Courses:
+    """States of many courses at a sample, one a row: slip, slip rate, friction, level, v+, measured before, reference."""
+
+    x: np.ndarray
+    y: np.ndarray
+    mu: np.ndarray
+    level: np.ndarray
+    predicted: np.ndarray
+    slip_before: np.ndarray
+    rate_before: np.ndarray
+    r: np.ndarray
+    noise: np.ndarray
+
+    def picked(self, which):
+        return Courses(**{name: value[which] for name, value in vars(self).items()})
+
+
+class Attack:
+    """One file."""
+
+    def __init__(self, document, seed=0):
+        fault, friction = numbers(document["fault"]), numbers(document["fault"]["friction"])
+        self.law, self.claims = numbers(document["loop"]), document["claims"]
+        self.facets = np.array([[float(Fraction(v)) for v in row] for row in document["set"]["facets"]])
+        self.random, self.friction = np.random.default_rng(seed), friction
+        mass = fault["density"] * fault["length"]
+        self.n, self.k = 1 / mass, fault["shear_modulus"] / (mass * fault["length"])
+        self.damping = fault["damping"] / (mass * fault["length"] ** 2)
+        self.stress, self.amplitude = fault["normal_stress"], float(Fraction(document["disturbance"]["amplitude"]))
+        task = document["reference"]
+        self.target = float(Fraction(task["target_slip"]))
+        shape = np.polynomial.Polynomial([float(Fraction(v)) for v in task["shape"]])
+        grid = np.linspace(0, 1, 100_001)
+        self.fastest = self.target / float(Fraction(task["operation_time"])) * shape.deriv()(grid).max()
+
+    def rest_pressure(self, one):
+        """p that balances the fault at its slip."""
+        load = self.n * self.friction["static"] * self.stress - self.k * one.x
+        return self.stress - load / (self.n * one.mu)
+
+    def begun(self, count):
+        """At rest on the reference, anywhere in the task, the law at equilibrium."""
+        f, zero = self.friction, np.zeros(count)
+        x = self.random.uniform(0, self.target, count) * (self.random.random(count) < 0.8)
+        least = np.maximum(f["least"], f["static"] - f["weakening"] * x)
+        most = np.minimum(f["largest"], f["static"] + f["strengthening"] * x)
+        mu = least + (most - least) * self.random.choice([0.0, 0.5, 1.0], count)
+        one = Courses(x, zero, mu, zero, zero, x.copy(), zero, x.copy(), zero)
+        one.level = -self.rest_pressure(one)
+        return one
+
+    def after(self, one):
+        """A period later."""
+        law, random, count = self.law, self.random, len(one.x)
+        step, rate = (
+            law["step"],
+            np.where(random.random(count) < 0.7, random.choice([0.0, 1.0], count), random.random(count)),
+        )
+        rate = rate * self.fastest
+        v = rate - law["return_rate"] * (one.x + one.noise - one.r)
+        p = -law["rate_gain"] * one.y + law["target_gain"] * v - one.level
+        turn, sign = random.uniform(0, 1, count), random.choice([-1.0, 1.0], count)
+        turn = np.where(random.random(count) < 0.3, 1.0, turn)
+        slopes = -self.friction["weakening"], self.friction["strengthening"]
+        slope, other = random.choice(slopes, (2, count))
+        h, x, y, mu = step / SUBSTEPS, one.x.copy(), one.y.copy(), one.mu.copy()
+        hold = self.n * self.friction["static"] * self.stress
+        for i in range(SUBSTEPS):
+            push = self.amplitude * np.where((i + 0.5) / SUBSTEPS < turn, sign, -sign)
+            grown = np.where((i + 0.5) / SUBSTEPS < turn, slope, other)
+            force = hold - self.k * x - self.n * mu * (self.stress - p) + push
+
+            def pull(moved, speed):  # the force is linear in the slip of a substep
+                return force - self.k * moved - self.n * grown * moved * (self.stress - p) - self.damping * speed
+
+            first = pull(0.0, y)
+            half = np.maximum(y + h / 2 * first, 0)
+            second = pull(h / 2 * (y + half) / 2, half)
+            end = y + h * second
+            braked = np.where(second < 0, y**2 / (2 * np.maximum(-second, 1e-300)), 0)
+            moved = np.where(end < 0, np.minimum(braked, h * y), h * (y + np.maximum(end, 0)) / 2)
+            x, y = x + moved, np.maximum(end, 0)
+            mu = np.clip(mu + grown * moved, self.friction["least"], self.friction["largest"])
+        noise = law["slip_noise"] * random.choice([-1.0, 1.0], count)
+        predicted = np.maximum(v, 0)
+        innovation = x + noise - one.x - one.noise - step * (one.y + predicted) / 2
+        lowest = -step * predicted / 2 - law["rest_slip"]
+        innovation = np.where(y == 0, np.maximum(innovation, lowest), innovation)
+        level = one.level + law["level_gain"] * (y - predicted) + law["slip_gain"] * innovation
+        return Courses(x, y, mu, level, predicted, one.x, one.y, one.r + step * rate, noise), p
+
+    def values(self, one):
+        """Facets of courses, (courses, facets), and slip less reference."""
+        error = one.x - one.r
+        known = one.level + self.rest_pressure(one) - self.law["slip_gain"] * one.noise
+        return np.column_stack([error + self.law["slip_noise"], one.y, known]) @ self.facets.T, error
+
+    def run(self, periods=300):
+        """Largest facet value, and largest values over the claims."""
+        claims = numbers(self.claims)
+        low, high = claims["least_pressure"], claims["largest_pressure"]
+        one, found, tried = (
+            self.begun(2000),
+            dict.fromkeys(("facet", "slip_rate", "behind", "ahead", "pressure"), 0.0),
+            0,
+        )
+        for _ in range(periods):
+            one, p = self.after(one.picked(np.repeat(np.arange(len(one.x)), BRANCHES)))
+            tried += len(p)
+            values, error = self.values(one)
+            for name, value in (
+                ("facet", values.max()),
+                ("slip_rate", one.y.max() / claims["peak_slip_rate"]),
+                ("behind", -error.min() / claims["slip_behind"]),
+                ("ahead", error.max() / claims["slip_ahead"]),
+                ("pressure", max(p.max() / high, p.min() / low)),
+            ):
+                found[name] = max(found[name], float(value))
+            kept = np.unique(values.argmax(axis=0))
+            kept = np.concatenate([kept, self.random.integers(0, len(p), 300)])
+            inside = (one.x[kept] <= self.target) & (one.x[kept] >= 0)
+            one = one.picked(kept[inside])
+        return found | {"periods": tried}
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        told = Attack(json.loads(Path(name).read_text())).run()
+        print(name, {key: round(value, 6) for key, value in told.items()})
