@@ -25,7 +25,7 @@ def numbers(raw):
 
 @dataclass
 class Courses:
-    """States of many courses at a sample, one a row: slip, slip rate, friction, level, v+, measured before, reference."""
+    """States of many courses at a sample, one a row."""
 
     x: np.ndarray
     y: np.ndarray
@@ -38,6 +38,7 @@ class Courses:
     noise: np.ndarray
 
     def picked(self, which):
+        """Some of them."""
         return Courses(**{name: value[which] for name, value in vars(self).items()})
 
 
@@ -96,12 +97,9 @@ class Attack:
             grown = np.where((i + 0.5) / SUBSTEPS < turn, slope, other)
             force = hold - self.k * x - self.n * mu * (self.stress - p) + push
 
-            def pull(moved, speed):  # the force is linear in the slip of a substep
-                return force - self.k * moved - self.n * grown * moved * (self.stress - p) - self.damping * speed
-
-            first = pull(0.0, y)
-            half = np.maximum(y + h / 2 * first, 0)
-            second = pull(h / 2 * (y + half) / 2, half)
+            steep = self.k + self.n * grown * (self.stress - p)  # the force is linear in the slip of a substep
+            half = np.maximum(y + h / 2 * (force - self.damping * y), 0)
+            second = force - steep * h / 2 * (y + half) / 2 - self.damping * half
             end = y + h * second
             braked = np.where(second < 0, y**2 / (2 * np.maximum(-second, 1e-300)), 0)
             moved = np.where(end < 0, np.minimum(braked, h * y), h * (y + np.maximum(end, 0)) / 2)

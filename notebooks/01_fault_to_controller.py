@@ -133,7 +133,7 @@ comparison
 comparison.figures()["errors"]
 
 # %% [markdown]
-# The designed laws follow the reference to within seven micrometres. Neither chatters, and both stay inside what is guaranteed of them, as does the worst
+# The designed laws follow the reference to within eight micrometres. Neither chatters, and both stay inside what is guaranteed of them, as does the worst
 # that a search found. On the plant without stick, as in
 # the paper's simulations (`plant="printed"`), the published 2-CTA chatters from the first half hour on.
 

@@ -288,7 +288,7 @@ FORGED = {
     "ahead less": ((*FACETS, 0), times("101/100")),
     "ahead more": ((*FACETS, 0), times("99/100")),
     "level less": ((*FACETS, 2), times("101/100")),
-    "another facet less": ((*FACETS, 163), times("101/100")),
+    "another facet less": ((*FACETS, 60), times("101/100")),
     "no multipliers": (MULTIPLIERS, lambda old: [["0"] * 5] * len(old)),
     "few bases": (("set", "sliding", 0), lambda old: old[:2]),
 }
