@@ -462,6 +462,8 @@ def read_friction(table: Table | None, problems: Problems, allow_code: bool) -> 
                 key = table.spelling(field.name, field.metadata["symbol"])
                 value = table.quantities({key: field.metadata["unit"]}, optional=field.name in optional)
                 read |= dict.fromkeys([field.name] if value else [], value.get(key))
+            elif "unit" in field.metadata:
+                read |= table.quantities({field.name: field.metadata["unit"]}, optional=field.name in optional)
             elif field.name not in optional or field.name in table.entries:
                 read[field.name] = table.text(field.name)
         table.close()
@@ -554,6 +556,7 @@ _EXAMPLES: dict[str, str | float] = {
     "slip_growth": "0 1/s^2",
     "rate_growth": "0 1/s",
     "residual": 0.45,
+    "healing": 0.0001,
     "drop": 0.15,
     "critical_slip": "2 cm",
     "critical_rate": "10 cm/s",
@@ -567,6 +570,7 @@ _EXAMPLES: dict[str, str | float] = {
 _WIDTHS_SAID = {"stiffness": "of k/m", "damping": "of η/m", "authority": "of A/m, the area per mass"}
 _COME_TO_REST = ("exponential-slip-weakening", "linear-slip-weakening")
 _LEFT_OUT = {
+    "healing": "0 if left out",
     "width": "square if left out",
     "damping": "radiation of shear waves, G A/(2 c_s), if left out",
     "target_slip": "the next rest slip if left out",
@@ -619,7 +623,8 @@ def _stresses(fault: Fault) -> dict[str, str]:
 
 def _law_values(law: FrictionLaw) -> dict[str, Any]:
     options = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
-    return options | _values(law, units_of(type(law)))
+    found = options | _values(law, units_of(type(law)))
+    return {name: value for name, value in found.items() if name != "healing" or value}
 
 
 def _entries(entries: Mapping[str, Any]) -> Iterator[str]:
@@ -780,7 +785,7 @@ def _law_schema(law: type[FrictionLaw]) -> dict[str, Any]:
     }
     schema = _table(properties, ("law",))
     schema["patternProperties"] = {
-        _pattern(law.quantities()[key].metadata["symbol"]): entry for key, entry in properties.items() if key in units
+        _pattern(field.metadata["symbol"]): properties[key] for key, field in law.quantities().items()
     }
     schema["allOf"] = [_one_of(law, key) for key in units if key not in _optional(law)]
     return schema

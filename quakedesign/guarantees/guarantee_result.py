@@ -108,7 +108,11 @@ class LoopAnswer:
     def lines(self) -> list[str]:
         """Lines of text: the guarantee first, then the worst case found, then what was changed in the law."""
         tried = [f"not proved on the stick-slip plant: {self.not_at_rest}"] if self.not_at_rest else []
-        return [*self._lines(), *tried, *(self.notes or ())]
+        excess = self.fault.friction.rest_excess
+        healed = [
+            f"not covered: friction at rest up to {excess:.3g} above friction in slip (healing of the fault file)"
+        ]
+        return [*self._lines(), *tried, *(healed if excess else ()), *(self.notes or ())]
 
     def _lines(self) -> list[str]:
         if not self.found.proved:

@@ -84,6 +84,7 @@ class StickSlipAnswer:
             "slip_error": self.found.claims.slip_error.exact,
             **self.found.claims.to_dict(),
             "covered_healing": float(self.found.covered_healing()),
+            "healing": str(self.found.healing),
             "worst_found": worst
             and {"slip_rate": worst.slip_rate, "slip_behind": worst.behind, "slip_ahead": worst.ahead},
             "limit": None if (least := self.least_slip_rate) is None else {"slip_rate": least.exact},
@@ -134,7 +135,8 @@ def answer_stick_slip(
         if progress is not None:
             progress(said, done)
 
-    found = design_stick_slip(task, step, objective=objective, slip_noise=setup.slip_noise, tell=tell)
+    healing = rational(fault.friction.rest_excess)
+    found = design_stick_slip(task, step, objective=objective, slip_noise=setup.slip_noise, healing=healing, tell=tell)
     return attacked_stick_slip(fault, found)
 
 

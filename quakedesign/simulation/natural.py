@@ -41,7 +41,8 @@ def natural_earthquake(
 ) -> Trajectory:
     """Let an uncontrolled fault go, under a constant pressure and, if it is unstable, a tiny constant acceleration.
 
-    The acceleration is a share of 1e-9 of the largest change of friction, and the step so short, that the peak of the
+    A fault whose friction heals begins as it is released. The acceleration is a share of 1e-9 of the largest change of
+    friction, and the step so short, that the peak of the
     slip rate depends on neither of them in its first six digits.
 
     Parameters
@@ -75,7 +76,7 @@ def natural_earthquake(
         )
     growth = derive(fault).eigenvalues[0].real
     nudge = _nudge(fault) if growth > 0 else 0.0
-    nudged = fault.with_disturbance(Disturbance(constant=nudge))
+    nudged = _released(fault).with_disturbance(Disturbance(constant=nudge))
     step = min(fault.sampling_time, FINENESS / fault.natural_frequency)
     setting = RunSetting.of(nudged, step, _duration(fault, growth), 2000, 0.0)
     recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
@@ -100,6 +101,12 @@ def _with_peak(earthquake: Trajectory, fault: Fault, growth: float) -> Trajector
             f"{peak!r} m/s. Rounding may drown its friction; check the numbers of the law."
         )
     return replace(earthquake, criterion=OutcomeCriterion.of(fault, peak))
+
+
+def _released(fault: Fault) -> Fault:
+    """A fault that has lost what healing held it by: no nudge would release it."""
+    law: Any = fault.friction
+    return replace(fault, friction=replace(law, healing=0.0)) if law.rest_excess else fault
 
 
 def natural_peak(fault: Fault) -> float | None:

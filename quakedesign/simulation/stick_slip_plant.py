@@ -20,7 +20,8 @@ class StickSlipLoop(ClosedLoop):
     While the fault slips it obeys eq. shift, and digits are those of `ClosedLoop` as long as p < σ'. Where the slip
     rate falls to zero it stops; it rests as long as friction can carry the load, and the slip rate is exactly zero.
     A step locates one stop or one release, to the order of the integrator. Friction in the backward direction is not
-    modelled: `reversing` says where it would be exceeded.
+    modelled: `reversing` says where it would be exceeded. Friction that heals (`rest_excess` of the law) holds a fault
+    at rest by so much more, which is lost at the release.
 
     Attributes
     ----------
@@ -43,12 +44,21 @@ class StickSlipLoop(ClosedLoop):
 
         return rates
 
+    @property
+    def held(self) -> Any:
+        """As `plant`, out of rest: with the friction that holds the fault there."""
+        plant, excess = self.plant, self.fault.friction.rest_excess
+        _, normal, _, stress = self.hats()
+        if not excess:
+            return plant
+        return lambda time, x, p: plant(time, x, p) - ca.vertcat(0, normal * excess * ca.fmax(stress - p, 0))
+
     def resting_load(self, time: Any, slip: Any, pressure: Any) -> tuple[Any, Any]:
         """Load less friction, and load plus friction [m/s²], of a fault at rest (SX): it rests from ≤ 0 to ≥ 0."""
-        forward = self.plant(time, ca.vertcat(slip, 0), pressure)[1]
+        forward = self.held(time, ca.vertcat(slip, 0), pressure)[1]
         _, normal, _, stress = self.hats()
-        strength = normal * self.friction(ca.vertcat(slip, 0)) * ca.fmax(stress - pressure, 0)
-        return forward, forward + 2 * strength
+        friction = self.friction(ca.vertcat(slip, 0)) + self.fault.friction.rest_excess
+        return forward, forward + 2 * normal * friction * ca.fmax(stress - pressure, 0)
 
     def reversing(self, time: Any, state: Any, pressure: Any) -> Any:
         """Whether the load on a fault at rest exceeds friction backward (SX)."""
@@ -56,13 +66,14 @@ class StickSlipLoop(ClosedLoop):
 
     def shear_stress(self, time: Any, state: Any, pressure: Any, friction: Any) -> Any:
         """Shear stress [Pa]: μ max(σ' − p, 0) against slip, or what carries the load at rest (SX)."""
-        strength = friction * ca.fmax(self.fault.effective_normal_stress - pressure, 0)
-        carried = self.resting_load(time, state[0], pressure)[0] / self.hats()[1] + strength
-        return ca.if_else(state[1] == 0, ca.fmin(carried, strength), strength)
+        closed = ca.fmax(self.fault.effective_normal_stress - pressure, 0)
+        strength, held = friction * closed, (friction + self.fault.friction.rest_excess) * closed
+        carried = self.resting_load(time, state[0], pressure)[0] / self.hats()[1] + held
+        return ca.if_else(state[1] == 0, ca.fmin(carried, held), strength)
 
     def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float, works: int = 0) -> Any:
         """State after one step, with at most one release and one stop; the last entries of the state are works."""
-        moved = _SplitStep(self.plant, method, motion, step, works)
+        moved = _SplitStep(self.plant, self.held, method, motion, step, works)
         rests, push = state[1] == 0, moved.push(0.0, state)
         release = _crossing(push, moved.push(1.0, moved.rested(0.0, 1.0, state)))
         begin = ca.if_else(rests, ca.if_else(push > 0, 0.0, release), 0.0)
@@ -77,6 +88,7 @@ class _SplitStep:
     """The motion within one step, cut at shares [-] of its length."""
 
     plant: Any
+    held: Any
     method: type[Integrator]
     motion: Motion
     step: float
@@ -88,7 +100,7 @@ class _SplitStep:
 
     def push(self, passed: Any, state: Any) -> Any:
         """Acceleration [m/s²] out of rest; positive where friction cannot hold the fault."""
-        return self.rates(passed, _at_rest(state))[1]
+        return self.motion(self.held, passed, _at_rest(state))[1]
 
     def slid(self, passed: Any, share: Any, state: Any) -> Any:
         """State after a share of the step of the sliding fault."""

@@ -593,7 +593,11 @@ def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee | StickSlipGuarante
     """What of a fault a certificate does not cover."""
     if isinstance(claim, SlidingGuarantee):
         return claim.task.differences(slow_sliding_plant(fault, claim.task.stress))
-    return differences(claim.task, uncertain_plant(fault, rate_limited=claim.task.change is not None))
+    task = uncertain_plant(fault, rate_limited=claim.task.change is not None)
+    if isinstance(claim, StickSlipGuarantee) and task.amplitude <= claim.task.amplitude:
+        if claim.covered_healing(task.amplitude) >= rational(fault.friction.rest_excess):
+            task = replace(task, amplitude=claim.task.amplitude)  # healing and a larger disturbance count alike
+    return differences(claim.task, task)
 
 
 def optional_choice(fault: Fault, name: str, gains: tuple[str, ...], **more: Any) -> Choice | None:

@@ -144,7 +144,12 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     without: dict[str, Any] = {}
     if problem.plant != Guarantee.plant and may_stick(law, setup, problem.disturbance_class):
         sticking = design_stick_slip(
-            task, step, objective=problem.objective, slip_noise=setup.slip_noise, tell=problem.tell
+            task,
+            step,
+            objective=problem.objective,
+            slip_noise=setup.slip_noise,
+            healing=rational(fault.friction.rest_excess),
+            tell=problem.tell,
         )
         if isinstance(sticking, StickSlipGuarantee):
             details = {"objective": problem.objective, "step": str(step), "reason": None, "measured": setup.measured}

@@ -334,7 +334,8 @@ def test_a_pressure_that_rises_at_rest_releases_the_fault():
 @pytest.mark.parametrize("law_states", [0, 1])
 def test_a_stop_after_a_release_is_counted_from_the_start_of_the_step(law_states):
     """Sliding from a quarter of the step on at 0.5, braked by 1: half a step later it rests, 0.125 further."""
-    step = _SplitStep(lambda _, x, __: ca.vertcat(x[1], -1), DormandPrince, _motion, 1.0, 1)
+    braked = lambda _, x, __: ca.vertcat(x[1], -1)  # noqa: E731
+    step = _SplitStep(braked, braked, DormandPrince, _motion, 1.0, 1)
     start = ca.DM([0, 0.5, *[0.25] * law_states, 0.5])
     stop, stopped = step.stop(0.25, start, step.slid(0.25, 0.75, start))
     assert float(ca.evalf(stop)) == pytest.approx(0.75, rel=1e-12)

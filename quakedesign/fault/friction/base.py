@@ -56,6 +56,11 @@ class FrictionLaw(ABC):
         return self.coefficient(0, rate, *self.steady_state(rate))
 
     @property
+    def rest_excess(self) -> float:
+        """Friction at rest less that in slip [-]: `healing` of laws that have it."""
+        return float(getattr(self, "healing", 0.0))
+
+    @property
     def operating_rate(self) -> float:
         """Slip rate [m/s] of the equilibrium that is studied unless another is asked for: rest."""
         return 0

@@ -27,6 +27,9 @@ class Weakening(FrictionLaw):
         Kinetic friction coefficient μ_res [-], positive.
     drop : float
         Static minus kinetic friction coefficient Δμ [-], not negative; the paper's Δμ has the opposite sign.
+    healing : float
+        What friction that holds the fault at rest may exceed that in slip by, Δμ_h [-]; 0 unless given. After a rest of
+        any length all of it is there, and a release loses it.
 
     Raises
     ------
@@ -36,11 +39,14 @@ class Weakening(FrictionLaw):
 
     residual: float = field(metadata={"unit": "", "symbol": r"\mu_{res}"})
     drop: float = field(metadata={"unit": "", "symbol": r"\Delta\mu"})
+    healing: float = field(default=0.0, metadata={"unit": ""})
 
     def __post_init__(self) -> None:
         remedy = "It is the static minus the kinetic coefficient; the paper's Δμ has the opposite sign."
         require_all(
-            lambda: require_positive(residual=self.residual), lambda: require_nonnegative(remedy, drop=self.drop)
+            lambda: require_positive(residual=self.residual),
+            lambda: require_nonnegative(remedy, drop=self.drop),
+            lambda: require_nonnegative(healing=self.healing),
         )
 
     @property

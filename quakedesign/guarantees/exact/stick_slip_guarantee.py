@@ -31,6 +31,8 @@ class StickSlipGuarantee:
     held : SampledStickSlip
     reach : StickSlipPolytope
     claims : StickSlipClaims
+    healing : Fraction
+        Δμ_h [-] that a part of the task's disturbance stands for, see `covered_healing`; files do not state it.
     covers, lasts, plant : str
         For what it holds, for how long, and the plant of `simulate` that it is about.
     """
@@ -40,6 +42,7 @@ class StickSlipGuarantee:
     held: SampledStickSlip
     reach: StickSlipPolytope
     claims: StickSlipClaims
+    healing: Fraction = Fraction(0)
     covers: ClassVar[str] = (
         "every friction law of the box and every disturbance up to the stated size, whether the fault slides or sticks"
     )
@@ -85,8 +88,13 @@ class StickSlipGuarantee:
                 f"disturbance must be from 0 to that of the claims, {float(most):g} m/s^2, got {float(disturbance):g} "
                 "m/s^2"
             )
+        return LowerBound((most - disturbance) / self._per_healing)
+
+    @property
+    def _per_healing(self) -> Fraction:
+        """Δ/Δμ_h [m/s²]."""
         stress = self.task.normal_stress - Fraction(self.claims.least_pressure)
-        return LowerBound((most - disturbance) / (self.task.area_per_mass[1] * stress))
+        return self.task.area_per_mass[1] * stress
 
     def bounds(self) -> StickSlipClaims | NoGuarantee:
         """What the theorem gives, computed anew."""
@@ -99,13 +107,17 @@ class StickSlipGuarantee:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         bounds = self.bounds()
         sound = isinstance(bounds, StickSlipClaims) and self.claims.follow(bounds)
+        sound = sound and 0 <= self.healing * self._per_healing <= self.task.amplitude
         return Verdict.PROVED if sound else Verdict.UNDECIDED
 
     def sentence(self) -> str:
         """What is guaranteed, for people; bounds rounded outward, what it is guaranteed for inward."""
         task, held, claims = self.task, self.held, self.claims
-        stress = LowerBound(task.amplitude / task.area_per_mass[1])
-        size = f"{LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
+        amplitude = task.amplitude - self.healing * self._per_healing
+        stress = LowerBound(amplitude / task.area_per_mass[1])
+        size = f"{LowerBound(amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
+        if self.healing:
+            size += f" and friction at rest up to {LowerBound(self.healing):.3g} above friction in slip"
         behind, ahead = claims.slip_behind.quantity("m"), claims.slip_ahead.quantity("m")
         pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
         return (

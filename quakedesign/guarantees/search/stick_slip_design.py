@@ -1,7 +1,7 @@
 """Designs with a guarantee on the stick–slip plant: gains by the states that disturbances reach, then a polytope."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
@@ -63,6 +63,7 @@ _MARGINS = 2e-6, 2e-5  # by which the last polytope is larger than the images th
 _FAR = 30  # times the first extents, from where on a set counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried: of a size, and of the present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
+_LOWER, _GUESSES = Fraction(1, 50), 3  # of σ', by which a pressure may be lower than it is guessed; guesses
 _SHRUNK, _LITTLE_LESS = 60, 2e-5  # times that a set is replaced by its image; decrease of its extents that ends it
 _SNAPPED = 1e-3  # of e1's factor: largest factor of the slip that counts as 0
 _INSIDE = 1e-4  # distance from all facets, of the size of a set, of a point that counts as inside
@@ -715,6 +716,7 @@ def design_stick_slip(
     *,
     objective: str = "tracking",
     slip_noise: Fraction = Fraction(0),
+    healing: Fraction = Fraction(0),
     tell: Tell = lambda said, done: None,
 ) -> StickSlipGuarantee | NoGuarantee:
     """Gains with a guarantee on the stick–slip plant: the first tuning of an objective that has one.
@@ -728,10 +730,12 @@ def design_stick_slip(
         ``tracking``: small slip error; ``peak``: small slip rate.
     slip_noise : Fraction
         Bound of the measurement error of the slip [m].
+    healing : Fraction
+        Δμ_h [-], proved as a larger disturbance, see `StickSlipGuarantee.covered_healing`.
     tell : callable
         Called with what is done, and the fraction done [-].
     """
-    if not task.amplitude:
+    if not task.amplitude and not healing:
         return NoGuarantee(reason="the stick-slip theorem needs a disturbance above 0 m/s^2", small_gain=None)
     none = list[StickSlipGuarantee | NoGuarantee]()
     for tuning in TUNINGS[objective]:
@@ -739,11 +743,25 @@ def design_stick_slip(
             held = tuned(task, step, tuning, slip_noise)
         except (ParameterError, ArithmeticError, ValueError):
             return NoGuarantee(reason="no gains of this size are floats", small_gain=None)
-        found = proved(task, held, tell)
+        found = _healed(task, held, healing, tell)
         if found.proved:
             return found
         none.append(found)
     return none[0]
+
+
+def _healed(
+    task: FaultPlant, held: SampledStickSlip, healing: Fraction, tell: Tell
+) -> StickSlipGuarantee | NoGuarantee:
+    """With as much more disturbance as healing stands for under the least pressure, which is known afterwards."""
+    least = task.rest_pressure[0] - _LOWER * task.normal_stress
+    for _ in range(_GUESSES):
+        more = task.area_per_mass[1] * healing * (task.normal_stress - least)
+        found = proved(replace(task, amplitude=task.amplitude + more), held, tell)
+        if not found.proved or found.covered_healing(task.amplitude) >= healing:
+            return replace(found, healing=healing) if found.proved else found
+        least = Fraction(found.claims.least_pressure) - _LOWER * task.normal_stress
+    return NoGuarantee(reason="the pressure falls too far for this healing", small_gain=None)
 
 
 # ----------------------------------------------------------------------
