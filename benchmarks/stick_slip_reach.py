@@ -25,12 +25,18 @@ CHECK = Path(__file__).parent.parent / "proofs" / "check.py"
 def rows():
     """Name, fault and options of `guarantee`."""
     real, lab = qd.load_fault("real-fault"), qd.load_fault("lab-fault")
-    for step in (10, 25, 50, 100, 140, 184, 250, 300, 350, 400, 500, 600, 700):
+    for step in (10, 15, 25, 50, 100, 140, 184, 250, 300, 350, 400, 450, 500):
         yield f"real fault, {step} ms", real, {"step": f"{step} ms"}
     yield "real fault, 184 ms, peak", real, {"objective": "peak"}
     yield "real fault, 184 ms, slip within 1 µm", real, {"slip_noise": "1 um"}
     yield "real fault, 184 ms, slip within 5 µm", real, {"slip_noise": "5 um"}
     yield "real fault, 184 ms, box ten-percent", real.with_box("ten-percent"), {}
+    for excess in (2e-5, 5e-5, 1e-4, 2e-4):
+        yield (
+            f"real fault, 184 ms, healing {excess:g}",
+            replace(real, friction=replace(real.friction, healing=excess)),
+            {},
+        )
     for step in ("0.5", "1", "2", "3", "4"):
         yield f"lab fault, {step} ms", lab, {"step": f"{step} ms"}
     yield "2.5 km, 110 ms", replace(real, length=2500.0), {"step": "110 ms"}
