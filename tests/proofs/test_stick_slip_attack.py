@@ -1,0 +1,33 @@
+"""Stored certificates of the stick-slip plant under a simulator that knows nothing but their numbers."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from stick_slip_attack import Attack
+
+CERTIFICATES = Path(__file__).parents[2] / "proofs" / "certificates"
+
+
+def stored(name):
+    return json.loads((CERTIFICATES / name).read_text(encoding="utf-8"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["stick_slip_real-fault.json", "stick_slip_noise_real-fault.json"])
+def test_no_course_leaves_the_polytope_or_passes_a_claim(name):
+    found = Attack(stored(name)).run(periods=150)
+    assert 0.7 < found["facet"] < 1
+    assert 0.6 < found["slip_rate"] < 1
+    assert max(found["behind"], found["ahead"]) < 1
+    assert 0.99 < found["pressure"] < 1
+    assert found["periods"] > 10**6
+
+
+@pytest.mark.slow
+def test_the_attack_finds_courses_outside_where_the_disturbance_is_larger():
+    """A third more than the file says: the polytope is left, so that the attack would see a set that is too small."""
+    document = stored("stick_slip_real-fault.json")
+    document["disturbance"]["amplitude"] = str(Fraction(document["disturbance"]["amplitude"]) * Fraction(4, 3))
+    assert Attack(document).run(periods=60)["facet"] > 1
