@@ -86,7 +86,12 @@ class StickSlipAnswer:
             "covered_healing": float(self.found.covered_healing()),
             "healing": str(self.found.healing),
             "worst_found": worst
-            and {"slip_rate": worst.slip_rate, "slip_behind": worst.behind, "slip_ahead": worst.ahead},
+            and {
+                "slip_error": worst.slip_error,
+                "slip_rate": worst.slip_rate,
+                "slip_behind": worst.behind,
+                "slip_ahead": worst.ahead,
+            },
             "limit": None if (least := self.least_slip_rate) is None else {"slip_rate": least.exact},
             "step": str(self.found.held.step),
             **{name: str(size) for name, size in self.found.held.noise.items()},
