@@ -90,7 +90,7 @@ def peak_against_tracking(study: "PaperRuns") -> Any:
         axis.set(xlabel=f"guaranteed slip-rate error [{unit}]", ylim=(0, 1.15 * max(seen) / divisor))
         axis.set_ylabel(f"{'slip' if base == 'm' else 'slip-rate'} error seen [{name}]")
         axis.margins(x=0.12)
-    note = "peak: smallest guaranteed slip-rate error; numbers: how many times that tracking may spend"
+    note = "peak: smallest slip-rate error, plant without stick; numbers: how many times that tracking may spend"
     title = f"{study.comparison.fault.name}: peak against tracking of the e-LQR"
     return finish(drawing, title, [point.run for point in study.front], note)
 
