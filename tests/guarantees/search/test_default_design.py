@@ -34,7 +34,7 @@ SPECIFICATION.loader.exec_module(attacker)
 
 @cache
 def designed(name):
-    return qd.design({"real": REAL, "slow": SLOW}[name], "elqr")
+    return qd.design({"real": REAL, "slow": SLOW}[name], "elqr", plant="printed")
 
 
 @pytest.fixture
@@ -142,7 +142,7 @@ def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
     fails = NoGuarantee(reason="small gain 1.2", small_gain=None)
     monkeypatch.setattr("quakedesign.guarantees.search.defaults.design_held", lambda *_, **__: fails)
     monkeypatch.setattr("quakedesign.guarantees.search.defaults.longest_step", lambda *_, **__: None)
-    design = qd.design(REAL, "elqr")
+    design = qd.design(REAL, "elqr", plant="printed")
     assert (design.verdict, design.controller) == (Verdict.UNDECIDED, None)
     assert design.details["reason"] == "small gain 1.2"
     assert design.guarantee.sentence().startswith("none: ")

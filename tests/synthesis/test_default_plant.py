@@ -1,0 +1,101 @@
+"""On which plant a design and a guarantee are proved: the stick-slip plant where possible, else that without stick."""
+
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.guarantees import LoopAnswer, NoGuarantee, StickSlipAnswer, load_guarantee
+from quakedesign.laws import StickSlipController
+from quakedesign.report.sentences import sentences
+from quakedesign.studies.comparison import Entry
+
+PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
+REAL = qd.load_fault("real-fault")
+GUARANTEE, FEEDBACK = (import_module(f"quakedesign.synthesis.{name}") for name in ("guarantee", "state_feedback"))
+NONE = NoGuarantee(reason="no polytope", small_gain=None)
+
+
+@pytest.fixture(scope="module")
+def sticking():
+    return load_guarantee(PROOFS / "stick_slip_real-fault.json")
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return load_guarantee(PROOFS / "guarantee_real-fault.json")
+
+
+def test_a_design_is_that_of_the_stick_slip_plant_where_it_is_proved(monkeypatch, sticking):
+    monkeypatch.setattr(FEEDBACK, "design_stick_slip", lambda *_, **__: sticking)
+    monkeypatch.setattr(FEEDBACK, "sampled_design", None)  # not searched as well
+    design = qd.design(REAL, "elqr")
+    assert str(design.verdict) == "proved"
+    assert design.guarantee is sticking
+    assert isinstance(design.controller, StickSlipController)
+    assert design.premises == design.conditions == ()
+    assert (design.details["reason"], design.compensation) == (None, None)
+
+
+def test_a_design_without_that_proof_falls_back_and_says_why(monkeypatch, plain):
+    monkeypatch.setattr(FEEDBACK, "design_stick_slip", lambda *_, **__: NONE)
+    sampled = SimpleNamespace(runs=plain, reason="", premises=tuple)
+    monkeypatch.setattr(FEEDBACK, "sampled_design", lambda *_, **__: sampled)
+    design = qd.design(REAL, "elqr")
+    assert design.guarantee is plain
+    assert design.details["not_at_rest"] == "no polytope"
+    assert design.guarantee.sentence().startswith("on the plant without stick, from rest")
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"plant": "printed"},
+        {"delay": "20 ms"},
+        {"rate_noise": "1 um/s"},
+        {"disturbance_class": "rate"},
+        {"measured": "slip"},
+    ],
+    ids=str,
+)
+def test_loops_that_the_theorem_does_not_know_are_proved_without_stick(monkeypatch, plain, asked):
+    monkeypatch.setattr(FEEDBACK, "design_stick_slip", None)
+    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", None)
+    sampled = SimpleNamespace(runs=plain, reason="", premises=tuple)
+    monkeypatch.setattr(FEEDBACK, "sampled_design", lambda *_, **__: sampled)
+    monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
+    monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: SimpleNamespace(found=found, proved=True))
+    assert qd.design(REAL, "elqr", **asked).guarantee is plain
+    assert qd.guarantee(REAL, **asked).found is plain
+
+
+def test_a_guarantee_takes_the_first_that_is_proved(monkeypatch, sticking, plain):
+    answer = StickSlipAnswer(fault=REAL, found=sticking)
+    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, **__: answer)
+    assert qd.guarantee(REAL) is answer
+    assert answer.lines()[-1].startswith(
+        "no controller with zero-order hold over T_s = 0.184 s keeps the slip rate below 1"
+    )
+    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, **__: replace(answer, found=NONE))
+    monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
+    monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: LoopAnswer(fault=fault, found=found))
+    found = qd.guarantee(REAL)
+    assert found.found is plain
+    assert "not proved on the stick-slip plant: no polytope" in found.lines()
+    assert found.to_dict()["stick_slip"] == "no polytope"
+    assert not qd.guarantee(REAL, plant="stick-slip").proved
+
+
+def test_what_is_said_of_a_run_names_the_plant_of_its_proof(monkeypatch, sticking):
+    monkeypatch.setattr(FEEDBACK, "design_stick_slip", lambda *_, **__: sticking)
+    design = qd.design(REAL, "elqr")
+    for plant, said in (
+        ("stick-slip", "for the loop that ran"),
+        ("printed", "for this sampled loop on the stick-slip"),
+    ):
+        run = qd.simulate(REAL, design.controller, duration=20.0, plant=plant)
+        told = sentences(Entry(label="e-LQR", origin="designed", design=design, run=run))
+        assert any(said in sentence for sentence in told)
