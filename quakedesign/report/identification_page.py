@@ -136,7 +136,7 @@ def _warnings(identification: Identification) -> list[str]:
         short, size = critical.value < _SHORT, critical.value
         told.append(
             f"D_c of {f'{1e9 * size:.3g} nm' if short else f'{100 * size:.3g} cm'} is far "
-            f"{'shorter' if short else 'longer'} than the some 1 to 100 um of laboratories: check the unit of the "
+            f"{'shorter' if short else 'longer'} than the some 1 to 100 µm of laboratories: check the unit of the "
             "displacement"
         )
     if (correlated := identification.fit.correlated) is not None and correlated.share:
@@ -181,7 +181,7 @@ def steps_figure(found: Steps) -> Any:
             linestyle=(0, (5, 2)),
         )
         axis.set_title(f"{i + 1}: {step.record.name}", fontsize=SMALL)
-        axis.set_xlabel("time [s]" if path is None else "displacement of the load point [um]", fontsize=SMALL)
+        axis.set_xlabel("time [s]" if path is None else "displacement of the load point [µm]", fontsize=SMALL)
         _region(axes["region"], step, f"{i + 1}", f"C{i}")
     _region(axes["region"], found.common, "all", "black")
     axes["region"].legend(fontsize=SMALL - 1, frameon=False, ncols=4)
@@ -194,8 +194,8 @@ def identification_figure(identification: Identification) -> Any:
     record, used, fit = identification.record, identification.used, identification.fit
     along = record.load_point if record.load_point is not None else record.slip
     way = record.time[used] if along is None else along[used] * 1e6
-    label = "time [s]" if along is None else "displacement of the load point [um]"
-    label = label if record.load_point is not None or along is None else "slip [um]"
+    label = "time [s]" if along is None else "displacement of the load point [µm]"
+    label = label if record.load_point is not None or along is None else "slip [µm]"
     rates = None if record.load_point is None else np.gradient(record.load_point[used], record.time[used])
     steps = [] if rates is None else _steps(rates)[:_MOST_PANELS]
     names = ["friction", *(["rate"] if rates is not None else []), "residual"]

@@ -55,7 +55,7 @@ def test_the_region_touches_the_ellipse_of_the_slopes(stepped):
 @pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
 def test_a_record_of_slip_weakening_is_drawn_over_its_slip_in_every_format(kind, tmp_path):
     found = identify(synthetic.weakening().noisy(0), "exponential-slip-weakening")
-    assert "slip [um]" in {axis.get_xlabel() for axis in identification_figure(found).axes}
+    assert "slip [µm]" in {axis.get_xlabel() for axis in identification_figure(found).axes}
     save_figure(found, tmp_path / f"weak.{kind}")
     begins = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[kind]
     assert (tmp_path / f"weak.{kind}").read_bytes().startswith(begins)
