@@ -26,8 +26,13 @@ from quakedesign.sos.exact.words import region_facts, region_words
 from quakedesign.sos.solve import attraction_search as attraction
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs" / "howto" / "region_of_attraction.md").read_text(encoding="utf-8")
-ROWS = {row[0]: row for row in re.findall(r"^\| (?!system|field)([a-z0-9-]+)" + r" \| (.+?)" * 6 + r" \|$", PAGE, re.M)}
+PAGE, LEVELS = (
+    (ROOT / "docs" / page).read_text(encoding="utf-8")
+    for page in ("howto/region_of_attraction.md", "explanation/attraction_levels.md")
+)
+ROWS = {
+    row[0]: row for row in re.findall(r"^\| (?!system|field)([a-z0-9-]+)" + r" \| (.+?)" * 6 + r" \|$", LEVELS, re.M)
+}
 SYSTEMS = tomllib.loads((ROOT / "tests" / "sos" / "regions.toml").read_text(encoding="utf-8"))
 TRUTH = {
     "cubic": 1, "cubic-quartic": 1, "rational-cubic": 1, "drake-12876": 1 / 20, "hahn": 8 * sqrt(3) / 9,
@@ -136,7 +141,7 @@ def on_the_page(tmp_path_factory):
 
 # ---------------------------------------------------------------- searched functions
 
-SEARCHED = {row[0]: row[1:] for row in re.findall(r"^\| ([a-z0-9-]+)" + r" \| ([\d.]+)" * 5 + r" \|$", PAGE, re.M)}
+SEARCHED = {row[0]: row[1:] for row in re.findall(r"^\| ([a-z0-9-]+)" + r" \| ([\d.]+)" * 5 + r" \|$", LEVELS, re.M)}
 
 
 @cache
