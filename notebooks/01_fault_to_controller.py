@@ -15,10 +15,8 @@
 
 # %% [markdown]
 # # From a fault to a controller with a proof
-#
-# A fault that is loaded long enough slips within half a minute: an earthquake. Fluid pressure can be steered so that the same slip takes a week.
-# This notebook takes a strike-slip fault of magnitude 5.8 (5 km long, $\sigma'_n$ = 50 MPa, $G$ = 30 GPa), designs two controllers for it,
-# looks at what is proved about them and at what is not, and runs them. All numbers are in SI units.
+# Without control, a strike-slip fault of 5 km slips within half a minute: an earthquake of magnitude 5.8. With feedback of the fluid pressure the same slip takes a week.
+# This notebook designs two controllers, proves guarantees and simulates. Numbers are in SI units.
 
 # %%
 import dataclasses
@@ -34,28 +32,20 @@ print(f"task: {fault.reference.target_slip} m in {fault.reference.operation_time
 
 # %% [markdown]
 # ## The equations
-# One symbolic definition is the source of the proof, of the simulation and of this page. $x_1$ is the slip [m] since the start, $x_2$ the
-# slip rate [m/s], $p$ the injected pressure [Pa]; quantities with a hat are per unit mass.
+# $x_1$ is the slip since the start, $x_2$ the slip rate, $p$ the injected pressure; a hat means per unit mass.
+# The origin is unstable if **either** inequality of the last line holds: here the first, with one positive eigenvalue.
 
 # %%
 model = qd.derive(fault)
 model
 
-# %% [markdown]
-# The origin is unstable if **either** inequality in the last line holds. For this fault it is the first one, and one eigenvalue is positive.
-
 # %%
 print(model.reasons)
 print("eigenvalues [1/s]:", [f"{z.real:.3f}" for z in model.eigenvalues])
-assert model.unstable
 
 # %% [markdown]
 # ## A sliding mode with a proof
-# `design` takes base gains of the continuous twisting algorithm (2-CTA) and proves them twice. First in continuous time, for the range of the
-# control coefficient $\beta = \mu\hat N/(\mu_0\hat N_0)$ that the uncertain friction allows: a solver proposes a Lyapunov function; rational
-# arithmetic decides. Then as the law runs: slip and slip rate are measured once per sampling time, an implicit step answers with an estimate of the
-# disturbance, and the pressure is held. The scale $\lambda$ of the gains (which keeps the first proof), the weight of that estimate and the input gain
-# that it assumes are chosen by what is guaranteed of that loop, along the moving reference and for every disturbance of the box. It is one sentence.
+# `design` proves the base gains of the continuous twisting algorithm (2-CTA) in continuous time, then the guarantee of the sampled loop, with an implicit step and zero-order hold. A solver proposes; rational arithmetic decides.
 
 # %%
 cta = qd.design(fault, "cta")
@@ -63,9 +53,7 @@ print(cta.guarantee.sentence())
 cta
 
 # %% [markdown]
-# The paper's design in continuous time has more **premises**. With the smallest scale that its reference needs, `level_set` does not hold: the start
-# at rest with an unknown phase of the disturbance lies outside the region for which the bound on $|\dot h|$ can be guaranteed beforehand.
-# Such a premise is part of the answer and is never hidden.
+# In continuous time, as in the paper, a proof needs more **premises**. `level_set` does not hold: the initial condition is outside the region where the bound on $|\dot h|$ is proved.
 
 # %%
 paper = qd.design(fault, "cta", continuous=True)
@@ -75,9 +63,8 @@ for premise in paper.premises:
     print(f"{'':20} {premise.note}")
 
 # %% [markdown]
-# ## Trying to cheat
-# The certificate holds everything that is needed to verify it again, and nothing else counts. Exchange one gain and it is refused. (That says
-# only that this is no proof for the other gain. The other gain may be a good one, and then has a proof of its own.)
+# ## A forged certificate
+# A certificate with one gain exchanged is rejected. The other gains may have a proof of their own.
 
 # %%
 loop = cta.certificate.loop
@@ -93,8 +80,7 @@ own_proof, _ = qd.certify("cta", ("8", "5", "2.3", "1.1"), lipschitz="1", gain_r
 print("on its own:", own_proof)
 
 # %% [markdown]
-# Bad gains are **refuted**, with an equilibrium away from the origin as the counterexample: here $k_3 < k_4$, so the integral action can be
-# held in balance.
+# With $k_3 < k_4$ an equilibrium away from the origin **refutes** the gains.
 
 # %%
 verdict, counterexample = qd.certify("cta", ("7", "5", "1.1", "2.3"), lipschitz="1")
@@ -102,7 +88,6 @@ print(verdict, {name: str(v) for name, v in counterexample.refutation.point.item
 
 # %% [markdown]
 # ## A linear controller with a proof
-# This one is designed for the loop as it runs, too. It has no switching, and its guarantee is a sentence of the same kind.
 
 # %%
 elqr = qd.design(fault, "elqr")
@@ -110,8 +95,8 @@ print(elqr.guarantee.sentence())
 elqr
 
 # %% [markdown]
-# ## A first look at the closed loop
-# The first 2000 s of about 184 h, with the laws as they were designed: once per sample. Metrics come from every step of the run, not only from the instants kept.
+# ## Simulations
+# First 2000 s, then the whole task, where errors count after a quarter of it.
 
 # %%
 qd.simulate(fault, cta.controller, duration=2000).plot()
@@ -120,22 +105,15 @@ for name in ("max_slip_error", "max_slip_rate_error", "rms_pressure"):
     print(f"{name} = {getattr(run.metrics, name):.3g} {run.metrics.unit(name)}")
 run.to_pandas().iloc[::400, :4]
 
-# %% [markdown]
-# ## Side by side
-# Both over the whole task; errors count after a quarter of it. (Without `with_published=False` the gains that the paper prints come along, with their
-# verdicts and premises, as in `quakedesign design real-fault`, and take as long again.)
-
 # %%
-comparison = qd.compare(fault, [cta, elqr], with_published=False)
+comparison = qd.compare(fault, [cta, elqr], with_published=False)  # True adds the published gains
 comparison
 
 # %%
 comparison.figures()["errors"]
 
 # %% [markdown]
-# The designed laws follow the reference to within eight micrometres. Neither chatters, and both stay inside what is guaranteed of them, as does the worst
-# that a search found. On the plant without stick, as in
-# the paper's simulations (`plant="printed"`), the published 2-CTA chatters from the first half hour on.
+# In these simulations the designed laws stay within their proved bounds. The published 2-CTA chatters on the plant without stick (`printed`), as in the paper.
 
 # %%
 from quakedesign.report import headline
@@ -150,6 +128,7 @@ for entry in comparison.of("designed"):
 
 # %%
 path = {entry.label: entry.run.metrics.pressure_total_variation for entry in comparison.entries}
+assert model.unstable
 assert str(cta.verdict) == str(elqr.verdict) == str(paper.verdict) == "proved"
 assert all(entry.run.metrics.peak_slip_rate < entry.guarantee.claims.peak_slip_rate for entry in comparison.of("designed"))
 assert all(p.holds for p in cta.premises) and not all(p.holds for p in paper.premises)
