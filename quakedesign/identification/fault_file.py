@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from itertools import product
-from math import log
+from math import ceil, log
 from pathlib import Path
 from shlex import quote
 
@@ -25,7 +25,7 @@ from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
 
 _DIGITS = 6
-_WIDEST_SPREAD = 0.99  # as it is rounded up to two digits and must stay below 1
+_WIDEST_SPREAD = Fraction(1, 5)  # of a, b and D_c, independent of each other, for which guarantees are found
 _WEAKENING = {"residual", "drop", "critical_slip"}
 _OF_TASK = ("target slip", "operation time")
 _RATE_AND_STATE = ("direct_effect", "evolution_effect", "critical_slip")
@@ -210,14 +210,12 @@ def next_command(identification: Identification, path: str | Path) -> str:
     difference = identification.difference
     if identification.explained and difference is not None and difference.low > 0:
         return "none is needed: friction strengthens with rate, so that the fault creeps without control"
-    if not covers(identification.law) and (vague := _too_vague(identification)):
-        return (
-            f"none that covers the record, which is too vague: {vague}. Measure more, or design for the best fit alone"
-        )
-    spread = "" if covers(identification.law) else f" --spread {_spread(identification)}"
-    code = "" if type(identification.law) in friction_laws().values() else " --allow-code"
     if why := poor_fit(identification):
         return f"none: {why}. Design refuses the file without --accept-poor-fit"
+    if not covers(identification.law) and (wide := _too_wide(identification)):
+        return f"none that covers the record: {wide}. Without --spread, design covers the best fit alone"
+    spread = "" if covers(identification.law) else f" --spread {_spread(identification)}"
+    code = "" if type(identification.law) in friction_laws().values() else " --allow-code"
     return f"quakedesign design {quote(str(path))}{spread}{code}"
 
 
@@ -280,7 +278,8 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
     said = (
         "friction and uncertainty below hold every law of the boxes"
         if covers(identification.law)
-        else "friction below is the best fit: a fault file holds no ranges of this law; " + _ranges(identification)
+        else "friction below is the best fit: a fault file holds no ranges of this law; "
+        + (_too_wide(identification) or f"design --spread {_spread(identification)} covers a, b and D_c of the box")
     )
     return [
         f"Friction identified from {identification.record.name!r} as {identification.law.name}; "
@@ -291,24 +290,28 @@ def _remarks(identification: Identification, fault: Fault) -> list[str]:
     ]
 
 
-def _ranges(identification: Identification) -> str:
-    if vague := _too_vague(identification):
-        return f"no --spread holds those of a, b and D_c, as the record is too vague: {vague}"
-    return f"--spread {_spread(identification)} of design and guarantee holds those of a, b and D_c"
-
-
-def _too_vague(identification: Identification) -> str:
-    """Those of a, b and D_c that may be off by their whole value, which no spread below 1 covers."""
-    found = [identification.estimates[name] for name in _RATE_AND_STATE]
-    wide = [e for e in found if max(abs(e.least / e.value - 1), abs(e.most / e.value - 1)) >= _WIDEST_SPREAD]
-    return ", ".join(f"{e.name} from {e.least:.3g} to {e.most:.3g} {e.unit}".rstrip() for e in wide)
+def _too_wide(identification: Identification) -> str:
+    """Which of a, b and D_c are too uncertain for a guarantee, and what narrows them; nothing where none is."""
+    wide = {name: share for name, share in _shares(identification).items() if share > _WIDEST_SPREAD}
+    if not wide:
+        return ""
+    number = ceil((max(wide.values()) / _WIDEST_SPREAD) ** 2)  # as deviations fall with the root of it
+    told = ", ".join(f"{name} within {float(share):.0%}" for name, share in wide.items())
+    return (
+        f"the box is too wide for a guarantee: {told}; about {float(_WIDEST_SPREAD):.0%} is the most. Fit about "
+        f"{number} such steps together, or steps to ten times the rate with more samples within D_c after them"
+    )
 
 
 def _spread(identification: Identification) -> str:
     """By how much of their best values a, b and D_c leave them in the box, rounded up to two digits."""
+    return f"{float(_decimal(max(_shares(identification).values()), up=True, digits=2)):g}"
+
+
+def _shares(identification: Identification) -> dict[str, Fraction]:
+    """By how much of its best value each of a, b and D_c leaves it in the box."""
     found = [identification.estimates[name] for name in _RATE_AND_STATE]
-    shares = [abs(rational(end) / rational(e.value) - 1) for e in found for end in (e.least, e.most)]
-    return f"{float(_decimal(max(shares), up=True, digits=2)):g}"
+    return {e.name: max(abs(rational(end) / rational(e.value) - 1) for end in (e.least, e.most)) for e in found}
 
 
 def _remark(estimate: ParameterEstimate) -> str:

@@ -50,8 +50,7 @@ class ParameterEstimate:
 
     def to_dict(self) -> dict[str, Any]:
         """Value and ends, None for an end that the record does not set."""
-        ends = {name: getattr(self, name) for name in ("value", "low", "high")}
-        known = {name: end if math.isfinite(end) else None for name, end in ends.items()}
+        known = {name: _finite(getattr(self, name)) for name in ("value", "low", "high")}
         return {**known, "unit": self.unit, "identified": self.identified}
 
 

@@ -54,17 +54,8 @@ def test_three_records_with_a_trouble_hold_the_truth(kind):
     assert sum(holds(found.fit, truth) for found, truth in (identified(kind, seed) for seed in range(3))) >= 2
 
 
-LOW = pytest.mark.xfail(reason="35 of 40 on the page Identification compared; why is open", strict=False)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "kind",
-    [
-        pytest.param(kind, marks=[LOW] * (kind == "unsteady beginning"))
-        for kind in (*synthetic.TROUBLES, *synthetic.OTHER_TROUBLES)
-    ],
-)
+@pytest.mark.parametrize("kind", [*synthetic.TROUBLES, *synthetic.OTHER_TROUBLES])
 def test_regions_hold_the_truth_in_90_to_99_of_100_records_with_a_trouble(kind):
     told = [one(kind, seed) for seed in range(REPEATS)]
     assert 90 <= sum(each["inside"] for each in told)

@@ -198,10 +198,17 @@ def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, nam
     estimates["reference_coefficient"] = replace(estimates["reference_coefficient"], most=2.0)
     path = tmp_path / "state.toml"
     save_fault(replace(weak, law=law, estimates=estimates), patch, path)
-    assert "--spread 0.063 of design and guarantee holds" in path.read_text()
+    assert "design --spread 0.063 covers a, b and D_c of the box" in path.read_text()
     assert next_command(replace(weak, law=law, estimates=estimates), "my own.toml") == (
         "quakedesign design 'my own.toml' --spread 0.063"
     )
+    slip = replace(estimates["critical_slip"], most=1.41 * values["critical_slip"])
+    wide = replace(weak, law=law, estimates=estimates | {"critical_slip": slip})
+    save_fault(wide, patch, path)
+    for told in (next_command(wide, path), path.read_text()):
+        assert "too wide for a guarantee: critical_slip within 41%; about 20% is the most" in told
+        assert "Fit about 5 such steps together" in told
+        assert "--spread 0" not in told
     low, high = slow_sliding_plant(replace(patch, friction=law), Fraction(0), Fraction("0.063")).ranges[
         "evolution_effect"
     ]
