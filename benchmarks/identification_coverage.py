@@ -34,12 +34,13 @@ def main() -> None:
     """Print one line a kind."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--records", type=int, default=100, help="of every kind")
+    parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--kinds", nargs="+", default=[*synthetic.TROUBLES, *synthetic.OTHER_TROUBLES])
     parser.add_argument("--results", type=Path, help="file with a line for every record")
     given = parser.parse_args()
     print(f"{'kind':40}{'records':>8}{'truth inside':>13}{'wrong signs':>12}{'cannot tell':>12}{'s a record':>11}")
     for kind in given.kinds:
-        told = [one(kind, seed, given.results) for seed in range(given.records)]
+        told = [one(kind, seed, given.results) for seed in range(given.first, given.first + given.records)]
         sums = {name: sum(each[name] for each in told) for name in ("inside", "wrong", "open", "seconds")}
         counts = f"{sums['inside']:13}{sums['wrong']:12}{sums['open']:12}"
         print(f"{kind:40}{len(told):8}{counts}{sums['seconds'] / len(told):11.1f}", flush=True)

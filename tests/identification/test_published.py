@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from quakedesign.fault import friction_law
-from quakedesign.identification import identify, read_record
+from quakedesign.identification import identify, next_command, read_record
 from quakedesign.simulation import SpringSlider, simulate_state
 
 CUT = Path(__file__).parents[1] / "data" / "records"
@@ -78,6 +78,7 @@ def test_a_real_step_agrees_with_an_independent_fit_and_has_no_wrong_sign(name, 
     record = read_record(CUT / f"{name}.csv")
     own = independent(record, at, near)
     found = identify(record, "rate-and-state-slip")
+    assert next_command(found, "found.toml").startswith("none")  # basalt 7 is too wide for a guarantee
     for quantity in ("direct_effect", "evolution_effect", "critical_slip"):
         assert found.estimates[quantity].least < own[quantity] < found.estimates[quantity].most, quantity
     difference = own["direct_effect"] - own["evolution_effect"]
