@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from math import exp, log
+from math import exp
 from typing import Any, ClassVar, Unpack
 
 import numpy as np
@@ -23,7 +23,6 @@ from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.statement import Guarantee, SlidingGuarantee, guarantee
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding, worst_found, worst_sliding
 from quakedesign.guarantees.search.compensated_search import Compensation
-from quakedesign.guarantees.search.estimate import own_poles
 from quakedesign.guarantees.search.linear_design import AMPLITUDE, BOX, SATURATION
 from quakedesign.guarantees.search.lqg import measured_by, sliding_model
 from quakedesign.guarantees.search.sliding_design import (
@@ -39,6 +38,7 @@ from quakedesign.guarantees.search.sliding_design import (
     what_would_do,
 )
 from quakedesign.laws import LinearLaw, RestLimit
+from quakedesign.laws.sampled_controller import growth_at_rest, warning_at_rest
 from quakedesign.loop.loop_setup import MEASURED, Pump
 from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -61,7 +61,6 @@ _TOLD = (
     "averaging",
     "longest_step",
 )
-_GROWS = 1 + 1e-6  # a factor per sample; eigenvalues that are 1 twice are rounded by less
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,9 +149,7 @@ class LoopAnswer:
         """
         if not self.found.proved:
             return None
-        held = self.found.held
-        growth = float(np.max(np.abs(own_poles(held.law)), initial=0.0))
-        return float(held.step) / log(growth) if growth > _GROWS else None
+        return growth_at_rest(self.found.held.law, self.found.held.step)
 
     @property
     def differentiator_bound(self) -> UpperBound | None:
@@ -173,13 +170,9 @@ class LoopAnswer:
 
     def _at_rest(self) -> list[str]:
         """For people; nothing of a law that does not grow."""
-        time = self.grows_at_rest
-        if time is None:
+        if not self.found.proved:
             return []
-        return [
-            "NOT for a fault that sticks: by itself the law is unstable, and while friction holds the fault at rest "
-            f"its pressure grows e-fold in {time:.3g} s"
-        ]
+        return list(filter(None, [warning_at_rest(self.found.held.law, self.found.held.step)]))
 
     def limit_lines(self) -> list[str]:
         """Performance limits at the same T_s, as text; empty if unknown."""

@@ -275,6 +275,9 @@ class Controller(Law):
             return ""
         return f"NOT for the fault's T_s = {fault.sampling_time:g} s: it runs once every {self.sampling_time:.4g} s"
 
+    warning_at_rest: ClassVar[str] = ""
+    """Warning about a law that is unstable while the fault is at rest."""
+
     @property
     def of_slip(self) -> Any:
         """Matrices of a sampled linear law that measures the slip alone (`LinearLaw`), or None."""

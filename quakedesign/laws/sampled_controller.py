@@ -8,9 +8,11 @@ from collections.abc import Mapping
 from dataclasses import field, fields, replace
 from fractions import Fraction
 from functools import partial
+from math import log
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
+import numpy as np
 import sympy as sp
 
 from quakedesign.arguments import checked_dataclass
@@ -88,6 +90,24 @@ def cut_off(
 # A linear law of samples as a controller that simulations run.
 
 
+def growth_at_rest(law: LinearLaw, step: Fraction) -> float | None:
+    """Time [s] in which the states grow e-fold while the fault is at rest, sampled every T_s [s]; None if stable."""
+    sizes = np.abs(np.linalg.eigvals(np.array(law.update, dtype=float).reshape((len(law.states),) * 2)))
+    growth = float(np.max(sizes, initial=0.0))
+    return float(step) / log(growth) if growth > 1 + 1e-6 else None  # rounding moves double eigenvalues of 1 by less
+
+
+def warning_at_rest(law: LinearLaw, step: Fraction) -> str:
+    """Warning about a law whose pressure grows while the fault is at rest; empty for others."""
+    time = growth_at_rest(law, step)
+    return (
+        "NOT for a fault that sticks: by itself the law is unstable, and while friction holds the fault at rest its "
+        f"pressure grows e-fold in {time:.3g} s: use a law whose matrix A has no eigenvalue outside the unit circle"
+        if time
+        else ""
+    )
+
+
 @checked_dataclass(frozen=True, kw_only=True)
 class SampledController(Controller):
     """p = Cz + Dy, whose states z ← Fz + Gy are those of the scheme ``explicit`` with the step T_s: ξ ← ξ + T_s·ξ′.
@@ -130,6 +150,11 @@ class SampledController(Controller):
     def sampling(self) -> Sampling:
         """By the scheme ``explicit``, once every T_s."""
         return Sampling(step=self.step, delay=self.delay, lag=self.lag, diffusion=self.diffusion, longest=self.longest)
+
+    @property
+    def warning_at_rest(self) -> str:  # type: ignore[override]
+        """That its pressure grows while the fault is at rest; empty if it does not."""
+        return warning_at_rest(self.law, self.step)
 
     @property
     def of_slip(self) -> LinearLaw | None:

@@ -399,7 +399,7 @@ def _after(loop: ClosedLoop, scheme: Sampled, counter: Any, state: Any, step: fl
 
 
 def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
-    """That a law of samples is for another T_s than the fault's, and behind what its pressure is meant to act."""
+    """Limits of use of a sampled law: another T_s, a fault that sticks, and what its pressure acts through."""
     own = controller.sampling
     path = {"a delay of": own.delay, "a lag of": own.lag, "rock of L^2/D =": own.diffusion} if own else {}
     between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
@@ -410,7 +410,8 @@ def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
         if own and own.longest
         else ""
     )
-    return tuple(filter(None, (controller.other_step(fault), behind if between else "", by_a_clock)))
+    limits = (controller.other_step(fault), controller.warning_at_rest)
+    return tuple(filter(None, (*limits, behind if between else "", by_a_clock)))
 
 
 def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, str]:

@@ -23,6 +23,7 @@ from quakedesign.laws import (
     Prediction,
     RestLimit,
     SampledController,
+    SampledLaw,
     control_law,
     disturbance_estimate,
     published,
@@ -320,9 +321,18 @@ def test_an_integral_that_pushes_beyond_what_was_applied_stays_as_it_was_before(
 def test_what_is_said_first_is_what_a_law_is_for(other, path, longest, said):
     none = {"delay": F(0), "lag": F(0), "diffusion": F(0)}
     own = None if path is None else SimpleNamespace(**{**none, **path}, longest=longest, step=F(1, 4))
-    found = _remarks(LAB, SimpleNamespace(sampling=own, other_step=lambda _: other))
+    found = _remarks(LAB, SimpleNamespace(sampling=own, other_step=lambda _: other, warning_at_rest=""))
     assert len(found) == len(said)
     assert all(part in remark for part, remark in zip(said, found, strict=True))
+
+
+@pytest.mark.parametrize(("eigenvalue", "warned"), [(1.1, True), (1.0, False), (-1.1, True), (0.5, False)])
+def test_a_law_that_is_unstable_at_rest_is_exported_with_a_warning(eigenvalue, warned):
+    system = SimpleNamespace(A=[[eigenvalue]], B=[[1]], C=[[1]], D=[[1e8]], dt=0.25)
+    law = SampledLaw.from_statespace(system, inputs=["slip_error"])
+    said = [line for line in _remarks(LAB, law) if line.startswith("NOT for a fault that sticks")]
+    assert bool(said) == warned
+    assert not warned or f"e-fold in {0.25 / np.log(1.1):.3g} s" in said[0]
 
 
 def test_gains_and_sampling_are_told_in_words_of_their_own():
