@@ -140,10 +140,8 @@ def guarantee(
     if not more:
         if isinstance(found[0], QuakedesignError):
             raise found[0]
-        unwritten = (
-            [] if files[0] is None or _proved(found[0]) else [f"{files[0]} is not written, as nothing is proved"]
-        )
-        output.show(_facts(found[0], files[0]) | said, [*found[0].lines(), *unwritten])
+        written = f"written: {files[0]}" if _proved(found[0]) else f"{files[0]} is not written, as nothing is proved"
+        output.show(_facts(found[0], files[0]) | said, [*found[0].lines(), *([written] if files[0] else [])])
     else:
         each = zip(faults, found, files, strict=True)
         facts = [{"fault": one.name} | _facts(proof, path) for one, proof, path in each]

@@ -133,6 +133,10 @@ class LoopAnswer:
                     f"worst case found{name}: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
                     f"{quantity(seen.slip_rate_error, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
                 )
+        if self.worst_with_stick is None:
+            said.append(
+                "worst case on the stick-slip plant: not searched, may exceed the bounds; simulate runs this plant"
+            )
         said += [*self._told(), *self.task_lines()]
         if self.leaves_with_stick:
             said.append(
@@ -184,7 +188,10 @@ class LoopAnswer:
         step += " with that noise" if held.noise else ""
         both = "" if limit.slip_error is None else f" while the slip error stays below {limit.slip_error.quantity('m')}"
         rate = limit.slip_rate_error.quantity("m/s")
-        return [f"no controller with zero-order hold over T_s = {step} keeps the slip-rate error below {rate}{both}"]
+        return [
+            f"no controller with zero-order hold over T_s = {step} keeps the slip-rate error below {rate}{both}, "
+            "for all disturbances and friction of the box"
+        ]
 
     def task_lines(self) -> list[str]:
         """What is said of the task, whatever law it is for."""

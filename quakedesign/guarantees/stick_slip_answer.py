@@ -52,7 +52,8 @@ class StickSlipAnswer:
             return []
         step = f"{float(self.found.held.step):.6g} s"
         return [
-            f"no controller with zero-order hold over T_s = {step} keeps the slip rate below {least.quantity('m/s')}"
+            f"no controller with zero-order hold over T_s = {step} keeps the slip rate below "
+            f"{least.quantity('m/s')} for all disturbances"
         ]
 
     def lines(self) -> list[str]:

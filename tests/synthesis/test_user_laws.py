@@ -85,6 +85,7 @@ def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
     assert found.proved
     assert found.found.claims.slip_rate_error < Fraction("2.5e-4")
     assert "an integrator that rounding has moved" in found.lines()[-1]
+    assert "worst case on the stick-slip plant: not searched" in "".join(found.lines())
     assert found.to_dict()["notes"] == list(LAW.notes)
 
 
@@ -278,6 +279,8 @@ def test_the_command_line_takes_the_file_of_a_law(tmp_path, capsys):
     LAW.save(path)
     assert run("guarantee", "real-fault", "--law", path, "--out", tmp_path / "c.json", "--json") == 0
     assert json.loads(capsys.readouterr().out)["verdict"] == "proved"
+    assert run("guarantee", "real-fault", "--law", path, "--out", tmp_path / "again.json") == 0
+    assert f"written: {tmp_path / 'again.json'}" in "".join(capsys.readouterr().out.split("\n")).replace("  ", " ")
     assert run("check", tmp_path / "c.json") == 0
     assert run("simulate", "real-fault", "--law", path, "--duration", "60 s", "--json") == 0
     assert run("export", "real-fault", "--law", path, "--out", tmp_path / "c") == 0

@@ -736,7 +736,8 @@ def design_stick_slip(
         Called with what is done, and the fraction done [-].
     """
     if not task.amplitude and not healing:
-        return NoGuarantee(reason="the stick-slip theorem needs a disturbance above 0 m/s^2", small_gain=None)
+        reason = "the stick-slip theorem needs a disturbance above 0 m/s^2: give amplitude in [disturbance]"
+        return NoGuarantee(reason=reason, small_gain=None)
     none = list[StickSlipGuarantee | NoGuarantee]()
     for tuning in TUNINGS[objective]:
         try:
