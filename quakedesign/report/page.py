@@ -384,8 +384,8 @@ MODEL_LIMITS = (
     "in these runs the pressure has no limit and is even over the patch",
 )
 REST_LIMITS = (
-    "proofs are about the plant without stick, the linear continuation to negative slip rates; the worst case found "
-    "on the stick–slip plant is a lower bound by falsification",
+    "a guarantee that begins 'on the plant without stick' is about friction continued linearly to negative slip rates; "
+    "the worst case found on the stick–slip plant is then a lower bound by falsification",
 )
 _WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "rock of L^2/D ="}
 SLIDING_LIMITS = (
