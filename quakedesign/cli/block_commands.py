@@ -67,8 +67,8 @@ def _scope(chain: "BlockChain") -> list[str]:
         pushed += ", the second m/s"
         meant = (
             "the load of a pressure is the pressure that keeps the averages of the slips, one for each well, on the "
-            "reference; slip errors count from where each block is in balance under these pressures, which is within "
-            f"{far:.3g} m of the reference at every time"
+            "reference; slip errors are relative to the equilibrium of each block under these pressures, which is "
+            f"within {far:.3g} m of the reference at every time"
         )
     return [
         f"plant: {chain.name}, {blocks}, {wells}, any constants of box {chain.fault.box.name}, without stick (friction "

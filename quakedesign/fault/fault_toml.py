@@ -348,7 +348,7 @@ DISTURBANCE = units_of(Disturbance)
 WIDTHS = ("stiffness", "damping", "authority")
 OPTIONAL = ("damping", "width")  # of the plant
 _NO_SOURCE = "no source given"
-_UNDISTURBED = "no disturbance, so that no guarantee covers one"
+_UNDISTURBED = "no disturbance, so that no guarantee covers one: give amplitude in [disturbance], such as '2 kPa'"
 _STILL = (
     "frequency 0 of the disturbance, so that its sine is 0 in every run; guarantees are for any course of its size. "
     "Give a frequency to see one"
@@ -407,7 +407,8 @@ def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
     try:
         raw = parse_toml(text)
     except ValueError as error:
-        raise ScenarioError(f"{name} is not valid TOML: {error}. Compare with a preset.") from None
+        remedy = "Values with a unit are in quotes, such as length = '5 km'."
+        raise ScenarioError(f"{name} is not valid TOML: {error}. {remedy}") from None
     if {"block", "well"} & set(raw):
         raise ScenarioError(
             f"{name} must have no [[block]] and [[well]] tables here. Received a fault of several blocks. Use the "

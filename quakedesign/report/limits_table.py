@@ -39,7 +39,7 @@ def _meaning(limits: Limits) -> list[str]:
     if isinstance(limits, SlidingLimits):
         return _meaning_of_sliding(limits)
     if limits.peak_slip_rate_error.impossible_beyond is None:
-        return ["without a disturbance no limit is known"]
+        return ["without a disturbance no limit is known: give amplitude in [disturbance] of the fault file"]
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
     known = "even with slip, slip rate and disturbance known"
     if limits.told.noisy:

@@ -61,7 +61,7 @@ class ChainLimits:
             f"{self.chain.name}: limits of every controller, {blocks} blocks, {counted(wells, 'well')}",
             f"(box {self.chain.fault.box.name}, every block at its steepest friction, for constant disturbances)",
             "",
-            f"{'mode':>4}{'pole [1/s]':>12}{'pressure less balance':>26}  slips of the blocks",
+            f"{'mode':>4}{'pole [1/s]':>12}{'pressure less equilibrium':>26}  slips of the blocks",
         ]
         for place, mode in enumerate(self.modes, 1):
             needed = f"at least {mode.pressure:.3g} Pa" if mode.reached else "no well reaches it"

@@ -162,6 +162,7 @@ WRONG = {
     "overflow": (LENGTH, 'length = "1e300 m"', ParameterError, "of a size between"),
     "hertz": ("0.69 rad/s", "0.11 Hz", UnitError, "frequency must be an angular frequency"),
     "broken TOML": (LENGTH, 'length = "5 km', ScenarioError, "own.toml is not valid TOML"),
+    "unit without quotes": (LENGTH, "length = 5 km", ScenarioError, "Values with a unit are in quotes"),
     "nested TOML": (LENGTH, "length = " + "[" * 5000, ScenarioError, "own.toml is not valid TOML"),
 }
 

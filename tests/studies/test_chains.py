@@ -148,14 +148,14 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
     told = " ".join(capsys.readouterr().out.split())
     assert "plant: three-blocks, 3 blocks, 3 wells, any constants of box paper, without stick" in told
     assert "units: slip m, slip rate m/s, disturbance m/s^2, pressure Pa, rate of a load Pa/s" in told
-    assert "in balance" not in told
+    assert "equilibrium of each block" not in told
     alone = PATH.read_text().split("[[block]]")[0] + '[[block]]\nlength = "2.5 km"\n' * 2
     (tmp_path / "blocks.toml").write_text(alone + '[[well]]\nposition = "1 km"\n')
     assert run("guarantee", tmp_path / "blocks.toml") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "2 blocks, 1 well," in told
     assert "disturbance m/s^2, the second m/s," in told
-    assert "slip errors count from where each block is in balance under these pressures" in told
+    assert "slip errors are relative to the equilibrium of each block under these pressures" in told
     assert re.search(r"within 0\.\d+ m of the reference at every time", told)
     assert run("guarantee", PATH, "--json") == 0
     notes = json.loads(capsys.readouterr().out)["notes"]

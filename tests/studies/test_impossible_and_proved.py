@@ -187,7 +187,7 @@ def test_without_a_disturbance_nothing_is_impossible():
     found = study(quiet, prove=False)
     assert {limit.impossible_beyond for limit in found.named().values()} == {None}
     assert found.smallest_peaks() == []
-    assert "without a disturbance no limit is known" in limits_lines(found)
+    assert "without a disturbance no limit is known: give amplitude in [disturbance]" in " ".join(limits_lines(found))
     assert limits_figure(found).axes[0].get_ylabel().endswith("[m/s]")
 
 
