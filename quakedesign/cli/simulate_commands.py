@@ -131,7 +131,8 @@ def simulate(
         "guarantee": {"sentence": proved} if proved else None,
         "outside": outside,
     }
-    output.show(answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside)))
+    warning = chosen.controller.warning_at_rest if chosen else ""
+    output.show(answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside), warning))
     return 0
 
 
@@ -169,14 +170,14 @@ def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
     }
 
 
-def _print_run(trajectory: Any, fault: Any, premises: Any, proved: str) -> None:
+def _print_run(trajectory: Any, fault: Any, premises: Any, *said: str) -> None:
     from quakedesign.report.terminal import print_run
 
     print_run(trajectory, fault, premises, console())
     if trajectory.energy:
         lost = f"{trajectory.energy.relative_residual:.2g} of the largest share"
         print_lines([f"  energy that the integration loses: {lost}"])
-    print_lines([f"  {proved}"] if proved else [])
+    print_lines([f"  {line}" for line in said if line])
 
 
 @app.command

@@ -157,6 +157,8 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
     for entry in comparison.of("published"):
         published.setdefault(_published(grade(entry)), []).append(entry.design.title)
     yield from (f"{', '.join(names)} (published): {said}" for said, names in published.items())
+    if any(e.run is not None and e.run.provenance["scheme"] == "continuous" for e in comparison.of("published")):
+        yield "runs of published gains are in continuous time, without zero-order hold"
     yield from left_out_lines(comparison)
     if best is not None and best.answer is not None:
         yield from _with_stick(best.answer)

@@ -83,7 +83,8 @@ def entry(label, peak=None, slip=None, *, compensation=None, origin="designed"):
         peak_slip_rate=UpperBound(peak), claims=claims, sentence=lambda: f"the sentence of {label}"
     )
     outcome = SimpleNamespace(kind="tracked", peak_slip_rate=1e-6)
-    run = SimpleNamespace(outcome=outcome, metrics=SimpleNamespace(max_slip_error=1e-7), pressure=None)
+    metrics, provenance = SimpleNamespace(max_slip_error=1e-7), {"scheme": "continuous"}
+    run = SimpleNamespace(outcome=outcome, metrics=metrics, pressure=None, provenance=provenance)
     worst = SimpleNamespace(slip_error=1e-6, slip_rate_error=2e-6)
     answer = SimpleNamespace(
         worst=worst if found else None,
@@ -178,6 +179,10 @@ def test_published_gains_keep_what_is_said_of_how_they_run(monkeypatch, grade, s
     monkeypatch.setattr("quakedesign.report.summary.grade", lambda _: grade)
     (note,) = (note for note in summary(one).notes if "(published)" in note)
     assert note == f"P (published): {said if grade == 'undecided' else f'proved in continuous time only, {said}'}"
+    unsampled = "runs of published gains are in continuous time, without zero-order hold"
+    assert unsampled in summary(one).notes
+    one.of("published")[0].run.provenance["scheme"] = "explicit"
+    assert unsampled not in summary(one).notes
 
 
 def test_numbers_of_any_size_stay_apart():

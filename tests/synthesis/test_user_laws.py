@@ -291,6 +291,14 @@ def test_the_command_line_takes_the_file_of_a_law(tmp_path, capsys):
     assert run("guarantee", "real-fault", "--law", tmp_path / "none.json") == 2
 
 
+def test_runs_of_a_law_that_is_unstable_at_rest_carry_its_warning(tmp_path, capsys):
+    law = {"step": "0.184", "inputs": ["slip_error"], "A": [[1.1]], "B": [[1]], "C": [[0]], "D": [[-1e7]]}
+    for eigenvalue, warned in ((1.1, True), (0.9, False)):
+        (tmp_path / "law.json").write_text(json.dumps(law | {"A": [[eigenvalue]]}))
+        assert run("simulate", "real-fault", "--law", tmp_path / "law.json", "--duration", "2 s") == 0
+        assert ("NOT for a fault that sticks" in capsys.readouterr().out) == warned
+
+
 @pytest.mark.slow
 def test_every_snippet_of_the_page_runs(tmp_path, monkeypatch, capsys):
     page = (Path(__file__).parents[2] / "docs" / "howto" / "own_controller.md").read_text(encoding="utf-8")
