@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,16 +27,17 @@ def several_blocks(
     ParameterError
         For options that a fault of several blocks does not have.
     """
-    from quakedesign.fault import load_chain
+    from quakedesign.fault import load_chain, with_accepted_fit
 
     if not str(fault).endswith(".toml") or not os.path.isfile(fault):
         return None
     chain = load_chain(fault, box=box)
     if chain is None:
         return None
-    usual = {"fault", "output", "json", "force", "box", "allow_code", *known}
+    usual = {"fault", "output", "json", "force", "box", "allow_code", "accept_poor_fit", *known}
     given = {name: value for name, value in options.items() if value != ()}
-    others = [name for name in changed_options(command, given) if name not in usual]
+    chosen = changed_options(command, given)
+    others = [name for name in chosen if name not in usual]
     if "more" in others:
         raise ParameterError(
             f"{command.__name__} takes one fault of several blocks at a time. Received more faults. Omit the others."
@@ -47,6 +49,8 @@ def several_blocks(
             f"{command.__name__} has, of a fault of several blocks, the options "
             f"{', '.join(f'--{name}' for name in sorted(has))}. Received {named}. Omit these."
         )
+    if chosen.get("accept_poor_fit"):
+        chain = replace(chain, fault=with_accepted_fit(chain.fault, True))
     return chain
 
 
@@ -70,8 +74,10 @@ def _scope(chain: "BlockChain") -> list[str]:
             "reference; slip errors are relative to the equilibrium of each block under these pressures, which is "
             f"within {far:.3g} m of the reference at every time"
         )
+    box = chain.fault.box
+    springs = ", springs between the blocks as they are" if any((box.stiffness, box.damping, box.authority)) else ""
     return [
-        f"plant: {chain.name}, {blocks}, {wells}, any constants of box {chain.fault.box.name}, without stick (friction "
+        f"plant: {chain.name}, {blocks}, {wells}, any constants of box {box.name}{springs}, without stick (friction "
         "continues to negative slip rates)",
         f"units: slip m, slip rate m/s, disturbance {pushed}, pressure Pa, rate of a load Pa/s; {meant}",
     ]

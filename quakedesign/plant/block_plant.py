@@ -16,8 +16,11 @@ With s = s0 + δs and β = β0 + δβ let F bound |δs(1 + ξ) + δβb·Sq|. The
 of M is below 1 (Collatz and Wielandt), no matrix of the ranges is singular, the balance is a Lipschitz function of r
 (Clarke), and |ξ| ≤ X and |q| ≤ Q follow from F.
 
-With one well and blocks that are alike, the mean of all forces is that of one block whose coefficient is the mean of μ
-at x*: N then lies in the range of one block whose friction weakens and strengthens 1 + X times as fast.
+With one well, and blocks that are alike and pull each other with equal force, springs drop out of the mean of all
+forces, which is that of one block whose coefficient is the mean of μ at x*: N then lies in the range of one block whose
+friction weakens and strengthens 1 + X times as fast; where X > 1 weakening in backward motion strengthens, X − 1 times.
+
+Where no such F is found, nothing is proved: sectors then hold for no error at all.
 """
 
 from collections.abc import Iterable, Sequence
@@ -39,7 +42,8 @@ from quakedesign.plant.ranges import FaultPlant, Range
 from quakedesign.text import counted
 
 _STEEP = Fraction(10**9)  # of friction that may have any coefficient at once
-_LOST = Fraction(10**9)  # X and Q where no balance is proved: nothing of use can be proved with them
+_LOST = Fraction(10**9)  # X, Q and |σ′ − Sp*| where no balance is proved
+_NOWHERE = Fraction(1, 10**30)  # errors up to which sectors then hold, so that nothing is proved
 _TURNS = 6
 _GRID = 10**4
 _DIGITS = 6  # of middles
@@ -76,11 +80,11 @@ def _parts(tasks: Sequence[FaultPlant], springs: Iterable[Spring], shares: Seque
     """Fields of a plant of blocks and wells."""
     N, m, zero = len(tasks), len(shares[0]), Fraction(0)
     size, springs = 2 * N, list(springs)
-    inverse, weights = _inverse(shares) if m == N else None, None
+    inverse, weights, lost = _inverse(shares) if m == N else None, None, False
     if inverse is None:
         weights = _averages(tasks, shares)
         balance = _balance(tasks, springs, shares, weights)
-        slopes, dampings = balance.slopes, balance.dampings
+        slopes, dampings, lost = balance.slopes, balance.dampings, max(balance.moves) >= _LOST
     else:
         slopes, dampings = [task.slip_chord for task in tasks], [task.rate_chord for task in tasks]
     pulls = [[zero] * size for _ in range(N)]
@@ -92,7 +96,8 @@ def _parts(tasks: Sequence[FaultPlant], springs: Iterable[Spring], shares: Seque
     sectors, disturbances, first = {}, {}, tasks[0].reference_rates[0]
     for i, task in enumerate(tasks):
         half, place = (dampings[i][1] - dampings[i][0]) / 2, i + 1
-        sectors[f"slope of block {place}"] = dict(entry=rate[i], row=unit(size, i), slopes=slopes[i])
+        within = _NOWHERE if lost else None
+        sectors[f"slope of block {place}"] = dict(entry=rate[i], row=unit(size, i), slopes=slopes[i], within=within)
         if half:
             sectors[f"damping of block {place}"] = dict(entry=rate[i], row=rate[i], slopes=(-half, half))
         acts = (*[zero] * size, *(task.authority * v for v in shares[i]))
@@ -172,12 +177,14 @@ def _balance(
     tasks: Sequence[FaultPlant], springs: Sequence[Spring], shares: Sequence[Row], weights: Matrix
 ) -> _Balance:
     """The balance of blocks under fewer wells."""
-    alike = len(weights) == 1 and all(task == tasks[0] for task in tasks)
+    both_ways = {(j, i, K) for i, j, K in springs} == set(springs)  # else they do not drop out of the mean
+    alike = len(weights) == 1 and both_ways and all(task == tasks[0] for task in tasks)
     found: _Balance | None = None
     for _ in range(_TURNS if alike else 1):
         if alike:
             law, steep = tasks[0].friction, _STEEP if found is None else 1 + max(found.moves)
-            faster = replace(law, weakening=law.weakening * steep, strengthening=law.strengthening * steep)
+            stronger = max(law.strengthening * steep, law.weakening * (steep - 2))
+            faster = replace(law, weakening=law.weakening * steep, strengthening=stronger)
             stresses = [replace(tasks[0], friction=faster).stress] * len(tasks)
         else:
             stresses = _stresses(tasks, springs, shares, weights)
@@ -252,7 +259,7 @@ def _moving(
     force = [tuple(task.authority * v for v in row) for task, row in zip(tasks, shares, strict=True)]
     acting = [tuple(b * v for v in row) for b, row in zip(beta, force, strict=True)]
     inverse = _balancing(s, springs, acting, weights)
-    if inverse is None:
+    if inverse is None or (-_LOST, _LOST) in stresses:
         return lost
     right = [*(-v for v in s), *[Fraction(0)] * m]
     still = [_dot(row, right) for row in inverse]  # ξ and q with δs = δβ = 0

@@ -51,7 +51,13 @@ def test_answers_are_told_in_lines_and_numbers():
 CHAIN = qd.load_chain(Path(__file__).parents[1] / "data" / "three_blocks.toml")
 SHORT = replace(CHAIN.fault, length=4500.0)
 ALIKE = replace(CHAIN, fault=SHORT, blocks=(replace(CHAIN.blocks[0], length=1500.0),) * 3, wells=(2250.0,))
-CASES = {"alike, one well": ALIKE, "one well": replace(CHAIN, wells=(2500.0,)), "two": replace(CHAIN, wells=(1e3, 4e3))}
+LONG = tuple(replace(CHAIN.blocks[0], length=length) for length in (500.0, 3500.0, 500.0))
+CASES = {
+    "alike, one well": ALIKE,
+    "of other lengths, one well": replace(ALIKE, blocks=LONG),
+    "one well": replace(CHAIN, wells=(2500.0,)),
+    "two": replace(CHAIN, wells=(1e3, 4e3)),
+}
 
 
 def numbers(chain):
@@ -99,6 +105,13 @@ def test_balances_of_random_slopes_and_coefficients_stay_within_their_bounds(cas
     if case != "alike, one well":  # there any coefficient at any slip is more than the friction can have
         assert (steepest <= slopes[:, 1]).all()
         assert (steepest > 0.8 * slopes[:, 1]).all()
+
+
+def test_where_no_balance_is_proved_sectors_hold_for_no_error():
+    lost, held = (qd.UncertainPlant.from_blocks(REAL, 2, wells="one", coupling=v) for v in ("0.5", "50"))
+    assert max(size for name, (_, size) in lost.disturbances.items() if "balance" in name) > 1000
+    assert all(one.within < 1e-20 for name, one in lost.sectors.items() if "slope" in name)
+    assert all(one.within is None for one in held.sectors.values())
 
 
 @pytest.mark.slow

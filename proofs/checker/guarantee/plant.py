@@ -368,8 +368,13 @@ class Sums:
         ends = [0]
         for width in widths:
             ends.append(ends[-1] + width)
+        height = len(rows.rows)
+        each = height * self.size * (len(now.rows[0]) + self.size)  # work of a period
+        need(AT_ONCE[0] * each <= MOST_WORK, "the loop must be smaller, or its flow cut into fewer pieces")
         turned, leap = [now], period  # products of few powers: of many maps, one after another, all digits are lost
-        while len(turned) < AT_ONCE[0] or (len(turned) < AT_ONCE[1] and not shrinks(leap)):
+        while len(turned) < AT_ONCE[0] or (
+            2 * len(turned) * each <= MOST_WORK and len(turned) < AT_ONCE[1] and not shrinks(leap)
+        ):
             turned, leap = turned + [leap * one for one in turned], leap * leap
         at_once = len(turned)
         groups = [[(t, a, b) for t in range(at_once)] for a, b in pairwise(ends)]
@@ -377,12 +382,11 @@ class Sums:
         lines = [[v for group in groups for t, a, b in group for v in turned[t].rows[j][a:b]] for j in range(self.size)]
         columns = Fixed(lines, max(one.error for one in turned))
         lengths = [sum(b - a for _, a, b in group) for group in groups]
-        known, height, done, until = rows, len(rows.rows), 0, at_once
-        require_fading(leap, at_once, height * self.size * (len(now.rows[0]) + self.size))
+        known, done, until = rows, 0, at_once
+        require_fading(leap, at_once, each)
         totals, free = [[0] * len(widths) for _ in rows.rows], [0] * height
         while True:
-            work = until * height * self.size * (len(now.rows[0]) + self.size)
-            need(work <= MOST_WORK, "the nominal loop must be stable, and forget its past soon")
+            need(until * each <= MOST_WORK, "the nominal loop must be stable, and forget its past soon")
             for _ in range((until - done) // at_once):
                 for r, found in enumerate(grouped(known, columns, lengths)):
                     totals[r] = [a + b for a, b in zip(totals[r], found, strict=False)]

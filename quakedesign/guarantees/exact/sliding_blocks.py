@@ -11,10 +11,10 @@ On |y| ≤ Y and |z| ≤ Z let f = γy and g = ηz, γ and η between the chords
 gives ranges of α and κ. The plant below has the sectors γα and η of z and γκ of w, which hold for |z| ≤ Z and |w| ≤ W,
 and disturbances of the size sup(γκ)·sup|ŝ|. From these claims Y = sup α·Z + sup κ·(W + sup|ŝ|) follows.
 
-|ŝ| is at most the shear stress, what inertia adds, sup|r|/λ₀ with |w′| ≤ (K + 2Σk)V(e^Y − 1 + swing) + μ*q̇ in place of
-K|x′| + μ*|q′|, q̇ = 2Q/lag, and what the rounding of μ* leaves. y, z, w and q are continuous and 0 at
-first, and u is decided by samples before it acts: where smaller bounds follow from the claims Z, W and Q, none is ever
-reached. ∎
+|ŝ| is at most the shear stress, what inertia adds, sup|r|/λ₀ with |w′| ≤ (K + 2Σk)V(e^Y − 1 + swing) + μ*q̇, Y the
+largest of all blocks here, in place of K|x′| + μ*|q′|, q̇ = 2Q/lag, and what the rounding of μ* leaves. y, z, w and q
+are continuous and 0 at first, and u is decided by samples before it acts: where smaller bounds follow from the claims
+Z, W and Q, none is ever reached. ∎
 """
 
 from dataclasses import dataclass
@@ -101,6 +101,12 @@ class SlidingBlocks:
                 "blocks in slow sliding need a positive lag and a positive bound of the shear stress. Received "
                 f"{shortly(self.lag)} s and {shortly(self.stress)} Pa. Give both."
             )
+        box = self.chain.fault.box
+        if any((box.stiffness, box.damping, box.authority)):
+            raise UnsupportedError(
+                f"blocks in slow sliding need constants that are known, box paper. Received the box {box.name}. "
+                "Use --box paper, or fault.with_box('paper')."
+            )
         for place, task in enumerate(self.tasks, 1):
             if task.state_law != "ageing" or task.regularised:
                 raise UnsupportedError(
@@ -141,10 +147,25 @@ class SlidingBlocks:
 
     def log_rate(self, claims: BlockClaims) -> UpperBound | None:
         """Y of all blocks [-] by claims; None where a block may open, or Y is beyond 3."""
-        found = [self._ranges(i, claims) for i in range(len(self.tasks))]
-        return None if None in found else UpperBound(max(one.log_rate for one in found if one is not None))
+        found = self._ranges(claims)
+        return None if found is None else UpperBound(max(one.log_rate for one in found))
 
-    def _ranges(self, i: int, claims: BlockClaims) -> _Ranges | None:
+    def _ranges(self, claims: BlockClaims) -> list[_Ranges] | None:
+        """Of all blocks."""
+        fastest = claims.log_state
+        for _ in range(_TURNS):
+            found = [self._of_block(i, claims, fastest) for i in range(len(self.tasks))]
+            known = [one for one in found if one is not None]
+            if len(known) < len(found):
+                return None
+            largest = max(one.log_rate for one in known)
+            if largest <= fastest:
+                return known
+            fastest = min(_outward(largest, largest * _WIDER)[1], Fraction(_LARGEST))
+        return None
+
+    def _of_block(self, i: int, claims: BlockClaims, fastest: Fraction) -> _Ranges | None:
+        """Of one block, with a bound of |y| of those that pull it."""
         task, Z, (mu_low, mu) = self.tasks[i], claims.log_state, self.tasks[i].ranges["coefficient"]
         a, b = task.ranges["direct_effect"][1], task.ranges["evolution_effect"][1]
         low, high = task.normal_stress(claims.push)
@@ -160,9 +181,9 @@ class SlidingBlocks:
             if Y > _LARGEST:
                 return None
             grown, (least, most) = exponential(Y), chords(Y)
-            fastest = ageing * max(grown - 1 / aged, aged - 1 / grown)
-            change = (task.pressure_per_slip * task.fastest + moved) * (a * Y + b * Z) + high * b * fastest
-            change += pulls * task.rate * (grown - 1 + task.swing) + mu * moved
+            of_state = ageing * max(grown - 1 / aged, aged - 1 / grown)
+            change = (task.pressure_per_slip * task.fastest + moved) * (a * Y + b * Z) + high * b * of_state
+            change += pulls * task.rate * (exponential(fastest) - 1 + task.swing) + mu * moved
             stress = task.stress + rounding + change * task.inertia * task.rate * grown / (low * a)
             alpha = b / (a + damping * most / low), b / (a + damping * least / high)
             kappa = 1 / (high * a + damping * most), 1 / (low * a + damping * least)
@@ -181,12 +202,12 @@ class SlidingBlocks:
         States: slip errors over D [-], logarithms of states [-], pressures of wells [MPa]; controls [MPa].
         """
         N, m, V, size, zero = len(self.tasks), len(self.chain.wells), self.tasks[0].rate, self.size, Fraction(0)
-        sectors, disturbances, pulls = {}, {}, []
+        sectors, disturbances, pulls, ranges = {}, {}, [], self._ranges(claims)
+        if ranges is None:
+            return None
         slip = [task.ranges["critical_slip"][0] for task in self.tasks]
         for i, task in enumerate(self.tasks):
-            found, place = self._ranges(i, claims), i + 1
-            if found is None:
-                return None
+            found, place = ranges[i], i + 1
             mu, D = sum(task.ranges["coefficient"]) / 2, task.ranges["critical_slip"][0]
             ageing = V / D
             state = unit(size, N + i)

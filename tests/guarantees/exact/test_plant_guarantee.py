@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -229,6 +230,17 @@ def test_a_sector_that_holds_up_to_a_bound_needs_it_in_both_checkers(checker):
     with pytest.raises(checker.Refused, match="close the small gain"):
         checker.check(json.dumps(document))
     assert str(read_guarantee(document).check()) == "undecided"
+
+
+def test_a_loop_that_is_too_large_is_refused_before_its_powers_are_formed(checker, monkeypatch):
+    plant, K = spring()
+    text = json.dumps(guarantee_document(qd.guarantee(plant, gains=K, step="0.1")))
+    checker.check(text)
+    (plant,) = (module for name, module in sys.modules.items() if name.endswith("guarantee.plant"))
+    monkeypatch.setattr(plant, "MOST_WORK", 1000)
+    monkeypatch.setattr(plant, "shrinks", None)
+    with pytest.raises(checker.Refused, match="the loop must be smaller"):
+        checker.check(text)
 
 
 def test_negative_numbers_close_no_small_gain(checker):

@@ -80,6 +80,27 @@ def test_inertia_is_a_stress_of_less_than_a_pascal_and_grows_with_the_mass():
     assert extra == pytest.approx(1000 * (light / by_pull - 10000), rel=0.05)
 
 
+def test_inertia_counts_the_pull_of_a_neighbour_that_is_faster():
+    """A heavy rock, whose second block has less direct effect, and so slides faster."""
+    dense = replace(CHAIN.fault, density=2670e4, shear_modulus=32.04e9)
+    blocks = changed(1, direct_effect=0.004)
+    plant = SlidingBlocks(chain=replace(CHAIN, fault=dense, blocks=blocks), lag=F(800), stress=F(10000)).plant(CLAIMS)
+    slow, fast = (
+        SlidingBlocks(chain=replace(CHAIN, fault=dense, blocks=(one,) * 3), lag=F(800), stress=F(10000))
+        for one in (blocks[0], blocks[1])
+    )
+    own, other = (float(np.exp(float(one.log_rate(CLAIMS)))) for one in (slow, fast))
+    assert other > 1.15 * own
+    least = STRESS - K / MU - 2e5
+    inertia = 2670e4 * 15e3 * V * own / (least * A)  # 1/λ₀ [s]
+    by_pull = float(plant.sectors["rate of block 1 by its pull"].slopes[1]) / 1e6
+    found = float(plant.disturbances["stress on block 1"][1]) / by_pull
+    alone = float(slow.plant(CLAIMS).disturbances["stress on block 1"][1])
+    alone /= float(slow.plant(CLAIMS).sectors["rate of block 1 by its pull"].slopes[1]) / 1e6
+    assert found - alone >= SPRING * V * (other - own) * inertia
+    assert found - alone > 1
+
+
 def test_claims_under_which_a_block_may_open_give_no_plant():
     assert BLOCKS.plant(replace(CLAIMS, push=F(48 * 10**6))) is None
     assert BLOCKS.log_rate(replace(CLAIMS, pull=F(10**8))) is None
@@ -174,6 +195,7 @@ def run(*arguments):
         (("compare", PATH), "Use guarantee with --lag and --stress"),
         (("limits", PATH), "Use guarantee with --lag and --stress"),
         (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--controller", "decentralised"), "one kind of law"),
+        (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--box", "ten-percent"), "box paper"),
         (("guarantee", PATH.with_name("three_blocks.toml"), "--lag", "1 s"), "need friction with a state"),
     ],
 )
@@ -181,6 +203,22 @@ def test_what_does_not_apply_is_refused_in_one_line(arguments, said, capsys):
     assert run(*arguments) == 2
     assert said in " ".join(capsys.readouterr().err.split())
     assert not Path("unwritten").exists()
+
+
+@pytest.mark.parametrize(
+    "option", [{"objective": "peak"}, {"scheme": "explicit"}, {"disturbance_class": "rate"}, {"plant": "stick-slip"}]
+)
+def test_options_that_are_not_used_are_refused(option):
+    with pytest.raises(QuakedesignError, match="omit all else"):
+        qd.guarantee(CHAIN, stress="1 kPa", lag="800", **option)
+
+
+def test_blocks_whose_record_does_not_support_their_friction_are_refused_unless_that_is_accepted():
+    poor = replace(CHAIN, fault=replace(CHAIN.fault, poor_fit="residuals are 3 times the noise"))
+    with pytest.raises(QuakedesignError, match="residuals are 3 times the noise"):
+        qd.guarantee(poor, stress="1 kPa", lag="800")
+    with pytest.raises(QuakedesignError, match="a positive lag"):  # goes on
+        qd.guarantee(poor, stress="1 kPa", accept_poor_fit=True)
 
 
 def changed(place, **values):
