@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.cli.app import new_file, progress
 from quakedesign.cli.options import Output, changed_options
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.exact import UpperBound, rational
 from quakedesign.files import hold, made_folder, require_room
 from quakedesign.text import counted
 
@@ -76,7 +77,10 @@ def _scope(chain: "BlockChain") -> list[str]:
         )
     box = chain.fault.box
     springs = ", springs between the blocks as they are" if any((box.stiffness, box.damping, box.authority)) else ""
+    excess = UpperBound(max(rational(block.friction.rest_excess) for block in chain.blocks))
+    healed = f"not covered: friction at rest up to {excess:.3g} above friction in slip (healing of the fault file)"
     return [
+        *([healed] if excess else []),
         f"plant: {chain.name}, {blocks}, {wells}, any constants of box {box.name}{springs}, without stick (friction "
         "continues to negative slip rates)",
         f"units: slip m, slip rate m/s, disturbance {pushed}, pressure Pa, rate of a load Pa/s; {meant}",

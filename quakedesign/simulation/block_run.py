@@ -163,6 +163,8 @@ def simulate_blocks(
     substeps : int
         Of a period, 1 to 1000: slip rates by a projected Euler step, v = max(v + h·a, 0), then slips.
     """
+    if any(block.friction.rest_excess for block in chain.blocks):
+        raise ParameterError("a run of several blocks has no healing. Received friction with it. Set healing to 0.")
     step, periods = float(law.step), whole_periods(chain, law.step, duration)
     if not 1 <= substeps <= 1000:
         raise ParameterError(f"substeps must be 1 to 1000. Received {substeps}.")

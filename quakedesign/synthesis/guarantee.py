@@ -163,7 +163,7 @@ def guarantee(
         fault = replace(fault, fault=with_accepted_fit(fault.fault, accept_poor_fit))
         setup = setup if law is not None or setup.step else setup.with_given(step=rational(fault.fault.sampling_time))
         if fault.ages:
-            usual = (law, tuple(gains), controller, plant) == (None, (), "elqr", PLANTS[0])
+            usual = (law, tuple(gains), controller) == (None, (), "elqr") and plant in (None, PRINTED)
             usual = usual and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])
             usual = usual and not exact_value(spread, "", "spread")
             if not usual or stress is None or setup.given().keys() - {"step", "lag"}:

@@ -161,6 +161,12 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
     notes = json.loads(capsys.readouterr().out)["notes"]
     assert notes[0] == "a note"
     assert notes[1].startswith("plant: three-blocks")
+    healed = tmp_path / "healed.toml"
+    healed.write_text(PATH.read_text().replace("drop = 0.1", "drop = 0.1\nhealing = 0.02"))
+    assert run("guarantee", healed) == 0
+    assert "not covered: friction at rest up to 0.02 above" in " ".join(capsys.readouterr().out.split())
+    assert run("simulate", healed, "--duration", "2 s") == 2
+    assert "has no healing" in " ".join(capsys.readouterr().err.split())
     assert run("simulate", PATH, "--duration", "2 s") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "run over 1.84 s on the stick-slip plant" in told
