@@ -152,7 +152,7 @@ def test_a_certificate_is_written_where_there_is_a_proof(prove, tmp_path):
     assert (code, json.loads(out)["certificate"], (tmp_path / "a.json").read_text()) == (0, "a.json", "claim")
     assert prove([proof(True)], "real-fault", "--out", "a.json")[0] == 2
     code, out, _ = prove([proof(True, "other")], "real-fault", "--out", "a.json", "--force")
-    assert (code, out, (tmp_path / "a.json").read_text()) == (0, "line of other\n", "other")
+    assert (code, out, (tmp_path / "a.json").read_text()) == (0, "line of other\nwritten: a.json\n", "other")
 
 
 def test_certificates_of_several_faults_lie_in_a_folder_that_no_other_command_writes(prove, tmp_path, monkeypatch):
