@@ -50,7 +50,7 @@ def allow_code(allowed: bool) -> None:
 
 @contextmanager
 def user_code() -> Iterator[None]:
-    """Turn whatever code of the user's raises into one error, but for interruptions and refusals of quakedesign."""
+    """Turn every exception of user code into one error, except interruptions and errors of quakedesign."""
     try:
         yield
     except (KeyboardInterrupt, MemoryError, QuakedesignError):

@@ -782,7 +782,7 @@ def shared_library(text: str, folder: Path, command: tuple[str, ...], flags: tup
 
 
 def _run(call: list[str], folder: Path) -> None:
-    """Run a compiler in a folder of its own; an interruption ends it and the processes that it has started."""
+    """Run a compiler in a separate folder; an interruption ends it and its child processes."""
     where, pipe = os.environ | {"TMPDIR": str(folder)}, subprocess.PIPE
     with subprocess.Popen(
         call, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, env=where, start_new_session=True

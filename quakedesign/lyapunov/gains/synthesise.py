@@ -152,7 +152,7 @@ class LargestDecay(Objective):
 
 @dataclass(frozen=True, kw_only=True)
 class LargestRange(Objective):
-    """Largest ρ for β ∈ [b/ρ, bρ] around the geometric middle b of the range asked for."""
+    """Largest ρ for β ∈ [b/ρ, bρ] around the geometric middle b of the requested range."""
 
     name: ClassVar[str] = "beta"
     unit: ClassVar[str] = "-"
@@ -168,7 +168,7 @@ class LargestRange(Objective):
         return replace(loop, uncertain={**loop.uncertain, "beta": ends})
 
     def start(self, setting: PathSetting, loop: Loop) -> State | None:
-        """State with the range asked for, or a hundredth to either side."""
+        """State with the requested range, or a hundredth to either side."""
         return look(setting, loop, self.first, least=FAINT)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
@@ -215,7 +215,7 @@ def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
 
 
 # ----------------------------------------------------------------------
-# What is asked of a synthesis of gains, and where its search begins.
+# The problem of a synthesis of gains, and the loops at which its search begins.
 
 _SPREAD, _WIDTH = 0.4, 3.0
 _HIGHEST = 12  # beyond, one programme takes minutes
@@ -223,7 +223,7 @@ _HIGHEST = 12  # beyond, one programme takes minutes
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisProblem:
-    """What is asked of a synthesis, read and checked."""
+    """Problem of a synthesis, read and checked."""
 
     subject: Subject
     loop: Loop  # With gains of one
@@ -241,7 +241,7 @@ def question(
     bound: float | None = None,
     degrees: Iterable[int] | None = None,
 ) -> SynthesisProblem:
-    """Read what is asked; see `synthesise`.
+    """Read and check the arguments of `synthesise`.
 
     Raises
     ------
@@ -291,21 +291,21 @@ def _scaled(
     return short(loop, moved)
 
 
-def begin_with(asked: SynthesisProblem, seed: int) -> Iterator[Loop]:
+def begin_with(problem: SynthesisProblem, seed: int) -> Iterator[Loop]:
     """Gains from the literature, the nearest to the bound on the norm first, then random ones around them.
 
     Random ones of any size where there are none in the literature.
     """
-    yield from sorted(asked.known, key=lambda one: _beyond(asked.setting, one))
-    loop, rng = asked.loop, np.random.default_rng(seed)
+    yield from sorted(problem.known, key=lambda one: _beyond(problem.setting, one))
+    loop, rng = problem.loop, np.random.default_rng(seed)
     while True:
-        near = asked.known[int(rng.integers(len(asked.known)))].gains if asked.known else {}
+        near = problem.known[int(rng.integers(len(problem.known)))].gains if problem.known else {}
         spread = rng.normal(0, _SPREAD, len(loop.gains)) if near else rng.uniform(0, _WIDTH, len(loop.gains))
         factors = dict(zip(loop.gains, np.exp(spread).tolist(), strict=True))
         if near:
             yield with_gains(loop, short(loop, {n: float(k) * factors[n] for n, k in near.items()}))
         else:
-            yield with_gains(loop, _scaled(loop, factors, 1.0, asked.setting.exponents))
+            yield with_gains(loop, _scaled(loop, factors, 1.0, problem.setting.exponents))
 
 
 def _beyond(setting: PathSetting, loop: Loop) -> tuple[bool, float]:
@@ -414,39 +414,39 @@ def synthesise(
     SimulationError
         When the workers cannot be reached, or do not live.
     """
-    asked = question(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
+    problem = question(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
     require_count(_MOST_STARTS, starts=starts)
     require_count(MOST_WORKERS, workers=workers)
-    first = list(islice(begin_with(asked, seed), starts * _DRAWS))
+    first = list(islice(begin_with(problem, seed), starts * _DRAWS))
     with Here() if handing_back() else crew_or_here(workers, scheduler, executor) as crew:
-        best = _best(asked, _climbed(asked.setting, first, starts, crew))
-    mine = _synthesis(asked, *best) if best else None
-    return _beside(asked, mine) if compare else mine
+        best = _best(problem, _climbed(problem.setting, first, starts, crew))
+    mine = _synthesis(problem, *best) if best else None
+    return _beside(problem, mine) if compare else mine
 
 
-def _synthesis(asked: SynthesisProblem, certificate: Certificate, value: float) -> Synthesis:
+def _synthesis(problem: SynthesisProblem, certificate: Certificate, value: float) -> Synthesis:
     return Synthesis(
-        law=asked.loop.law,
-        objective=asked.setting.objective.name,
-        unit=asked.setting.objective.unit,
+        law=problem.loop.law,
+        objective=problem.setting.objective.name,
+        unit=problem.setting.objective.unit,
         gains=dict(certificate.loop.gains),
         certificate=certificate,
         value=value,
-        norm=scaled_norm(certificate.loop, asked.setting.exponents),
+        norm=scaled_norm(certificate.loop, problem.setting.exponents),
     )
 
 
-def _beside(asked: SynthesisProblem, mine: Synthesis | None) -> Synthesis | None:
+def _beside(problem: SynthesisProblem, mine: Synthesis | None) -> Synthesis | None:
     """Gains found beside known ones, which take their place where they are better within the same bound on the norm."""
-    objective = asked.setting.objective
-    compared = [given(asked, one) for one in asked.known]
+    objective = problem.setting.objective
+    compared = [given(problem, one) for one in problem.known]
     for one in compared:
         if one.certificate is None or one.value is None or one.norm > (objective.bound or one.norm) * (1 + 1e-9):
             continue
-        if not _covers(one.certificate.loop, asked.loop):
+        if not _covers(one.certificate.loop, problem.loop):
             continue
         if mine is None or objective.better(one.value, mine.value):
-            mine = _synthesis(asked, one.certificate, one.value)
+            mine = _synthesis(problem, one.certificate, one.value)
     if mine is None:
         return None
     best = mine.value
@@ -455,7 +455,7 @@ def _beside(asked: SynthesisProblem, mine: Synthesis | None) -> Synthesis | None
 
 
 def _covers(proved: Loop, wanted: Loop) -> bool:
-    """Whether a proof is about all ranges that were asked for."""
+    """Whether a proof covers all requested ranges."""
     return all(
         proved.uncertain[name][0] <= low and high <= proved.uncertain[name][1]
         for name, (low, high) in wanted.uncertain.items()
@@ -506,18 +506,18 @@ def _stretched(setting: PathSetting, loop: Loop, factor: float) -> Loop:
     return with_gains(loop, short(loop, gains))
 
 
-def _best(asked: SynthesisProblem, climbs: Sequence[Sequence[State]]) -> tuple[Certificate, float] | None:
+def _best(problem: SynthesisProblem, climbs: Sequence[Sequence[State]]) -> tuple[Certificate, float] | None:
     """Best proof, the best climb going on with higher degrees."""
-    best = _in_order(asked.setting, climbs)
-    stages = [(asked.setting, best)]
-    for degree in asked.degrees[1:] if best else ():
-        higher = replace(asked.setting, degree=degree)
+    best = _in_order(problem.setting, climbs)
+    stages = [(problem.setting, best)]
+    for degree in problem.degrees[1:] if best else ():
+        higher = replace(problem.setting, degree=degree)
         begin = next(filter(None, (_carried(higher, state) for state in best[:_TRIES])), None)
         if begin is not None:
             best = _in_order(higher, [climb(higher, begin)])
             stages.append((higher, best))
-    proofs = list(filter(None, (_proved(at, states, asked.subject) for at, states in stages)))
-    pick = max if asked.setting.objective.larger else min
+    proofs = list(filter(None, (_proved(at, states, problem.subject) for at, states in stages)))
+    pick = max if problem.setting.objective.larger else min
     return pick(proofs, key=lambda item: item[1], default=None)
 
 
@@ -548,7 +548,7 @@ def _proved(
     return None
 
 
-def given(asked: SynthesisProblem, loop: Loop) -> ComparedGains:
+def given(problem: SynthesisProblem, loop: Loop) -> ComparedGains:
     """The same question about given gains, whatever their norm, with V of every degree; its ratio is left open.
 
     Parameters
@@ -556,19 +556,19 @@ def given(asked: SynthesisProblem, loop: Loop) -> ComparedGains:
     loop : Loop
         With the gains.
     """
-    objective = replace(asked.setting.objective, bound=None)
-    setting = replace(asked.setting, objective=objective, least=FAINT)
-    shorter = objective.given(loop, asked.degrees, asked.subject)
+    objective = replace(problem.setting.objective, bound=None)
+    setting = replace(problem.setting, objective=objective, least=FAINT)
+    shorter = objective.given(loop, problem.degrees, problem.subject)
     found = [(shorter, objective.figure(shorter, setting))] if shorter else []
-    for degree in asked.degrees if objective.paced or not shorter else ():
+    for degree in problem.degrees if objective.paced or not shorter else ():
         at = replace(setting, degree=degree)
         begin = objective.start(at, loop)
         states = _in_order(at, [climb(at, begin, free=False)]) if begin else []
         states = [s for s in states if all(objective.better(s.level, value) for _, value in found)]
-        reached = _proved(at, states, asked.subject, _FEW if found else _TRIES)
+        reached = _proved(at, states, problem.subject, _FEW if found else _TRIES)
         found += [reached] if reached else []
         if found and not objective.bounded:  # then V does not matter
             break
     certificate, value = (max if objective.larger else min)(found, key=lambda item: item[1], default=(None, None))
-    norm = scaled_norm(loop, asked.setting.exponents)
+    norm = scaled_norm(loop, problem.setting.exponents)
     return ComparedGains(gains=dict(loop.gains), value=value, norm=norm, ratio=None, certificate=certificate)

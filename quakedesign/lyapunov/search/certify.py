@@ -348,7 +348,7 @@ class CertifiedLimit:
     # Smallest number at which the search found nothing, at most value·(1 + 1e-4) unless a proof could not be finished;
     # None where `limit` is as near, or where there seems to be no end
     beyond: Fraction | None
-    limit: Fraction | None  # No Lyapunov function exists there, of whatever kind; None where none is known
+    limit: Fraction | None  # No Lyapunov function of any kind exists there; None where no such value is known
     degrees: tuple[int, ...]  # Degrees of V that were tried, all sums of squares on cells without multiplier
     degree: int | None  # That of the certificate
     # Proof for the value; where there is none, the exact counterexample, if one is known

@@ -378,7 +378,7 @@ SLICE = 200_000  # steps of all samples together in one call of compiled code, w
 
 @dataclass(frozen=True, kw_only=True)
 class Library:
-    """Compiled source, bound to its content: whoever loads it makes sure that it is what was built."""
+    """Compiled source and the digest of its content, which is compared before each load."""
 
     path: Path
     digest: str
@@ -418,7 +418,7 @@ class CompiledProgram:
     function: str
     size: int  # Length of the vector of one sample
     diverged: int  # Index of the time of divergence in it
-    library: Library | None = None  # Where somebody has compiled the source already
+    library: Library | None = None  # None before the source is compiled
 
     @classmethod
     def of(cls, step: Any, diverged: int) -> "CompiledProgram":
