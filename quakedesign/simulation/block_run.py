@@ -162,6 +162,11 @@ def simulate_blocks(
         [s]; the operation time unless given.
     substeps : int
         Of a period, 1 to 1000: slip rates by a projected Euler step, v = max(v + h·a, 0), then slips.
+
+    Raises
+    ------
+    ParameterError
+        For friction that heals, for substeps outside of 1 to 1000, and for a run that overflows.
     """
     if any(block.friction.rest_excess for block in chain.blocks):
         raise ParameterError("a run of several blocks has no healing. Received friction with it. Set healing to 0.")

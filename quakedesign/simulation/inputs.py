@@ -192,6 +192,11 @@ def pressure_course(text: str) -> PressureCourse:
         A constant; or instants as ``"0 s: 0 MPa, 1 day: 0 MPa, 1 day: 5 MPa, 9 day: 2 MPa"``, linear between, a step
         where one stands twice; or a path that ends in ``.csv``, its first row ``time [s],pressure [MPa]`` or with
         other units.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        For another form or unit, no instant or more than 4096, or times that descend.
     """
     if Path(text).suffix.lower() == ".csv":
         rows = list(_rows(text))

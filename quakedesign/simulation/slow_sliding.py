@@ -129,10 +129,16 @@ def simulate_sliding(
     rate, reference, reference_rate = np.exp(log_rate), loop.reference.slip(time), loop.reference.rate(time)
     friction = loop.slider.readings.map(len(time))(rows[:, 1:5].T, pressure)[0].full().ravel()
     late = time > setting.settled_from
+    slip_error, rate_error, applied = (values[late] for values in (slip - reference, rate - reference_rate, pressure))
     figures = metrics(
         {
             "settled_count": float(np.count_nonzero(late)),
-            **_of_errors((slip - reference)[late], (rate - reference_rate)[late], pressure[late]),
+            "max_slip_error": float(np.max(np.abs(slip_error), initial=0.0)),
+            "max_slip_rate_error": float(np.max(np.abs(rate_error), initial=0.0)),
+            "sum_square_slip_error": float(np.sum(slip_error**2)),
+            "sum_square_slip_rate_error": float(np.sum(rate_error**2)),
+            "sum_square_pressure": float(np.sum(applied**2)),
+            "pressure_variation": float(np.sum(np.abs(np.diff(applied)))),
             "reverse_count": 0.0,  # the logarithm of the slip rate is what is integrated
             "max_h_change": math.nan,
             "max_pressure": float(pressure.max()),
@@ -186,18 +192,6 @@ def simulate_sliding(
         f.name: value[..., shown] for f in fields(run) if isinstance(value := getattr(run, f.name), np.ndarray)
     }
     return replace(run, **arrays)
-
-
-def _of_errors(slip: "np.ndarray", rate: "np.ndarray", pressure: "np.ndarray") -> dict[str, float]:
-    """What a recorder accumulates of the errors of slip and slip rate and of the pressure."""
-    return {
-        "max_slip_error": float(np.max(np.abs(slip), initial=0.0)),
-        "max_slip_rate_error": float(np.max(np.abs(rate), initial=0.0)),
-        "sum_square_slip_error": float(np.sum(slip**2)),
-        "sum_square_slip_rate_error": float(np.sum(rate**2)),
-        "sum_square_pressure": float(np.sum(pressure**2)),
-        "pressure_variation": float(np.sum(np.abs(np.diff(pressure)))),
-    }
 
 
 @dataclass(frozen=True)
