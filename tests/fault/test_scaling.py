@@ -340,6 +340,14 @@ def test_different_laws_name_what_only_one_has():
     assert {"friction.residual", "friction.direct_effect"} < set(relation.unmatched)
 
 
+def test_lengths_of_friction_fix_the_scale_of_slip_before_its_rates():
+    faster = replace(RATE_AND_STATE, friction=replace(RATE_AND_STATE.friction, reference_rate=2e-9))
+    relation = similarity(RATE_AND_STATE, faster)
+    assert "friction.critical_slip" in relation.repeating
+    assert relation.scales.of("slip_m").fraction == 1
+    assert [c.group.name for c in relation.violations()] == ["friction.reference_rate"]
+
+
 # --- a law that admits no factor --------------------------------------------------------------------------------
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -174,3 +175,24 @@ def test_friction_of_the_slip_rate_is_followed_too():
     setting = {"step": 0.01, "duration": 20.0, "samples": 20}
     fixed, run = (simulate(fault, method=m, **setting, plant="printed") for m in ("dormand-prince", "idas"))
     assert np.max(np.abs(run.slip - fixed.slip)) < 1e-5 * np.max(np.abs(fixed.slip))
+
+
+def test_where_the_solver_stops_it_is_tried_over_fewer_steps_and_then_no_longer_over_more(monkeypatch):
+    tried = []
+
+    def piece(recorder, method, rtol, count):
+        def vectors(vector):
+            tried.append(count)
+            if count > 1:
+                raise adaptive.StoppedError("step too small")
+            return vector[:, None] + 1
+
+        return vectors
+
+    def parts(vector):
+        return SimpleNamespace(counter=vector[0], watched={"diverged": -1.0})
+
+    monkeypatch.setattr(adaptive, "_piece", piece)
+    found = adaptive.smooth_march(SimpleNamespace(parts=parts, step=1.0), None, 1e-6, [0.0], [0, 20, 40])
+    assert found.tolist() == [[0.0, 20.0, 40.0]]
+    assert tried == [40, 2] + [1] * 40
