@@ -303,6 +303,7 @@ def test_the_equation_of_motion_is_invariant_symbolically():
 
 def test_one_changed_parameter_breaks_exactly_its_group():
     relation = similarity(LAB, replace(LAB, damping=2 * LAB.damping))
+    assert "reference.operation_time" in relation.repeating
     assert [c.group.name for c in relation.violations()] == ["damping"]
     assert [c.ratio.fraction for c in relation.differing] == [2]
     assert relation.scales.of("s") == radical(1)

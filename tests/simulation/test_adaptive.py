@@ -193,6 +193,8 @@ def test_where_the_solver_stops_it_is_tried_over_fewer_steps_and_then_no_longer_
         return SimpleNamespace(counter=vector[0], watched={"diverged": -1.0})
 
     monkeypatch.setattr(adaptive, "_piece", piece)
-    found = adaptive.smooth_march(SimpleNamespace(parts=parts, step=1.0), None, 1e-6, [0.0], [0, 20, 40])
+    recorder, heard = SimpleNamespace(parts=parts, step=1.0), []
+    found = adaptive.smooth_march(recorder, None, 1e-6, [0.0], [0, 20, 40], heard.append)
     assert found.tolist() == [[0.0, 20.0, 40.0]]
     assert tried == [40, 2] + [1] * 40
+    assert heard == [k / 40 for k in range(1, 41)]
