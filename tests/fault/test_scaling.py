@@ -16,6 +16,8 @@ from quakedesign.fault import Disturbance, Fault, FrictionLaw, friction_law, loa
 from quakedesign.fault.similarity import (
     BASES,
     PLANT_UNITS,
+    GroupComparison,
+    PiGroup,
     Scales,
     dimension,
     dimensional_matrix,
@@ -339,6 +341,13 @@ def test_different_laws_name_what_only_one_has():
     relation = similarity(LAB, RATE_AND_STATE)
     assert relation.unmatched[0] == "friction.law"
     assert {"friction.residual", "friction.direct_effect"} < set(relation.unmatched)
+
+
+@pytest.mark.parametrize(("squared", "within"), [("0.981", True), ("0.98", False), ("1.02", True), ("1.0202", False)])
+def test_a_root_is_compared_with_the_tolerance_exactly(squared, within):
+    root = radical(Fraction(squared)) ** Fraction(1, 2)
+    compared = GroupComparison(group=PiGroup(name="x", exponents={"x": Fraction(1)}), source=radical(1), target=root)
+    assert compared.within(Fraction(1, 100)) is within
 
 
 def test_lengths_of_friction_fix_the_scale_of_slip_before_its_rates():
