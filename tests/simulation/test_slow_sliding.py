@@ -18,7 +18,7 @@ from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Saturation, sliding_loop
 from quakedesign.loop.sensing import Measurement, Transducer
-from quakedesign.simulation import Load, Variation
+from quakedesign.simulation import Load, Variation, slow_sliding
 from quakedesign.simulation.slow_sliding import _Loop, simulate_sliding
 from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
 from quakedesign.symbolic import derive
@@ -176,6 +176,15 @@ def test_a_lag_between_samples_is_that_of_an_independent_integrator():
     assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
     at_once = oracle(law, "rate-and-state-aging", tide, 30)[1]
     assert np.max(np.abs(log_rate - at_once)) > 1e-3
+
+
+def test_a_run_with_which_the_solver_cannot_go_on_has_no_metrics(monkeypatch):
+    followed = slow_sliding._followed
+    monkeypatch.setattr(slow_sliding, "_followed", lambda *given: (followed(*given)[0], {"diverged": 80.0}))
+    run = simulate_sliding(fault(), sliding_law(sliding_model(fault()), STEP), STEP, duration=80.0, settled_from=20.0)
+    known = {name: value for name, value in run.metrics.to_dict().items() if value is not None}
+    assert known.keys() == {"settled_from", "steps", "seconds"}
+    assert (known["settled_from"], known["steps"]) == (20.0, len(run.time) - 1)
 
 
 def test_metrics_are_those_of_the_instants_from_where_errors_count():
