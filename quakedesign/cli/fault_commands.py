@@ -269,9 +269,8 @@ def identify(
         new_file(path, what, force=force)
     if figure is not None:
         require_format(figure)
-    require_different({"--out": out, "--figure": figure, "the record": data, "--fault": Path(fault)})
-    for each in more:
-        require_different({"--out": out, "--figure": figure, "the record": each})
+    further = {f"record {i}": path for i, path in enumerate(more, start=2)}
+    require_different({"--out": out, "--figure": figure, "the record": data, "--fault": Path(fault), **further})
     around = load_fault(fault)
     records = [
         record

@@ -126,7 +126,11 @@ def test_files_of_several_steps_are_fitted_together_and_one_with_trend_in_time_b
     assert code == 2
     assert "--steps must name windows" in err
     assert "auto" in run(capsys, paths[0], "--trend", "never")[2]
-    for option in ("--out", "--figure"):
-        code, _, err = run(capsys, *paths, option, paths[1], "--force")
+    for option, own in (("--out", tmp_path / "b.toml"), ("--figure", tmp_path / "b.svg")):
+        own.write_text(paths[1].read_text())
+        code, _, err = run(capsys, paths[0], own, option, own, "--force")
         assert code == 2
-        assert "must" in err
+        assert f"{option} and record 2 must be different files" in err
+    code, _, err = run(capsys, *paths, paths[1])
+    assert code == 2
+    assert "record 2 and record 3 must be different files" in err
