@@ -30,9 +30,7 @@ class CorrelatedNoise:
     along: "np.ndarray"  # where every sample lies: time [s] or displacement [m]
     counts: "np.ndarray"  # measurements in every sample
     of_time: bool  # whether `along` is time
-    common: "np.ndarray | None" = (
-        None  # what one deviation of each unknown of the load moves in all samples, by columns
-    )
+    common: "np.ndarray | None" = None  # columns: what a deviation of each unknown of the load moves in all samples
 
     def to_dict(self, noise: float) -> dict[str, Any] | None:
         """Size and length with their units, of the white noise [-] of one measurement; None where nothing fades."""

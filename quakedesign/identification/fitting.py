@@ -50,6 +50,7 @@ class Fit:
     agreeing: int  # searches that end in the best fit
     starts: int  # searches
     correlated: CorrelatedNoise | None = None  # noise that samples share with their neighbours
+    pieces: float = math.inf  # independent ones of the noise, where samples of several records are whitened
 
     @cached_property
     def residuals(self) -> "np.ndarray":
@@ -92,6 +93,11 @@ class Fit:
         return int(self.kept.sum()) - len(self.fitted)
 
     @property
+    def freedom_of_noise(self) -> float:
+        """Degrees of freedom of the size of noise; where noise fades, pieces of twice its length."""
+        return min(self.freedom, self.pieces, self.correlated.pieces if self.correlated is not None else math.inf)
+
+    @property
     def noise(self) -> float:
         """Standard deviation of one measurement [-]."""
         return float(np.sqrt(self.squares / self.freedom))
@@ -120,12 +126,8 @@ class Fit:
         return (squares - self.squares) / (self.noise**2 * self.correlation)
 
     def threshold(self, count: int) -> float:
-        """`excess` that so many parameters jointly stay below with the confidence of `CONFIDENCE` (Fisher's F).
-
-        The size of noise that fades is known from as many samples as the record has pieces of twice its length.
-        """
-        freedom = min(self.freedom, self.correlated.pieces if self.correlated is not None else math.inf)
-        return float(count * stats.f.ppf(CONFIDENCE, count, freedom))
+        """`excess` that so many parameters jointly stay below with the confidence of `CONFIDENCE` (Fisher's F)."""
+        return float(count * stats.f.ppf(CONFIDENCE, count, self.freedom_of_noise))
 
     def distance(self, fitted: "np.ndarray") -> float:
         """`excess` of given coordinates, infinite where there is no such experiment."""

@@ -175,9 +175,8 @@ class Loading:
         begins, rates = self.pieces.begins, self.pieces.rates
         ends = np.append(begins[1:], np.inf)
         off = self.pieces.noise / np.maximum(np.abs(np.diff(rates)), 1e-300)
-        period = (record.time[-1] - record.time[0]) / float(
-            len(record.time) if record.counts is None else np.sum(record.counts)
-        )
+        count = len(record.time) if record.counts is None else float(np.sum(record.counts))
+        period = (record.time[-1] - record.time[0]) / count
         known = self.pieces.rough or off.size == 0
         hidden = [
             i for i in range(len(off)) if not known and self.pieces.large_changes[i] and off[i] > _TIMELY * period

@@ -153,13 +153,11 @@ def read_record(
 
 
 def part(record: Record, inside: "np.ndarray", name: str) -> Record:
-    """Samples of a record, as a record of its own that begins with the first of them."""
-    columns = ("time", "friction", "load_point", "slip", "normal", "counts", "load_rates")
-    values: dict[str, Any] = {n: None if getattr(record, n) is None else getattr(record, n)[inside] for n in columns}
+    """Samples of a record, with time and load point from the first of them on."""
+    values: dict[str, Any] = {n: column[inside] for n, column in vars(record).items() if isinstance(column, np.ndarray)}
     begun = float(values["time"][0]) if np.any(inside) else 0.0
-    values["time"] = values["time"] - begun
-    if values["load_point"] is not None:
-        values["load_point"] = values["load_point"] - values["load_point"][:1]
+    for along in values.keys() & {"time", "load_point"}:
+        values[along] = values[along] - values[along][:1]
     return replace(record, name=name, origin=record.origin + begun, **values)
 
 

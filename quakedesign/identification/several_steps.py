@@ -78,6 +78,13 @@ def read_steps(
         if len(ends) != 2:
             raise RecordError(f"--steps must name windows as 0 s to 60 s, 60 s to 120 s. Received {shown(window)}.")
         record = read_record(path, begin=ends[0].strip(), end=ends[1].strip(), **how)
+        for other in found:
+            shared = np.isin((record.origin + record.time).round(9), (other.origin + other.time).round(9))
+            if shared.sum() > 1:
+                raise RecordError(
+                    f"--steps windows must not overlap: part them. Received {shared.sum()} samples of {window} twice."
+                )
+            record = part(record, ~shared, record.name)
         found.append(replace(record, name=f"{record.name} {window}"))
     return found
 
@@ -121,17 +128,18 @@ def identify_steps(
     law, stiffness, rates, states, trend, seed
         As for `identify`; `rates` are those of every step.
 
-    Returns
-    -------
-    Steps
-
     Raises
     ------
     RecordError
-        When a record does not suit the law, or a step has no law with a state.
+        When a record does not suit the law, or stiffnesses of steps have different units.
     """
     if len(records) < 2:
         raise RecordError(f"several steps must be at least 2. Received {len(records)}. Use identify for one.")
+    units = sorted({record.stiffness_unit for record in records if record.load_point is not None})
+    if len(units) > 1:
+        raise RecordError(
+            f"stiffness must have one unit in all steps. Received {', '.join(units)}. Give stresses alone."
+        )
     more: dict[str, Any] = {"stiffness": stiffness, "rates": rates, "trend": trend, "seed": seed}
     kinds = kinds_of(law, states)
     steps = [identified_as(record, kinds, **more) for record in records]
@@ -141,17 +149,16 @@ def identify_steps(
         step if step.law.name == kind.name else identified_as(record, [kind], **more)
         for step, record in zip(steps, records, strict=True)
     ]
-    best, shared, excess = _common(steps)
-    names = [*shared, _LEVEL]
+    best, shared, squares = _common(steps)
     notes = tuple(f"step {i}: {note}" for i, step in enumerate(steps, start=1) for note in step.notes[:2])
     setup = Setup(experiment=best.experiment, used=np.ones(len(best.measured), dtype=bool), notes=notes)
     name = f"{steps[0].record.name} and {counted(len(steps) - 1, 'more step')}"
     places = np.arange(float(len(best.measured)))
     whole = replace(steps[0].record, name=name, time=places, friction=best.measured, load_point=None, slip=None)
-    common = profiled(best, whole, setup, seed, names)
+    common = profiled(best, whole, setup, seed, [*shared, _LEVEL])
     count = len(shared) * (len(steps) - 1)
-    freedom = sum(step.fit.freedom for step in steps)
-    probability = float(stats.f.sf(excess / count, count, freedom))
+    excess = squares / max(step.fit.correlation for step in steps)
+    probability = float(stats.f.sf(excess / count, count, best.pieces))
     common = replace(common, assessment=_assessed(common, steps, probability))
     return Steps(steps=tuple(steps), common=common, probability=probability)
 
@@ -161,7 +168,8 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
     fits = [step.fit for step in steps]
     told = [fit.experiment.coordinates for fit in fits]
     quantities = steps[0].law.quantities()
-    shared = [c.name for c in told[0] if (c.name in quantities and c.name != _LEVEL) or c.name == STIFFNESS]
+    everywhere = set.intersection(*({c.name for c in own} for own in told))
+    shared = [c.name for c in told[0] if c.name in everywhere & {*quantities, STIFFNESS} - {_LEVEL}]
     coordinates: list[Coordinate] = [c for c in told[0] if c.name in shared]
     places, starts = [], []
     for i, (fit, own) in enumerate(zip(fits, told, strict=True)):
@@ -184,12 +192,12 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
     measured = joint.joined([fit.measured for fit in fits])
     ones = np.ones(len(measured))
     best = Fit(experiment=joint, fitted=start, measured=measured, counts=ones, kept=ones > 0, agreeing=1, starts=1)
+    best = replace(best, pieces=sum(fit.freedom_of_noise for fit in fits))
     for _ in range(_ROUNDS):
         finer = best.experiment.resolved(best.fitted, best.accuracy)
         fitted, _ = minimised(finer, measured, ones, best.fitted)
         best = replace(best, experiment=finer, fitted=fitted)
-    alone = sum(fit.squares / fit.noise**2 for fit in fits)
-    return best, shared, max(best.squares - alone, 0.0) / max(fit.correlation for fit in fits)
+    return best, shared, max(best.squares - sum(fit.squares / fit.noise**2 for fit in fits), 0.0)
 
 
 def _assessed(common: Identification, steps: Sequence[Identification], probability: float) -> Assessment:
@@ -197,13 +205,11 @@ def _assessed(common: Identification, steps: Sequence[Identification], probabili
     told = "explains" if probability >= _UNLIKELY else "does not explain"
     said = f"one set of parameters {told} all steps (chance {probability:.2g})"
     one = Check(name="common", passed=probability >= _UNLIKELY, value=probability, limit=_UNLIKELY, sentence=said)
-    signs = [check for step in steps for check in step.assessment.checks if check.name == "sign"]
+    signs = {np.sign(c.value) for step in steps for c in step.assessment.checks if c.name == "sign" and c.passed}
     sign = sign_check(common.difference, {})
-    if sign is not None:
-        with_it = [check for check in signs if check.passed and check.value * sign.value > 0]
-        against = [check for check in signs if check.passed and check.value * sign.value < 0]
-        sure = bool(sign.passed and with_it and not against)
-        sign = sign if sure else replace(sign, passed=False, sentence="the sign of a - b is open: steps do not agree")
+    if sign is not None and sign.passed and signs != {np.sign(sign.value)}:
+        why = "steps do not agree" if signs else "no step has one by itself"
+        sign = replace(sign, passed=False, sentence=f"the sign of a - b is open: {why}")
     checks = (one, *([sign] if sign is not None else []))
     return Assessment(
         checks=checks,

@@ -5,12 +5,17 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from quakedesign.errors import RecordError
-from quakedesign.identification.several_steps import cut, identify_steps, read_steps
+from quakedesign.identification import several_steps
+from quakedesign.identification.assessment import Assessment, Check
+from quakedesign.identification.correlated_noise import CorrelatedNoise
+from quakedesign.identification.identification_result import ParameterEstimate
+from quakedesign.identification.several_steps import _assessed, _common, cut, identify_steps, read_steps
 from quakedesign.report.identification_page import identification_lines, save_figure, steps_figure
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_steps", Path(__file__).with_name("synthetic.py"))
@@ -46,6 +51,18 @@ def test_steps_of_one_rock_have_one_law_that_is_sharper_than_that_of_each(agreei
             own = one.estimates[name]
             assert common.high - common.low < own.high - own.low
     assert agreeing.common.difference.low < -0.004 < agreeing.common.difference.high
+
+
+def test_the_size_of_shared_noise_is_known_from_its_pieces_in_all_steps(agreeing):
+    """Noise that fades over 2 s of 40 s has 10 pieces, over 1 s of 60 s 30: F of 1 and 40 has 4.085 (tables)."""
+    told = []
+    for length, most, step in zip((2.0, 1.0), (40.0, 60.0), agreeing.steps, strict=True):
+        along = np.linspace(0, most, len(step.fit.measured))
+        noise = CorrelatedNoise(share=1e-9, length=length, along=along, counts=step.fit.counts, of_time=True)
+        told.append(replace(step, fit=replace(step.fit, correlated=noise)))
+    best = _common(told)[0]
+    assert best.threshold(1) == pytest.approx(4.085, abs=1e-3)
+    assert _common(agreeing.steps)[0].threshold(1) == pytest.approx(3.87, abs=0.01)
 
 
 @pytest.mark.slow
@@ -106,10 +123,82 @@ def test_the_figure_has_a_panel_a_step_with_both_fits_and_a_region_for_each(agre
     assert (tmp_path / "steps.png").read_bytes().startswith(b"\x89PNG")
 
 
+def stub(sign=0, passed=True, factor=1.0, law="", excess=0.0, record=None):
+    """Identification of a step by its sign of a - b, residuals over noise, law and by how much its rival is worse."""
+    check = Check(name="sign", passed=passed, value=float(sign), limit=0.0, sentence="")
+    return SimpleNamespace(
+        assessment=Assessment(checks=(check,), factor=factor),
+        fit=SimpleNamespace(correlation=2.0),
+        law=SimpleNamespace(name=law),
+        rival=SimpleNamespace(law={"one": "other", "other": "one"}[law], excess=excess) if law else None,
+        record=record,
+        notes=(),
+    )
+
+
+@pytest.mark.parametrize(
+    ("signs", "ends", "reason"),
+    [
+        ([(-1, True), (1, False)], (-3, -1), ""),
+        ([(-1, False), (-1, False)], (-3, -1), "no step has one by itself"),
+        ([(-1, True), (1, True)], (-3, -1), "steps do not agree"),
+        ([(-1, True), (-1, True)], (-3, 1), "from -3 to 1"),
+        ([(1, True), (1, True)], (-3, -1), "steps do not agree"),
+    ],
+)
+def test_a_sign_needs_a_step_that_has_it_none_against_it_and_the_common_fit(signs, ends, reason):
+    difference = ParameterEstimate(
+        name="a - b", unit="", value=sum(ends) / 2, low=ends[0], high=ends[1], least=ends[0], most=ends[1]
+    )
+    common = SimpleNamespace(difference=difference, untold=lambda: (), experiments=lambda sign: ())
+    told = _assessed(common, [stub(*each) for each in signs], 0.5)
+    assert [check.passed for check in told.checks] == [True, not reason]
+    assert told.open == ((f"the sign of a - b is open: {reason}",) if reason else ())
+    assert told.verdict == ("cannot tell" if reason else "explains the record")
+    told = _assessed(common, [stub(-1), stub(-1, factor=3.0)], 0.5)
+    assert told.verdict == "does not explain the record"
+
+
+@pytest.mark.parametrize(("tabulated", "probability", "verdict"), [(3.098, 0.05, "explains"), (4.94, 0.01, "cannot")])
+def test_the_chance_is_that_of_tables_of_f_and_the_law_is_the_likeliest_of_all_steps(
+    monkeypatch, agreeing, tabulated, probability, verdict
+):
+    """F of 3 and 20 degrees of freedom; squares count by the samples for an independent one, here 2."""
+    asked = []
+
+    def fitted(record, kinds, **_):
+        asked.append([kind.name for kind in kinds])
+        first = len(asked) == 1
+        law = "one" if first or len(kinds) == 1 else "other"
+        return stub(law=law, excess=10.0 if first else 4.0, record=record)
+
+    best = SimpleNamespace(pieces=20.0, measured=np.ones(9), experiment=None)
+    common, record = replace(agreeing.common, difference=None), agreeing.steps[0].record
+    monkeypatch.setattr(several_steps, "kinds_of", lambda *_: [SimpleNamespace(name=n) for n in ("other", "one")])
+    monkeypatch.setattr(several_steps, "identified_as", fitted)
+    monkeypatch.setattr(several_steps, "_common", lambda steps: (best, ["a", "b", "D_c"], 2 * 3 * tabulated))
+    monkeypatch.setattr(several_steps, "profiled", lambda *_: common)
+    found = identify_steps([record] * 2)
+    assert asked == [["other", "one"], ["other", "one"], ["one"]]
+    assert [each.law.name for each in found.steps] == ["one", "one"]
+    assert found.probability == pytest.approx(probability, rel=0.01)
+    assert found.common.assessment.verdict.startswith(verdict)
+
+
+def test_a_stiffness_is_shared_only_where_every_step_has_one():
+    """Slip weakening behind a spring, then at measured slip."""
+    records = [made(samples=80).noisy(0) for made in (synthetic.drawn, synthetic.weakening)]
+    found = identify_steps(records, "exponential-slip-weakening", trend="none")
+    assert set(found.common.estimates) == {"residual", "drop", "critical_slip"}
+    for name, value in synthetic.weakening().truth.items():
+        assert found.common.estimates[name].least < value < found.common.estimates[name].most
+
+
 def test_a_record_is_cut_midway_between_changes_of_rate_and_no_sample_counts_twice():
     made = synthetic.sliding("rate-and-state-slip", synthetic.STEPS).noisy(0)
     parts = cut(made)
     assert [part.name for part in parts] == ["made, step 1", "made, step 2", "made, step 3"]
+    assert parts[1].friction.tolist() == made.friction[(made.time >= 27.5) & (made.time < 47.5)].tolist()
     assert [part.origin for part in parts] == pytest.approx([0.0, 27.5, 47.5], abs=0.21)
     assert sum(len(part.time) for part in parts) == len(made.time)
     assert all(part.time[0] == part.load_point[0] == 0 for part in parts)
@@ -124,6 +213,11 @@ def test_windows_of_a_file_are_steps(tmp_path):
     first, second = read_steps(path, "0 s to 9 s, 19 um to 40 um")
     assert (first.name, len(first.time), second.origin) == ("run 0 s to 9 s", 10, 10.0)
     assert [len(record.time) for record in read_steps(path, end="9 s")] == [10]
+    assert [len(record.time) for record in read_steps(path, "0 s to 9 s, 9 s to 20 s")] == [10, 11]
+    with pytest.raises(RecordError, match=r"must not overlap: part them. Received 3 samples of 7 s to 30 s twice"):
+        read_steps(path, "0 s to 9 s, 7 s to 30 s")
+    with pytest.raises(RecordError, match=r"one unit in all steps. Received 1/m, Pa/m. Give stresses alone"):
+        identify_steps([replace(first, normal_unit="Pa"), second])
     with pytest.raises(RecordError, match=r"must name windows as 0 s to 60 s, 60 s to 120 s. Received '0 s-9 s'"):
         read_steps(path, "0 s-9 s")
     with pytest.raises(RecordError, match=r"--from and --to are for one window. Received them beside --steps"):
