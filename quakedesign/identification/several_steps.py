@@ -72,7 +72,7 @@ def read_steps(
         raise RecordError(
             f"--from and --to are for one window. Received them beside --steps {shown(steps)}. Omit them."
         )
-    found = []
+    found: list[Record] = []
     for window in (each.strip() for each in steps.split(",")):
         ends = window.split(" to ")
         if len(ends) != 2:

@@ -4,13 +4,14 @@ import importlib.util
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError, RecordError
 from quakedesign.fault import fault_toml, load_fault, parse_fault, with_accepted_fit
-from quakedesign.identification.assessment import in_doubt, sign_check
+from quakedesign.identification.assessment import _beginning, in_doubt, sign_check
 from quakedesign.identification.fault_file import identified_fault, next_command, poor_fit
 from quakedesign.identification.identification_result import ParameterEstimate
 from quakedesign.identification.identify import identify
@@ -231,3 +232,8 @@ def test_a_record_of_nothing_but_noise_tells_nothing():
     )
     found = identify(flat, "rate-and-state-slip")
     assert found.assessment.verdict == "cannot tell"
+
+
+def test_a_trend_is_told_with_the_unit_of_what_it_is_along():
+    said = _beginning({"trend": 5.0, "trend_in_time": 3e-6}, SimpleNamespace(first_rate=1e-6)).sentence
+    assert said.endswith("at 1e-06 m/s, on a trend of 5 1/m, on a trend of 3e-06 1/s")

@@ -90,3 +90,8 @@ def test_correlated_noise_makes_no_outliers():
     each = [known.deletion(noise(5.0, 8.0, seed), everything) for seed in range(20)]
     assert np.std(each) == pytest.approx(1, rel=0.03)
     assert sum(outliers(one, 2).sum() for one in each) <= 4
+
+
+@pytest.mark.parametrize(("share", "length", "pieces"), [(0.5, 2.0, 10.0), (0.5, 30.0, 4.0), (0.0, 2.0, np.inf)])
+def test_noise_that_fades_has_pieces_of_twice_its_length_and_at_least_four(share, length, pieces):
+    assert CorrelatedNoise(share, length, np.linspace(5, 45, 9), np.ones(9), True).pieces == pieces

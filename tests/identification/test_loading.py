@@ -149,3 +149,16 @@ def test_normal_stress_within_the_noise_of_friction_is_constant():
             counts = np.concatenate([[0], np.cumsum(record.counts)])
             means = np.add.reduceat(5e6 + wandering, counts[:-1]) / record.counts
             np.testing.assert_allclose(record.normal, means, atol=3e3)
+
+
+def test_a_rest_after_sliding_is_a_hold_without_an_error_and_one_at_the_beginning_is_not():
+    """Within 0.3 um of noise; a record that begins at rest has no steady sliding to begin with."""
+    time = np.arange(0, 60, 0.1)
+    noise = 3e-7 * np.random.default_rng(0).standard_normal(len(time))
+    x = 1e-5 * (np.minimum(time, 20) + np.maximum(time - 40, 0)) + noise
+    pieces = straight_pieces(time, x, scatter(time, x), reading_step(x))
+    assert pieces.rates == pytest.approx([1e-5, 0.0, 1e-5], rel=0.01, abs=0.0)
+    assert pieces.errors[1] == 0 < pieces.errors[0]
+    x = 1e-5 * np.maximum(time - 20, 0) + noise
+    pieces = straight_pieces(time, x, scatter(time, x), reading_step(x))
+    assert 0 < abs(pieces.rates[0]) < 1e-7

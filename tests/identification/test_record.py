@@ -160,6 +160,7 @@ def test_a_column_of_weights_counts_samples_and_leaves_out_those_of_weight_0(tmp
     assert record.time.tolist() == [0, 1, 3]
     assert record.counts.tolist() == [1, 0.5, 1.5]
     assert "1 samples of weight 0 left out" in record.remarks
-    path.write_text("\n".join([*lines[:2], "1, 1, 0.6, -1"]))
-    with pytest.raises(RecordError, match=r"weight must be positive, or 0 for what is left out. Received -1 to 2"):
-        read_record(path)
+    for rows, ends in (([*lines[:3], "2, 2, 0.6, -1"], "-1 to 2"), ([*lines[:2], "1, 1, 0.6, 0"], "0 to 2")):
+        path.write_text("\n".join(rows))
+        with pytest.raises(RecordError, match=rf"weight must be positive, or 0 for what is left out. Received {ends}"):
+            read_record(path)

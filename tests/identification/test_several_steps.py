@@ -15,6 +15,7 @@ from quakedesign.identification import several_steps
 from quakedesign.identification.assessment import Assessment, Check
 from quakedesign.identification.correlated_noise import CorrelatedNoise
 from quakedesign.identification.identification_result import ParameterEstimate
+from quakedesign.identification.record import part
 from quakedesign.identification.several_steps import _assessed, _common, cut, identify_steps, read_steps
 from quakedesign.report.identification_page import identification_lines, save_figure, steps_figure
 
@@ -197,11 +198,14 @@ def test_a_stiffness_is_shared_only_where_every_step_has_one():
 def test_a_record_is_cut_midway_between_changes_of_rate_and_no_sample_counts_twice():
     made = synthetic.sliding("rate-and-state-slip", synthetic.STEPS).noisy(0)
     parts = cut(made)
-    assert [part.name for part in parts] == ["made, step 1", "made, step 2", "made, step 3"]
+    assert [each.name for each in parts] == ["made, step 1", "made, step 2", "made, step 3"]
     assert parts[1].friction.tolist() == made.friction[(made.time >= 27.5) & (made.time < 47.5)].tolist()
-    assert [part.origin for part in parts] == pytest.approx([0.0, 27.5, 47.5], abs=0.21)
-    assert sum(len(part.time) for part in parts) == len(made.time)
-    assert all(part.time[0] == part.load_point[0] == 0 for part in parts)
+    assert [each.origin for each in parts] == pytest.approx([0.0, 27.5, 47.5], abs=0.21)
+    assert sum(len(each.time) for each in parts) == len(made.time)
+    assert all(each.time[0] == each.load_point[0] == 0 for each in parts)
+    numbers = np.arange(len(made.time))
+    half = part(replace(made, counts=numbers + 1.0, load_rates=numbers * 2.0), numbers > 9, "half")
+    assert (half.counts[0], half.load_rates[0], half.slip, len(half.normal)) == (11.0, 20.0, None, len(numbers) - 10)
     with pytest.raises(RecordError, match=r"must have two changes of rate by a quarter. Received 1. Name the windows"):
         cut(step(UP, 0))
 
