@@ -35,7 +35,7 @@ def identification_lines(found: Identification | Steps, *, verbose: bool = False
         common = identification_lines(found.common)
         head = common.index(_HEAD) - 1
         said = f"All together: {found.common.assessment.checks[0].sentence}."
-        return [*common[:head], "", *table, "", *_wrapped([said]), *common[head + 1 :], *(each if verbose else [])]
+        return [*common[:head], "", *table, "", *_wrapped([said]), *common[head:], *(each if verbose else [])]
     assessment, law = found.assessment, found.law.name
     reason = f": {assessment.open[0]}" if assessment.verdict == CANNOT_TELL else ""
     joined = "," if assessment.verdict == CANNOT_TELL else ""
