@@ -1,7 +1,7 @@
 """Result of a guarantee on the stick–slip plant, with the worst case that a search finds."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar
 
@@ -43,7 +43,10 @@ class StickSlipAnswer:
     @property
     def least_slip_rate(self) -> LowerBound | None:
         """Slip rate [m/s] that the fault reaches at this T_s under every controller; None without a guarantee."""
-        return smallest_stick_slip_rate(self.found.task, self.found.held.step) if self.found.proved else None
+        if not self.found.proved:
+            return None
+        task = replace(self.found.task, amplitude=self.found.disturbance)  # which healing does not enlarge
+        return smallest_stick_slip_rate(task, self.found.held.step)
 
     def limit_lines(self) -> list[str]:
         """Performance limit at the same T_s, as text; empty if unknown."""

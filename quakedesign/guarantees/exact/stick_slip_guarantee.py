@@ -91,6 +91,11 @@ class StickSlipGuarantee:
         return LowerBound((most - disturbance) / self._per_healing)
 
     @property
+    def disturbance(self) -> Fraction:
+        """Bound of the disturbance [m/s²] beside `healing`."""
+        return self.task.amplitude - self.healing * self._per_healing
+
+    @property
     def _per_healing(self) -> Fraction:
         """Δ/Δμ_h [m/s²]."""
         stress = self.task.normal_stress - Fraction(self.claims.least_pressure)
@@ -107,15 +112,14 @@ class StickSlipGuarantee:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         bounds = self.bounds()
         sound = isinstance(bounds, StickSlipClaims) and self.claims.follow(bounds)
-        sound = sound and 0 <= self.healing * self._per_healing <= self.task.amplitude
+        sound = sound and self.healing >= 0 and self.disturbance >= 0
         return Verdict.PROVED if sound else Verdict.UNDECIDED
 
     def sentence(self) -> str:
         """What is guaranteed, for people; bounds rounded outward, what it is guaranteed for inward."""
         task, held, claims = self.task, self.held, self.claims
-        amplitude = task.amplitude - self.healing * self._per_healing
-        stress = LowerBound(amplitude / task.area_per_mass[1])
-        size = f"{LowerBound(amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
+        stress = LowerBound(self.disturbance / task.area_per_mass[1])
+        size = f"{LowerBound(self.disturbance):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
         if self.healing:
             size += f" and friction at rest up to {LowerBound(self.healing):.3g} above friction in slip"
         behind, ahead = claims.slip_behind.quantity("m"), claims.slip_ahead.quantity("m")

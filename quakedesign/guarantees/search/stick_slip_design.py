@@ -182,6 +182,7 @@ class _Reach:
     held: SampledStickSlip
     found: Ranges
     period: Period
+    excess: float = 0.0  # of friction at rest above that in slip [m/s²], in runs
 
     @classmethod
     def of(cls, task: FaultPlant, held: SampledStickSlip) -> "_Reach":
@@ -242,6 +243,8 @@ class _Reach:
         for i in range(_SUBSTEPS):
             push = (sign if i < turn else -sign) * amplitude
             acceleration = -damping * now + start.slope * moved - start.force + push
+            rests = (now <= 0) & (acceleration <= self.excess)
+            acceleration = np.where(rests, np.minimum(acceleration, 0), acceleration)
             end = now + size * acceleration
             stops = end < 0
             braked = np.where(acceleration < 0, now**2 / (2 * np.maximum(-acceleration, 1e-300)), 0)
@@ -796,9 +799,13 @@ def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstSt
 
     For each facet of the invariant polytope the state that is farthest in its direction is kept. β is constant in a
     course, as it is nearly in a fault; the slope of friction is either end of its range in each period, and the
-    disturbance changes its sign at most once in each.
+    disturbance changes its sign at most once in each. Friction at rest is that in slip, or higher by `healing` under
+    the largest pressure of the claims, where it weighs least.
     """
-    reach, noises = _Reach.of(found.task, found.held), _noises(found.held)
+    task, claims = found.task, found.claims
+    excess = found.healing * task.area_per_mass[0] * (task.normal_stress - Fraction(claims.largest_pressure))
+    plain = _Reach.of(replace(task, amplitude=found.disturbance), found.held)
+    reaches, noises = [replace(plain, excess=e) for e in sorted({0.0, float(excess)})], _noises(found.held)
     facets, extremes = np.array(found.reach.facets, dtype=float), np.zeros(3)
     for high in (False, True):  # which end of β
         first = _at_first(found.held)
@@ -807,7 +814,7 @@ def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstSt
             known = dict(states)
             for later in noises:
                 ends = [states[later]]
-                for noise, starts in known.items():
+                for reach, (noise, starts) in product(reaches, known.items()):
                     after = reach.simulated(starts, noise, later)
                     half = after.shape[1] // 2  # β is the slower half of the choices
                     ends.append((after[:, half:] if high else after[:, :half]).reshape(-1, 3))

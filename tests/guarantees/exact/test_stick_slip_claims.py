@@ -383,6 +383,26 @@ def test_healing_counts_the_largest_area_per_mass_and_is_part_of_the_answer(proo
     )
 
 
+def test_limit_and_worst_case_take_only_the_disturbance_beside_healing(proof):
+    """A part of the proved disturbance stands for healing: an adversary has the rest, and friction that heals."""
+    half = replace(proof, healing=F(proof.covered_healing()) / 2)
+    assert half.disturbance == proof.task.amplitude / 2
+    without = replace(proof, task=replace(proof.task, amplitude=half.disturbance))
+    answers = [StickSlipAnswer(fault=qd.load_fault("real-fault"), found=found) for found in (half, without, proof)]
+    limits = [answer.least_slip_rate for answer in answers]
+    assert limits[0] == limits[1] < limits[2]
+    seen, milder, harder = (worst_stick_slip(found, periods=12).slip_rate for found in (half, without, proof))
+    assert milder < seen < harder
+
+
+@pytest.mark.parametrize("share", [-1, 1 + F(1, 10**6)])
+def test_healing_stands_for_a_part_of_the_disturbance(proof, share, monkeypatch):
+    monkeypatch.setattr(StickSlipGuarantee, "bounds", lambda found: found.claims)
+    most = F(proof.covered_healing())
+    assert replace(proof, healing=most).check() is Verdict.PROVED
+    assert replace(proof, healing=share * most).check() is Verdict.UNDECIDED
+
+
 def test_a_run_of_its_file_knows_what_is_proved_and_on_which_plant(proof, monkeypatch):
     monkeypatch.setattr(StickSlipGuarantee, "check", lambda _: Verdict.PROVED)
     choice = certified_choice(qd.load_fault("real-fault"), FILE)
