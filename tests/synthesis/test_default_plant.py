@@ -1,6 +1,7 @@
 """On which plant a design and a guarantee are proved: the stick-slip plant where possible, else that without stick."""
 
 from dataclasses import replace
+from fractions import Fraction as F
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -70,6 +71,26 @@ def test_loops_that_the_theorem_does_not_know_are_proved_without_stick(monkeypat
     monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: SimpleNamespace(found=found, proved=True))
     assert qd.design(REAL, "elqr", **asked).guarantee is plain
     assert qd.guarantee(REAL, **asked).found is plain
+
+
+def test_a_design_hands_down_what_the_theorem_takes(monkeypatch, sticking):
+    seen = {}
+    monkeypatch.setattr(FEEDBACK, "design_stick_slip", lambda task, step, **given: seen.update(given) or sticking)
+    healed = replace(REAL, friction=replace(REAL.friction, healing=1e-5))
+    qd.design(healed, "elqr", objective="peak", slip_noise="1 um")
+    assert seen.pop("tell")
+    assert seen == {"objective": "peak", "slip_noise": F(1, 10**6), "healing": F(1, 10**5)}
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"controller": "cta"}, {"gains": (1, 1, 1, 1)}, {"scheme": "compensated"}],
+    ids=lambda given: next(iter(given)),
+)
+def test_other_laws_are_guaranteed_without_stick(monkeypatch, given):
+    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", None)
+    monkeypatch.setattr(GUARANTEE, "_sampled", lambda *_: NONE)
+    assert qd.guarantee(REAL, **given) is NONE
 
 
 def test_a_guarantee_takes_the_first_that_is_proved(monkeypatch, sticking, plain):
