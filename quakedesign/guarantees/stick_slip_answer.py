@@ -53,10 +53,9 @@ class StickSlipAnswer:
         least = self.least_slip_rate
         if least is None or not self.found.proved:
             return []
-        step = f"{float(self.found.held.step):.6g} s"
         return [
-            f"no controller with zero-order hold over T_s = {step} keeps the slip rate below "
-            f"{least.quantity('m/s')} for all disturbances"
+            f"no controller with zero-order hold over T_s = {float(self.found.held.step):.6g} s keeps the slip rate "
+            f"below {least.quantity('m/s')} for all disturbances"
         ]
 
     def lines(self) -> list[str]:
@@ -139,11 +138,7 @@ def answer_stick_slip(
         )
     task = uncertain_plant(fault)
     step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)
-
-    def tell(said: str, done: float) -> None:
-        if progress is not None:
-            progress(said, done)
-
+    tell = progress or (lambda what, done: None)
     healing = rational(fault.friction.rest_excess)
     found = design_stick_slip(task, step, objective=objective, slip_noise=setup.slip_noise, healing=healing, tell=tell)
     return attacked_stick_slip(fault, found)

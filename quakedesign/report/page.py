@@ -109,7 +109,7 @@ ASKED = {
 
 @dataclass(frozen=True, kw_only=True)
 class Account:
-    """What is told of one controller."""
+    """What the report states of one controller."""
 
     label: str
     badge: str

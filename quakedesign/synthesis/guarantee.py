@@ -75,7 +75,7 @@ def _asked(question: Callable[[], Found]) -> Found | QuakedesignError:
 
 STICK_SLIP, PRINTED = PLANTS = StickSlipGuarantee.plant, Guarantee.plant
 BLOCK_LAWS = ("centralised", "decentralised")
-"""Of several blocks: the pressure of each well depends on all measurements, or on those of its own."""
+"""Of several blocks: the pressure of each well depends on all measurements, or only on those of its block."""
 _PUMP = ("saturation", "withdrawal", "rate_limit")
 _OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", *_PUMP)
 

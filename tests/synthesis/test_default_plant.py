@@ -82,6 +82,13 @@ def test_a_design_hands_down_what_the_theorem_takes(monkeypatch, sticking):
     assert seen == {"objective": "peak", "slip_noise": F(1, 10**6), "healing": F(1, 10**5)}
 
 
+def test_a_guarantee_hands_down_what_the_theorem_takes(monkeypatch, sticking):
+    seen, answer = {}, StickSlipAnswer(fault=REAL, found=sticking)
+    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda fault, setup, **given: seen.update(given) or answer)
+    assert qd.guarantee(REAL, objective="peak", progress=print) is answer
+    assert seen == {"objective": "peak", "progress": print}
+
+
 @pytest.mark.parametrize(
     "given",
     [{"controller": "cta"}, {"gains": (1, 1, 1, 1)}, {"scheme": "compensated"}],

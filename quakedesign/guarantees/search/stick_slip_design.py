@@ -55,10 +55,7 @@ _LITTLE = 1.01  # of a height that one step to where a policy leads may make of 
 _NEARLY = 0.93  # of the factor of y that keeps a facet where it is in a slow slide
 _ADDED, _MOST = 35, 270  # facets added at once, and in all: a check takes 1.3 s for each hundred
 _ALIKE, _WIDER = 1 - 1e-8, 1e-5  # cosine of normals that count as one; room of a facet that rest leaves where it is
-_KEPT, _FOLLOWED = (
-    0.6,
-    14,
-)  # share of the growth kept where facets are added; turns after the last before heights only grow
+_KEPT, _FOLLOWED = 0.6, 14  # growth kept where facets are added; turns after the last before heights only grow
 _MARGINS = 2e-6, 2e-5  # by which the last polytope is larger than the images that it must hold
 _FAR = 30  # times the first extents, from where on a set counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried: of a size, and of the present ones
@@ -615,10 +612,9 @@ class _Growing:
             if len(more) == _ADDED:
                 break
         more.append(np.array([0, float(self.held.law.slip_gain * self.held.step) / 2 * (1 + _WIDER), -1]) / size[2])
-        if more:
-            self.normals = np.vstack([self.normals, more])
-            self.least = np.concatenate([self.least, (np.array(more) @ self.points.T).max(axis=1)])
-            self.multipliers = np.vstack([self.multipliers, np.zeros((len(more), 5))])
+        self.normals = np.vstack([self.normals, more])
+        self.least = np.concatenate([self.least, (np.array(more) @ self.points.T).max(axis=1)])
+        self.multipliers = np.vstack([self.multipliers, np.zeros((len(more), 5))])
         before = np.concatenate([self.heights, self.least[len(self.heights) :]])
         self.normals = self._neutral(self.normals, chord)
         self.least = np.maximum(self.least, (self.normals @ self.points.T).max(axis=1))
