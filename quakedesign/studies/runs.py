@@ -595,8 +595,10 @@ def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee | StickSlipGuarante
         return claim.task.differences(slow_sliding_plant(fault, claim.task.stress))
     task = uncertain_plant(fault, rate_limited=claim.task.change is not None)
     if isinstance(claim, StickSlipGuarantee) and task.amplitude <= claim.task.amplitude:
-        if claim.covered_healing(task.amplitude) >= rational(fault.friction.rest_excess):
-            task = replace(task, amplitude=claim.task.amplitude)  # healing and a larger disturbance count alike
+        covered = claim.covered_healing(task.amplitude)
+        if covered < rational(fault.friction.rest_excess):
+            return [f"healing beside this disturbance up to {covered:.3g} there, {fault.friction.rest_excess:.3g} here"]
+        task = replace(task, amplitude=claim.task.amplitude)  # healing and a larger disturbance count alike
     return differences(claim.task, task)
 
 

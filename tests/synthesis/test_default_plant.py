@@ -12,6 +12,7 @@ import quakedesign as qd
 from quakedesign.guarantees import LoopAnswer, NoGuarantee, StickSlipAnswer, load_guarantee
 from quakedesign.laws import StickSlipController
 from quakedesign.report.sentences import sentences
+from quakedesign.report.summary import _answer
 from quakedesign.studies.comparison import Entry
 
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
@@ -127,3 +128,17 @@ def test_what_is_said_of_a_run_names_the_plant_of_its_proof(monkeypatch, stickin
         run = qd.simulate(REAL, design.controller, duration=20.0, plant=plant)
         told = sentences(Entry(label="e-LQR", origin="designed", design=design, run=run))
         assert any(said in sentence for sentence in told)
+
+
+def test_the_answer_of_a_summary_names_the_plant(sticking, plain):
+    natural = SimpleNamespace(outcome=SimpleNamespace(peak_slip_rate=0.0, kind="at rest"))
+    compared = SimpleNamespace(uncontrolled=natural, fault=REAL)
+
+    def said(found):
+        best = SimpleNamespace(guaranteed=found, label="e-LQR", design=SimpleNamespace(other_step_first=""))
+        return _answer(compared, best)
+
+    assert "guaranteed. With the e-LQR the slip rate never" in said(sticking)
+    assert "m/s, whether the fault slides or sticks, and" in said(sticking)
+    assert "On the plant without stick, with the e-LQR, the slip rate" in said(plain)
+    assert "sticks" not in said(plain)

@@ -403,6 +403,16 @@ def test_healing_stands_for_a_part_of_the_disturbance(proof, share, monkeypatch)
     assert replace(proof, healing=share * most).check() is Verdict.UNDECIDED
 
 
+def test_a_file_is_for_faults_whose_healing_it_covers(monkeypatch):
+    """It covers 6.22e-5 without a disturbance, so 3.11e-5 beside half of the disturbance."""
+    monkeypatch.setattr(StickSlipGuarantee, "check", lambda _: Verdict.PROVED)
+    real = qd.load_fault("real-fault")
+    half = real.with_disturbance(replace(real.disturbance, amplitude=real.disturbance.amplitude / 2))
+    certified_choice(replace(half, friction=replace(half.friction, healing=3.1e-5)), FILE)
+    with pytest.raises(CertificateError, match=r"up to 3\.11e-05 there, 3\.2e-05 here"):
+        certified_choice(replace(half, friction=replace(half.friction, healing=3.2e-5)), FILE)
+
+
 def test_a_run_of_its_file_knows_what_is_proved_and_on_which_plant(proof, monkeypatch):
     monkeypatch.setattr(StickSlipGuarantee, "check", lambda _: Verdict.PROVED)
     choice = certified_choice(qd.load_fault("real-fault"), FILE)
