@@ -55,7 +55,7 @@ def several_blocks(
     return chain
 
 
-def _scope(chain: "BlockChain") -> list[str]:
+def _scope(found: Any, chain: "BlockChain") -> list[str]:
     """What a statement about blocks depends on, and its units."""
     from quakedesign.studies.chains import farthest_balance
 
@@ -68,7 +68,7 @@ def _scope(chain: "BlockChain") -> list[str]:
             "units: slip m, log state (ln of the state over D_c/V) 1, pull and pressure beside the "
             "plan MPa; |y| is bounded for log states and pulls; a disturbance is the rate over V that the stress adds",
         ]
-    if (far := farthest_balance(chain)) is not None:
+    if (far := farthest_balance(chain, found)) is not None:
         pushed += ", the second m/s"
         meant = (
             "the load of a pressure is the pressure that keeps the averages of the slips, one for each well, on the "
@@ -90,11 +90,11 @@ def _scope(chain: "BlockChain") -> list[str]:
 def _facts(found: Any, chain: "BlockChain") -> dict[str, Any]:
     if not found.proved:
         return {"verdict": "undecided", "reason": found.reason}
-    return {**found.to_dict(), "notes": [*found.notes, *_scope(chain)]}
+    return {**found.to_dict(), "notes": [*found.notes, *_scope(found, chain)]}
 
 
 def _lines(found: Any, chain: "BlockChain") -> list[str]:
-    return [*found.lines(), *_scope(chain)] if found.proved else [found.sentence()]
+    return [*found.lines(), *_scope(found, chain)] if found.proved else [found.sentence()]
 
 
 def _require_no_state(chain: "BlockChain", command: str) -> None:

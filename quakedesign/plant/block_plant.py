@@ -286,7 +286,7 @@ def _closed(gains: Sequence[Sequence[Fraction]], first: Sequence[Fraction]) -> l
     if not np.isfinite(matrix).all() or max(abs(np.linalg.eigvals(matrix))) >= 1:
         return None
     own = np.array(first, dtype=float)
-    own = own * _WIDER + 1e-9 * max(own.max(), 1e-300)
+    own = own * _WIDER + 1e-9 * max(own.max(), 1e-100)
     found = [rational(float(v)) for v in np.linalg.solve(np.eye(len(own)) - _WIDER * matrix, own)]
     holds = all(v > 0 and f + _dot(row, found) < v for v, f, row in zip(found, first, gains, strict=True))
     return found if holds else None

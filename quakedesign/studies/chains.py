@@ -16,7 +16,8 @@ import numpy as np
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, rational
 from quakedesign.fault import BlockChain
-from quakedesign.plant import UncertainPlant, uncertain_plant
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.plant import uncertain_plant
 from quakedesign.simulation.block_run import BlockRun, simulate_blocks, whole_periods
 from quakedesign.synthesis import guarantee
 from quakedesign.synthesis.guarantee import BLOCK_LAWS
@@ -181,11 +182,13 @@ def chain_dict(chain: BlockChain) -> dict[str, Any]:
 # A designed law, its proof and a run.
 
 
-def farthest_balance(chain: BlockChain) -> UpperBound | None:
+def farthest_balance(chain: BlockChain, found: PlantGuarantee) -> UpperBound | None:
     """How far from the reference a block may be at balance [m], under fewer wells than blocks; else None."""
-    plant, task = UncertainPlant.from_blocks(chain), uncertain_plant(chain.fault)
-    moves = [size for name, (_, size) in plant.disturbances.items() if name.startswith("balance")]
-    return UpperBound(max(moves) / task.reference_rates[0] * task.target_slip) if moves else None
+    N, task = len(chain.blocks), uncertain_plant(chain.fault)
+    if len(chain.wells) == N:
+        return None
+    moves = [size for _, size in found.part.disturbances[N:]]  # behind the forces on the blocks
+    return UpperBound(max(moves) / task.reference_rates[0] * task.target_slip)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

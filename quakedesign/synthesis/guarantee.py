@@ -177,7 +177,8 @@ def guarantee(
         fault = UncertainPlant.from_blocks(fault)
     if isinstance(fault, UncertainPlant):
         usual = plant in (None, PRINTED) and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])
-        named = isinstance(controller, str) and controller in ("elqr", *BLOCK_LAWS)
+        designed = law is None and not len(gains) and "slope of block 1" in fault.sectors
+        named = isinstance(controller, str) and (controller == "elqr" or (designed and controller in BLOCK_LAWS))
         if not usual or not named or stress is not None or exact_value(spread, "", "spread"):
             raise ParameterError(
                 "an uncertain plant is guaranteed with a law or gains alone. Received controller, objective, scheme, "

@@ -1,6 +1,7 @@
 """Runs of several blocks beside an integrator with events of rest and slip, and beside what is proved."""
 
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError
+from quakedesign.guarantees.exact.plant_loop import MatrixLaw
 from quakedesign.simulation import simulate_blocks
 
 CHAIN = qd.load_chain(Path(__file__).parents[1] / "data" / "three_blocks.toml")
@@ -118,6 +120,25 @@ def test_without_a_law_that_acts_the_blocks_run_away():
     run = simulate_blocks(CHAIN, law, duration=400)
     assert run.slip_rate.max() > 0.05
     assert (run.slip[-1] > 0.3).all()
+
+
+def test_a_law_of_two_wells_reads_the_averages_of_its_wells():
+    """p = -1e9*y, one number a well: the first pressures are those of the averages after one period at rest, less r."""
+    two = replace(CHAIN, wells=(1000.0, 4000.0))
+    zero, one = Fraction(0), Fraction(-(10**9))
+    law = MatrixLaw(
+        step=Fraction("0.184"),
+        delay=zero,
+        update=(),
+        measured=(),
+        output=((), ()),
+        feedback=((one, zero, zero, zero), (zero, one, zero, zero)),
+    )
+    run = simulate_blocks(two, law, duration=400)
+    k = len(run.times) - 2
+    averages = [12 / 17 * run.slip[k, 0] + 5 / 17 * run.slip[k, 1], 7 / 19 * run.slip[k, 1] + 12 / 19 * run.slip[k, 2]]
+    assert run.slip[k].max() > 1e-9
+    assert run.pressure[k + 1] == pytest.approx(-1e9 * (np.array(averages) - run.reference[k]), rel=1e-9, abs=1e-6)
 
 
 @pytest.mark.parametrize(("given", "received"), [({"duration": 0.1}, "0.1 s"), ({"substeps": 0}, "0")])

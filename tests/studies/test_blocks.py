@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from fractions import Fraction
+from fractions import Fraction as F
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.cli import main
-from quakedesign.plant import uncertain_plant
+from quakedesign.guarantees.search import block_design
+from quakedesign.guarantees.search.plant_search import linear_part
+from quakedesign.plant import block_plant, uncertain_plant
 from quakedesign.studies import one_block
 
 REAL = qd.load_fault("real-fault")
@@ -151,3 +154,49 @@ def test_the_balance_of_blocks_under_fewer_wells_stays_within_its_bounds(case):
             before = x, p
     assert (worst <= moves).all()
     assert (worst > 0.1 * moves).all()
+
+
+def known(least, largest, weakening=0):
+    """Two alike blocks of a friction that is known but for its coefficient."""
+    task = uncertain_plant(CHAIN.faults[0])
+    law = replace(task.friction, static=F("0.3"), least=F(least), largest=F(largest), weakening=F(weakening))
+    return [replace(task, friction=law)] * 2
+
+
+def test_the_stress_at_balance_goes_from_that_at_rest_to_that_at_the_target():
+    """Of a constant coefficient: mu*N = mu*sigma' - kx/n, no matter what the springs are."""
+    tasks, K = known("0.3", "0.3"), F(5)
+    (low, high), _ = block_plant._stresses(tasks, [(0, 1, K), (1, 0, K)], [(F(1),)] * 2, ((F(1, 2),) * 2,))
+    task = tasks[0]
+    k, n = task.stiffness[0] - task.growths[0], task.area_per_mass[0]
+    assert float(high) == pytest.approx(50e6)
+    assert float(low) == pytest.approx(50e6 - float(k * task.target_slip / n) / 0.3)
+
+
+def test_blocks_that_differ_in_their_coefficient_alone_move_apart():
+    """mu*q the same force on both: by 2/3 and 4/3 of the mean; k(1 + xi) + K(2 xi) is that force."""
+    tasks, K = known("0.25", "0.35"), F(1)
+    plant = block_plant._moving(
+        tasks, [(0, 1, K), (1, 0, K)], [(F(1),)] * 2, ((F(1, 2),) * 2,), [(F(5 * 10**7),) * 2] * 2
+    )
+    k = float(tasks[0].stiffness[0] - tasks[0].growths[0])
+    least = k * (0.35 - 0.25) / (0.35 + 0.25) / (k + 2)  # of one block at each end
+    assert float(plant.moves[0]) >= least
+    assert float(plant.moves[0]) <= 1.5 * least
+
+
+def test_a_stress_that_is_not_bounded_proves_no_balance(monkeypatch):
+    tasks, K = known("0.29", "0.31"), F(1000)
+    lost = [(-block_plant._LOST, block_plant._LOST)] * 2
+    monkeypatch.setattr(block_plant, "_stresses", lambda *_: lost)
+    springs = [(0, 1, K), (1, 0, K / 2)]
+    assert min(block_plant._balance(tasks, springs, [(F(1),)] * 2, ((F(1, 2),) * 2,)).moves) >= block_plant._LOST
+
+
+def test_a_decentralised_law_uses_the_signals_of_its_well_alone():
+    part = linear_part(qd.UncertainPlant.from_blocks(CASES["two"]), {})
+    whole, alone = (block_design._law_of(part, F("0.184"), np.array(block_design._START), one) for one in (False, True))
+    for name in ("update", "measured", "output", "feedback"):
+        crossed = [[bool(v) for v in row if v] for row in getattr(whole, name)]
+        assert max(map(len, crossed)) > 1
+        assert all(not v or i % 2 == j % 2 for i, row in enumerate(getattr(alone, name)) for j, v in enumerate(row))

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -124,6 +125,7 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
         """Stands for a proof, whose search takes seconds."""
 
         proved, notes = True, ("a note",)
+        part = SimpleNamespace(disturbances=[((), F(1))] * 2 + [((), F(1, 10**7))] * 2)  # forces, balances
         law = MatrixLaw(
             step=F(23, 125),
             delay=F(0),

@@ -13,10 +13,11 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import minimize
 
-from quakedesign.exact import LowerBound, UpperBound, float_above, rational
+from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
 from quakedesign.guarantees.exact.sliding_blocks import MPA, BlockClaims, SlidingBlocks
+from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.search.block_design import estimate
 from quakedesign.guarantees.search.plant_search import linear_part, plant_guarantee
@@ -27,7 +28,7 @@ _STARTS = ((100.0, 100.0, 1e-2, 1e-9), (10.0, 100.0, 1e-4, 1e-9), (1000.0, 100.0
 _SPREAD = 2.0  # of the first simplex, in logarithms
 _EVALUATIONS = 60
 _SLOWEST, _FORGET = 0.985, 1000  # eigenvalue of a period, and periods: a loop that forgets later takes long to prove
-_SMALL = (0.02, 0.02)  # claims that the search begins with: logarithms of rate and state
+_SMALL = 0.004  # logarithm of the state that the search begins with, at least
 _TURNS = 14
 _PIECES = 8  # of a period, which is short beside the times of the plant
 _ROOM = 1.03
@@ -65,17 +66,16 @@ def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuara
             break
         found = plant_guarantee(plant, law, _PIECES)
         if isinstance(found, PlantGuarantee) and max(found.claims.controls) * MPA < claims.push:
-            return replace(found, notes=(_told(blocks, rate),))
+            return replace(found, notes=(_slip_rates(blocks, rate),))
     return NoGuarantee(reason="the bounds that an estimate finds are not proved", small_gain=None)
 
 
-def _told(blocks: SlidingBlocks, rate: UpperBound) -> str:
+def _slip_rates(blocks: SlidingBlocks, rate: UpperBound) -> str:
     V = blocks.tasks[0].rate
-    grown = float_above(V) * float(np.exp(float_above(rate))) * (1 + 1e-12)
+    fastest, most = UpperBound(V * exponential(rate)), LowerBound(blocks.stress)
     return (
-        f"so the slip rate of every block stays at most {UpperBound(rational(grown)):.4g} m/s, |ln(v/V)| <= {rate:.3g} "
-        f"with V = {UpperBound(V):.4g} m/s, under any shear stress of at most {LowerBound(blocks.stress):.4g} Pa on "
-        "every block"
+        f"so the slip rate of every block stays at most {fastest:.4g} m/s, |ln(v/V)| <= {rate:.3g} with "
+        f"V = {UpperBound(V):.4g} m/s, under any shear stress of at most {most:.4g} Pa on every block"
     )
 
 
@@ -100,9 +100,8 @@ class _WeightSearch:
         self.count = m
         stress = float(blocks.stress)
         b = float(task.ranges["evolution_effect"][0]) * float(task.ranges["normal_stress"][0])
-        first = max(stress / b, _SMALL[1])
         self.small = BlockClaims(
-            log_state=rational(f"{first / 5:.3g}"),
+            log_state=rational(f"{max(stress / b / 5, _SMALL):.3g}"),
             pull=rational(f"{stress:.3g}"),
             push=rational(f"{9 * stress:.3g}"),
         )

@@ -492,6 +492,12 @@ def test_the_pressure_of_a_well_depends_on_its_own_measurements_in_a_decentralis
     assert max(whole.claims.outputs[3:]) < max(found.claims.outputs[3:])
 
 
+@pytest.mark.parametrize("given", [{"gains": [[1.0]]}, {}], ids=["gains", "no blocks"])
+def test_a_law_that_is_not_designed_is_not_decentralised(given):
+    with pytest.raises(ParameterError, match="Received controller"):
+        qd.guarantee(qd.UncertainPlant(A=[[-1]], B=[[1]]), "decentralised", step="0.1", **given)
+
+
 def test_blocks_that_one_well_does_not_hold_name_the_mode_that_escapes():
     plant = qd.UncertainPlant.from_blocks(REAL, 2, wells="one", coupling=0.5)
     none = qd.guarantee(plant, step="0.184")

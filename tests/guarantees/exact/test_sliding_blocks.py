@@ -1,7 +1,7 @@
 """Blocks in slow sliding beside their nonlinear equations, and runs of these beside what is proved."""
 
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from fractions import Fraction as F
 from pathlib import Path
 
@@ -13,8 +13,12 @@ from scipy.linalg import expm
 import quakedesign as qd
 from quakedesign.cli import main
 from quakedesign.errors import QuakedesignError
+from quakedesign.exact import UpperBound
+from quakedesign.fault.friction import rate_and_state as friction_laws
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document
+from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantGuarantee
 from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
+from quakedesign.guarantees.search import sliding_block_design
 
 PATH = Path(__file__).parents[2] / "data" / "three_sliding_blocks.toml"
 CHAIN = qd.load_chain(PATH)
@@ -54,6 +58,8 @@ def test_rates_of_slip_and_state_lie_within_the_sectors():
     aged = -np.expm1(-z) / z
     assert third[0] <= aged.min()
     assert aged.max() <= third[1]
+    assert third == pytest.approx([aged.min(), aged.max()], rel=1e-8)
+    assert {one.within for name, one in plant.sectors.items() if "pull" not in name} == {CLAIMS.log_state}
     # a disturbance is what the stress adds to f at most
     (entry, size) = plant.disturbances["stress on block 1"]
     assert float(size) >= second[1] * 10000
@@ -99,6 +105,58 @@ def test_inertia_counts_the_pull_of_a_neighbour_that_is_faster():
     alone /= float(slow.plant(CLAIMS).sectors["rate of block 1 by its pull"].slopes[1]) / 1e6
     assert found - alone >= SPRING * V * (other - own) * inertia
     assert found - alone > 1
+
+
+def test_the_pull_of_a_fast_pressure_counts_as_inertia():
+    """|q'| <= 2Q/lag, and sup|r| of which mu*|q'| is a part is multiplied by mVe^Y/(Na)."""
+    quick = SlidingBlocks(chain=CHAIN, lag=F(1, 100), stress=F(10000))
+    by_pull = float(quick.plant(CLAIMS).sectors["rate of block 1 by its pull"].slopes[1]) / 1e6
+    extra = float(quick.plant(CLAIMS).disturbances["stress on block 1"][1]) / by_pull - 10000
+    moved = 2 * 2e5 / 0.01
+    a_y = A * float(quick.log_rate(CLAIMS)) + B * float(CLAIMS.log_state)
+    wanted = (MU + a_y) * moved * 2670 * 15e3 * V * np.exp(float(quick.log_rate(CLAIMS)))
+    assert extra == pytest.approx(wanted / ((STRESS - K / MU - 2e5) * A), rel=1e-3)
+
+
+def test_what_is_left_open_of_the_steady_coefficient_counts_as_stress():
+    open_to = SlidingBlocks(chain=CHAIN, lag=F(800), stress=F(10000))
+    ends = (F("0.59"), F("0.61"))
+    tasks = tuple(replace(t, ranges={**t.ranges, "coefficient": ends}) for t in BLOCKS.tasks)
+    vars(open_to)["tasks"] = tasks
+    stresses = [float(one._ranges(CLAIMS)[0].stress) for one in (BLOCKS, open_to)]
+    assert stresses[1] - stresses[0] == pytest.approx(0.01 * (2e5 + K * 1.0 / 0.59), rel=1e-3)
+
+
+def test_a_reference_that_swings_moves_every_block():
+    task = replace(CHAIN.fault.reference, ramp=0.05)
+    swinging = SlidingBlocks(
+        chain=replace(CHAIN, fault=replace(CHAIN.fault, reference=task)), lag=F(800), stress=F(10000)
+    ).plant(CLAIMS)
+    entry, size = swinging.disturbances["reference of block 3"]
+    first = 1e-6 * 0.95  # V [m/s]
+    assert float(size) == pytest.approx(first / D * 15 / 8 * 0.05 / 0.95)
+    assert entry == tuple(F(i == 2) for i in range(9))
+
+
+def test_a_pressure_beyond_its_claim_proves_nothing(monkeypatch):
+    class Search:
+        """Stands for the search of weights."""
+
+        def __init__(self, *_):
+            pass
+
+        def log_rate(self, _):
+            return 1.0
+
+        def closed(self, _):
+            return object(), CLAIMS, 0.5
+
+    found = object.__new__(PlantGuarantee)
+    object.__setattr__(found, "claims", PlantClaims(outputs=(), controls=(UpperBound(1),)))  # MPa, beyond 0.2
+    monkeypatch.setattr(sliding_block_design, "_WeightSearch", Search)
+    monkeypatch.setattr(sliding_block_design, "plant_guarantee", lambda *_: found)
+    none = sliding_block_design.sliding_block_guarantee(BLOCKS, F(400))
+    assert none.reason == "the bounds that an estimate finds are not proved"
 
 
 def test_claims_under_which_a_block_may_open_give_no_plant():
@@ -227,6 +285,13 @@ def changed(place, **values):
     return tuple(replace(one, friction=friction) if i == place else one for i, one in enumerate(blocks))
 
 
+def of_law(name):
+    values = {field.name: getattr(CHAIN.blocks[0].friction, field.name) for field in fields(CHAIN.blocks[0].friction)}
+    law = getattr(friction_laws, name)
+    friction = law(**{key: value for key, value in values.items() if key in law.__dataclass_fields__})
+    return replace(CHAIN, blocks=tuple(replace(one, friction=friction) for one in CHAIN.blocks))
+
+
 @pytest.mark.parametrize(
     ("chain", "said"),
     [
@@ -234,6 +299,17 @@ def changed(place, **values):
         (replace(CHAIN, blocks=changed(1, critical_slip=7e-3), wells=(2500.0,)), "need blocks that are alike"),
         (replace(CHAIN, wells=(1000.0, 2000.0)), "wells that act independently"),
         (replace(CHAIN, blocks=changed(1, stress_sensitivity=0.1)), "stress_sensitivity 0"),
+        (of_law("RateAndStateSlip"), "need rate-and-state-aging friction. Received rate-and-state-slip in block 1"),
+        (of_law("RegularisedRateAndState"), "Received regularised-rate-and-state in block 1"),
+        (
+            replace(
+                CHAIN,
+                fault=replace(CHAIN.fault, length=14e3),
+                blocks=(replace(CHAIN.blocks[0], length=1000.0),) * 14,
+                wells=(500.0,),
+            ),
+            "must be 2 to 13. Received 14",
+        ),
     ],
 )
 def test_blocks_that_are_not_covered_are_refused(chain, said):
