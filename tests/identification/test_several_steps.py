@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from quakedesign.errors import RecordError
 from quakedesign.identification import several_steps
 from quakedesign.identification.assessment import Assessment, Check
 from quakedesign.identification.correlated_noise import CorrelatedNoise
-from quakedesign.identification.identification_result import ParameterEstimate
+from quakedesign.identification.identification_result import Identification, ParameterEstimate
 from quakedesign.identification.record import part
 from quakedesign.identification.several_steps import _assessed, _common, cut, identify_steps, read_steps
 from quakedesign.report.identification_page import identification_lines, save_figure, steps_figure
@@ -127,7 +128,8 @@ def test_the_figure_has_a_panel_a_step_with_both_fits_and_a_region_for_each(agre
 def stub(sign=0, passed=True, factor=1.0, law="", excess=0.0, record=None):
     """Identification of a step by its sign of a - b, residuals over noise, law and by how much its rival is worse."""
     check = Check(name="sign", passed=passed, value=float(sign), limit=0.0, sentence="")
-    return SimpleNamespace(
+    return Mock(
+        spec=Identification,  # as the check of arguments asks, once Steps was loaded by its public name
         assessment=Assessment(checks=(check,), factor=factor),
         fit=SimpleNamespace(correlation=2.0),
         law=SimpleNamespace(name=law),
