@@ -10,6 +10,7 @@ from quakedesign import guarantees, lyapunov
 from quakedesign import plant as plants
 from quakedesign.arguments import checked
 from quakedesign.errors import CertificateError, WorkError
+from quakedesign.exact import UpperBound, rational
 from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.certificate_files import (
     ATTRACTION,
@@ -103,9 +104,22 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     about = entry_lines(guarantees.guarantee_document(claim))
     lines = [f'fault "{claim.task.name}", by the data in the file', claim.sentence(), *about]
     if fault is not None:
-        if claim.task != replace(_task(claim, fault), name=claim.task.name):
+        task, healing = _task(claim, fault), rational(fault.friction.rest_excess)
+        covers = isinstance(claim, guarantees.StickSlipGuarantee) and healing > 0
+        if covers and task.amplitude <= claim.task.amplitude:  # type: ignore[union-attr]
+            covered = claim.covered_healing(task.amplitude)  # type: ignore[union-attr]
+            if covered < healing:
+                raise CertificateError(
+                    f'healing of "{fault.name}" must be covered beside its disturbance, up to {covered:.3g}. Received '
+                    f"{UpperBound(healing):.3g}"
+                )
+            task = replace(task, amplitude=claim.task.amplitude)  # healing and a larger disturbance count alike
+        if claim.task != replace(task, name=claim.task.name):
             raise CertificateError(f'the data are not those of "{fault.name}"')
         lines.append(f'the data are those of "{fault.name}"{_other_step(claim, fault)}')
+        if healing:
+            above = f"friction at rest up to {UpperBound(healing):.3g} above friction in slip"
+            lines.append(f"{'' if covers else 'not '}covered: {above} (healing of the fault file)")
     return str(Verdict.PROVED), lines
 
 

@@ -459,7 +459,7 @@ BUDGETS = {
     "rocq": 600,
     "simulation": 9070,
     "identification": 4485,
-    "studies": 3580,
+    "studies": 3590,
     "report": 3955,
     "cli": 3390,
 }

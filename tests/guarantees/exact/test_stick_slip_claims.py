@@ -12,9 +12,11 @@ import pytest
 from scipy.optimize import linprog
 
 import quakedesign as qd
+from quakedesign.checking import check_files
 from quakedesign.cli.simulate_commands import _outside
 from quakedesign.errors import CertificateError, ParameterError, UnknownNameError
 from quakedesign.exact import LowerBound, UpperBound
+from quakedesign.fault import fault_toml
 from quakedesign.guarantees import guarantee_document, load_guarantee, read_guarantee
 from quakedesign.guarantees.exact import stick_slip_set
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
@@ -411,6 +413,24 @@ def test_a_file_is_for_faults_whose_healing_it_covers(monkeypatch):
     certified_choice(replace(half, friction=replace(half.friction, healing=3.1e-5)), FILE)
     with pytest.raises(CertificateError, match=r"up to 3\.11e-05 there, 3\.2e-05 here"):
         certified_choice(replace(half, friction=replace(half.friction, healing=3.2e-5)), FILE)
+
+
+def test_check_says_of_a_fault_that_heals_whether_that_is_covered(monkeypatch, tmp_path):
+    monkeypatch.setattr(StickSlipGuarantee, "check", lambda _: Verdict.PROVED)
+    real = qd.load_fault("real-fault")
+    half = real.with_disturbance(replace(real.disturbance, amplitude=real.disturbance.amplitude / 2))
+
+    def said(fault, healing):
+        path = tmp_path / "fault.toml"
+        path.write_text(fault_toml(replace(fault, friction=replace(fault.friction, healing=healing))))
+        return check_files([FILE], str(path))[str(FILE)]
+
+    verdict, lines = said(half, 3.1e-5)
+    assert verdict == "proved"
+    assert lines[-1] == "covered: friction at rest up to 3.1e-05 above friction in slip (healing of the fault file)"
+    assert "must be covered beside its disturbance, up to 3.11e-05. Received 3.2e-05" in said(half, 3.2e-5)[0]
+    assert "up to 0. Received 1e-06" in said(real, 1e-6)[0]
+    assert "not those of" in said(half, 0.0)[0]  # without healing its data are others
 
 
 def test_a_run_of_its_file_knows_what_is_proved_and_on_which_plant(proof, monkeypatch):
