@@ -1,4 +1,4 @@
-"""What `fault`, `guarantee`, `design`, `compare`, `simulate` and `limits` do with a file of several blocks."""
+"""What the commands about one fault do with a file of several blocks."""
 
 import os
 from collections.abc import Collection
@@ -14,6 +14,7 @@ from quakedesign.files import hold, made_folder, require_room
 from quakedesign.text import counted
 
 if TYPE_CHECKING:
+    from quakedesign.cli.options import LawOptions
     from quakedesign.fault import BlockChain
     from quakedesign.studies.chains import ChainRun
 
@@ -123,17 +124,21 @@ def chain_limits(chain: "BlockChain", output: Output) -> int:
     return 0
 
 
-def block_law(named: str, usual: str) -> str:
+def block_law(named: str, usual: str, certificate: Path | None = None) -> str:
     """Kind of law of several blocks.
 
     Raises
     ------
+    ParameterError
+        For a kind beside a certificate, which has its own.
     UnknownNameError
     """
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
 
     if named == usual:
         return BLOCK_LAWS[0]
+    if certificate is not None:
+        raise ParameterError(f"--certificate contains the law. Received --controller {named} too. Omit --controller.")
     require_known(named, BLOCK_LAWS, "controller of several blocks", UnknownNameError)
     return named
 
@@ -209,6 +214,32 @@ def _run_facts(one: "ChainRun") -> dict[str, Any]:
     return {"guarantee": _facts(one.found, one.chain), "run": one.run.to_dict()}
 
 
+def export_chain(
+    chain: "BlockChain", law: "LawOptions", fmu: bool, out: Path | None, force: bool, output: Output
+) -> int:
+    """The command `export`: the law that is designed, or that of a certificate, where something is proved of it."""
+    from quakedesign.report.plain import export_lines
+    from quakedesign.simulation.export import FILES, block_step, require_free, write_step
+    from quakedesign.studies.chains import chain_law
+
+    _require_no_state(chain, "export")
+    controller = block_law(law.controller, "cta", law.certificate)
+    folder = out or Path(f"quakedesign-{chain.name}-{controller}")
+    require_free(folder, force)
+    with progress() as tell:
+        tell("design and proof", 0.0)
+        found = chain_law(chain, controller, law.certificate)
+    if not found.proved:
+        output.show(_facts(found, chain), [*_lines(found, chain), "nothing is exported, as no law is proved"])
+        return 1
+    step = block_step(chain, found.law, remarks=(f"proved: {found.sentence()}", *_scope(found, chain)))
+    exported = write_step(step, folder, fmu=fmu, force=force)
+    files = {"files": [str(folder / name) for name in (FILES if fmu else FILES[:2])], "premises": []}
+    answer = exported.to_dict() | files
+    output.show(answer | {"guarantee": _facts(found, chain)}, export_lines(answer))
+    return 0
+
+
 def run_chain(
     chain: "BlockChain",
     controller: str,
@@ -217,6 +248,7 @@ def run_chain(
     force: bool,
     output: Output,
     formats: Any = ("png",),
+    certificate: Path | None = None,
 ) -> int:
     """The commands `design` and `simulate`: a law, its proof, a run and, with a folder, files and a figure."""
     from quakedesign.report.folder import prepare
@@ -229,7 +261,7 @@ def run_chain(
         hold(out)
     with progress() as tell:
         tell("design, proof and run", 0.0)
-        one = run_of_chain(chain, controller, duration)
+        one = run_of_chain(chain, controller, duration, certificate=certificate)
     found, run, facts = one.found, one.run, _run_facts(one)
     if run is None:
         output.show(facts, [*_lines(found, chain), "nothing is simulated, as no law is proved"])

@@ -91,8 +91,11 @@ def simulate(
     from quakedesign.simulation import Load
     from quakedesign.studies.runs import run_single
 
-    if (blocks := several_blocks(fault, simulate, options, ("duration", "out", "controller"))) is not None:
-        return run_chain(blocks, block_law(law.controller, "none"), run.duration, out, force, output)
+    if (
+        blocks := several_blocks(fault, simulate, options, ("duration", "out", "controller", "certificate"))
+    ) is not None:
+        kind = block_law(law.controller, "none", law.certificate)
+        return run_chain(blocks, kind, run.duration, out, force, output, certificate=law.certificate)
     new_file(out, "output file", force=force)
     loaded = load_fault(fault)
     if loaded.friction.state_names:
@@ -272,10 +275,16 @@ def export(
     out
         Output folder; ./quakedesign-FAULT-CONTROLLER by default.
     """
+    options = dict(locals())
+    from quakedesign.cli.block_commands import export_chain, several_blocks
     from quakedesign.fault import load_fault
     from quakedesign.report.plain import export_lines
     from quakedesign.studies.exporting import export_answer
 
+    if (
+        chain := several_blocks(fault, globals()["export"], options, ("controller", "certificate", "fmu", "out"))
+    ) is not None:
+        return export_chain(chain, law, fmu, out, force, output)
     loaded = load_fault(fault)
     chosen = law.choose(loaded, step)
     if chosen is None:

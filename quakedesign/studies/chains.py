@@ -9,15 +9,19 @@ controller of any kind needs pressures that far from balance, with the largest Î
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound, rational
 from quakedesign.fault import BlockChain
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
-from quakedesign.plant import uncertain_plant
+from quakedesign.guarantees.exact.guarantee_files import load_guarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, named
+from quakedesign.guarantees.search.plant_search import linear_part
+from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import UncertainPlant, uncertain_plant
 from quakedesign.simulation.block_run import BlockRun, simulate_blocks, whole_periods
 from quakedesign.synthesis import guarantee
 from quakedesign.synthesis.guarantee import BLOCK_LAWS
@@ -218,7 +222,36 @@ class ChainRun:
         ]
 
 
-def run_of_chain(chain: BlockChain, controller: str = BLOCK_LAWS[0], duration: float | None = None) -> ChainRun:
+def chain_law(chain: BlockChain, controller: str = BLOCK_LAWS[0], certificate: str | Path | None = None) -> Any:
+    """Guarantee of a law for several blocks: designed, or that of a certificate, which is checked anew.
+
+    Raises
+    ------
+    CertificateError
+        For a file that does not hold, or is about another plant.
+    """
+    if certificate is None:
+        return guarantee(chain, controller)
+    claim, plant = load_guarantee(certificate), UncertainPlant.from_blocks(chain)
+    if not isinstance(claim, PlantGuarantee) or claim.part != linear_part(plant, {}):
+        raise CertificateError(
+            f"a certificate must be about the fault. Received {certificate}, about another plant than {plant.name}. "
+            f"Give a file of guarantee {chain.name} --out FILE."
+        )
+    if claim.law.delay or claim.check() is not Verdict.PROVED:
+        raise CertificateError(
+            f"a certificate must hold, for a law without delay. Received {certificate}. Prove it anew with guarantee."
+        )
+    return named(claim, tuple(plant.outputs or ()), tuple(plant.controls), plant.name)
+
+
+def run_of_chain(
+    chain: BlockChain,
+    controller: str = BLOCK_LAWS[0],
+    duration: float | None = None,
+    *,
+    certificate: str | Path | None = None,
+) -> ChainRun:
     """Design a law for several blocks, prove it, and run it on the stickâ€“slip plant.
 
     Parameters
@@ -228,12 +261,14 @@ def run_of_chain(chain: BlockChain, controller: str = BLOCK_LAWS[0], duration: f
         ``centralised`` or ``decentralised``.
     duration : float, optional
         [s]; the operation time unless given.
+    certificate : str or Path, optional
+        File of a guarantee of this fault, whose law is run instead.
 
     Raises
     ------
-    ParameterError
+    ParameterError, CertificateError
     """
     whole_periods(chain, rational(chain.fault.sampling_time), duration)  # is refused before the long search
-    found: Any = guarantee(chain, controller)
+    found = chain_law(chain, controller, certificate)
     run = simulate_blocks(chain, found.law, duration=duration) if found.proved else None
     return ChainRun(chain=chain, controller=controller, found=found, run=run)
