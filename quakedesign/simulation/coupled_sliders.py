@@ -35,6 +35,7 @@ MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
 _LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
 _ONSET = 10.0  # times the loading rate
 _RTOL = 1e-9
+_SMALL = 1e3  # Pa, below which errors of a pressure count absolutely
 _TIGHT = 1e-11  # of runs under a law
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run under a law is recorded
 _WIDEST = 50.0  # change of the logarithm of a rate at the start
@@ -289,9 +290,9 @@ def simulate_sliders(
     loading_rate: float = 0.0,
     inputs: Sequence[tuple[float, Sequence[float]]] = (),
     onset_rate: float = math.inf,
+    times: Sequence[float] = (),
     method: str = "radau",
     rtol: float = _RTOL,
-    scale: float | None = None,
 ) -> SlidersRun:
     """Follow coupled blocks that are loaded from afar.
 
@@ -308,10 +309,10 @@ def simulate_sliders(
         Times [s] from 0 on at which inputs u change, and what they are from then on.
     onset_rate : float
         [m/s], whose passing begins an event.
+    times : sequence of float, optional
+        Ascending instants to return [s] beside the start, changes of inputs and the end; every step unless given.
     method, rtol
         As of `simulate_state`.
-    scale : float, optional
-        Size of pressures below which their errors count absolutely [Pa]; 1e3 unless given.
 
     Raises
     ------
@@ -321,7 +322,7 @@ def simulate_sliders(
     N, n = sliders.sizes
     prestress = tuple(sliders.resisting(start)) if sliders.mass else ()
     slips = [float(law.critical_slip) for law in sliders.laws]  # type: ignore[attr-defined]
-    scales = np.array([*slips, *[1.0] * (2 * N), *[scale or 1e3] * n])
+    scales = np.array([*slips, *[1.0] * (2 * N), *[_SMALL] * n])
     level = math.log(onset_rate) if math.isfinite(onset_rate) else math.inf
     told = tuple(inputs[0][1]) if inputs else ()
     problem = SmoothProblem(sliders.rates(len(told)), scales, slice(N, 2 * N), level)
@@ -332,17 +333,18 @@ def simulate_sliders(
         told = next((tuple(u) for time, u in reversed(inputs) if time <= now), told)
         load = (loading_rate, 0.0, 0.0, *prestress, *told)
         ramp = Ramp(now, load, (0.0,) * len(load))
-        part = problem.integrate(y, ramp, np.array([now, end]), every_step=True, method=method, rtol=rtol)
+        instants = np.array([now, *(time for time in times if now < time < end), end])
+        part = problem.integrate(y, ramp, instants, every_step=not len(times), method=method, rtol=rtol)
         first = int(bool(pieces))
         pieces.append((part.time[first:], part.values[:, first:]))
         crossings.append(part.crossings)
         evaluations += part.evaluations
         y = part.values[:, -1]
-    times = np.concatenate([time for time, _ in pieces])
+    passed = np.concatenate([time for time, _ in pieces])
     values = np.concatenate([value for _, value in pieces], axis=1).T
     return SlidersRun(
-        times=times,
-        slip=values[:, :N] + loading_rate * times[:, None],
+        times=passed,
+        slip=values[:, :N] + loading_rate * passed[:, None],
         slip_rate=np.exp(values[:, N : 2 * N]),
         state=np.exp(values[:, 2 * N : 3 * N]),
         pressure=values[:, 3 * N :],
