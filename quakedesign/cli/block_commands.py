@@ -57,20 +57,19 @@ def several_blocks(
 
 
 def _scope(found: Any, chain: "BlockChain") -> list[str]:
-    """What a statement about blocks depends on, and its units."""
+    """What a statement about blocks depends on, and what its words mean."""
     from quakedesign.studies.chains import farthest_balance
 
     blocks, wells = counted(len(chain.blocks), "block"), counted(len(chain.wells), "well")
-    pushed, meant = "m/s^2", "the load of a pressure is the pressure that balances the blocks on the reference"
+    meant = "the load of a pressure is the pressure that balances the blocks on the reference"
     if chain.ages:
         return [
             f"plant: {chain.name}, {blocks}, {wells}, its constants as they are, from steady sliding; the plan of the "
             "reference reaches the fault as it is",
-            "units: slip m, log state (ln of the state over D_c/V) 1, pull and pressure beside the "
-            "plan MPa; |y| is bounded for log states and pulls; a disturbance is the rate over V that the stress adds",
+            "a log state is ln of the state over D_c/V; |y| is bounded for log states and pulls [MPa]; the load of a "
+            "pressure is the plan; a disturbance is the rate over V that the stress adds",
         ]
     if (far := farthest_balance(chain, found)) is not None:
-        pushed += ", the second m/s"
         meant = (
             "the load of a pressure is the pressure that keeps the averages of the slips, one for each well, on the "
             "reference; slip errors are relative to the equilibrium of each block under these pressures, which is "
@@ -84,7 +83,7 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
         *([healed] if excess else []),
         f"plant: {chain.name}, {blocks}, {wells}, any constants of box {box.name}{springs}, without stick (friction "
         "continues to negative slip rates)",
-        f"units: slip m, slip rate m/s, disturbance {pushed}, pressure Pa, rate of a load Pa/s; {meant}",
+        meant,
     ]
 
 
@@ -291,3 +290,33 @@ def run_chain(
         said.append(f"written: {out}/ (results.json, guarantee.json, {file_names('blocks', formats)})")
     output.show(facts, said)
     return 1 if run.reversed or run.opened else 0
+
+
+def run_sliding(chain: "BlockChain", plant: str, out: Path | None, force: bool, output: Output, **given: Any) -> int:
+    """The command `simulate` of blocks with rate-and-state friction."""
+    from quakedesign.report.folder import prepare
+    from quakedesign.simulation.slow_sliding import PLANTS
+    from quakedesign.studies.chains import run_sliding_chain
+
+    require_known(plant, PLANTS, "plant of rate-and-state friction")
+    if out is not None:
+        prepare(out, force=force)
+        require_room(out)
+        hold(out)
+    with progress() as tell:
+        tell("proof and run" if given["certificate"] else "run", 0.0)
+        one = run_sliding_chain(chain, inertia=PLANTS[plant], tell=lambda done: tell("run", done), **given)
+    proved = "" if one.found is None else one.found.sentence()
+    facts = {"run": one.to_dict(), "guarantee": {"sentence": proved} if proved else None}
+    said = [*([f"proved: {proved}"] if proved else []), *one.lines()]
+    if out is not None:
+        from quakedesign.files import whole_folder
+        from quakedesign.report.block_figure import block_figure
+        from quakedesign.report.drawing import file_names, write_figures, write_results
+
+        with whole_folder(out) as folder:
+            write_figures(folder, {"blocks": block_figure(chain, one.run, proved)}, ("png",))
+            write_results(folder, facts)
+        said.append(f"written: {out}/ (results.json, {file_names('blocks', ('png',))})")
+    output.show(facts, said)
+    return 0

@@ -85,16 +85,28 @@ def simulate(
         NetCDF file to write; of a fault of several blocks, a folder.
     """
     options = dict(locals())
-    from quakedesign.cli.block_commands import block_law, run_chain, several_blocks
+    from quakedesign.cli.block_commands import block_law, run_chain, run_sliding, several_blocks
     from quakedesign.fault import load_fault
     from quakedesign.report.sentences import proved_line
     from quakedesign.simulation import Load
     from quakedesign.studies.runs import run_single
 
-    if (
-        blocks := several_blocks(fault, simulate, options, ("duration", "out", "controller", "certificate"))
-    ) is not None:
-        kind = block_law(law.controller, "none", law.certificate)
+    known = ("duration", "out", "controller", "certificate", "plant", "drift", "stress", "stress_period")
+    if (blocks := several_blocks(fault, simulate, options, known)) is not None:
+        kind, loads = block_law(law.controller, "none", law.certificate), state.of_control()
+        if blocks.ages and law.controller != "none":
+            raise ParameterError(
+                "blocks in slow sliding run under the law of a certificate. Received --controller. Use guarantee with "
+                "--out, then simulate with --certificate."
+            )
+        if blocks.ages:
+            loads |= {"certificate": law.certificate, "duration": run.duration, "loading_rate": run.drift}
+            return run_sliding(blocks, run.plant or "quasi-dynamic", out, force, output, **loads)
+        if run.plant or run.drift is not None or loads:
+            raise ParameterError(
+                "--plant, --drift and --stress of several blocks need friction with a state. Received "
+                f"{blocks.blocks[0].friction.name}. Omit these options."
+            )
         return run_chain(blocks, kind, run.duration, out, force, output, certificate=law.certificate)
     new_file(out, "output file", force=force)
     loaded = load_fault(fault)

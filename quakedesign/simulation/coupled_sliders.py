@@ -27,6 +27,7 @@ from quakedesign.plant.block_plant import averages
 from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
 from quakedesign.simulation.smooth import Ramp, SmoothProblem
 from quakedesign.simulation.state_plant import TIDE, slip
+from quakedesign.simulation.stick_slip import direct_strength
 from quakedesign.symbolic.casadi_printer import to_casadi
 from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
 
@@ -34,6 +35,7 @@ MOST_EXPANDED = 40  # blocks whose equations are written out; more are matrices
 MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
 _LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
 _ONSET = 10.0  # times the loading rate
+_EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # of a run that shows a cycle: events, and loads of aσ'
 _RTOL = 1e-9
 _SMALL = 1e3  # Pa, below which errors of a pressure count absolutely
 _TIGHT = 1e-11  # of runs under a law
@@ -181,10 +183,10 @@ class CoupledSliders:
         field = ca.cse([found(state, told)])[0]
         return ca.Function("rates", [state, told], [field, ca.jacobian(field, state)])
 
-    def resisting(self, y: "np.ndarray", pressure: float = 0.0) -> "np.ndarray":
-        """Nμ + Hv [Pa] of every block, under a pressure [Pa] on all beside that of cells or wells."""
+    def resisting(self, y: "np.ndarray") -> "np.ndarray":
+        """Nμ + Hv [Pa] of every block."""
         N, n = self.sizes
-        normal = np.array(self.normal_stress) - pressure - (np.asarray(self.shares) @ y[3 * N :] if n else 0)
+        normal = np.array(self.normal_stress) - (np.asarray(self.shares) @ y[3 * N :] if n else 0)
         mu = [float(f(*pair)[0]) for f, pair in zip(self._friction, y[N : 3 * N].reshape(2, N).T, strict=True)]
         return np.asarray(normal * mu + self.damping * np.exp(y[N : 2 * N]))
 
@@ -230,6 +232,8 @@ class SlidersRun:
     ----------
     times, slip, slip_rate, state, pressure : ndarray
         [s], [m], [m/s], [s], [Pa].
+    reference : ndarray
+        Displacement of the far end, or r of a run under a law [m].
     onsets : ndarray
         Times [s] at which the fastest block passes the onset rate.
     onset_rate, loading_rate : float
@@ -242,6 +246,7 @@ class SlidersRun:
     slip_rate: "np.ndarray"
     state: "np.ndarray"
     pressure: "np.ndarray"
+    reference: "np.ndarray"
     onsets: "np.ndarray"
     onset_rate: float
     loading_rate: float
@@ -348,6 +353,7 @@ def simulate_sliders(
         slip_rate=np.exp(values[:, N : 2 * N]),
         state=np.exp(values[:, 2 * N : 3 * N]),
         pressure=values[:, 3 * N :],
+        reference=loading_rate * passed,
         onsets=np.concatenate(crossings),
         onset_rate=onset_rate,
         loading_rate=loading_rate,
@@ -357,7 +363,7 @@ def simulate_sliders(
 
 def natural_cycles(
     chain: BlockChain,
-    duration: float,
+    duration: float | None = None,
     *,
     loading_rate: float | None = None,
     inertia: bool = False,
@@ -370,8 +376,8 @@ def natural_cycles(
     ----------
     chain : BlockChain
         With rate-and-state friction.
-    duration : float
-        [s].
+    duration : float, optional
+        [s]; unless given as long as three events take, or a thousand times the load of the direct effect of block 1.
     loading_rate : float, optional
         v_∞ [m/s]; the reference rate of the friction of the first block unless given.
     inertia : bool
@@ -381,11 +387,18 @@ def natural_cycles(
     """
     far = float(chain.blocks[0].friction.operating_rate) if loading_rate is None else loading_rate
     require_positive(loading_rate=far)
-    sliders, N = CoupledSliders.of(chain, inertia=inertia), len(chain.blocks)
+    sliders, N, fault = CoupledSliders.of(chain, inertia=inertia), len(chain.blocks), chain.faults[0]
     older = [float(law.steady_state(far)[0]) * (1 + i / N) for i, law in enumerate(sliders.laws, 1)]
     start = sliders.start([far] * N, older)
-    settings: dict[str, Any] = {"method": method, "rtol": rtol}
-    return simulate_sliders(sliders, start, duration, loading_rate=far, onset_rate=_ONSET * far, **settings)
+    settings: dict[str, Any] = {"method": method, "rtol": rtol, "loading_rate": far, "onset_rate": _ONSET * far}
+    if duration is not None:
+        return simulate_sliders(sliders, start, duration, **settings)
+    unit, loads = direct_strength(fault) * fault.area / (fault.stiffness * far), _FIRST_LOADS
+    while True:
+        run = simulate_sliders(sliders, start, loads * unit, **settings)
+        loads *= 2
+        if len(run.onsets) >= _EVENTS or loads > _MOST_LOADS:
+            return run
 
 
 # ----------------------------------------------------------------------
@@ -456,7 +469,7 @@ def simulate_held_blocks(
         now = k * step
         seen = weights @ y[:N] - float(course.slip(now))
         u = MPA * (H @ z + D @ seen)
-        z = F @ z + G @ seen
+        z = F @ z + G @ seen if len(F) else z
         try:
             found = flow.follow(now, step, y, u)[0]
         except StoppedError as error:
@@ -472,6 +485,7 @@ def simulate_held_blocks(
         slip_rate=np.exp(values[:, N : 2 * N]),
         state=np.exp(values[:, 2 * N : 3 * N]),
         pressure=values[:, 3 * N :],
+        reference=np.asarray(course.slip(np.array(times))),
         onsets=np.empty(0),
         onset_rate=math.inf,
         loading_rate=0.0,
