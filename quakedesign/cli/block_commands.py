@@ -46,10 +46,10 @@ def several_blocks(
         )
     if others:
         named = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(others))
-        has = {*known, "json"} | ({"force", "box"} & options.keys())
+        has = {*known, "json"} - {"state"} | ({"force", "box"} & options.keys())
         raise ParameterError(
             f"{command.__name__} has, of a fault of several blocks, the options "
-            f"{', '.join(f'--{name}' for name in sorted(has))}. Received {named}. Omit these."
+            f"{', '.join(f'--{name}' for name in sorted(has)).replace('_', '-')}. Received {named}. Omit these."
         )
     if chosen.get("accept_poor_fit"):
         chain = replace(chain, fault=with_accepted_fit(chain.fault, True))

@@ -91,9 +91,14 @@ def simulate(
     from quakedesign.simulation import Load
     from quakedesign.studies.runs import run_single
 
-    known = ("duration", "out", "controller", "certificate", "plant", "drift", "stress", "stress_period")
+    known = ("duration", "out", "controller", "certificate", "plant", "drift", "stress", "stress_period", "state")
     if (blocks := several_blocks(fault, simulate, options, known)) is not None:
-        kind, loads = block_law(law.controller, "none", law.certificate), state.of_control()
+        kind = block_law(law.controller, "none", law.certificate)
+        loads = given({"stress": state.stress, "stress_period": state.stress_period})
+        if state != StateOptions(**loads):
+            raise ParameterError(
+                "several blocks have no --pressure, --start, --hold and --share. Received one of them. Omit these options."
+            )
         if blocks.ages and law.controller != "none":
             raise ParameterError(
                 "blocks in slow sliding run under the law of a certificate. Received --controller. Use guarantee with "
