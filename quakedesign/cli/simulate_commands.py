@@ -97,7 +97,7 @@ def simulate(
         loads = given({"stress": state.stress, "stress_period": state.stress_period})
         if state != StateOptions(**loads):
             raise ParameterError(
-                "several blocks have no --pressure, --start, --hold and --share. Received one of them. Omit these options."
+                "several blocks have no --pressure, --start, --hold and --share. Received one of them. Omit these."
             )
         if blocks.ages and law.controller != "none":
             raise ParameterError(

@@ -330,7 +330,7 @@ def test_a_guarantee_of_slow_sliding_tells_its_lag_and_the_stress_that_it_covers
     smaller = tuple((entry, size / 2) for entry, size in claim.part.disturbances)
     _, half = covered_stress(chain, replace(claim, part=replace(claim.part, disturbances=smaller)))
     assert float(half) == pytest.approx(5000, abs=1)
-    friction = replace(chain.blocks[0].friction, evolution_effect=0.0151)
+    friction = replace(chain.blocks[0].friction, evolution_effect=0.02)
     others = (
         replace(chain, blocks=tuple(replace(block, friction=friction) for block in chain.blocks)),
         replace(chain, fault=replace(chain.fault, shear_modulus=32.05e9)),
@@ -339,20 +339,16 @@ def test_a_guarantee_of_slow_sliding_tells_its_lag_and_the_stress_that_it_covers
     for other in others:
         with pytest.raises(CertificateError, match="about these blocks"):
             covered_stress(other, claim)
-
-    def narrow(place):
-        """A sector that is narrower than that of the blocks under 10 kPa."""
+    for place in (0, 1, 2):  # a sector that is narrower than that of the blocks
         sector = claim.part.sectors[place]
         low, high = sector.slopes
-        narrower = replace(sector, slopes=(low + (high - low) / 5, high))
-        sectors = (*claim.part.sectors[:place], narrower, *claim.part.sectors[place + 1 :])
-        return replace(claim, part=replace(claim.part, sectors=sectors))
-
-    assert max(covered_stress(chain, narrow(place))[1] for place in (0, 1)) < 9500
-    with pytest.raises(CertificateError):  # the sector of ageing does not depend on the stress
-        covered_stress(chain, narrow(2))
+        narrow = replace(sector, slopes=(low + (high - low) / 5, high))
+        sectors = (*claim.part.sectors[:place], narrow, *claim.part.sectors[place + 1 :])
+        with pytest.raises(CertificateError):
+            covered_stress(chain, replace(claim, part=replace(claim.part, sectors=sectors)))
 
 
+@pytest.mark.slow
 def test_a_run_of_slow_sliding_says_whether_it_stays_within_what_is_proved(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(PlantGuarantee, "check", lambda _: Verdict.PROVED)  # takes 17 s; decided in the slow tests
     certificate = SLIDING.with_suffix(".json")
@@ -373,6 +369,7 @@ def test_a_run_of_slow_sliding_says_whether_it_stays_within_what_is_proved(monke
     assert strong.to_dict()["plant"] == "smooth"
 
 
+@pytest.mark.slow
 def test_cycles_without_control_are_told(capsys, tmp_path):
     assert run("simulate", SLIDING, "--duration", "1 year", "--drift", "1 nm/s", "--out", tmp_path / "run") == 0
     told = " ".join(capsys.readouterr().out.split())
