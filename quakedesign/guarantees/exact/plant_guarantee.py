@@ -16,14 +16,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import zip_longest
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds, response_bounds
 from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant import UncertainPlant
 from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad
 from quakedesign.sos.exact.strict import (
     headed,
@@ -37,6 +36,9 @@ from quakedesign.sos.exact.strict import (
     with_keys,
 )
 from quakedesign.text import counted
+
+if TYPE_CHECKING:
+    from quakedesign.plant import UncertainPlant
 
 MOST_PIECES = 64
 _MOST_LAW_STATES = 48
@@ -332,7 +334,7 @@ def _read_law(raw: Any) -> MatrixLaw:
     )
 
 
-def named(claim: PlantGuarantee, plant: UncertainPlant) -> PlantGuarantee:
+def named(claim: PlantGuarantee, plant: "UncertainPlant") -> PlantGuarantee:
     """A claim with the names and units of its plant, for people."""
     outputs, controls, units = tuple(plant.outputs or ()), tuple(plant.controls), plant.units
     told = tuple(units.get(name, "") for name in (*outputs, *controls, *plant.disturbances)) if units else ()
