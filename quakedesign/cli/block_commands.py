@@ -306,9 +306,9 @@ def run_sliding(chain: "BlockChain", plant: str, out: Path | None, force: bool, 
     with progress() as tell:
         tell("proof and run" if given["certificate"] else "run", 0.0)
         one = run_sliding_chain(chain, inertia=PLANTS[plant], tell=lambda done: tell("run", done), **given)
-    proved = "" if one.found is None else one.found.sentence()
-    facts = {"run": one.to_dict(), "guarantee": {"sentence": proved} if proved else None}
-    said = [*([f"proved: {proved}"] if proved else []), *one.lines()]
+    proved, notes = ("", []) if one.found is None else (one.found.sentence(), _scope(one.found, chain))
+    facts = {"run": one.to_dict(), "guarantee": {"sentence": proved, "notes": notes} if proved else None}
+    said = [*([f"proved: {proved}", *notes] if proved else []), *one.lines()]
     if out is not None:
         from quakedesign.files import whole_folder
         from quakedesign.report.block_figure import block_figure

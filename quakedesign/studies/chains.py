@@ -38,6 +38,7 @@ from quakedesign.text import counted, lasting, quantity
 
 _SAME = 1e-6  # poles that are one, relative to the largest
 _UNREACHED = 1e-9  # of a mode's vectors
+_NONE = UpperBound(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -295,9 +296,10 @@ class SlidingChainRun:
     run: SlidersRun
     inertia: bool
     found: PlantGuarantee | None = None
-    # Lag [s] and largest stress [Pa] that the guarantee covers, and that of the run [Pa]
+    # Lag [s] and largest stress [Pa] that the guarantee covers, its bound of |ln(v/V)|, and the stress of the run [Pa]
     lag: Fraction = Fraction(0)
     covered: Fraction = Fraction(0)
+    log_rate: UpperBound = _NONE
     stress: float = 0.0
 
     @property
@@ -324,8 +326,8 @@ class SlidingChainRun:
         """Whether all errors of a run under a law are within what is proved of their blocks and wells."""
         assert self.found is not None
         N, claims, errors = len(self.chain.blocks), self.found.claims, self.errors
-        told = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan")]
-        proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls)]
+        told = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
+        proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
         return bool((np.concatenate(told) <= np.array(proved, dtype=float)).all())
 
     def lines(self) -> list[str]:
@@ -335,7 +337,7 @@ class SlidingChainRun:
             covered = LowerBound(self.covered).quantity("Pa")
             said = [
                 f"run over {end} under a sine of {quantity(self.stress, 'Pa')} of shear on every block; proved for up "
-                f"to {covered}, and a lag of {float(self.lag):g} s",
+                f"to {covered}, a lag of {float(self.lag):g} s, with |ln(v/V)| <= {self.log_rate:.3g}",
                 *(
                     f"block {i}: slip error {quantity(float(slip), 'm')}, |ln(v/V)| {rate:.3g}, |ln(state)| {state:.3g}"
                     for i, (slip, rate, state) in enumerate(zip(*list(self.errors.values())[:3], strict=True), 1)
@@ -347,7 +349,7 @@ class SlidingChainRun:
             ]
             return [
                 *said,
-                f"{'within' if self.within else 'OUTSIDE'} what is proved of slip errors, states and pressures",
+                f"{'within' if self.within else 'OUTSIDE'} what is proved of slips, slip rates, states and pressures",
             ]
         events = self.events
         loaded = f"{self.chain.name}, loaded from afar at {quantity(self.run.loading_rate, 'm/s')}"
@@ -373,6 +375,7 @@ class SlidingChainRun:
         if self.found is not None:
             errors = {f"max_{name}": values.tolist() for name, values in self.errors.items()}
             told = {"lag": float(self.lag), "stress": self.stress, "covered_stress": float(self.covered)}
+            told |= {"proved_log_rate": float(self.log_rate)}
             return facts | told | errors | {"within": self.within}
         last = run.onsets[-2:]
         return facts | {
@@ -423,7 +426,7 @@ def run_sliding_chain(
         raise CertificateError(
             f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of guarantee."
         )
-    lag, covered = covered_stress(chain, claim)
+    lag, covered, rate = covered_stress(chain, claim)
     if claim.check() is not Verdict.PROVED:
         raise CertificateError(f"a certificate must hold. Received {certificate}. Prove it anew with guarantee.")
     size = float(covered) if stress is None else stress
@@ -437,4 +440,6 @@ def run_sliding_chain(
         inertia=inertia,
         progress=tell,
     )
-    return SlidingChainRun(chain=chain, run=held, inertia=inertia, found=claim, lag=lag, covered=covered, stress=size)
+    return SlidingChainRun(
+        chain=chain, run=held, inertia=inertia, found=claim, lag=lag, covered=covered, log_rate=rate, stress=size
+    )

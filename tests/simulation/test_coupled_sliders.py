@@ -49,11 +49,11 @@ def stiffness(lengths):
     return S
 
 
-def quasi_dynamic(ln_v, ln_theta, S, stress, slip, far, p=0.0, p_rate=0.0, pushed=0.0):
-    """(ln v)' and (ln θ)' from the derivative of Nμ + Hv = τ - S(x - far) + s."""
+def quasi_dynamic(ln_v, ln_theta, S, stress, slip, far, p=0.0, p_rate=0.0, pushed=0.0, alpha=0.0):
+    """(ln v)' and (ln θ)' from the derivative of Nμ + Hv = τ - S(x - far) + s; θ' has −αθN'/(bN) more."""
     v, theta = np.exp(ln_v), np.exp(ln_theta)
     N, mu = stress - p, MU + A * np.log(v / V0) + B * np.log(V0 * theta / slip)
-    aged = 1 / theta - v / slip
+    aged = 1 / theta - v / slip + alpha / B * p_rate / N
     return (pushed - S @ (v - far) + p_rate * mu - N * B * aged) / (N * A + DAMPING * v), aged
 
 
@@ -61,8 +61,10 @@ def test_the_field_is_that_of_the_equations():
     """With pressures of wells behind a lag, a planned pressure and a stress; without mass and with it."""
     random = np.random.default_rng(1)
     load = np.array([1e-9, 2e6, 3.0])
+    blocks = (replace(b, friction=replace(b.friction, stress_sensitivity=0.2)) for b in CHAIN.blocks)
+    chain = replace(CHAIN, blocks=tuple(blocks))
     for mass in (0.0, RHO * LENGTH):
-        sliders = CoupledSliders.of(CHAIN, lag=800.0, inertia=mass > 0)
+        sliders = CoupledSliders.of(chain, lag=800.0, inertia=mass > 0)
         assert sliders.mass == pytest.approx(mass)
         for _ in range(5):
             behind, u = random.normal(size=3), random.normal(size=3) * 1e6
@@ -72,7 +74,7 @@ def test_the_field_is_that_of_the_equations():
             y = np.concatenate([behind, ln_v, ln_theta, h])
             found = np.array(sliders.field(y, np.concatenate([load, prestress, u]), s, s_rate)).ravel()
             S, p, p_rate = stiffness(LENGTHS), 2e6 + h, 3.0 + (u - h) / 800
-            first, aged = quasi_dynamic(ln_v, ln_theta, S, STRESSES, SLIPS, 1e-9, p, p_rate, s_rate)
+            first, aged = quasi_dynamic(ln_v, ln_theta, S, STRESSES, SLIPS, 1e-9, p, p_rate, s_rate, 0.2)
             if mass:
                 v, theta = np.exp(ln_v), np.exp(ln_theta)
                 mu = MU + A * np.log(v / V0) + B * np.log(V0 * theta / SLIPS)

@@ -324,11 +324,12 @@ def test_a_certificate_that_does_not_hold_or_is_of_other_blocks_gives_no_law(tmp
 def test_a_guarantee_of_slow_sliding_tells_its_lag_and_the_stress_that_it_covers():
     """Proved for 10 kPa; what inertia adds to the stress is below a pascal."""
     chain, claim = qd.load_chain(SLIDING), load_guarantee(SLIDING.with_suffix(".json"))
-    lag, stress = covered_stress(chain, claim)
+    lag, stress, rate = covered_stress(chain, claim)
     assert lag == 800
+    assert 0.07 < rate < 0.0739  # of the proof, with larger claims: 0.0738
     assert 10_000 <= stress < 10_001
     smaller = tuple((entry, size / 2) for entry, size in claim.part.disturbances)
-    _, half = covered_stress(chain, replace(claim, part=replace(claim.part, disturbances=smaller)))
+    _, half, _ = covered_stress(chain, replace(claim, part=replace(claim.part, disturbances=smaller)))
     assert float(half) == pytest.approx(5000, abs=1)
     friction = replace(chain.blocks[0].friction, evolution_effect=0.02)
     others = (
@@ -356,8 +357,8 @@ def test_a_run_of_slow_sliding_says_whether_it_stays_within_what_is_proved(monke
         run("simulate", SLIDING, "--certificate", certificate, "--duration", "2 hours", "--out", tmp_path / "run") == 0
     )
     told = " ".join(capsys.readouterr().out.split())
-    assert "proved for up to 10 kPa, and a lag of 800 s" in told
-    assert "within what is proved of slip errors, states and pressures" in told
+    assert "proved for up to 10 kPa, a lag of 800 s, with |ln(v/V)| <= 0.07" in told
+    assert "within what is proved of slips, slip rates, states and pressures" in told
     facts = json.loads((tmp_path / "run" / "results.json").read_text())["run"]
     assert facts["within"] is True
     assert facts["stress"] == pytest.approx(10_000, rel=1e-4)

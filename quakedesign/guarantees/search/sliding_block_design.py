@@ -73,8 +73,8 @@ def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuara
     return NoGuarantee(reason="the bounds that an estimate finds are not proved", small_gain=None)
 
 
-def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, Fraction]:
-    """Lag [s] and largest shear stress [Pa] for which a guarantee is one of these blocks.
+def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, Fraction, UpperBound]:
+    """Lag [s] and largest shear stress [Pa] for which a guarantee is one of these blocks, and its bound of |ln(v/V)|.
 
     The claims of the plant are read off its sectors, and Q off the bounds of its pressures: with a smaller one its
     sectors and disturbances still cover the blocks.
@@ -100,9 +100,10 @@ def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, 
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if covers(middle) else (low, middle)
-    if not low:
+    rate = SlidingBlocks(chain=chain, lag=lag, stress=low).log_rate(claims) if low else None
+    if rate is None:
         raise _of_another(chain)
-    return lag, low
+    return lag, low, rate
 
 
 def _within(asked: LinearPart, proved: LinearPart) -> bool:
