@@ -8,13 +8,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from fractions import Fraction
 from itertools import chain
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 from flint import arb, ctx
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
-from quakedesign.exact import LowerBound, UpperBound, shortly
+from quakedesign.exact import Bound, LowerBound, UpperBound, shortly
 from quakedesign.guarantees.exact.loop import NOISELESS, Channel, Gains, GainSpread, beside, channels_of, through_layer
 from quakedesign.guarantees.exact.norms import ball, flow_norms, norms
 from quakedesign.laws import ImplicitRoot, NominalModel, Power
@@ -203,6 +204,8 @@ class NoGuarantee:
     """
 
     proved: ClassVar[Literal[False]] = False
+    verdict: ClassVar[Verdict] = Verdict.UNDECIDED
+    bounds: ClassVar[Mapping[str, Bound]] = MappingProxyType({})
     reason: str
     small_gain: UpperBound | None
     needs: Fraction | None = None
