@@ -76,6 +76,8 @@ class PlantGuarantee:
     """
 
     proved: ClassVar[Literal[True]] = True
+    verdict: ClassVar[Verdict] = Verdict.PROVED
+    reason: ClassVar[str] = ""
     part: LinearPart
     law: MatrixLaw
     pieces: int
@@ -97,10 +99,10 @@ class PlantGuarantee:
         units = self.units[: len(bounds)] or [""] * len(bounds)
         return [f"|{name}| <= {_told(bound, unit)}" for name, bound, unit in zip(named, bounds, units, strict=True)]
 
-    def bound(self, name: str) -> UpperBound:
-        """Peak of an output or a control by its name."""
-        bounds = (*self.claims.outputs, *self.claims.controls)
-        return dict(zip((*self.outputs, *self.controls), bounds, strict=True))[name]
+    @property
+    def bounds(self) -> dict[str, UpperBound]:
+        """Peaks by the names of outputs and controls, in the units of the plant."""
+        return dict(zip((*self.outputs, *self.controls), (*self.claims.outputs, *self.claims.controls), strict=True))
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
@@ -130,18 +132,17 @@ class PlantGuarantee:
         sizes, first = [size for _, size in part.disturbances], len(self.claims.outputs)
         pushed = self.units[first + len(part.B[0]) :]
         said += f", disturbances of at most {_listed(sizes, pushed)}" if sizes else ""
-        rates, unit = [load.rate for load in part.loads], f"{self.units[first]}/s" if self.units else ""
-        said += f", loads of rates of at most {_listed(rates, [unit] * len(rates))}" if rates else ""
+        rates, unit = [load.rate for load in part.loads], self.units[first] if self.units else ""
+        said += f", loads of rates of at most {_listed(rates, [unit and f'{unit}/s'] * len(rates))}" if rates else ""
         said += f", measurement noise of at most {_listed(part.noise)}" if any(part.noise) else ""
         return f"{said}, for all t >= 0: {', '.join(self._peaks())}"
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts."""
-        named = zip((*self.outputs, *self.controls), (*self.claims.outputs, *self.claims.controls), strict=True)
         return {
             "verdict": "proved",
             "sentence": self.sentence(),
-            "peaks": {name: bound.exact for name, bound in named},
+            "peaks": {name: bound.exact for name, bound in self.bounds.items()},
             "step": str(self.law.step),
             "delay": str(self.law.delay),
             "notes": list(self.notes),
@@ -155,8 +156,8 @@ def _listed(values: Iterable[Fraction], units: Iterable[str] = ()) -> str:
 
 def _told(bound: LowerBound | UpperBound, unit: str) -> str:
     """With four digits, and an engineering prefix of its unit."""
-    if unit == "MPa":
-        bound, unit = type(bound)(bound * 10**6), "Pa"
+    if unit.startswith("MPa"):
+        bound, unit = type(bound)(bound * 10**6), unit[1:]
     return bound.quantity(unit, 4) if unit and bound else f"{bound:.4g}"
 
 
