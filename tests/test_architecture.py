@@ -458,7 +458,7 @@ BUDGETS = {
     "linear": 2400,
     "synthesis": 1840,
     "rocq": 600,
-    "simulation": 9700,
+    "simulation": 9715,
     "identification": 4485,
     "studies": 3790,
     "report": 3960,

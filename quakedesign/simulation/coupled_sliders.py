@@ -34,6 +34,9 @@ from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, witho
 MOST_EXPANDED = 40  # blocks whose equations are written out; more are matrices
 MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
 _LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
+_LONGEST_RUN = 1e5 * _LONGEST  # s
+_FARTHEST = 1e6  # critical slips that the far end travels: some thousand cycles
+_MOST_PERIODS = 10**5  # of a run under a law
 _ONSET = 10.0  # times the loading rate
 _EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # of a run that shows a cycle: events, and loads of aσ'
 _RTOL = 1e-9
@@ -324,9 +327,14 @@ def simulate_sliders(
     ParameterError, SimulationError
     """
     require_positive(duration=duration)
+    slips = [float(law.critical_slip) for law in sliders.laws]  # type: ignore[attr-defined]
+    if duration > _LONGEST_RUN or duration * loading_rate > _FARTHEST * min(slips):
+        raise ParameterError(
+            f"a run of blocks must last at most {_LONGEST_RUN:g} s, in which the far end moves at most {_FARTHEST:g} "
+            f"critical slips. Received {duration:g} s at {loading_rate:g} m/s. Shorten the duration."
+        )
     N, n = sliders.sizes
     prestress = tuple(sliders.resisting(start)) if sliders.mass else ()
-    slips = [float(law.critical_slip) for law in sliders.laws]  # type: ignore[attr-defined]
     scales = np.array([*slips, *[1.0] * (2 * N), *[_SMALL] * n])
     level = math.log(onset_rate) if math.isfinite(onset_rate) else math.inf
     told = tuple(inputs[0][1]) if inputs else ()
@@ -446,6 +454,11 @@ def simulate_held_blocks(
     """
     length, step = chain.fault.reference.operation_time if duration is None else duration, float(law.step)
     require_positive(duration=length, stress_period=period, lag=lag)
+    if length > _MOST_PERIODS * step:
+        raise ParameterError(
+            f"a run of blocks under a law must last at most {_MOST_PERIODS:g} samples, {_MOST_PERIODS * step:g} s. "
+            f"Received {length:g} s. Shorten the duration."
+        )
     sliders, course = CoupledSliders.of(chain, inertia=inertia, lag=lag), SlidingReference(task=chain.fault.reference)
     (N, m), V = sliders.sizes, float(course.first_rate)
     steady = float(chain.blocks[0].friction.steady_coefficient(V))

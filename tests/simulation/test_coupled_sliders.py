@@ -228,3 +228,11 @@ def test_friction_without_a_state_is_refused():
     memoryless = qd.load_chain(Path(__file__).parents[1] / "data" / "three_blocks.toml")
     with pytest.raises(ParameterError, match=r"need friction with one state\. Received exponential-slip-weakening"):
         natural_cycles(memoryless, 1e6, loading_rate=1e-9)
+
+
+@pytest.mark.parametrize(("duration", "far"), [(1e30, 1e-20), (1e14, 1e-9)])
+def test_runs_that_never_end_are_refused(duration, far):
+    with pytest.raises(ParameterError, match="Shorten the duration"):
+        natural_cycles(CHAIN, duration, loading_rate=far)
+    with pytest.raises(ParameterError, match="at most 100000 samples"):
+        simulate_held_blocks(CHAIN, LAW, lag=800.0, duration=duration)
