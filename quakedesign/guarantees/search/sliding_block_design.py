@@ -36,7 +36,7 @@ _PIECES = 8  # of a period, which is short beside the times of the plant
 _ROOM = 1.03
 _LOST = 100.0
 _DIGITS = 10
-_HALVINGS = 24
+_HALVINGS = 20  # of a range of stresses
 
 
 def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuarantee | NoGuarantee:
