@@ -95,14 +95,16 @@ def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, 
         plant = SlidingBlocks(chain=chain, lag=lag, stress=stress).plant(claims)
         return plant is not None and _within(linear_part(plant, {}), part)
 
-    low, high = Fraction(0), max((entry[1] for entry in part.disturbances), default=Fraction(0))
-    high = high / min((s.slopes[1] for s in part.sectors[1::3] if s.slopes[1] > 0), default=Fraction(1)) * MPA
+    high = max((entry[1] for entry in part.disturbances), default=Fraction(0)) * MPA
+    high = high / min((s.slopes[1] for s in part.sectors[1::3] if s.slopes[1] > 0), default=Fraction(1))
+    low = high / 2**_HALVINGS
+    if not low or not covers(low):
+        raise _of_another(chain)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if covers(middle) else (low, middle)
-    rate = SlidingBlocks(chain=chain, lag=lag, stress=low).log_rate(claims) if low else None
-    if rate is None:
-        raise _of_another(chain)
+    rate = SlidingBlocks(chain=chain, lag=lag, stress=low).log_rate(claims)
+    assert rate is not None  # as the plant is known
     return lag, low, rate
 
 
