@@ -88,7 +88,7 @@ def test_slips_are_those_of_an_integrator_with_events():
     exact = with_events(chain, proved().law, periods)
     assert exact[-1].min() > 1e-3
     apart = []
-    for substeps in (40, 160):
+    for substeps in (20, 80):
         run = simulate_blocks(chain, proved().law, duration=periods * STEP, substeps=substeps)
         assert len(run.times) == periods
         assert run.times == pytest.approx(STEP * np.arange(1, periods + 1))
