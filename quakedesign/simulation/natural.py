@@ -20,12 +20,12 @@ from quakedesign.symbolic import derive
 # ----------------------------------------------------------------------
 # Natural earthquake.
 
-NUDGE = 1e-9  # of the largest change of friction: far above rounding, far below what the peak depends on
+NUDGE = 1e-9  # relative to the largest change of friction: far above rounding, without effect on the peak
 FOLDINGS = 90
 PERIODS = 100
-ENDING = 30, 10  # e-foldings and natural periods, of a fault that grows much faster than it swings
-FINENESS = 2e-3  # a step passes a kink of friction with an error of its square
-STILL = 1e3  # times the slip rate that the nudge alone gives: less is no growth
+ENDING = 30, 10  # e-foldings and natural periods, for a growth rate far above the natural frequency
+FINENESS = 2e-3  # steps across a kink of friction have an error of second order
+STILL = 1e3  # factor above the slip rate due to the nudge alone; a smaller peak is no instability
 
 _PEAKS: dict[Fault, float | None] = {}
 _MOST_PEAKS = 64
@@ -158,7 +158,7 @@ class Waiting:
 
 
 def waiting(run: Trajectory, fault: Fault) -> Waiting | None:
-    """What a run without control waits for; None where the event has begun, or there is none to come."""
+    """Event that has not begun in a run without control; None if it has begun, or if none will."""
     natural, reached = run.criterion.natural_peak, run.outcome.share_of_natural
     if run.provenance["controller"] != "none" or natural is None or reached is None or reached >= BEGUN_SHARE:
         return None
