@@ -1,0 +1,121 @@
+"""A sliding mode on the stick-slip plant: its implicit step is deadbeat in the set, and both checkers ask for that."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction as F
+from functools import cache
+from pathlib import Path
+from random import Random
+
+import pytest
+from scipy.optimize import brentq
+from standalone_guarantee import CHECK
+from stick_slip_box import STICK, box, changed, package_refuses, refused, times
+
+from quakedesign.checking import check_files
+from quakedesign.errors import UnsupportedError
+from quakedesign.exact import UpperBound
+from quakedesign.guarantees import read_guarantee
+
+PATH = Path(__file__).parents[2] / "proofs" / "certificates" / "stick_slip_cta_real-fault.json"
+PULL = ("loop", "pull")
+TERM = {"factor": ["1/2", "1/2"], "power": "0", "of": "slip"}
+DEADBEAT = {"target_gain": "3", "rate_gain": "3", "return_rate": "2"}  # of a box: T_s = 1/2 s
+
+
+@cache
+def stored():
+    return json.loads(PATH.read_text())
+
+
+def end_rate(terms, step, slip, rate):
+    """Root of F(w) = w - e2 + q(e1 + T w, w) by Brent's method; all q here are sums of signed powers of e1 and e2."""
+
+    def excess(w):
+        seen = {"slip": slip + step * w, "rate": w}
+        return w - rate + sum(c * ((seen[x] > 0) - (seen[x] < 0)) * abs(seen[x]) ** a for c, x, a in terms)
+
+    most = abs(slip) / step + abs(rate) + 1e-9
+    return brentq(excess, -most, most, xtol=1e-15)
+
+
+def test_the_root_is_deadbeat_for_all_claimed_errors_and_for_no_much_larger_ones():
+    claims = {name: float(F(v)) for name, v in stored()["claims"].items()}
+    terms = [(float(F(t["factor"][0])), t["of"], float(F(t["power"]))) for t in stored()["loop"]["pull"]]
+    random, step, fastest = Random(0), float(F(stored()["loop"]["step"])), 15 / 8 * 0.785 / 663012
+    for _ in range(100):
+        slip = random.uniform(-claims["slip_behind"], claims["slip_ahead"])
+        rate = random.uniform(-fastest, claims["peak_slip_rate"])
+        assert end_rate(terms, step, slip, rate) == pytest.approx(-slip / step, abs=1e-12)
+    far = [(30 * claims["slip_ahead"], 0.0), (claims["slip_ahead"], 30 * claims["peak_slip_rate"])]
+    assert any(abs(end_rate(terms, step, *errors) + errors[0] / step) > 1e-6 for errors in far)
+
+
+def test_the_file_binds_the_root_and_its_statement_names_it():
+    claim = read_guarantee(stored())
+    assert claim.held.law.pull
+    assert claim.held.law.return_rate * claim.held.step == 1
+    with pytest.raises(UnsupportedError, match="sliding mode"):
+        _ = claim.controller
+
+
+@pytest.mark.slow
+def test_both_prove_the_stored_file_within_the_aims():
+    found = CHECK.check(PATH.read_text())
+    assert found.verdict == "proved"
+    assert "its implicit step is deadbeat, w = -e1/step, on this set" in "\n".join(found.statement)
+    ((verdict, _),) = check_files([PATH], "real-fault").values()
+    assert verdict == "proved"
+    claims = read_guarantee(stored()).claims
+    assert claims.peak_slip_rate <= F("2.4e-4")
+    assert claims.slip_error <= F("5e-5")
+
+
+def test_a_weaker_sign_is_refused_by_both():
+    """Of a tenth of its size the sign of e1 does not hold the step at e1 = 0 for all claimed errors."""
+    which = next(i for i, term in enumerate(stored()["loop"]["pull"]) if (term["of"], term["power"]) == ("slip", "0"))
+    weaker = changed(stored(), ((*PULL, which, "factor"), times("1/10")))
+    assert refused(weaker, "the implicit step must be deadbeat in the set")
+    assert "deadbeat" in read_guarantee(weaker).bounds().reason
+
+
+def test_without_its_root_the_same_file_is_about_a_linear_law():
+    document = changed(stored(), (("loop",), lambda old: {name: v for name, v in old.items() if name != "pull"}))
+    assert read_guarantee(document).held.law.pull == ()
+
+
+@pytest.mark.parametrize("name", DEADBEAT)
+def test_a_root_needs_the_gains_of_a_deadbeat_step(name):
+    document = changed(box(), (("loop",), lambda old: old | DEADBEAT | {"pull": [TERM]}))
+    assert STICK.read_law(document["loop"]).pull
+    assert read_guarantee(document).held.law.pull
+    other = changed(document, (("loop", name), times("9/8")))
+    assert refused(other, "of a sliding mode target_gain must be rate_gain, and return_rate 1/step")
+    assert package_refuses(other)
+
+
+@pytest.mark.parametrize(
+    ("pull", "reason"),
+    [
+        ([], "a sum must be a list of its terms"),
+        ([TERM] * 17, "a sum must be a list of its terms, at most 16"),
+        ([TERM | {"of": [TERM] * 15}] * 2, "at most 16 terms"),
+        ([TERM | {"factor": ["-1", "1"]}], "a factor must have two ends"),
+        (TERM, "a sum must be a list of its terms"),
+    ],
+)
+def test_a_root_of_another_form_is_refused_by_both(pull, reason):
+    document = changed(box(), (("loop",), lambda old: old | DEADBEAT | {"pull": pull}))
+    assert refused(document, reason)
+    assert package_refuses(document)
+
+
+def test_noise_of_the_slip_counts_in_what_the_root_must_cover():
+    """|e1| up to the larger slip error and the noise, |e2| up to the larger of the peak and max r'."""
+    claim = read_guarantee(stored())
+    held = claim.held
+    noisy = replace(held, law=replace(held.law, rest_slip=F(1)), slip_noise=F(1, 2))
+    fastest = claim.task.reference_rates[0]
+    assert held.errors(claim.task, F(3), F(2)) == (3, 2)
+    assert noisy.errors(claim.task, F(3), F(2)) == (F(7, 2), 2)
+    assert held.errors(claim.task, F(3), UpperBound(0)) == (3, fastest)
