@@ -15,10 +15,11 @@ from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
+from quakedesign.guarantees.search.defaults import deadbeat
 from quakedesign.guarantees.search.linear_design import nearest_setup
 from quakedesign.guarantees.search.sliding_block_design import sliding_block_guarantee
 from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer, answer_stick_slip
-from quakedesign.laws import Controller, control_law
+from quakedesign.laws import Controller, SlidingMode, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
 from quakedesign.plant import FaultPlant, UncertainPlant, uncertain_plant
@@ -121,7 +122,8 @@ def guarantee(
         k1 to k4 of an e-LQR whose integrals are summed once per sample, run by the scheme ``explicit``; base gains of a
         sliding mode. A matrix of one row, as the K of ``control.dlqr``, is its row.
     scheme : str, optional
-        Of a sliding mode: ``compensated`` unless given, the only one with a guarantee; of the e-LQR ``explicit``.
+        Of a sliding mode: ``stick-slip`` unless given, or ``compensated`` on the plant without stick; no other has a
+        guarantee. Of the e-LQR ``explicit``.
     disturbance_class : str
         ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
     stress : str, float or Fraction, optional
@@ -130,8 +132,9 @@ def guarantee(
     spread : str, float or Fraction
         Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
     plant : str
-        ``stick-slip``: friction holds the fault at rest and it never slips backward; an e-LQR is designed whose
-        predicted slip rate is never negative (`StickSlipLaw`), for an exact slip rate and a pressure that acts at once.
+        ``stick-slip``: friction holds the fault at rest and it never slips backward; an e-LQR or a sliding mode is
+        designed whose predicted slip rate is never negative (`StickSlipLaw`), for an exact slip rate and a pressure
+        that acts at once.
         ``printed``: the plant without stick, its friction continued to negative slip rates. Unless given the first
         where it applies and has a proof, else the second.
     progress : callable, optional
@@ -206,21 +209,24 @@ def guarantee(
         task = uncertain_plant(fault, rate_limited=disturbance_class == "rate")
         return method_of(type(law)).given(fault, task, law, setup)
     assert not isinstance(controller, Controller)
-    if plant == STICK_SLIP:
+    if STICK_SLIP in (plant, scheme) and plant != PRINTED:
         if fault.friction.state_names:
             raise ParameterError(
                 f"friction with a state never rests, so that the stick-slip plant is no other. Received "
                 f"{fault.friction.name}. Omit plant."
             )
         require_known(disturbance_class, CLASSES, "class")  # what is proved for the first holds for the second
-        usual = (control_law(controller).name, tuple(gains), scheme) == ("elqr", (), None)
+        family = control_law(controller)
+        sliding = issubclass(family, SlidingMode)
+        usual = scheme in (None, STICK_SLIP) if sliding else (family.name, tuple(gains), scheme) == ("elqr", (), None)
         if not usual or stress is not None or exact_value(spread, "", "spread"):
             raise ParameterError(
-                "the stick-slip plant is guaranteed with a designed elqr and friction without a state: omit "
-                "controller, gains, scheme, stress and spread"
+                "the stick-slip plant is guaranteed with a designed elqr, or a sliding mode in the scheme stick-slip, "
+                "and friction without a state: omit gains of an elqr, scheme, stress and spread"
             )
         require_known(objective, OBJECTIVES, "objective")
-        return answer_stick_slip(fault, setup, objective=objective, progress=progress)
+        mode = _sliding_mode(fault, family, gains)
+        return answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
     least = None if stress is None else exact_value(stress, "Pa", "stress")
     off = exact_value(spread, "", "spread")
     if fault.friction.state_names:
@@ -249,13 +255,22 @@ def guarantee(
     task, family = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
     wanted = Wanted(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
     without = ""
-    if plant is None and not wanted.gains and scheme is None and may_stick(family, setup, disturbance_class):
-        sticking = answer_stick_slip(fault, setup, objective=objective, progress=progress)
+    usual = scheme is None and (issubclass(family, SlidingMode) or not wanted.gains)
+    if plant is None and usual and may_stick(family, setup, disturbance_class):
+        mode = _sliding_mode(fault, family, wanted.gains)
+        sticking = answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
         if isinstance(sticking.found, StickSlipGuarantee):
             return sticking
         without = sticking.found.reason
     answer = _sampled(fault, task, family, wanted)
     return replace(answer, not_at_rest=without) if without else answer
+
+
+def _sliding_mode(fault: Fault, law: type[Controller], gains: Sequence[Any]) -> SlidingMode | None:
+    """Sliding mode with base gains, or the first ones known for it; None for an e-LQR."""
+    if not issubclass(law, SlidingMode):
+        return None
+    return deadbeat(uncertain_plant(fault), law, _exact_texts(gains)).controller
 
 
 def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> LoopAnswer:

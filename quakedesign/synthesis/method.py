@@ -245,7 +245,9 @@ class DesignMethod(Generic[L]):
         known = linear_about_a_reference(controller)
         return tuple(linear_premises(fault, controller, certificate)) if known else (), None
 
-    def guarantee(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> Guarantee | NoGuarantee:
+    def guarantee(
+        self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup
+    ) -> Guarantee | StickSlipGuarantee | NoGuarantee:
         """Guarantee of the sampled law on a task of the fault, with the noise of a loop setup."""
         return NoGuarantee(
             reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
@@ -255,8 +257,8 @@ class DesignMethod(Generic[L]):
         """Certified peaks of slip, slip rate and pressure in continuous time."""
         return NoGuarantee(reason=f"no bound of peaks of {controller.title} is known here", small_gain=None)
 
-    def compensation(self, controller: L, found: Guarantee | NoGuarantee) -> Compensation | None:
-        """A law of samples that runs in the scheme ``compensated``, with its guarantee; None for another."""
+    def compensation(self, controller: L, found: Guarantee | StickSlipGuarantee | NoGuarantee) -> Compensation | None:
+        """A sliding mode of samples with its guarantee; None for another law."""
         return None
 
     def held_loop(self, fault: Fault, controller: L) -> HeldLoop | None:
