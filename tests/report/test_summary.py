@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -139,6 +140,23 @@ def test_the_worst_case_on_the_stick_slip_plant_is_reported_with_why_nothing_is_
         "worst case found on the stick-slip plant: slip error 1.2 µm, slip-rate error 30 µm/s; no proof there: T_s is "
         "too long"
     )
+
+
+def test_proofs_without_stick_are_named_where_the_best_one_is_with_it(monkeypatch):
+    """With the stored certificates of both kinds."""
+    folder = Path(__file__).parents[2] / "proofs" / "certificates"
+    stick, plain = (qd.load_guarantee(folder / f"{name}_real-fault.json") for name in ("stick_slip", "guarantee"))
+    one, two, three = (entry(f"{name} (designed)", "1e-4", "1e-5") for name in "ABC")
+    one.guaranteed, two.guaranteed, three.guaranteed = stick, plain, plain
+    said = summary(compared(monkeypatch, one, two, three))
+    assert ". With the A (designed) the slip rate" in said.answer
+    assert ", whether the fault slides or sticks, and the slip stays" in said.answer
+    assert "B, C: proved on the plant without stick" in said.notes
+    without = summary(compared(monkeypatch, two, three))
+    assert ". On the plant without stick, with the B (designed), the slip rate" in without.answer
+    assert "whether the fault slides or sticks" not in without.answer
+    assert not any("proved on the plant without stick" in note for note in without.notes)
+    assert not any("proved on the plant" in note for note in summary(compared(monkeypatch, one)).notes)
 
 
 def test_a_share_is_rounded_up_from_the_numbers_themselves(monkeypatch):

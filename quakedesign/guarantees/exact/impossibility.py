@@ -413,7 +413,8 @@ def hopeless(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffusion:
 
 
 _ASSUMED = (
-    " (for some friction of the box, against the largest disturbance from one time on, even if the controller knows both)"
+    " (for some friction of the box, against the largest disturbance from one time on, even if the controller knows "
+    "both)"
 )
 
 
