@@ -60,7 +60,7 @@ class DesignOptions(WellOptions):
         change, starting at 0, such as a tide.
     scheme
         Scheme of the runs of gains from --continuous: continuous (default, as in the paper), or sampled with a
-        zero-order hold: explicit, implicit, semi-implicit, compensated. Other designs run as designed.
+        zero-order hold: explicit, implicit, semi-implicit, compensated, stick-slip. Other designs run as designed.
     stress
         Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; by default the largest that the
         design withstands.
@@ -69,7 +69,7 @@ class DesignOptions(WellOptions):
     published_scheme
         Scheme of the runs of published gains, see --scheme.
     plant
-        Plant of the runs and of the e-LQR's guarantee: stick-slip (friction holds the fault at rest), or printed (the
+        Plant of the runs and of the guarantee: stick-slip (friction holds the fault at rest), or printed (the
         paper's, continued to negative slip rates). By default stick-slip; the guarantee is on the plant without stick
         where it has no proof on this one. Not for rate-and-state faults, which never rest.
     whole_task

@@ -85,7 +85,8 @@ def guarantee(
     law
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
-        Sliding modes: compensated (default); no other scheme has a guarantee. The e-LQR runs in explicit.
+        Sliding modes: stick-slip (default), or compensated on the plant without stick; no other scheme has a guarantee.
+        The e-LQR runs in explicit.
     step
         Sampling time T_s, such as '184 ms' or 7/50 (s); the fault's by default.
     measured
@@ -94,8 +95,8 @@ def guarantee(
     disturbance_class
         amplitude: any disturbance of the fault's amplitude; rate: also with the fault's rate of change, starting at 0.
     plant
-        stick-slip: friction holds the fault at rest, and it never slips backward (designed e-LQR, exact slip rate, a
-        pressure that acts at once); printed: the plant without stick, continued to negative slip rates. By default the
+        stick-slip: friction holds the fault at rest, and it never slips backward (designed e-LQR or sliding mode, exact
+        slip rate, a pressure that acts at once); printed: the plant without stick, continued to negative slip rates. By default the
         first where it has a proof, else the second.
     stress
         Rate-and-state faults (slow sliding, e-LQR through a diffusion path or a lag): bound of the shear stress

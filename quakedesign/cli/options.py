@@ -306,8 +306,8 @@ class RunOptions:
     Parameters
     ----------
     scheme
-        Sampled with a zero-order hold: explicit, implicit, semi-implicit or compensated; or continuous, with the law in
-        every stage of the integrator. By default continuous in simulate and explicit in campaign. Designed laws have
+        Sampled with a zero-order hold: explicit, implicit, semi-implicit, compensated or stick-slip; or continuous, with
+        the law in every stage of the integrator. By default continuous in simulate and explicit in campaign. Designed laws have
         their own scheme.
     method
         Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: cvodes or
