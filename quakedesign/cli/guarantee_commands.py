@@ -96,8 +96,8 @@ def guarantee(
         amplitude: any disturbance of the fault's amplitude; rate: also with the fault's rate of change, starting at 0.
     plant
         stick-slip: friction holds the fault at rest, and it never slips backward (designed e-LQR or sliding mode, exact
-        slip rate, a pressure that acts at once); printed: the plant without stick, continued to negative slip rates. By default the
-        first where it has a proof, else the second.
+        slip rate, a pressure that acts at once); printed: the plant without stick, continued to negative slip rates. By
+        default the first where it has a proof, else the second.
     stress
         Rate-and-state faults (slow sliding, e-LQR through a diffusion path or a lag): bound of the shear stress
         disturbance, such as '25 kPa'; by default the largest that the design withstands.

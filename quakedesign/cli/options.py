@@ -306,9 +306,9 @@ class RunOptions:
     Parameters
     ----------
     scheme
-        Sampled with a zero-order hold: explicit, implicit, semi-implicit, compensated or stick-slip; or continuous, with
-        the law in every stage of the integrator. By default continuous in simulate and explicit in campaign. Designed laws have
-        their own scheme.
+        Sampled with a zero-order hold: explicit, implicit, semi-implicit, compensated or stick-slip; or continuous,
+        with the law in every stage of the integrator. By default continuous in simulate and explicit in campaign.
+        Designed laws have their own scheme.
     method
         Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: cvodes or
         idas, for single runs without control also radau or dop853.
