@@ -15,11 +15,10 @@ from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
-from quakedesign.guarantees.search.defaults import deadbeat
 from quakedesign.guarantees.search.linear_design import nearest_setup
 from quakedesign.guarantees.search.sliding_block_design import sliding_block_guarantee
 from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer, answer_stick_slip
-from quakedesign.laws import Controller, SlidingMode, control_law
+from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
 from quakedesign.plant import FaultPlant, UncertainPlant, uncertain_plant
@@ -217,15 +216,16 @@ def guarantee(
             )
         require_known(disturbance_class, CLASSES, "class")  # what is proved for the first holds for the second
         family = control_law(controller)
-        sliding = issubclass(family, SlidingMode)
-        usual = scheme in (None, STICK_SLIP) if sliding else (family.name, tuple(gains), scheme) == ("elqr", (), None)
+        usual = (family.name, tuple(gains), scheme) == ("elqr", (), None)
+        if method_of(family).takes_base_gains:
+            usual = scheme in (None, STICK_SLIP)
         if not usual or stress is not None or exact_value(spread, "", "spread"):
             raise ParameterError(
                 "the stick-slip plant is guaranteed with a designed elqr, or a sliding mode in the scheme stick-slip, "
                 "and friction without a state: omit gains of an elqr, scheme, stress and spread"
             )
         require_known(objective, OBJECTIVES, "objective")
-        mode = _sliding_mode(fault, family, gains)
+        mode = method_of(family).base_law(uncertain_plant(fault), family, _exact_texts(gains))
         return answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
     least = None if stress is None else exact_value(stress, "Pa", "stress")
     off = exact_value(spread, "", "spread")
@@ -255,22 +255,15 @@ def guarantee(
     task, family = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
     wanted = Wanted(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
     without = ""
-    usual = scheme is None and (issubclass(family, SlidingMode) or not wanted.gains)
+    usual = scheme is None and (method_of(family).takes_base_gains or not wanted.gains)
     if plant is None and usual and may_stick(family, setup, disturbance_class):
-        mode = _sliding_mode(fault, family, wanted.gains)
+        mode = method_of(family).base_law(task, family, wanted.gains)
         sticking = answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
         if isinstance(sticking.found, StickSlipGuarantee):
             return sticking
         without = sticking.found.reason
     answer = _sampled(fault, task, family, wanted)
     return replace(answer, not_at_rest=without) if without else answer
-
-
-def _sliding_mode(fault: Fault, law: type[Controller], gains: Sequence[Any]) -> SlidingMode | None:
-    """Sliding mode with base gains, or the first ones known for it; None for an e-LQR."""
-    if not issubclass(law, SlidingMode):
-        return None
-    return deadbeat(uncertain_plant(fault), law, _exact_texts(gains)).controller
 
 
 def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> LoopAnswer:

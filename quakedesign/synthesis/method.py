@@ -30,7 +30,7 @@ from quakedesign.guarantees import (
 )
 from quakedesign.guarantees.search.adversary import worst_found
 from quakedesign.guarantees.search.estimate import spectral_radius
-from quakedesign.laws import Controller, SampledController, Signals, control_laws
+from quakedesign.laws import Controller, SampledController, Signals, SlidingMode, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.laws.sampled_law import steady_states
 from quakedesign.linear.robust_stability import sector_loop
@@ -214,12 +214,15 @@ class DesignMethod(Generic[L]):
         Whether it finds gains for a fault.
     without_state : str
         Why it finds none for friction with a state; empty where it does.
+    takes_base_gains : bool
+        Whether it scales base gains, as of a sliding mode.
     """
 
     name: ClassVar[str] = "any"
     family: ClassVar[type] = Controller
     designs: ClassVar[bool] = False
     without_state: ClassVar[str] = MEMORYLESS
+    takes_base_gains: ClassVar[bool] = False
 
     def design(self, problem: GainProblem[Designed], law: type[L]) -> Designed:
         """Find gains with a proof.
@@ -259,6 +262,10 @@ class DesignMethod(Generic[L]):
 
     def compensation(self, controller: L, found: Guarantee | StickSlipGuarantee | NoGuarantee) -> Compensation | None:
         """A sliding mode of samples with its guarantee; None for another law."""
+        return None
+
+    def base_law(self, task: FaultPlant, law: type[L], gains: tuple[str, ...]) -> SlidingMode | None:
+        """Sliding mode with base gains, or the first ones known for it; None for other laws."""
         return None
 
     def held_loop(self, fault: Fault, controller: L) -> HeldLoop | None:

@@ -43,6 +43,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
     name: ClassVar[str] = "sliding-mode"
     family: ClassVar[type] = SlidingMode
     designs: ClassVar[bool] = True
+    takes_base_gains: ClassVar[bool] = True
     without_state: ClassVar[str] = (
         "sliding modes of second order do not apply to friction with a state, where the slip rate follows the pressure "
         "at once (it is algebraic without inertia)"
@@ -100,6 +101,10 @@ class SlidingModes(DesignMethod[SlidingMode]):
     ) -> Guarantee | StickSlipGuarantee | NoGuarantee:
         """In the scheme ``compensated`` or ``stick-slip``, and in no other."""
         return guarantee_of(task, controller, **setup.noise)
+
+    def base_law(self, task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...]) -> SlidingMode:
+        """Given base gains, or the first ones known."""
+        return deadbeat(task, law, gains).controller
 
     def compensation(
         self, controller: SlidingMode, found: Guarantee | StickSlipGuarantee | NoGuarantee

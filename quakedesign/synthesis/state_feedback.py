@@ -28,7 +28,7 @@ from quakedesign.guarantees.search.linear_design import continued, design_at, lo
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
 from quakedesign.guarantees.stick_slip_answer import TAKEN
-from quakedesign.laws import Controller, SlidingMode, summed_integrals
+from quakedesign.laws import Controller, summed_integrals
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.laws.feed_forward import NONE
 from quakedesign.linear.linear_problem import FeedbackLoop, LinearProblem, Matrix
@@ -41,7 +41,7 @@ from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.search.search import claims_of, find_certificate, finish, quadratic_margin
 from quakedesign.plant import FaultPlant
-from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
+from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted, method_of
 
 
 class StateFeedback(DesignMethod[ExtendedLQR]):
@@ -134,7 +134,7 @@ def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
 
 def may_stick(law: type[Controller], setup: LoopSetup, disturbance_class: str) -> bool:
     """Whether a design is one that the theorem of the stick–slip plant takes, which does not use a bounded change."""
-    known = law is ExtendedLQR or issubclass(law, SlidingMode)
+    known = law is ExtendedLQR or method_of(law).takes_base_gains
     return known and not setup.given().keys() - TAKEN and disturbance_class == CLASSES[0]
 
 
