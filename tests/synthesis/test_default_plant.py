@@ -142,6 +142,15 @@ def test_a_sliding_mode_is_designed_on_the_stick_slip_plant_where_it_is_proved(m
     assert "rest_slip, slip_weight given" in guarantee_of(uncertain_plant(REAL), bare).reason
 
 
+def test_the_controller_of_a_result_is_the_sliding_mode_itself():
+    """On both plants, read off stored certificates; it has the scheme of its plant."""
+    for name, scheme in (("stick_slip_cta", "stick-slip"), ("guarantee_cta", "compensated")):
+        found = load_guarantee(PROOFS / f"{name}_real-fault.json")
+        kind = StickSlipAnswer if scheme == "stick-slip" else LoopAnswer
+        controller = kind(fault=REAL, found=found, compensation=recovered(found)).controller
+        assert (controller.name, controller.sampling.scheme) == ("cta", scheme)
+
+
 def test_a_sliding_mode_without_that_proof_falls_back_and_says_why(monkeypatch, plain):
     monkeypatch.setattr(COMPENSATED, "design_stick_slip", lambda *_, **__: NONE)
     made = SimpleNamespace(controller=control_law("cta").base_gains()[0].law, limited=None)
