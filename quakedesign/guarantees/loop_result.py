@@ -16,7 +16,6 @@ class LoopResult:
     __slots__ = ()
     found: Any
     worst: Any
-    compensation: Any
 
     @property
     def proved(self) -> bool:
@@ -77,8 +76,8 @@ class LoopResult:
         CertificateError
             Without a guarantee.
         """
-        found = self._proof()
-        return found.controller if self.compensation is None else self.compensation.limited
+        found, sliding = self._proof(), getattr(self, "compensation", None)
+        return found.controller if sliding is None else sliding.limited
 
     def save(self, path: str | Path) -> None:
         """Write the certificate for `load_guarantee`, ``quakedesign check`` and ``proofs/check.py``.
