@@ -16,6 +16,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import UnsupportedError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees import read_guarantee
+from quakedesign.guarantees.search.compensated_search import recovered
 
 PATH = Path(__file__).parents[2] / "proofs" / "certificates" / "stick_slip_cta_real-fault.json"
 PULL = ("loop", "pull")
@@ -119,3 +120,46 @@ def test_noise_of_the_slip_counts_in_what_the_root_must_cover():
     assert held.errors(claim.task, F(3), F(2)) == (3, 2)
     assert noisy.errors(claim.task, F(3), F(2)) == (F(7, 2), 2)
     assert held.errors(claim.task, F(3), UpperBound(0)) == (3, fastest)
+
+
+@pytest.mark.parametrize("slow", [False, True], ids=["peak", "reference"])
+@pytest.mark.parametrize("side", [0, 3], ids=["ahead", "behind"])
+def test_the_checker_asks_for_the_root_at_all_measured_errors_of_the_set(slow, side, monkeypatch):
+    """|e1| up to the larger side of the set, N and T·max r' more, |e2| up to the larger of its peak and max r'."""
+    noise, step = F(1, 10**6), F(stored()["loop"]["step"])
+    wider = times("1/2")  # of a facet: twice as far
+    document = changed(
+        stored(),
+        *((("loop", name), str(share * noise)) for name, share in (("slip_noise", 1), ("rest_slip", 2))),
+        (("set", "facets", side), wider),
+        *((("claims", name), "1") for name in ("slip_behind", "slip_ahead", "peak_slip_rate")),
+        (("claims", "largest_pressure"), "50000000"),
+        (("claims", "least_pressure"), "-50000000"),
+        *([(("set", "facets", 1), times("1000"))] if slow else []),
+    )
+    asked = []
+    monkeypatch.setattr(STICK, "root_within", lambda root, *given: asked.append((root, given)) or False)
+    with pytest.raises(CHECK.Refused, match="implicit step must be deadbeat"):
+        STICK.verify(document)
+    ((root, (period, slip, rate)),) = asked
+    facets = [[F(v) for v in row] for row in document["set"]["facets"]]
+    fastest = F(15, 8) * F("0.785") / 663012
+    ahead, behind = (1 / abs(facets[i][0]) + fastest * step for i in (0, 3))
+    assert (period, root.slopes, root.remainder) == (step, [1, 1], 0)
+    assert slip == pytest.approx(max(behind + noise, ahead - noise) + noise, rel=1e-9)
+    assert rate == pytest.approx(max(1 / facets[1][1], fastest), rel=1e-9)
+    assert (rate == pytest.approx(fastest, rel=1e-9)) == slow
+
+
+def test_gains_are_read_off_a_step_of_the_law_alone():
+    claim = read_guarantee(stored())
+    found = recovered(claim).controller
+    assert found.name == "cta"
+    assert dict(found.sampling.settings)["slip_weight"] == claim.held.law.slip_gain * claim.held.step / (
+        claim.held.law.target_gain
+    )
+    first = claim.held.law.pull[0]
+    for pull in (claim.held.law.pull[1:], (replace(first, argument=(first,)), *claim.held.law.pull[1:]), ()):
+        law = replace(claim.held.law, pull=pull)
+        with pytest.raises(UnsupportedError, match="scheme compensated or stick-slip"):
+            recovered(replace(claim, held=replace(claim.held, law=law)))
