@@ -13,7 +13,7 @@ from standalone_guarantee import CHECK
 from stick_slip_box import STICK, box, changed, package_refuses, refused, times
 
 from quakedesign.checking import check_files
-from quakedesign.errors import UnsupportedError
+from quakedesign.errors import CertificateError, UnsupportedError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees import read_guarantee
 from quakedesign.guarantees.search.compensated_search import recovered
@@ -92,7 +92,8 @@ def test_a_root_needs_the_gains_of_a_deadbeat_step(name):
     assert read_guarantee(document).held.law.pull
     other = changed(document, (("loop", name), times("9/8")))
     assert refused(other, "of a sliding mode target_gain must be rate_gain, and return_rate 1/step")
-    assert package_refuses(other)
+    with pytest.raises(CertificateError, match="a sliding mode must have target_gain = rate_gain and return_rate = 1/"):
+        read_guarantee(other)
 
 
 @pytest.mark.parametrize(
