@@ -458,7 +458,7 @@ BUDGETS = {
     "linear": 2400,
     "synthesis": 1880,
     "rocq": 600,
-    "simulation": 9070,
+    "simulation": 9110,
     "identification": 4485,
     "studies": 3590,
     "report": 3955,

@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import quakedesign as qd
-from quakedesign.simulation import simulate_blocks, simulate_state
+from quakedesign.simulation import simulate_blocks
 
 HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "tests" / "data"
@@ -82,9 +82,9 @@ def blocks():
 def seismic_cycle():
     """Earthquakes of a rate-and-state fault, and the slip rate under control."""
     fault = qd.load_fault("crustal-patch")
-    run = simulate_state(fault, 1e-9, duration=2e10, start_rate=2e-9, rtol=1e-6)
+    run = qd.simulate(fault, duration=2e10)
     figure, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
-    axes.semilogy(run.time / 31556952, run.slip_rate, label="no control, loaded at 1 nm/s")
+    axes.semilogy(run.time / 31556952, run.slip_rate, label="no control")
     bound = qd.design(fault, "elqr").guarantee.peak_slip_rate
     axes.axhline(float(bound), color="black", linestyle="--", label="proved with the designed law, at 1 µm/s")
     axes.set(xlabel="time [a]", ylabel="slip rate [m/s]", title=fault.name)
