@@ -160,7 +160,9 @@ def test_gains_are_read_off_a_step_of_the_law_alone():
         claim.held.law.target_gain
     )
     first = claim.held.law.pull[0]
-    for pull in (claim.held.law.pull[1:], (replace(first, argument=(first,)), *claim.held.law.pull[1:]), ()):
+    wide = replace(first, factor=(first.factor[0], 2 * first.factor[0]))
+    others = claim.held.law.pull[1:]
+    for pull in (others, (replace(first, argument=(first,)), *others), (wide, *others), ()):
         law = replace(claim.held.law, pull=pull)
         with pytest.raises(UnsupportedError, match="scheme compensated or stick-slip"):
             recovered(replace(claim, held=replace(claim.held, law=law)))

@@ -428,9 +428,7 @@ def _sticking(found: StickSlipGuarantee) -> Compensation | None:
     authority = 1 / (held.step * law.target_gain)
     for base in _with_gains(law.pull, held.step, authority) if law.pull else ():
         controller = sticking_controller(base, held)
-        again = sticking_loop(controller, held.slip_noise)
-        same = sorted_terms(again.law.pull) == sorted_terms(law.pull)
-        if same and replace(again, law=replace(again.law, pull=law.pull)) == held:
+        if sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(law.pull):
             return Compensation(controller=controller, found=found)
     return None
 
