@@ -197,7 +197,8 @@ def test_where_no_controller_renews_its_pressure_so_slowly_the_answer_says_so(mo
 @pytest.mark.slow
 def test_a_sliding_mode_with_its_file(call, tmp_path):
     path = tmp_path / "cta.json"
-    code, out, _ = call("real-fault", "--controller", "cta", "--json", "--out", str(path))
+    printed = "--plant", "printed"
+    code, out, _ = call("real-fault", "--controller", "cta", *printed, "--json", "--out", str(path))
     found = json.loads(out)
     assert (code, found["verdict"], found["controller"]["scheme"]) == (0, "proved", "compensated")
     assert F(found["slip_rate_error"]) <= F(4, 10**4)
@@ -213,7 +214,8 @@ def test_a_sliding_mode_with_its_file(call, tmp_path):
 
 @pytest.mark.slow
 def test_a_sliding_mode_with_given_gains_for_people(call):
-    code, out, _ = call("real-fault", "--controller", "dia", "--gains", "1", "20", "1", "0", "--objective", "peak")
+    printed = "--objective", "peak", "--plant", "printed"
+    code, out, _ = call("real-fault", "--controller", "dia", "--gains", "1", "20", "1", "0", *printed)
     assert code == 0
     assert out.startswith("proved: on the plant without stick, from rest, with zero-order hold over 0.184 s")
     assert "2-DIA with kI1 = 1, kI2 = 20, kI3 = 1, kI4 = 0" in out
@@ -221,6 +223,25 @@ def test_a_sliding_mode_with_given_gains_for_people(call):
         "its implicit step is deadbeat, e1 + T_s·w = 0, for all errors that are claimed, so it answers as any other"
         in out
     )
+
+
+@pytest.mark.slow
+def test_a_sliding_mode_is_guaranteed_on_the_stick_slip_plant_with_its_file(call, tmp_path):
+    path = tmp_path / "dia.json"
+    code, out, _ = call("real-fault", "--controller", "dia", "--json", "--out", str(path))
+    found = json.loads(out)
+    assert (code, found["verdict"], found["plant"]) == (0, "proved", "stick-slip")
+    assert found["controller"]["scheme"] == "stick-slip"
+    assert F(1, 10**4) < F(found["limit"]["slip_rate"]) < F(found["peak_slip_rate"]) <= F("2.4e-4")
+    assert F(found["slip_error"]) <= F("5e-5")
+    for name, claim in (("slip_rate", "peak_slip_rate"), ("slip_error", "slip_error")):
+        assert F("0.65") * F(found[claim]) <= found["worst_found"][name] <= F(found[claim])
+    assert check_files([path], "real-fault")[str(path)][0] == "proved"
+    code, out, _ = call("real-fault", "--controller", "dia", "--gains", "1", "20", "1", "0")
+    assert code == 0
+    assert "2-DIA with kI1 = 1, kI2 = 20, kI3 = 1, kI4 = 0" in out
+    assert "in the scheme stick-slip with slip weight 0.5" in out
+    assert "whether the fault slides or sticks" in out
 
 
 @pytest.mark.parametrize(
