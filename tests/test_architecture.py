@@ -453,16 +453,16 @@ BUDGETS = {
     "laws": 3205,
     "loop": 4240,
     "plant": 1325,
-    "guarantees": 12935,
+    "guarantees": 13010,
     "lyapunov": 7000,
     "linear": 2400,
     "synthesis": 1880,
     "rocq": 600,
-    "simulation": 9110,
+    "simulation": 9715,
     "identification": 4485,
-    "studies": 3590,
-    "report": 3955,
-    "cli": 3390,
+    "studies": 3790,
+    "report": 3960,
+    "cli": 3475,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 
