@@ -452,7 +452,7 @@ BUDGETS = {
     "sos": 6230,
     "laws": 3205,
     "loop": 4240,
-    "plant": 1325,
+    "plant": 1340,
     "guarantees": 13010,
     "lyapunov": 7000,
     "linear": 2400,
