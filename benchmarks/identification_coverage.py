@@ -24,9 +24,11 @@ from typing import Any
 import numpy as np
 
 from quakedesign.fault import friction_law
+from quakedesign.identification.experiment import TREND, TREND_IN_TIME
 from quakedesign.identification.fitting import Fit, minimised
 from quakedesign.identification.identification_result import Identification
 from quakedesign.identification.identify import identified_as
+from quakedesign.identification.sliding_experiment import START_STATE
 from quakedesign.identification.two_states import with_two_states
 
 
@@ -38,11 +40,12 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", default=[*synthetic.TROUBLES, *synthetic.OTHER_TROUBLES])
     parser.add_argument("--results", type=Path, help="file with a line for every record")
     given = parser.parse_args()
-    print(f"{'kind':40}{'records':>8}{'truth inside':>13}{'wrong signs':>12}{'cannot tell':>12}{'s a record':>11}")
+    head = f"{'kind':40}{'records':>8}{'truth inside':>13}{'wrong signs':>12}{'cannot tell':>12}{'trends':>8}"
+    print(f"{head}{'s a record':>11}")
     for kind in given.kinds:
         told = [one(kind, seed, given.results) for seed in range(given.first, given.first + given.records)]
-        sums = {name: sum(each[name] for each in told) for name in ("inside", "wrong", "open", "seconds")}
-        counts = f"{sums['inside']:13}{sums['wrong']:12}{sums['open']:12}"
+        sums = {name: sum(each[name] for each in told) for name in ("inside", "wrong", "open", "trend", "seconds")}
+        counts = f"{sums['inside']:13}{sums['wrong']:12}{sums['open']:12}{sums['trend']:8}"
         print(f"{kind:40}{len(told):8}{counts}{sums['seconds'] / len(told):11.1f}", flush=True)
 
 
@@ -62,6 +65,8 @@ def one(kind: str, seed: int, results: Path | None = None) -> dict[str, Any]:
         "inside": holds(found.fit, truth),
         "wrong": bool(sign is not None and sign.passed and sign.value * effects < 0),
         "open": bool(found.assessment.open),
+        "trend": any(c.name in (TREND, TREND_IN_TIME) for c in found.fit.experiment.coordinates),
+        "start": any(c.name == START_STATE for c in found.fit.experiment.coordinates),
         "verdict": found.assessment.verdict,
         "seconds": process_time() - began,
     }

@@ -94,7 +94,7 @@ class Fit:
 
     @property
     def freedom_of_noise(self) -> float:
-        """Degrees of freedom of the size of noise; where noise fades, pieces of twice its length."""
+        """Degrees of freedom of the size of noise; where noise fades, its pieces."""
         return min(self.freedom, self.pieces, self.correlated.pieces if self.correlated is not None else math.inf)
 
     @property
@@ -125,9 +125,9 @@ class Fit:
         """How far a sum of squares is above the smallest, in variances of the noise of independent samples."""
         return (squares - self.squares) / (self.noise**2 * self.correlation)
 
-    def threshold(self, count: int) -> float:
-        """`excess` that so many parameters jointly stay below with the confidence of `CONFIDENCE` (Fisher's F)."""
-        return float(count * stats.f.ppf(CONFIDENCE, count, self.freedom_of_noise))
+    def threshold(self, count: int, chance: float = 1 - CONFIDENCE) -> float:
+        """`excess` that so many parameters jointly pass by noise alone with a chance (Fisher's F)."""
+        return float(count * stats.f.isf(chance, count, self.freedom_of_noise))
 
     def distance(self, fitted: "np.ndarray") -> float:
         """`excess` of given coordinates, infinite where there is no such experiment."""

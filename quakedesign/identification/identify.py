@@ -249,6 +249,7 @@ TREND_CHOICES = "auto", *_ONE_TREND, "none"
 _STAYS = 0.5  # deviations: a delay as small needs no move
 _UNFELT = 0.1  # deviations of the whole record by which an error of a rate moves friction unseen
 _UNSEEN = 1e-5  # of the range of friction
+_CHANCE = 0.01  # of a trend or an unsteady beginning that is fitted to noise: they move a - b
 
 
 def identify(
@@ -446,7 +447,7 @@ class _Choice:
         taken = own
         if self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE:
             taken = TREND_IN_TIME
-        if taken and not _needed(found[taken][0].best, found[""][1]):
+        if taken and not needed(found[taken][0].best, found[""][1]):
             taken = ""
         others = {
             _TRENDS.get(name, "without a trend"): (found[name][0], aic[name] - aic[taken])
@@ -553,14 +554,14 @@ class _Choice:
             return fitted
         wider, _ = self._among(fitted, {*_nuisance(fitted), START_STATE})
         told = replace(wider, best=replace(wider.best, kept=fitted.best.kept))
-        return _again(wider) if _needed(told.best, fitted.best.squares, len(_START)) else fitted
+        return _again(wider) if needed(told.best, fitted.best.squares, len(_START)) else fitted
 
     def _without_start(self, fitted: _Fitted) -> _Fitted:
         """Without an unsteady beginning, where a region of 95 % holds a steady one."""
         if START_STATE not in _nuisance(fitted):
             return fitted
         narrower, squares = self._among(fitted, _nuisance(fitted) - {START_STATE})
-        return fitted if _needed(fitted.best, squares, len(_START)) else _again(narrower)
+        return fitted if needed(fitted.best, squares, len(_START)) else _again(narrower)
 
     def _among(self, fitted: _Fitted, nuisance: Collection[str]) -> tuple[_Fitted, float]:
         """Fit with other nuisance parameters at the same samples with the same noise, and its sum of squares."""
@@ -602,11 +603,14 @@ def profiled(
     )
 
 
-def _needed(best: Fit, squares: float, fewer: int = 1) -> bool:
-    """Whether a fit is likelier than one with so many parameters fewer, at 95 %, and by more than machines measure."""
+def needed(best: Fit, squares: float, fewer: int = 1) -> bool:
+    """Whether noise leaves so much better a fit than with so many parameters fewer in 1 record of 100, or none at all.
+
+    By Fisher's F with the pieces of the noise; what no machine measures does not count.
+    """
     floor = _UNSEEN * float(np.ptp(best.measured))
     seen = squares - best.squares > floor**2 * best.freedom
-    return seen and best.excess(squares) > best.threshold(fewer)
+    return seen and best.excess(squares) > best.threshold(fewer, _CHANCE)
 
 
 def _nuisance(fitted: _Fitted) -> set[str]:

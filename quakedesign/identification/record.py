@@ -146,10 +146,24 @@ def read_record(
     UnitError
         For a column whose unit is unknown or of another dimension.
     """
+    return read_windows(path, [(begin, end)], normal_stress=normal_stress, columns=columns)[0]
+
+
+def read_windows(
+    path: str | Path,
+    windows: Sequence[tuple[str | None, str | None]],
+    *,
+    normal_stress: float | None = None,
+    columns: str = "",
+) -> list[Record]:
+    """A record of each window of a file, which is read once; as `read_record`."""
     given, remarks = _given(read_columns(path), columns)
     given, told = _measured(given)
-    given, left = _weighted(_window(given, begin, end))
-    return _record(Path(path).stem, given, normal_stress, (*remarks, *told, *left))
+    found = []
+    for window in windows:
+        inside, left = _weighted(_window(given, *window))
+        found.append(_record(Path(path).stem, inside, normal_stress, (*remarks, *told, *left)))
+    return found
 
 
 def part(record: Record, inside: "np.ndarray", name: str) -> Record:
