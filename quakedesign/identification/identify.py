@@ -34,7 +34,7 @@ from quakedesign.identification.experiment import (
     delayed,
     trended,
 )
-from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, advantage, fit, interval, minimised, settled
+from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, Profile, advantage, fit, minimised, settled
 from quakedesign.identification.identification_result import Identification, ParameterEstimate, Rival, estimate
 from quakedesign.identification.loading import Loading, prepared
 from quakedesign.identification.record import FAR_OFF, Record, read_record, scatter
@@ -683,6 +683,8 @@ def _open(told: ParameterEstimate) -> ParameterEstimate:
 
 
 def _estimate(best: Fit, place: int, jointly: bool = True) -> ParameterEstimate:
-    alone = interval(best, place, best.threshold(1))
-    of_all = interval(best, place, best.threshold(len(best.fitted)), alone) if jointly else alone
-    return estimate(best, place, alone, of_all)
+    """Estimate of one coordinate, alone and of all at once where that is wanted too."""
+    profile = Profile(best, place)
+    alone = profile.interval(best.threshold(1))
+    of_all = profile.interval(best.threshold(len(best.fitted))) if jointly else alone
+    return estimate(profile, alone, of_all)
