@@ -639,42 +639,28 @@ def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, Pa
     if len(effects) < 2:
         return {name: _estimate(best, i) for i, name in enumerate(names) if wanted is None or name in wanted}
     direct, *others = effects
-    others_turned = _Turned(best, direct, tuple(others))
-    first_turned = _Turned(best, others[0], (direct,)) if len(others) == 1 else None
-    return {
-        name: (_estimate(best, i) if first_turned is None else first_turned.estimate(i))
-        if i == direct
-        else others_turned.estimate(i)
-        for i, name in enumerate(names)
-        if wanted is None or name in wanted
-    }
+    found = {}
+    for i, name in enumerate(names):
+        if wanted is None or name in wanted:
+            first, seconds = (others[0], (direct,)) if i == direct else (direct, tuple(others))
+            found[name] = _estimate(best, i) if len(others) > 1 and i == direct else _turned(best, i, first, seconds)
+    return found
 
 
 def _difference(best: Fit, jointly: bool = True) -> ParameterEstimate | None:
     """Estimate of the difference of the direct effect and all evolution effects."""
     names = [c.name for c in best.experiment.coordinates]
-    effects = [names.index(name) for name in _EFFECTS_OF if name in names]
-    if len(effects) < 2:
-        return None
-    return _Turned(best, effects[0], tuple(effects[1:])).estimate(effects[0], jointly)
+    first, *seconds = [names.index(name) for name in _EFFECTS_OF if name in names] or [0]
+    return _turned(best, first, first, tuple(seconds), jointly) if seconds else None
 
 
-@dataclass(frozen=True)
-class _Turned:
-    """A fit in coordinates with the difference of some in place of the first of them."""
-
-    best: Fit
-    first: int
-    seconds: tuple[int, ...]
-
-    def estimate(self, place: int, jointly: bool = True) -> ParameterEstimate:
-        turned = Difference(whole=self.best.experiment, first=self.first, seconds=self.seconds)
-        try:
-            return _estimate(
-                replace(self.best, experiment=turned, fitted=turned.difference(self.best.fitted)), place, jointly
-            )
-        except BetterFit as better:
-            raise BetterFit(turned.whole_of(better.fitted)) from None
+def _turned(best: Fit, place: int, first: int, seconds: tuple[int, ...], jointly: bool = True) -> ParameterEstimate:
+    """Estimate in coordinates with the difference of some in place of the first of them."""
+    turned = Difference(whole=best.experiment, first=first, seconds=seconds)
+    try:
+        return _estimate(replace(best, experiment=turned, fitted=turned.difference(best.fitted)), place, jointly)
+    except BetterFit as better:
+        raise BetterFit(turned.whole_of(better.fitted)) from None
 
 
 def _open(told: ParameterEstimate) -> ParameterEstimate:

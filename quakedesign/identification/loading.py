@@ -316,7 +316,10 @@ def _refined(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray") -> "np.ndarr
 
 
 def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float) -> "np.ndarray":
-    """Knots without those that explain no more than noise, and those at which the rate hardly changes."""
+    """Knots without those that explain no more than noise, and those at which the rate hardly changes.
+
+    Two that less than two points part stand for one: a mean of samples before and after a change lies off both lines.
+    """
     left = y - _hinges(u, y, knots)[1]
     noise = max(float(left @ left) / len(u) * _spread(left), floor)
     allowed = _ODDS * np.log(len(u)) * noise
@@ -326,7 +329,9 @@ def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float)
         changes = np.abs(np.diff(rates)) / np.maximum(np.maximum(np.abs(rates[1:]), np.abs(rates[:-1])), 1e-300)
         fewer = [_refined(u, y, np.delete(knots, i)) for i in range(len(knots))]
         losses = np.array([float(np.sum((y - _hinges(u, y, others)[1]) ** 2)) for others in fewer])
-        losses = np.where(changes < _LEAST_CHANGE, -1.0, losses - squares)
+        losses, near = np.maximum(losses - squares, 0), np.diff(knots) < 2 / len(u)
+        doubled = np.append(near, False) | np.insert(near, 0, False)
+        losses = np.where(changes < _LEAST_CHANGE, -1.0, np.where(doubled, -1 / (1 + losses), losses))
         least = int(np.argmin(losses))
         if losses[least] >= allowed:
             break

@@ -10,7 +10,7 @@ import numpy as np
 from quakedesign.errors import OutputError
 from quakedesign.files import write_whole
 from quakedesign.identification.assessment import CANNOT_TELL, EXPLAINS_NOT
-from quakedesign.identification.experiment import DELAY, Trended
+from quakedesign.identification.experiment import DELAY, TREND, TREND_IN_TIME, Widened
 from quakedesign.identification.fitting import Fit, weighed
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
 from quakedesign.identification.several_steps import Steps
@@ -271,8 +271,9 @@ def _friction(axis: Any, identification: Identification, way: "np.ndarray", part
     simulated = fit.measured - fit.residuals
     axis.plot(way[part], fit.measured[part], ".", color=_MEASURED, markersize=2, label="measured")
     axis.plot(way[part], simulated[part], color=_FITTED, linewidth=1.2, label=f"fitted: {identification.law.name}")
-    if isinstance(fit.experiment, Trended):
-        line = simulated[0] + fit.fitted[-1] * (fit.experiment.along - fit.experiment.along[0])
+    if isinstance(fit.experiment, Widened) and fit.experiment.coordinates[-1].name in (TREND, TREND_IN_TIME):
+        along = fit.experiment.columns[:, 0]
+        line = simulated[0] + fit.fitted[-1] * (along - along[0])
         axis.plot(way[part], line[part], color=NATURAL, linewidth=0.8, linestyle=(0, (4, 2)), label="trend")
     left = np.flatnonzero(~fit.kept[part]) + (part.start or 0)
     if len(left):
