@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from scipy import stats
 from scipy.optimize import least_squares
+from scipy.signal import correlate
 
 from quakedesign.errors import RecordError
 from quakedesign.identification.correlated_noise import CorrelatedNoise
@@ -114,9 +115,7 @@ class Fit:
         Summed over lags up to five times itself (Sokal 1997, in Functional Integration, NATO ASI B361, 131).
         """
         kept = self.whitened
-        size = 1 << (2 * len(kept) - 1).bit_length()
-        spectrum = np.abs(np.fft.rfft(kept, size)) ** 2
-        covariance = np.fft.irfft(spectrum, size)[: len(kept) // 2]
+        covariance = correlate(kept, kept, method="fft")[len(kept) - 1 :][: len(kept) // 2]
         sums = 2 * np.cumsum(covariance / covariance[0]) - 1
         window = np.flatnonzero(np.arange(len(sums)) >= 5 * sums)
         return float(max(sums[window[0] if len(window) else -1], 1.0))

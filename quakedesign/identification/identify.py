@@ -623,9 +623,8 @@ def _again(fitted: _Fitted) -> _Fitted:
 
 def _settled(best: Fit, noise: CorrelatedNoise | None) -> Fit:
     """A fit with another noise."""
-    if noise is None and best.correlated is None:
-        return best
-    return settled(replace(best, correlated=noise), FitSearch())
+    white = noise is None and best.correlated is None
+    return best if white else settled(replace(best, correlated=noise), FitSearch())
 
 
 def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, ParameterEstimate]:

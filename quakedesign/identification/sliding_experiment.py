@@ -59,8 +59,7 @@ def step(field: Callable[[Any], Any], y: Any, length: Any) -> tuple[Any, Any]:
 # ----------------------------------------------------------------------
 # Friction with a state on a block that a spring draws: the experiment behind velocity steps and holds.
 #
-# The far end follows the recorded load point, from sample to sample at a constant rate. Inertia is left out: the
-# spring
+# The far end follows the recorded load point, from sample to sample at a constant rate. Inertia is left out: the spring
 # balances friction, k(x − slip) = σ'μ, and the time derivative of that gives the slip rate (the plant of
 # `quakedesign.symbolic.rate_and_state_plant`, without damping, on a record's time).
 

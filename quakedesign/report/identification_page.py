@@ -288,9 +288,8 @@ def _correlation(axis: Any, fit: Fit) -> None:
         (fit.whitened, _FITTED, "made independent"),
     ):
         off = left - left.mean()
-        lags = np.arange(min(_LAGS, len(off) - 1) + 1)
-        each = [float(off[: len(off) - lag] @ off[lag:]) for lag in lags.tolist()]
-        axis.plot(lags, np.array(each) / max(each[0], 1e-300), ".-", color=colour, markersize=3, label=label)
+        each = np.correlate(off, off, "full")[len(off) - 1 :][: _LAGS + 1]
+        axis.plot(each / max(each[0], 1e-300), ".-", color=colour, markersize=3, label=label)
     for level in (-2.0, 2.0):
         axis.axhline(level / len(fit.whitened) ** 0.5, color=NATURAL, linewidth=0.6, linestyle=(0, (4, 2)))
     axis.set_xlabel("lag [samples]", fontsize=SMALL)

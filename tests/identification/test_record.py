@@ -1,13 +1,14 @@
 """Records are read with their units; what is wrong is said in one line."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from quakedesign.errors import QuakedesignError, RecordError
 from quakedesign.fault.units import si_value
-from quakedesign.identification.record import read_record
+from quakedesign.identification.record import COLUMNS, _meant, read_record
 
 HEAD = "time [ms], load_point_displacement [um], shear_stress [MPa], normal_stress [kPa]"
 ROWS = ["0, 5, 3, 5000", "100, 6, 3.1, 5000", "300, 8, 3.2, 6000"]
@@ -164,3 +165,13 @@ def test_a_column_of_weights_counts_samples_and_leaves_out_those_of_weight_0(tmp
         path.write_text("\n".join(rows))
         with pytest.raises(RecordError, match=rf"weight must be positive, or 0 for what is left out. Received {ends}"):
             read_record(path)
+
+
+def test_names_of_columns_on_the_page_are_understood():
+    page = (Path(__file__).parents[2] / "docs" / "explanation" / "identification.md").read_text(encoding="utf-8")
+    rows = [row.split("|")[1:3] for row in page.splitlines() if row.startswith("| `") and row.split("`")[1] in COLUMNS]
+    assert {name for meant, _ in rows for name in re.findall("`(.+?)`", meant)} == {*COLUMNS} - {"slip", "weight"}
+    for meant, names in rows:
+        for name, others in zip(re.findall("`(.+?)`", meant), names.split(";"), strict=False):
+            for other in re.findall("`(.+?)`", others):
+                assert _meant(other) == name
