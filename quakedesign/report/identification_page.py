@@ -314,7 +314,7 @@ def _profile(axis: Any, estimate: ParameterEstimate, fit: Fit) -> None:
     for level, style in ((alone, (0, (4, 2))), (jointly, (0, (1, 2)))):
         axis.axhline(level, color=NATURAL, linewidth=0.6, linestyle=style)
     axis.set_ylim(0, 1.3 * jointly)
-    axis.locator_params(axis="x", nbins=4)
+    axis.locator_params(axis="x", nbins=3)
     name = "a - b" if " - " in estimate.name else _SYMBOLS.get(estimate.name, estimate.name)
     axis.set_xlabel(f"{name} [{'$10^{-3}$' if small else PREFIXES[power] + (estimate.unit or '-')}]", fontsize=SMALL)
 
