@@ -172,7 +172,7 @@ def test_noise_without_a_trend_has_one_in_a_record_of_100_and_a_trend_is_seen():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("fading", "white"), [(0.0, 0.0), (0.5, 0.0), (0.9, 0.0), (0.9, 0.6)])
-def test_of_300_records_without_a_trend_about_3_have_one(fading, white):
-    """At most 8, which 3 in 300 exceed with a chance of 0.4 %."""
-    assert trends(300, 0.0, fading, white) <= 8
+@pytest.mark.parametrize(("fading", "white", "most"), [(0.0, 0.0, 8), (0.5, 0.0, 8), (0.9, 0.0, 8), (0.9, 0.6, 12)])
+def test_of_300_records_without_a_trend_about_3_have_one(fading, white, most):
+    """At most 8, which 3 in 300 exceed with a chance of 0.4 %; 1 in 25 where white noise hides how the other fades."""
+    assert trends(300, 0.0, fading, white) <= most
