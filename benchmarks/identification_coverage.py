@@ -90,26 +90,29 @@ def begun_at_truth(kind: str, seed: int) -> tuple[Fit, dict[str, float]]:
     """The best fit of a record near the truth with the noise that its residuals show, and the truth."""
     raw, truth = synthetic.troubled(kind, seed)
     law = _law(kind)
-    record, loading = prepared(raw)
     made = kind.rpartition(", ")[2]
     nuisance = {TREND} if made.startswith("trend") else {START_STATE} if made == "unsteady beginning" else set()
-    setup = set_up(record, law, None, loading, nuisance)
+    means, loading = prepared(raw)
+    choice: _Choice | None = _Choice(record=means, raw=raw, loading=loading, stiffness=None, seed=seed)
+    while choice is not None:  # until changes of rate are at the times that friction shows
+        now, record = choice, choice.record
+        setup = set_up(record, law, None, now.loading, nuisance)
+        near = setup.experiment.near(truth | {TREND: -1.0 if made == "trend over slip" else synthetic.TRUE_TREND})
+        best = fit(
+            setup.experiment,
+            record.friction[setup.used],
+            seed=seed,
+            counts=None if record.counts is None else record.counts[setup.used],
+            near=near,
+            search=FitSearch(least=1, most=0),
+        )
+        choice = now._moved(_Fitted(kind=law, setup=setup, best=best))
+    for _ in range(2):
+        noise = now._noise(_Fitted(kind=law, setup=setup, best=best))
+        best = settled(replace(best, correlated=noise), FitSearch())
     if law.state_names:
         template: Any = setup.experiment.law
         truth["reference_coefficient"] += effects_of(truth) * np.log(template.reference_rate / synthetic.MICRON)
-    near = setup.experiment.near(truth | {TREND: -1.0 if made == "trend over slip" else synthetic.TRUE_TREND})
-    best = fit(
-        setup.experiment,
-        record.friction[setup.used],
-        seed=seed,
-        counts=None if record.counts is None else record.counts[setup.used],
-        near=near,
-        search=FitSearch(least=1, most=0),
-    )
-    choice = _Choice(record=record, raw=raw, loading=loading, stiffness=None, seed=seed)
-    for _ in range(2):
-        noise = choice._noise(_Fitted(kind=law, setup=setup, best=best))
-        best = settled(replace(best, correlated=noise), FitSearch())
     return best, truth
 
 

@@ -131,9 +131,13 @@ def noise_of(
     time: "np.ndarray",
     path: "np.ndarray | None",
     kept: "np.ndarray",
+    most: int = _MOST_DENSE,
 ) -> CorrelatedNoise | None:
-    """Likeliest noise of residuals, by slopes of what was fitted; None where independent samples are as likely."""
-    if not 3 * slopes.shape[1] < kept.sum() <= _MOST_DENSE:
+    """Likeliest noise of residuals, by slopes of what was fitted; None where independent samples are as likely.
+
+    None as well where fewer samples than three a slope, or more than `most`, are kept.
+    """
+    if not 3 * slopes.shape[1] < kept.sum() <= most:
         return None
     scale = np.linalg.norm(slopes[kept], axis=0)
     basis, values, _ = np.linalg.svd(slopes[kept][:, scale > 0] / scale[scale > 0], full_matrices=False)
