@@ -175,3 +175,34 @@ def test_names_of_columns_on_the_page_are_understood():
         for name, others in zip(re.findall("`(.+?)`", meant), names.split(";"), strict=False):
             for other in re.findall("`(.+?)`", others):
                 assert _meant(other) == name
+
+
+def test_what_falls_is_turned_and_what_slows_down_is_not(tmp_path):
+    """A displacement above zero that falls, and rates that are positive and fall."""
+    record = read_record(written(tmp_path, "time [s], displ [um], mu", "0, 100, 0.6", "1, 80, 0.61", "2, 50, 0.6"))
+    assert record.load_point.tolist() == pytest.approx([0, 20e-6, 50e-6])
+    assert "load_point_displacement falls: its sign is changed" in record.remarks
+    record = read_record(written(tmp_path, "time [s], velocity [um/s], mu", "0, 10, 0.6", "1, 3, 0.61", "2, 1, 0.6"))
+    assert record.load_point.tolist() == pytest.approx([0, 10e-6, 13e-6])
+    assert not any("sign is changed" in remark for remark in record.remarks)
+
+
+@pytest.mark.parametrize(
+    ("head", "remedy"),
+    [
+        (
+            "clock, displ [um], mu",
+            r"Received load_point_displacement, friction, and 'clock', unknown.*'time=clock \[s\]'",
+        ),
+        (
+            "displ [um], mu, tau [MPa]",
+            r"Received load_point_displacement, friction, shear_stress\. Add.*'time=1 \[s\]'",
+        ),
+        ("time [s], displ [um], tau [MPa]", r"needs the column normal_stress or a constant normal stress\. Received"),
+        ("time [s], displ [um], shear_force [kN]", r"needs the column normal_force\. Received .*Add it\."),
+        ("time [s], tau [MPa], normal_force [kN]", r"Divide the force by the area that slides\."),
+    ],
+)
+def test_a_missing_column_is_named_with_its_remedy(head, remedy, tmp_path):
+    with pytest.raises(RecordError, match=remedy):
+        read_record(written(tmp_path, head, "0, 1, 0.6", "1, 2, 0.61", "2, 3, 0.6"))
