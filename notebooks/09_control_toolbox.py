@@ -84,9 +84,9 @@ plt.tight_layout()
 
 # %%
 found = qd.guarantee(fault, gains=tuple(gains.values()))
-guarantee = found.found
-print(guarantee.sentence())
-print(f"worst found: {found.worst.slip_rate_error:.3g} m/s, {found.worst.slip_error:.3g} m")
+print(found.sentence())
+for name in ("slip_error", "slip_rate_error"):
+    print(f"{name}: proved {found.bounds[name]:.3g}, worst case found {found.worst_case[name]:.3g}")
 
 # %% [markdown]
 # ## The nonlinear loop as a diagram
@@ -140,9 +140,9 @@ print(f"strongest at {strongest:.2f} rad/s; the disturbance has {fault.disturban
 # fault reaches an earthquake's slip rate; its margins alone would not have said so.
 
 # %%
-known, proved = found.worst.slip_rate_error, guarantee.claims.slip_rate_error
-assert str(guarantee.check()) == "proved" and known < proved < Fraction(2, 10**4)
+known, proved = found.worst_case["slip_rate_error"], found.bounds["slip_rate_error"]
+assert str(found.check()) == "proved" and known < proved < Fraction(2, 10**4)
 assert np.abs(poles).max() < 1 < np.abs(sampled.poles()).max() and lower < 1 and 20 < phase < at_once_phase
-assert np.abs(run.slip_error).max() < guarantee.claims.slip_error
-assert np.abs(at_once.outputs[0] - r).max() < guarantee.claims.slip_error
+assert np.abs(run.slip_error).max() < found.bounds["slip_error"]
+assert np.abs(at_once.outputs[0] - r).max() < found.bounds["slip_error"]
 assert abs(strongest - fault.disturbance.frequency) < 2 * (angular[1] - angular[0])

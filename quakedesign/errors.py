@@ -1,6 +1,8 @@
 """The exceptions of quakedesign: one small tree, each message says what, expected, received, remedy."""
 
+import re
 from collections.abc import Iterable
+from typing import ClassVar
 
 from quakedesign.text import nearest_name, one_line, shown
 
@@ -12,12 +14,24 @@ class QuakedesignError(Exception):
     ----------
     parts : tuple of QuakedesignError
         What is wrong one by one, where several things are.
+    code : str
+        Kind of the error for scripts, such as ``parameter``: that of its class.
     """
 
     parts: "tuple[QuakedesignError, ...]" = ()
+    code: ClassVar[str] = "error"
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
+
+    def __init_subclass__(cls) -> None:
+        cls.code = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__.removesuffix("Error")).lower()
+
+    @property
+    def quantity(self) -> str:
+        """What is wrong: the subject of the condition that the message begins with; empty without one."""
+        subject, verb, _ = re.split(r" (must|needs?) ", f"{self.args[0]} must ", maxsplit=1)
+        return subject if verb and subject != self.args[0] else ""
 
 
 class ParameterError(QuakedesignError, ValueError):

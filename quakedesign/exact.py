@@ -167,8 +167,7 @@ def six_digits(value: Fraction) -> str:
 # Certified numbers, which are printed on their outer side only: an upper bound is rounded up, a lower one down.
 #
 # A bound is a `fractions.Fraction`, so that it is compared and computed with exactly. What is computed from it is a
-# plain
-# fraction: whether that is a bound again, and of which side, says the code that computed it.
+# plain fraction: whether that is a bound again, and of which side, says the code that computed it.
 
 _SPEC = re.compile(
     r"(?P<align>.?[<>^])?(?P<sign>[-+ ]?)(?P<width>([1-9]\d*)?)(\.(?P<digits>\d+))?(?P<kind>[eEfFgG%]?)", re.ASCII

@@ -1,5 +1,6 @@
 """The documentation is built without a warning, and what is built needs no network."""
 
+import inspect
 import json
 import os
 import re
@@ -10,6 +11,7 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+import matplotlib.pyplot as plt
 import pytest
 
 import quakedesign
@@ -19,6 +21,9 @@ ROOT = Path(__file__).parents[1]
 SPECIFICATION = spec_from_file_location("generated_pages", ROOT / "docs" / "_extensions" / "generated.py")
 generated = module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(generated)
+DRAWN = spec_from_file_location("gallery", ROOT / "docs" / "figures" / "gallery.py")
+gallery = module_from_spec(DRAWN)
+DRAWN.loader.exec_module(gallery)
 PAGES = ("index.html", "reference/commands.html", "reference/fault_file.html", "explanation/glossary.html")
 
 
@@ -151,3 +156,22 @@ def test_every_example_runs(tmp_path):
     folder, said = built(tmp_path, execute="force")
     assert said == ""
     assert "T_s = 0.184 s" in (folder / "howto" / "bode_and_margins.html").read_text(encoding="utf-8")
+
+
+def test_the_gallery_shows_every_figure_with_the_lines_that_draw_it():
+    page = (ROOT / "docs" / "tutorial" / "gallery.md").read_text(encoding="utf-8")
+    for draw in gallery.FIGURES:
+        assert f":pyobject: {draw.__name__}\n" in page
+        assert f"## {draw.__doc__.rstrip('.')}\n" in page
+        image = f"gallery-{draw.__name__.replace('_', '-')}.png"
+        assert f"(../figures/{image})" in page
+        assert (ROOT / "docs" / "figures" / image).is_file()
+        assert len(inspect.getsource(draw).splitlines()) <= 15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("draw", gallery.FIGURES, ids=lambda draw: draw.__name__)
+def test_the_lines_of_the_gallery_draw_curves_with_labelled_axes(draw):
+    axes = draw().axes
+    assert all(each.lines and each.get_xlabel() + each.get_ylabel() for each in axes)
+    plt.close("all")

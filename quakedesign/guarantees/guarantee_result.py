@@ -21,6 +21,7 @@ from quakedesign.guarantees.exact.impossibility import SlidingPush, SmallestPeak
 from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.statement import Guarantee, SlidingGuarantee, guarantee
+from quakedesign.guarantees.loop_result import LoopResult
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding, worst_found, worst_sliding
 from quakedesign.guarantees.search.compensated_search import Compensation
 from quakedesign.guarantees.search.linear_design import AMPLITUDE, BOX, SATURATION
@@ -64,7 +65,7 @@ _TOLD = (
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class LoopAnswer:
+class LoopAnswer(LoopResult):
     """Guarantee of one loop, or the reason why there is none.
 
     Attributes
@@ -98,11 +99,6 @@ class LoopAnswer:
     compensation: Compensation | None = None
     notes: tuple[str, ...] | None = None
     not_at_rest: str = ""
-
-    @property
-    def proved(self) -> bool:
-        """Whether there is a guarantee."""
-        return self.found.proved
 
     def lines(self) -> list[str]:
         """Lines of text: the guarantee first, then the worst case found, then what was changed in the law."""
@@ -384,7 +380,7 @@ _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of a
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlidingAnswer:
+class SlidingAnswer(LoopResult):
     """Guarantee of slow sliding, or the reason why there is none.
 
     Attributes
@@ -399,11 +395,6 @@ class SlidingAnswer:
     task: SlidingPlant
     held: Held | None
     compensation: ClassVar[None] = None
-
-    @property
-    def proved(self) -> bool:
-        """Whether there is a guarantee."""
-        return self.found.proved
 
     @cached_property
     def worst(self) -> WorstSliding | None:

@@ -11,6 +11,7 @@ from quakedesign.fault import Fault
 from quakedesign.guarantees.exact.impossibility import smallest_stick_slip_rate
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.loop_result import LoopResult
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip, design_stick_slip, worst_stick_slip
 from quakedesign.laws.stick_slip_law import GAIN_UNITS
 from quakedesign.loop.loop_setup import LoopSetup
@@ -19,7 +20,7 @@ from quakedesign.text import quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StickSlipAnswer:
+class StickSlipAnswer(LoopResult):
     """Guarantee of one loop on the stick–slip plant, or why there is none.
 
     Attributes
@@ -34,11 +35,6 @@ class StickSlipAnswer:
     found: StickSlipGuarantee | NoGuarantee
     worst: WorstStickSlip | None = None
     compensation: ClassVar[None] = None
-
-    @property
-    def proved(self) -> bool:
-        """Whether there is a guarantee."""
-        return self.found.proved
 
     @property
     def least_slip_rate(self) -> LowerBound | None:

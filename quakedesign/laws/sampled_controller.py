@@ -241,8 +241,7 @@ def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Exp
 # ----------------------------------------------------------------------
 # What an implicit step does with an estimate of the disturbance in place of integral states; simulated and proved.
 #
-# Both functions take floats, SymPy and CasADi expressions. The estimate d follows what the slip rate did over the
-# last
+# Both functions take floats, SymPy and CasADi expressions. The estimate d follows what the slip rate did over the last
 # period beyond T_s·B0·p, and the pressure takes the slip rate to the end w of the step, less d.
 
 _STATES = ("rate_error_before", "push_before", "disturbance")

@@ -76,13 +76,13 @@ class SampledLaw(SampledController):
 
     @classmethod
     def from_statespace(
-        cls, system: Any, *, inputs: Sequence[str], output: str = OUTPUT, label: str = "user-defined law"
+        cls, system: Any, *, inputs: Sequence[str] = (), output: str = OUTPUT, label: str = "user-defined law"
     ) -> Self:
         """Law of a discrete-time system of python-control, or of anything with A, B, C, D and dt.
 
         Parameters
         ----------
-        system : control.StateSpace
+        system : control.StateSpace or control.TransferFunction
             Its one output is the pressure [Pa], sign included: a law made for negative feedback is given with −1.
         inputs : sequence of str
             Signals in the order of its inputs: slip_error, slip_rate_error, slip, slip_rate, reference or
@@ -95,6 +95,10 @@ class SampledLaw(SampledController):
         ParameterError
             For a system in continuous time, other sizes, unknown signals, or numbers that are not finite.
         """
+        if hasattr(system, "num") and not hasattr(system, "A"):
+            import control
+
+            system = control.ss(system)
         parts = [getattr(system, name, None) for name in "ABCD"]
         if any(part is None for part in parts):
             raise ParameterError(
@@ -106,6 +110,11 @@ class SampledLaw(SampledController):
             raise ParameterError(
                 f"a law must be in discrete time, with its sampling time as dt [s]. Received dt = {step!r}. "
                 "Use control.sample_system(system, T_s), or control.ss(A, B, C, D, T_s)."
+            )
+        if not inputs:
+            raise ParameterError(
+                "inputs of a law must be named in the order of its columns. Received none. Give some of "
+                f'{", ".join(SIGNALS)}, such as inputs=["slip_error", "slip_rate_error"].'
             )
         return cls._of_matrices(parts, rational(step, "dt"), tuple(inputs), output, label)
 

@@ -204,17 +204,15 @@ def law_unit(K: Sequence[Fraction], units: Sequence[Fraction]) -> Fraction:
 # ----------------------------------------------------------------------
 # The sampled law that runs, with a V that depends on the clock: longer periods than one V for all phases can prove.
 #
-# Within a period, z = (x1, x2, q1, q2, p) moves by x1' = x2, x2' = s·x1 − w·x2 + βb·p while p and the sums
-# q = ξ(t_{k+1}), known since t_k, wait; at its end z⁺ = Jz: p⁺ = −K(x1, x2, q), q⁺ = q + T(x1, q1). V = zᵀP(θ)z with
-# the
+# Within a period, z = (x1, x2, q1, q2, p) moves by x1' = x2, x2' = s·x1 − w·x2 + βb·p while p and the sums q =
+# ξ(t_{k+1}), known since t_k, wait; at its end z⁺ = Jz: p⁺ = −K(x1, x2, q), q⁺ = q + T(x1, q1). V = zᵀP(θ)z with the
 # phase θ = t/T and P(θ) = Σ B_i(θ)P_i, Bernstein polynomials of degree D. By degree elevation of P' the loop is
 # exponentially stable if
 #
 #     i(P_i − P_{i−1}) + (D − i)(P_{i+1} − P_i) + T(AᵀP_i + P_iA) < 0   for all i,   JᵀP_0J < P_D,   P_0 > 0
 #
 # at all vertices of (s, w, β), for all measurable s, w, β in the box. The first is affine in T and the second convex,
-# so
-# that the two ends of a range of periods prove every period in it, also one that changes from sample to sample.
+# so that the two ends of a range of periods prove every period in it, also one that changes from sample to sample.
 
 DEGREE = 8
 """Of P(θ): 4 reaches a longest period 2 % shorter, 12 one that is 0.5 % longer."""

@@ -16,14 +16,10 @@ from quakedesign.loop.periodic import Fading, PeriodicLoop
 # ----------------------------------------------------------------------
 # Flow through the rock between well and fault: slow modes exactly, and a bound of all the others.
 #
-# **Statement.** Let ∂p/∂t = D∂²p/∂x² in a layer of length L, without pressure at first, with the pressure u at the
-# well
-# and without outflow at the fault, and τ = L²/D. With λ_n = ((2n + 1)π/2)²/τ and c_n = (4/π)(−1)ⁿ/(2n + 1) the
-# pressure
-# in the fault t after a unit step of u is 1 − Σ c_n·e^{−λ_n·t} (Carslaw and Jaeger, Conduction of Heat in Solids,
-# 1959,
-# sec. 3.4), Σ c_n = 1. So it is Σ_{n<N} c_n·z_n + (1 − Σ_{n<N} c_n)u + R with z_n′ = λ_n(u − z_n) and what is left
-# out,
+# **Statement.** Let ∂p/∂t = D∂²p/∂x² in a layer of length L, without pressure at first, with the pressure u at the well
+# and without outflow at the fault, and τ = L²/D. With λ_n = ((2n + 1)π/2)²/τ and c_n = (4/π)(−1)ⁿ/(2n + 1) the pressure
+# in the fault t after a unit step of u is 1 − Σ c_n·e^{−λ_n·t} (Carslaw and Jaeger, Conduction of Heat in Solids, 1959,
+# sec. 3.4), Σ c_n = 1. So it is Σ_{n<N} c_n·z_n + (1 − Σ_{n<N} c_n)u + R with z_n′ = λ_n(u − z_n) and what is left out,
 # R(t) = Σ_k Δu_k·E(t − t_k) over the steps of u, E(t) = −Σ_{n≥N} c_n·e^{−λ_n·t}. These terms alternate and shrink, so
 # |E(t)| ≤ |c_N|e^{−λ_N·t}.
 #
@@ -86,21 +82,17 @@ class Layer:
 # What the fast modes of a layer bring into the slip rate at each step of the well: as one known kick, and a
 # remainder.
 #
-# **Statement.** Let R be what the modes n < N of a layer leave out of the pressure in the fault (`layer`), E that of
-# a
+# **Statement.** Let R be what the modes n < N of a layer leave out of the pressure in the fault (`layer`), E that of a
 # unit step, and A = τ/2 − Σ_{n<N} ĉ_n/λ̂_n. Then ∫E = −A exactly, and with F(t) = −∫_t^∞ E, Y = Σ_k Δu_k·F(t − t_k)
-# over
-# the steps so far, and e2 = x2 + β0·b·Y, the loop e1′ = e2, e2′ = s0·e1 − w0·e2 + β0·b·(v/b + R) + a is the same as
+# over the steps so far, and e2 = x2 + β0·b·Y, the loop e1′ = e2, e2′ = s0·e1 − w0·e2 + β0·b·(v/b + R) + a is the same
+# as
 #
 #     e1′ = x2 + β0·bY,   x2′ = s0·e1 − w0·x2 + β0·v + a − w0·β0·bY,   x2 ← x2 − β0·A·bΔu_k at every step.
 #
-# *Proof.* ∫₀^∞ Σ c_n·e^{−λ_n·t}dt = τ/2, since 1/cosh √(sτ) = 1 − sτ/2 + …; so F(0) = A, and R − Y′ = −A·Σ_k Δu_k·δ(t
-# −
-# t_k). ∎ Y is as unknown as R is, but λ_N times smaller and not differentiated: what the steps so far will still
-# bring.
+# *Proof.* ∫₀^∞ Σ c_n·e^{−λ_n·t}dt = τ/2, since 1/cosh √(sτ) = 1 − sτ/2 + …; so F(0) = A, and R − Y′ = −A·Σ_k Δu_k·δ(t −
+# t_k). ∎ Y is as unknown as R is, but λ_N times smaller and not differentiated: what the steps so far will still bring.
 #
-# **Bounds.** |F(t)| ≤ |ĉ_N|/λ̂_N·e^{−λ̂_N·t} + 6Nδτ·e^{−λ̂_0·t/2}: the terms c_n/λ_n·e^{−λ_n·t} alternate and shrink
-# as
+# **Bounds.** |F(t)| ≤ |ĉ_N|/λ̂_N·e^{−λ̂_N·t} + 6Nδτ·e^{−λ̂_0·t/2}: the terms c_n/λ_n·e^{−λ_n·t} alternate and shrink as
 # those of E, and the errors of ĉ_n and λ̂_n add at most 6Nδ·e^{−λ̂_0·t/2} to |E|, 2/λ̂_0 < τ.
 #
 # - *A well whose pressure is held*: |Y| ≤ max|Δu_k|·(h/λ̂_N·e^{−λ̂_N·θ} + f·τ) with θ, h and f of `layer`.

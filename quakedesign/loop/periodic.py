@@ -98,7 +98,7 @@ class Pulse:
 class PeriodicLoop:
     """x' = Ax + Σ b_i·w_i between jumps; segments repeat periodically for all t ≥ 0, the first at t = 0.
 
-    Without any segment there are no jumps: it flows for ever.
+    Without any segment there are no jumps: the flow never jumps.
 
     Attributes
     ----------

@@ -17,8 +17,7 @@ from quakedesign.loop import StateLaw
 # ----------------------------------------------------------------------
 # What a guarantee of slow sliding uses of a fault with rate-and-state friction, in rationals.
 #
-# Per unit of area: mass m = ρL, stiffness K = G/L, damping H = η/L². The friction coefficient is that of sliding at
-# V,
+# Per unit of area: mass m = ρL, stiffness K = G/L, damping H = η/L². The friction coefficient is that of sliding at V,
 # μ*, plus a·ln(v/V) + b·ln(θV/D), or its regularised form, a·arsinh(sinh(μ*/a)·exp((a·ln(v/V) + b·ln(θV/D))/a)); the
 # state follows the ageing law, θ′ = 1 − vθ/D, or the slip law, θ′ = −(vθ/D)·ln(vθ/D). The fault slides at V at first,
 # without pressure, its far end at rest. Along a reference r from 0, whose rate stays within V(1 ± ``swing``), it then

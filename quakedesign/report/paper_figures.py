@@ -37,8 +37,7 @@ if TYPE_CHECKING:
 # Figures of the paper that show simulations, drawn anew for any fault, published gains beside designed ones.
 #
 # Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Control, sections II-D and IV. Its figures
-# of
-# the laboratory show experiments; here the laboratory fault is simulated like any other.
+# of the laboratory show experiments; here the laboratory fault is simulated like any other.
 
 PAPER = {
     "friction-law": "fig:mu",

@@ -34,15 +34,12 @@ from quakedesign.loop.schemes.implicit import where_needed
 # ----------------------------------------------------------------------
 # Elementary functions of plain arithmetic: the same digits in every lane, on every processor, with any C library.
 #
-# Each is a straight line of sums, products, quotients, comparisons and choices, which IEEE 754 rounds in one way
-# only, on
-# exact powers of two (`two_to`) and exact parts of floats (`exponent_and_mantissa`, `near_cube_root`). They are
-# stated
-# once, as CasADi expressions; `quakedesign.simulation.compiled` puts them into functions,
-# `quakedesign.simulation.compiled` into C.
-# Errors are below one unit in the last place, those of cube roots below 0.65, of other powers (exponents up to 2)
-# below
-# one and a half, of the hyperbolic tangent below two. Zeros have no sign. The power ⅓ of floats is the cube root.
+# Each is a straight line of sums, products, quotients, comparisons and choices, which IEEE 754 rounds in one way only,
+# on exact powers of two (`two_to`) and exact parts of floats (`exponent_and_mantissa`, `near_cube_root`). They are
+# stated once, as CasADi expressions; `quakedesign.simulation.compiled` puts them into functions,
+# `quakedesign.simulation.compiled` into C. Errors are below one unit in the last place, those of cube roots below 0.65,
+# of other powers (exponents up to 2) below one and a half, of the hyperbolic tangent below two. Zeros have no sign. The
+# power ⅓ of floats is the cube root.
 
 _ROUNDER = 1.5 * 2.0**52  # sums with it have no digits behind the point
 _SPLITTER = 2.0**27 + 1

@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
+
+import numpy as np
 
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.fault import Fault, require_fault
@@ -18,12 +20,19 @@ from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import RunSetting, by_no_clock, loop_class, own_path, run, run_adaptive, sampled_scheme
 from quakedesign.simulation.slow_sliding import PLANTS, simulate_sliding
 from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
-from quakedesign.simulation.trajectory import OutcomeCriterion, Trajectory
+from quakedesign.simulation.stick_slip import disturbed, simulate_state
+from quakedesign.simulation.trajectory import OutcomeCriterion, StateTrajectory, Trajectory
 
-_METHOD, _RTOL = "dormand-prince", 1e-9
+_METHOD, _RTOL, _SAMPLES = "dormand-prince", 1e-9, 2000
 
 
-def simulate(
+@overload
+def simulate(fault: Fault, controller: Controller, **options: Any) -> Trajectory: ...
+@overload
+def simulate(fault: Fault, controller: None = None, **options: Any) -> Any: ...
+
+
+def simulate(  # type: ignore[misc]  # the overloads leave out the options, which have one type each
     fault: Fault,
     controller: Controller | None = None,
     *,
@@ -31,7 +40,7 @@ def simulate(
     scheme: str | Scheme | None = None,
     method: str = _METHOD,
     duration: float | None = None,
-    samples: int = 2000,
+    samples: int = _SAMPLES,
     settled_from: float | None = None,
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
@@ -46,7 +55,7 @@ def simulate(
     initial_slip: float = 0.0,
     initial_slip_rate: float = 0.0,
     tide: Tide | None = None,
-) -> Trajectory:
+) -> Trajectory | StateTrajectory:
     """Simulate a fault under a controller, from rest by default, with the fault's own disturbance and reference.
 
     A fault whose friction has a state starts in steady sliding at the mean rate of its task and is held there by a law
@@ -57,7 +66,8 @@ def simulate(
     ----------
     fault : Fault
     controller : Controller, optional
-        None: no fluid is injected.
+        None: no fluid is injected. Friction with a state is then loaded at its operating rate from near steady sliding,
+        and takes `duration`, `samples`, `method` and `plant` alone; `simulate_state` has other loading and pressures.
     step : float, optional
         Length of one step [s]; that of a law of samples, or the fault's sampling time, unless given.
     scheme : str or Scheme, optional
@@ -112,7 +122,7 @@ def simulate(
     -------
     Trajectory
         A `SampledTrajectory`, which has the signals of the actuator too, where there is one; a `SlidingRun` of friction
-        with a state.
+        with a state, and a `StateTrajectory` without a controller.
         One that diverges ends there, says so in `events`, and has no metrics.
 
     Raises
@@ -126,6 +136,8 @@ def simulate(
         cannot go on, or when the checkpoint is that of another run.
     """
     if require_fault(fault).friction.state_names:
+        plant = plant or next(iter(PLANTS))
+        require_known(plant, PLANTS, "plant of a fault with a state", UnknownNameError)
         refused = {
             "compiled": compiled is not None,
             "load": load is not None,
@@ -137,10 +149,21 @@ def simulate(
             "initial_slip": bool(initial_slip),
             "initial_slip_rate": bool(initial_slip_rate),
         }
+        if controller is None:
+            refused |= {
+                "step": step is not None,
+                "scheme": scheme is not None,
+                "settled_from": settled_from is not None,
+                "variation": variation is not None,
+                "actuator": actuator is not None,
+                "measurement": measurement is not None,
+                "tide": tide is not None,
+            }
+            return _uncontrolled(
+                fault, plant, method, duration, samples, [name for name, given in refused.items() if given]
+            )
         law, path = _sampled_law(fault, controller, actuator, [name for name, given in refused.items() if given])
         own_way(controller, scheme, step)
-        plant = plant or next(iter(PLANTS))
-        require_known(plant, PLANTS, "plant of a fault with a state", UnknownNameError)
         return simulate_sliding(
             fault,
             law.of_slip,
@@ -183,18 +206,41 @@ def simulate(
     return run(recorder, setting, chosen, criterion, progress=progress, compiled=compiled, checkpoint=checkpoint)
 
 
+def _uncontrolled(
+    fault: Fault, plant: str, method: str, duration: float | None, samples: int, refused: list[str]
+) -> StateTrajectory:
+    """Loaded at the operating rate of its friction, near steady sliding at first, under no pressure."""
+    if refused:
+        raise ParameterError(
+            f"an uncontrolled fault whose friction has a state has a duration, samples, a method and a plant. Received "
+            f"{', '.join(refused)}. Omit them, or use simulate_state for other loading, pressure and starting states."
+        )
+    whole = fault.reference.operation_time if duration is None else duration
+    rate = fault.friction.operating_rate
+    start = disturbed(fault, rate)
+    return simulate_state(
+        fault,
+        rate,
+        duration=whole,
+        start_rate=start.slip_rate,
+        start_state=start.state,
+        inertia=PLANTS[plant],
+        method="radau" if method == _METHOD else method,
+        times=None if samples == _SAMPLES else np.linspace(0, whole, samples),
+    )
+
+
 _OF_SLIDING = ("duration", "samples", "settled_from", "progress", "variation", "tide")
 
 
 def _sampled_law(
-    fault: Fault, controller: Controller | None, actuator: Actuator | None, refused: list[str]
+    fault: Fault, controller: Controller, actuator: Actuator | None, refused: list[str]
 ) -> tuple[Any, PressurePath]:
     """Law of samples that measures the slip alone, with its path; refuses arguments that slow sliding does not have."""
-    if controller is None or controller.of_slip is None or controller.sampling is None or refused:
+    if controller.of_slip is None or controller.sampling is None or refused:
         raise ParameterError(
             f"friction with a state is held by a law of samples, as design gives it, with {', '.join(_OF_SLIDING)} (a "
             f"SlidingVariation), method, plant, actuator and a Transducer as measurement. Received "
-            f"{', '.join(refused) or repr(controller)} with {fault.friction.name}. Without a controller use "
-            "simulate_state."
+            f"{', '.join(refused) or repr(controller)} with {fault.friction.name}."
         )
     return controller, PressurePath.of(controller.sampling, actuator)

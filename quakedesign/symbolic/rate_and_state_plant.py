@@ -279,9 +279,8 @@ def without_overflow(friction: sp.Expr) -> sp.Expr:
 # ----------------------------------------------------------------------
 # Errors about slow sliding of a fault with rate-and-state friction: slip, and the logarithms of rate and state.
 #
-# About sliding at V without inertia, with v = Ve^y, θ = θ_ss(V)e^z, the slip error x, the pressure error q = p − p*
-# and a
-# shear stress s on the fault, all per unit of area. What is derived here from the law is the change of friction, so
+# About sliding at V without inertia, with v = Ve^y, θ = θ_ss(V)e^z, the slip error x, the pressure error q = p − p* and
+# a shear stress s on the fault, all per unit of area. What is derived here from the law is the change of friction, so
 # that
 #
 #     N(μ(y, z) − μ*) + HV(e^y − 1) = −Kx + μ*q + s,    x′ = V(e^y − 1),    z′ = θ′/θ,

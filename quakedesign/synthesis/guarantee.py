@@ -145,9 +145,11 @@ def guarantee(
     Returns
     -------
     LoopAnswer, SlidingAnswer or StickSlipAnswer
-        Its ``lines()`` are what the command prints; ``found`` is the guarantee, which has a ``controller`` for
-        `simulate`, `loop_transfer` and `export_controller`, or the reason why there is none. Of an `UncertainPlant` the
-        guarantee, `PlantGuarantee`, or `NoGuarantee` itself.
+        All have ``verdict``, ``bounds`` and ``worst_case`` (by name, SI units), ``reason``, ``sentence()``,
+        ``check()``, ``controller`` for `simulate`, `loop_transfer` and `export_controller`, ``save(path)`` of the
+        certificate and ``to_dict()``; ``lines()`` are what the command prints. Of an `UncertainPlant` or blocks the
+        guarantee, `PlantGuarantee`, or `NoGuarantee` itself, with ``verdict``, ``bounds``, ``reason``, ``sentence()``
+        and ``check()``.
 
     Raises
     ------

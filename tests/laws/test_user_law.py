@@ -71,6 +71,8 @@ def test_a_pid_has_the_transfer_function_of_its_formula():
     expected = control.forced_response(-(kp + ki * summed + kd * derivative), np.arange(12) * STEP, SLIP - R).outputs
     assert answers(law, SIGNALS) == pytest.approx(expected, rel=1e-9)
     assert law.law.of_slip_alone
+    same = qd.SampledLaw.from_statespace(-(kp + ki * summed + kd * derivative), inputs=["slip_error"])
+    assert answers(same, SIGNALS) == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize(("terms", "states"), [((3,), 0), ((3, 1), 1), ((3, 0, 1), 1), ((3, 1, 1), 2)])
@@ -196,6 +198,8 @@ def test_a_file_with_pickles_or_too_much_in_it_is_refused(tmp_path):
         (lambda: qd.SampledLaw.from_statespace(control.ss(1, 1, 1, 1), inputs=["slip"]), "in discrete time"),
         (lambda: qd.SampledLaw.from_statespace(control.ss(1, 1, 1, 1, True), inputs=["slip"]), "in discrete time"),
         (lambda: qd.SampledLaw.from_statespace(3, inputs=["slip"]), "must have the matrices"),
+        (lambda: qd.SampledLaw.from_statespace(control.ss(1, 1, 1, 1, STEP)), r"such as inputs=\["),
+        (lambda: qd.SampledLaw.from_statespace(control.tf([1], [1, 2]), inputs=["slip"]), "in discrete time"),
         (lambda: qd.SampledLaw.from_gains([1] * 5, step=1), "one to four numbers"),
         (lambda: qd.SampledLaw.from_gains([], step=1), "one to four numbers"),
         (lambda: qd.SampledLaw.from_gains([1], step=1, inputs=("slip_rate", "slip")), "inputs of gains"),

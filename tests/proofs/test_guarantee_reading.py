@@ -366,7 +366,7 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
         "1/s, of a pressure 0.6667 m^2/kg times [1, 0.3334]",
         "law with 1 states, every 1 s, 1/3 s late, lag 2/3 s",
         "disturbance: any acceleration of at most 0.3333 m/s^2 that starts at 0 and changes by at most 0.1428 m/s^3; "
-        "from rest, along the reference, for ever; small gain 0.3334",
+        "from rest, along the reference, for all t >= 0; small gain 0.3334",
         "the slip rate of this fault never exceeds 0.1429 m/s",
         "|slip - reference| <= 0.3334 m, |slip rate - reference's| <= 0.6667 m/s",
         "pressure from -0.3334 Pa to 0.6667 Pa",

@@ -18,7 +18,7 @@ from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Saturation, sliding_loop
 from quakedesign.loop.sensing import Measurement, Transducer
-from quakedesign.simulation import Load, Variation, slow_sliding
+from quakedesign.simulation import Load, Variation, simulate_state, slow_sliding
 from quakedesign.simulation.slow_sliding import _Loop, simulate_sliding
 from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
 from quakedesign.symbolic import derive
@@ -355,7 +355,8 @@ def test_simulate_runs_what_a_design_found_in_its_own_way():
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"controller": None}, "Without a controller use simulate_state"),
+        ({"controller": None, "step": 20.0}, "uncontrolled .* Received step. Omit"),
+        ({"controller": None, "tide": Tide(amplitude=1.0)}, "uncontrolled .* Received tide. Omit"),
         ({"substeps": 2}, "Received substeps"),
         ({"initial_slip": 1e-3}, "Received initial_slip "),
         ({"initial_slip_rate": 1e-3}, "Received initial_slip_rate"),
@@ -377,6 +378,21 @@ def test_what_a_run_in_slow_sliding_does_not_take_is_refused(wrong, said):
     law = sliding_law(sliding_model(fault()), STEP)
     with pytest.raises((ParameterError, UnknownNameError), match=said):
         simulate(fault(), **({"controller": Held(law=law, step=STEP).controller, "duration": 80.0} | wrong))
+
+
+def test_an_uncontrolled_fault_with_a_state_is_loaded_at_its_operating_rate():
+    """As `simulate_state` by two other methods, from a state half as old again as the steady one."""
+    rate = fault().friction.operating_rate
+    run = simulate(fault(), duration=50.0, plant="quasi-dynamic", samples=6)
+    older = [1.5 * v for v in fault().friction.steady_state(rate)]
+    assert run.time.tolist() == [0, 10, 20, 30, 40, 50]
+    assert run.slip_rate[0] == pytest.approx(rate)
+    for method in ("dop853", "cvodes"):
+        own = simulate_state(
+            fault(), rate, duration=50.0, start_state=older, inertia=False, method=method, times=run.time
+        )
+        assert run.slip_rate == pytest.approx(own.slip_rate, rel=1e-5)
+    assert len(simulate(fault(), duration=50.0).time) != 6
 
 
 def test_a_fault_without_a_state_has_no_tide():

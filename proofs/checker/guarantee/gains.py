@@ -116,7 +116,7 @@ def plus(*sums: Iterable[int]) -> Sums:
 
 
 def flow_gains(loop: Loop, entry: Row) -> Row:
-    """The same without events, for ever: stretches of pieces, each twice as long as the one before."""
+    """The same without events, for all t: stretches of pieces, each twice as long as the one before."""
     flow, outputs, now = balanced(loop, entry)
     size, piece = len(flow), Fraction(1)
     while max(sum(map(abs, line)) for line in flow) * piece > Fraction(1, 1 << PARTS):

@@ -108,7 +108,7 @@ def statement(plant: Plant, law: Law, names: list[str], claims: Row) -> list[str
     return [
         f"plant with {len(plant.A)} states, {len(plant.B[0])} controls, {len(plant.sectors)} sectors, "
         f"{len(plant.loads)} loads; law with {len(law.A)} states, every {law.step} s, {law.delay} s late",
-        f"disturbances of at most {sizes}; {where}, for ever",
+        f"disturbances of at most {sizes}; {where}, for all t >= 0",
         ", ".join(f"|{name}| <= {upper(bound)}" for name, bound in zip(names, claims, strict=True)),
     ]
 

@@ -1,7 +1,7 @@
 """Verify certificate files of the kind ``stick_slip`` (FORMAT.md) with the Python standard library alone.
 
 From a fault that sticks or slides, a sampled law and a polytope of its states to bounds of slip, slip rate and pressure
-for ever. Whether the fault slides through a period or ends it at rest, no facet may exceed 1 at its end.
+for all t. Whether the fault slides through a period or ends it at rest, no facet may exceed 1 at its end.
 """
 
 from collections.abc import Iterator

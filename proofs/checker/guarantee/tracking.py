@@ -1,7 +1,7 @@
 """Verify certificate files of the kind ``guarantee`` (FORMAT.md) with the Python standard library alone.
 
 From a fault's data, a controller's matrices and the order of events in a period to bounds of slip, slip rate and
-pressure for ever. Nothing is searched for: ranges follow from rational inequalities, and the bounds from upper sums of
+pressure for all t. Nothing is searched for: ranges follow from rational inequalities, and the bounds from upper sums of
 impulse responses in integers, multiples of 2^-BITS, each with a bound of its error. `check.py` calls `verify`.
 """
 
@@ -125,7 +125,7 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
         f"less [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, of a pressure {upper(task.b)} m^2/kg times "
         f"[1, {upper(task.beta[1])}]",
         f"law with {len(loop['states'])} states{implicit}{told}, {when}{off}",
-        f"disturbance: {kind}; {where}, along the reference, for ever; small gain {upper(small)}",
+        f"disturbance: {kind}; {where}, along the reference, for all t >= 0; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",
         f"|slip - reference| <= {upper(claims['slip_error'])} m, "
         f"|slip rate - reference's| <= {upper(claims['slip_rate_error'])} m/s",

@@ -33,21 +33,19 @@ from quakedesign.plant.ranges import FaultPlant
 #
 # Controllers are any: linear or not, with memory, knowing plant, errors and stress exactly up to the sample.
 #
-# **Theorem 1 (surprise).** If pressures are decided at samples T apart, no controller keeps |y| below D·h(t) for any
-# 0 ≤ t < T, h the response of y to a unit step of d with q = 0: h(0) = 1/S.
-# *Proof.* Take d = D for ever, and the course on which it turns to −D just after a sample. All that is decided at
-# this
-# sample or before is the same, so q is, until the next one. The two courses of y then differ by 2D·h(t) at t after
-# the
-# turn, and one of them is at least D·h(t) in size. ∎  By continuity t = T may be taken as well.
+# **Theorem 1 (surprise).** If pressures are decided at samples T apart, no controller keeps |y| below D·h(t) for any 0
+# ≤ t < T, h the response of y to a unit step of d with q = 0: h(0) = 1/S. *Proof.* Take d = D for all t, and the course
+# on which it turns to −D just after a sample. All that is decided at this sample or before is the same, so q is, until
+# the next one. The two courses of y then differ by 2D·h(t) at t after the turn, and one of them is at least D·h(t) in
+# size. ∎  By continuity t = T may be taken as well.
 #
 # **Theorem 2 (push).** Let λ > 0 be an eigenvalue without control, G the transfer function of the path from well to
 # fault, whose impulse response is not negative, and q the path's answer to the well's u, |u| ≤ P. If a stress d = D
 # begins while x = z = u = 0 and u stays 0 until T later, no controller keeps x and z bounded if D·e^{λT} > μP·G(λ).
 # *Proof.* The plant is controllable from y, so that a left eigenvector w can be scaled to give ζ = w·(x, z) with
 # ζ′ = λζ + μq + d. With what u up to now will still do, η: η′ = λη + μG(λ)u + D, η(0) = 0. Until T η grows to
-# D(e^{λT} − 1)/λ, and then η′ ≥ λη + D − μG(λ)P > 0 for ever: η grows exponentially. What differs from ζ is bounded.
-# ∎
+# D(e^{λT} − 1)/λ, and then η′ ≥ λη + D − μG(λ)P > 0 at all later t: η grows exponentially. What differs from ζ is
+# bounded. ∎
 
 _BITS = 128
 _ZERO, _ONE = Fraction(0), Fraction(1)
@@ -108,16 +106,11 @@ class SlidingPush:
 # What no controller whatever can do with a fault: two theorems, evaluated in ball arithmetic.
 #
 # A claim about all frictions and parameters of the box fails if it fails for one of them, so each theorem picks the
-# plant
-# that hurts most among a few. κ = k̂ − φ1 and w = η̂ − φ2 stand for the plant, φ is any measurable function of time
-# with
-# |φ| ≤ H, the pressure p is whatever a controller likes: linear or not, with memory, knowing plant, slip, slip rate
-# and
-# disturbance exactly up to the sample; or, with noise in theorem 1, knowing the plant and being told, at all times up
-# to
-# the sample, slip and slip rate within n and n′ of the true ones, either of which may be missing (n = ∞). X and P
-# below
-# are the largest slip-rate error and the largest withdrawal.
+# plant that hurts most among a few. κ = k̂ − φ1 and w = η̂ − φ2 stand for the plant, φ is any measurable function of
+# time with |φ| ≤ H, the pressure p is whatever a controller likes: linear or not, with memory, knowing plant, slip,
+# slip rate and disturbance exactly up to the sample; or, with noise in theorem 1, knowing the plant and being told, at
+# all times up to the sample, slip and slip rate within n and n′ of the true ones, either of which may be missing (n =
+# ∞). X and P below are the largest slip-rate error and the largest withdrawal.
 #
 # **Theorem 1 (surprise).** Let the pressure be decided at samples T apart, act θ later and stay for T. On the plant
 # continued to negative slip rates no controller keeps the slip error within E and the slip-rate error below X for
@@ -136,45 +129,31 @@ class SlidingPush:
 # and σ must not be negative. Friction that does not change, m = 0, leaves σ = σ₊ = s = −κ, and E may be any bound.
 # *Proof.* Suppose |e1| ≤ E, |e2| ≤ X′ < X for every φ and every noise. Take φ = H from the rest of r on. While p is
 # held, y = e2 obeys y″ = σ_k·y − w·y′ with σ_k = s − N̂mq_k. Integrated over the T that q_k lasts, e2′ bounds q_k:
-# −(2X′/T
-# + sE + |w|X′ + H) ≤ N̂q_k(μr − mE) ≤ 2X′/T + sE + |w|X′, so σ ≤ σ_k ≤ σ₊. If y ≥ δ > 0 at all changes of p from some
-# on,
-# then y is in between above the solution for σ₊ with δ at both ends (maximum principle, or for σ < 0 since κT² ≤ 1 <
-# π²),
-# each T adds at least a fixed part of δ to e1, and e1 leaves E. So for every δ some change of p, at t + θ + T with t
-# a
-# sample, has e2 < δ, as late as one likes. Turn φ to −H at t − τ. As long as p is the same in both, the difference d
-# of
-# both courses has d2′ = σ(t)d1 − w·d2 + 2H with σ ≤ σ(t) ≤ σ₊, so that d1 and d2 are at least 0 and at most what σ₊
-# makes
-# of them: up to t at most 2n and 2n′. So let what is told be n and n′ too low in the first course, always, and higher
-# by
-# d in the turned one: it is within n and n′ there too, and up to t what is told is the same, which decides what p
-# does
-# until t + θ + T. By then d2 ≥ 2H·h(τ + θ + T) ≥ X, and the turned course has e2 < δ − X, for every δ > 0. ∎
-# A controller that holds for T also holds for T/n, and one that acts θ late could act earlier, so T and θ may be
-# shortened, and τ as well.
+# −(2X′/T + sE + |w|X′ + H) ≤ N̂q_k(μr − mE) ≤ 2X′/T + sE + |w|X′, so σ ≤ σ_k ≤ σ₊. If y ≥ δ > 0 at all changes of p
+# from some on, then y is in between above the solution for σ₊ with δ at both ends (maximum principle, or for σ < 0
+# since κT² ≤ 1 < π²), each T adds at least a fixed part of δ to e1, and e1 leaves E. So for every δ some change of p,
+# at t + θ + T with t a sample, has e2 < δ, as late as one likes. Turn φ to −H at t − τ. As long as p is the same in
+# both, the difference d of both courses has d2′ = σ(t)d1 − w·d2 + 2H with σ ≤ σ(t) ≤ σ₊, so that d1 and d2 are at least
+# 0 and at most what σ₊ makes of them: up to t at most 2n and 2n′. So let what is told be n and n′ too low in the first
+# course, always, and higher by d in the turned one: it is within n and n′ there too, and up to t what is told is the
+# same, which decides what p does until t + θ + T. By then d2 ≥ 2H·h(τ + θ + T) ≥ X, and the turned course has e2 < δ −
+# X, for every δ > 0. ∎ A controller that holds for T also holds for T/n, and one that acts θ late could act earlier, so
+# T and θ may be shortened, and τ as well.
 #
 # **Theorem 2 (withdrawal).** Let a fault rest at p = 0 when a push φ = H begins, and the pressure at the well be 0
-# until
-# T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse response is not
-# negative: delay, diffusion 1/cosh √(sL²/D). Friction that falls from μ* by m per slip gives s = N̂mσ′ − κ and, for s
-# > 0,
-# the unstable pole λ, λ² + wλ = s. If
+# until T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse response is
+# not negative: delay, diffusion 1/cosh √(sL²/D). Friction that falls from μ* by m per slip gives s = N̂mσ′ − κ and, for
+# s > 0, the unstable pole λ, λ² + wλ = s. If
 #
 #     H·e^{λT} > N̂μ*·P·G(λ),
 #
-# then slip passes E = (μ* − μ_res)/m, where friction has lost all that it can, whatever the controller does, even if
-# it
-# knows φ and the plant from the onset on; also where friction sticks instead of reversing.
-# *Proof.* For 0 ≤ x1 ≤ E: x2′ ≥ s·x1 − w·x2 + N̂(μ* − m·x1)p_f + H, an equality unless the fault sticks, and the
-# third
-# term is at least c·min(p_f, 0), c = N̂μ*, and min(p_f, 0) at least the path's answer to u = min(p, 0). With z = (λ +
-# w)x1
-# + x2, z′ = λz + … so that z ≥ ζ, ζ = z0 + what u up to now will still do; ζ′ = λζ + cG(λ)u + H, ζ(0) = 0. Until T ζ
-# grows to H(e^{λT} − 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 for ever: ζ grows exponentially. x1′ = z − (λ + w)x1
-# with
-# z ≥ ζ > 0 keeps x1 positive, so the premise x1 ≥ 0 lasts, and takes x1 beyond E. ∎
+# then slip passes E = (μ* − μ_res)/m, where friction has lost all that it can, whatever the controller does, even if it
+# knows φ and the plant from the onset on; also where friction sticks instead of reversing. *Proof.* For 0 ≤ x1 ≤ E: x2′
+# ≥ s·x1 − w·x2 + N̂(μ* − m·x1)p_f + H, an equality unless the fault sticks, and the third term is at least c·min(p_f,
+# 0), c = N̂μ*, and min(p_f, 0) at least the path's answer to u = min(p, 0). With z = (λ + w)x1 + x2, z′ = λz + … so
+# that z ≥ ζ, ζ = z0 + what u up to now will still do; ζ′ = λζ + cG(λ)u + H, ζ(0) = 0. Until T ζ grows to H(e^{λT} −
+# 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 at all later t: ζ grows exponentially. x1′ = z − (λ + w)x1 with z ≥ ζ > 0
+# keeps x1 positive, so the premise x1 ≥ 0 lasts, and takes x1 beyond E. ∎
 #
 # **Theorem 3 (a fault that sticks).** Let a fault rest at slip 0 and p = 0, held by friction, and never slip backward.
 # Let the pressure be decided at samples T apart and stay for T. No controller that moves it at all keeps its slip rate

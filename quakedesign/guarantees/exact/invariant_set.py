@@ -7,11 +7,11 @@ it x(θ) = e^{Aθ}(Cξ + Σ j·n) + ∫₀^θ e^{Aσ}Σ b_i·w_i dσ, n the samp
 
 **Theorem.** Let X = {ξ: |h_l·ξ| ≤ 1 for all l}, 0 ∈ X, and let every input be at most W_i. Suppose |h_l·Bx(T)| ≤ 1 for
 all l and T_s ≤ T ≤ T_m, and |c_y·x(θ)| ≤ Y_y for 0 ≤ θ ≤ T_m, whatever ξ ∈ X and the inputs are. If W_i ≥ F_i + Σ_y
-c_iy·Y_y for every input (`inputs`), then from rest every output stays below Y_y for ever.
+c_iy·Y_y for every input (`inputs`), then from rest every output stays below Y_y for all t.
 
 **Proof.** By induction ξ stays in X while the inputs obey their bounds. Along a trajectory of the loop s, w, β and φ
 are some functions of time, with which the inputs are linear in the state. Cut what they make off at ±W_i: a solution of
-that obeys all bounds of the inputs for ever, hence |y| ≤ Y_y for ever, so that nothing was cut off and it solves the
+that obeys all bounds of the inputs for all t, hence |y| ≤ Y_y for all t, so that nothing was cut off and it solves the
 loop as well; that solution is unique. ∎
 
 **What is verified.** With r facets l ∈ L that are independent, |gξ| ≤ |gH_L⁻¹|·1 on X: a file says which r facets to

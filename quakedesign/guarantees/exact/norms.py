@@ -455,9 +455,8 @@ def unstable() -> ParameterError:
 # ----------------------------------------------------------------------
 # How far a start away from 0 takes a periodic loop without inputs: the sup of its free response, in ball arithmetic.
 #
-# **Statement.** Let x′ = Ax between jumps and x(0) = Σ θ_i·s_i with |θ_i| ≤ 1, just before the first jump. Then
-# |cx(t)| ≤
-# g with the g that `free_peaks` returns for the part of the period in which t lies.
+# **Statement.** Let x′ = Ax between jumps and x(0) = Σ θ_i·s_i with |θ_i| ≤ 1, just before the first jump. Then |cx(t)|
+# ≤ g with the g that `free_peaks` returns for the part of the period in which t lies.
 #
 # **Proof.** Let X have the columns s_i and Ψ be the map of one period, so that |cx(t)| is at most the sum of the
 # absolute
@@ -583,25 +582,20 @@ def _pieces(flow: SegmentFlow, rows: Any, columns: Any, weights: list[Any]) -> I
 #   are below a chord plus remainders, hence at most the larger of the two ends plus remainders. ∎
 #
 # **Sampled inputs.** Where Σ j·w_k enters with the jumps at kT and |w_k| ≤ W for every k up to t, |cx(t)| ≤ W·Σ|cΦ(t,
-# kT)j|: the same with a sum in place of the integral. A period has the one column e^{Aτ}j without a remainder, the
-# flow
+# kT)j|: the same with a sum in place of the integral. A period has the one column e^{Aτ}j without a remainder, the flow
 # since the last jump adds |ce^{Aθ}j|, which is within (β − α)²/8·max|cA²e^{Aσ}j| of its chord.
 #
-# **Fading inputs.** Where |w(τ)| ≤ W·ω(τ) with a weight ω of the phase, let Ω ≥ ∫ω and Ω′ ≥ ∫(τ − α)ω over a piece
-# that
-# begins at α. There |cΦ(t, τ)b| ≤ |cΦ(t, α)b| + (τ − α)·max|cΦA·b|, so Ω|cΦ(t, α)b| + Ω′·max|…| stands in place of
-# the trapezoidal sum. Of the flow since the last jump, a piece that has passed adds Ω|ce^{A(θ − α)}b|, which is
-# within (β
-# − α)²/8·Ω·max|cA²e^{Aσ}b| of its chord, and Ω′ times the largest slope; the piece in which θ lies adds at most
+# **Fading inputs.** Where |w(τ)| ≤ W·ω(τ) with a weight ω of the phase, let Ω ≥ ∫ω and Ω′ ≥ ∫(τ − α)ω over a piece that
+# begins at α. There |cΦ(t, τ)b| ≤ |cΦ(t, α)b| + (τ − α)·max|cΦA·b|, so Ω|cΦ(t, α)b| + Ω′·max|…| stands in place of the
+# trapezoidal sum. Of the flow since the last jump, a piece that has passed adds Ω|ce^{A(θ − α)}b|, which is within (β −
+# α)²/8·Ω·max|cA²e^{Aσ}b| of its chord, and Ω′ times the largest slope; the piece in which θ lies adds at most
 # Ω·max|ce^{Aσ}b|. Since e^{−x} ≤ 1/(1 + x + x²/2 + x³/6 + x⁴/24) = E(x), the weight he^{−λθ} + f has Ω =
-# hE(λα)·min(1/λ,
-# ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
+# hE(λα)·min(1/λ, ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
 #
 # **Pulses.** Where w is there from `early` before a jump J to `late` after it, an impulse of it at −σ or σ has become
 # Je^{Aσ}b or e^{−Aσ}b, after the jump, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. As the area before the
 # jump, over `before`, and that after it, over `after`, are W in all, what comes of both is at most the larger of what
-# `before`·Jb and `after`·b become, and of these remainders. With x and y for the two that is |x + y|/2 + |x − y|/2:
-# two
+# `before`·Jb and `after`·b become, and of these remainders. With x and y for the two that is |x + y|/2 + |x − y|/2: two
 # columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added to the
 # outputs of the pieces that `early` reaches.
 #

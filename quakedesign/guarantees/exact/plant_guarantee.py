@@ -70,6 +70,8 @@ class PlantGuarantee:
     """
 
     proved: ClassVar[Literal[True]] = True
+    verdict: ClassVar[Verdict] = Verdict.PROVED
+    reason: ClassVar[str] = ""
     part: LinearPart
     law: MatrixLaw
     pieces: int
@@ -89,10 +91,10 @@ class PlantGuarantee:
         named = named if len(named) == len(bounds) else [f"row {i}" for i in range(1, len(bounds) + 1)]
         return [f"|{name}| <= {bound:.4g}" for name, bound in zip(named, bounds, strict=True)]
 
-    def bound(self, name: str) -> UpperBound:
-        """Peak of an output or a control by its name."""
-        bounds = (*self.claims.outputs, *self.claims.controls)
-        return dict(zip((*self.outputs, *self.controls), bounds, strict=True))[name]
+    @property
+    def bounds(self) -> dict[str, UpperBound]:
+        """Peaks by the names of outputs and controls, in the units of the plant."""
+        return dict(zip((*self.outputs, *self.controls), (*self.claims.outputs, *self.claims.controls), strict=True))
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
@@ -127,11 +129,10 @@ class PlantGuarantee:
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts."""
-        named = zip((*self.outputs, *self.controls), (*self.claims.outputs, *self.claims.controls), strict=True)
         return {
             "verdict": "proved",
             "sentence": self.sentence(),
-            "peaks": {name: bound.exact for name, bound in named},
+            "peaks": {name: bound.exact for name, bound in self.bounds.items()},
             "step": str(self.law.step),
             "delay": str(self.law.delay),
             "notes": list(self.notes),

@@ -8,13 +8,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from fractions import Fraction
 from itertools import chain
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 from flint import arb, ctx
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
-from quakedesign.exact import LowerBound, UpperBound, shortly
+from quakedesign.exact import Bound, LowerBound, UpperBound, shortly
 from quakedesign.guarantees.exact.loop import NOISELESS, Channel, Gains, GainSpread, beside, channels_of, through_layer
 from quakedesign.guarantees.exact.norms import ball, flow_norms, norms
 from quakedesign.laws import ImplicitRoot, NominalModel, Power
@@ -23,19 +24,15 @@ from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
-# The robust small-gain theorem for a loop that runs: bounds for ever, in exact arithmetic.
+# The robust small-gain theorem for a loop that runs: bounds for all t, in exact arithmetic.
 #
 # **Theorem.** Let a loop be linear with inputs w_1 … w_n, first at 0, and g_yi,j gains as those of `norms`: |y(τ)| ≤
-# Σ_i
-# g_yi,j·W_i(t) for τ ≤ t in part j of the period, W_i(t) the essential supremum of |w_i| on [0, t] (for a sampled
-# input,
-# over the samples up to t). Let every input in turn be bounded by the outputs, |w_i| ≤ F_i + Σ_y c_iy·|y| at every
-# time,
-# c ≥ 0, and M_ik = max_j Σ_y c_iy·g_yk,j. If the spectral radius of M is below 1, then W(t) ≤ (1 − M)⁻¹F for every t,
-# and the outputs stay below max_j Σ_i g_yi,j·W_i for ever. For W(t) ≤ F + M·W(t), W(t) is finite, because the
-# solution
-# of such a loop is bounded on [0, t], and (1 − M)⁻¹ = 1 + M + M² … has no negative entry. Nothing is assumed about
-# stability. ∎
+# Σ_i g_yi,j·W_i(t) for τ ≤ t in part j of the period, W_i(t) the essential supremum of |w_i| on [0, t] (for a sampled
+# input, over the samples up to t). Let every input in turn be bounded by the outputs, |w_i| ≤ F_i + Σ_y c_iy·|y| at
+# every time, c ≥ 0, and M_ik = max_j Σ_y c_iy·g_yk,j. If the spectral radius of M is below 1, then W(t) ≤ (1 − M)⁻¹F
+# for every t, and the outputs stay below max_j Σ_i g_yi,j·W_i for all t. For W(t) ≤ F + M·W(t), W(t) is finite, because
+# the solution of such a loop is bounded on [0, t], and (1 − M)⁻¹ = 1 + M + M² … has no negative entry. Nothing is
+# assumed about stability. ∎
 #
 # **Inputs.** Let v stand for b·(p − p*) [m/s²] and let the middle of the ranges of s, w and β be the model of the
 # nominal loop. Then e2′ = s0·e1 − w0·e2 + β0·v + a with the ``acceleration``
@@ -44,27 +41,19 @@ from quakedesign.plant.ranges import FaultPlant
 #
 # so its F is a bound of |φ − w·r′ − r″| and its c are half the ranges; p* drifts by d = b·dp*/dt, the ``drift``.
 #
-# **Class rate.** For |φ| ≤ H and |φ′| ≤ Ḣ with φ(0) = 0, and friction of the slip alone, shift p* by φ/(β·b), with
-# the β
-# of the plant: φ leaves a, v becomes b(p − p*) + φ/β, and d gains (φ/β)′. N̂ being constant, |β′| ≤ μ′·N̂|x2|/b with
-# the
-# largest slope μ′, so |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b, because β ≥ 1. Where friction depends on the slip
-# rate
-# as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0. A disturbance of this
-# class is one of the class amplitude too, so the smaller of both bounds holds for every output.
+# **Class rate.** For |φ| ≤ H and |φ′| ≤ Ḣ with φ(0) = 0, and friction of the slip alone, shift p* by φ/(β·b), with the
+# β of the plant: φ leaves a, v becomes b(p − p*) + φ/β, and d gains (φ/β)′. N̂ being constant, |β′| ≤ μ′·N̂|x2|/b with
+# the largest slope μ′, so |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b, because β ≥ 1. Where friction depends on the slip
+# rate as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0. A disturbance of
+# this class is one of the class amplitude too, so the smaller of both bounds holds for every output.
 #
 # **Start.** Where the loop starts at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of rest, |y(τ)| ≤ h_y,j + Σ_i g_yi,j·W_i(t)
-# by
-# superposition, with h_y,j ≥ |y| of the free response in part j, from every such start (`free_response`). So a start
-# is
-# one input more, ``start``, with F = 1, no c and the gains h, whose row of M is zero: the spectral radius stays. The
-# s_i
-# are bounds of e1(0) and e2(0), of both signs, and what the law makes at first of what it is told then; nothing else
-# moves before the first sample: p is 0, and so is p* at r = 0, as r(0) = r′(0) = 0. In the class rate φ(0) = 0, so
-# the
-# shift of p* is 0 too. Below, the loop of every β_i starts alike; since t = 0 counts, what bounds e1 and e2 for ever
-# is
-# at least their bound at first, so that E and R exceed that as well.
+# by superposition, with h_y,j ≥ |y| of the free response in part j, from every such start (`free_response`). So a start
+# is one input more, ``start``, with F = 1, no c and the gains h, whose row of M is zero: the spectral radius stays. The
+# s_i are bounds of e1(0) and e2(0), of both signs, and what the law makes at first of what it is told then; nothing
+# else moves before the first sample: p is 0, and so is p* at r = 0, as r(0) = r′(0) = 0. In the class rate φ(0) = 0, so
+# the shift of p* is 0 too. Below, the loop of every β_i starts alike; since t = 0 counts, what bounds e1 and e2 for
+# ever is at least their bound at first, so that E and R exceed that as well.
 #
 # **Noise.** A law that is told e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples has two sampled inputs
 # more, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c; nothing else is said of their courses.
@@ -73,73 +62,47 @@ from quakedesign.plant.ranges import FaultPlant
 #
 # **Implicit root.** A law that uses the end w of an implicit step is linear but for the sampled input ``root``, w_k +
 # γe1/T_s at the samples, γ the middle of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤ R
-# (`sector`). E and R are the claims themselves. Let the claims follow from these bounds of the inputs. If e was
-# within
+# (`sector`). E and R are the claims themselves. Let the claims follow from these bounds of the inputs. If e was within
 # them at the samples before kT_s, then the inputs up to kT_s, which these samples alone decide, obey the bounds, so e
-# is
-# within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do.
-# With
-# noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places of E and R, and ε gains δγN1/T_s. ∎
+# is within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do.
+# With noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places of E and R, and ε gains
+# δγN1/T_s. ∎
 #
 # **Jitter.** Let sample k be measured within J of kT_s, the first at 0, and let the valve's pressure leave p_{k−1}
-# within
-# A of when p_k is due and go to p_k without turning back, over a time of at most Θ, with |p_k − p_{k−1}|/Θ at least
-# until
-# it is there. Keep the nominal loop on schedule. What it is told is then e(kT_s) and what e moves until it is
-# measured:
-# |n1| ≤ J(|e2| + r′), r′ where it is compared with the reference at kT_s, and |n2| ≤ J(|e2′| + |r″|), |e2′| ≤
-# max|s||e1|
-# + max|w||e2| + max β|v| + |φ − w·r′ − r″|: both are c and F of the inputs of noise. The valve's pressure is j more
-# than
-# on schedule, b·|j| ≤ |u_k|, u_k = b(p_k − p_{k−1}), the output ``stepped``, and only from A before to A + Θ after
-# p_k is
-# due: p_k where it is early, p_{k−1} where it is late. The input ``late`` is b·j, which acts as the valve's pressure
-# does, F = 0 and c = 1 for u_k. Let f be the share of the step that is made when p_k is due. The areas of b|j| before
-# and
-# after that are E and L times |u_k|: where it begins late, E = 0 and L ≤ A + Θ/2; where it begins early, E ≤ f·A and
-# L ≤
-# (1 − f)²·Θ/2. So E/A + L/(A + Θ/2) ≤ 1 always, and ``late`` is a `Pulse`. v = b(p − p*) is what the nominal loop has
-# of
-# it at the same time or, of the pressure before or after, A + Θ away at most, when p* was d times that time another:
-# the
-# output ``push`` (behind a lag ``asked``) has that more.
+# within A of when p_k is due and go to p_k without turning back, over a time of at most Θ, with |p_k − p_{k−1}|/Θ at
+# least until it is there. Keep the nominal loop on schedule. What it is told is then e(kT_s) and what e moves until it
+# is measured: |n1| ≤ J(|e2| + r′), r′ where it is compared with the reference at kT_s, and |n2| ≤ J(|e2′| + |r″|),
+# |e2′| ≤ max|s||e1| + max|w||e2| + max β|v| + |φ − w·r′ − r″|: both are c and F of the inputs of noise. The valve's
+# pressure is j more than on schedule, b·|j| ≤ |u_k|, u_k = b(p_k − p_{k−1}), the output ``stepped``, and only from A
+# before to A + Θ after p_k is due: p_k where it is early, p_{k−1} where it is late. The input ``late`` is b·j, which
+# acts as the valve's pressure does, F = 0 and c = 1 for u_k. Let f be the share of the step that is made when p_k is
+# due. The areas of b|j| before and after that are E and L times |u_k|: where it begins late, E = 0 and L ≤ A + Θ/2;
+# where it begins early, E ≤ f·A and L ≤ (1 − f)²·Θ/2. So E/A + L/(A + Θ/2) ≤ 1 always, and ``late`` is a `Pulse`. v =
+# b(p − p*) is what the nominal loop has of it at the same time or, of the pressure before or after, A + Θ away at most,
+# when p* was d times that time another: the output ``push`` (behind a lag ``asked``) has that more.
 #
-# Some of these bounds are by outputs a little later, up to t + T_s for an input at t. But beyond t let the nominal
-# loop
+# Some of these bounds are by outputs a little later, up to t + T_s for an input at t. But beyond t let the nominal loop
 # go on with no inputs but those that bring what has been measured or has come before t to its instant: they obey the
-# same
-# bounds, and beyond t + T_s there is none. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is not more. A root is one of
-# what
-# was measured: of e at a time up to which the bounds hold, so that E and R have no more on top than noise, J·r′ and
-# J·|r″|, and ε gains δγ(N1 + J·r′)/T_s. What is told may as well be a mean of e, with any weights, over times within
-# J of
-# kT_s: it is as near e(kT_s), and within the bounds if e is. ∎
+# same bounds, and beyond t + T_s there is none. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is not more. A root is one
+# of what was measured: of e at a time up to which the bounds hold, so that E and R have no more on top than noise, J·r′
+# and J·|r″|, and ε gains δγ(N1 + J·r′)/T_s. What is told may as well be a mean of e, with any weights, over times
+# within J of kT_s: it is as near e(kT_s), and within the bounds if e is. ∎
 #
-# **Slow input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤ κ(2E +
-# r′σ),
+# **Slow input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤ κ(2E + r′σ),
 # σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Cut the range of β into parts with middles β_i and half widths δ. Fix t, let
 # β(t) be in part i, and take β_i in place of β0 in the nominal loop up to t: |β(τ) − β_i| ≤ δ + 2κE + κr′σ, and σ ≤
-# e^{ασ}/(eα) for every α > 0. So (β − β_i)v is at most (δ + 2κE)|v|, as before with a smaller c, and ``aged``, an
-# input
+# e^{ασ}/(eα) for every α > 0. So (β − β_i)v is at most (δ + 2κE)|v|, as before with a smaller c, and ``aged``, an input
 # that enters as a does with c = κr′/(eα) for v, its gains those of the loop with A + α in place of A, whose responses
-# are
-# e^{ασ} times as large. All gains are the largest over the parts. E is the claim on the slip error, which has to
-# exceed
-# the bound that follows: e1 is continuous and below E at first, so it never reaches E. ∎
+# are e^{ασ} times as large. All gains are the largest over the parts. E is the claim on the slip error, which has to
+# exceed the bound that follows: e1 is continuous and below E at first, so it never reaches E. ∎
 #
-# **Layer between well and fault.** Its pressure is that of its modes, v, and what they leave out, R, |R| ≤ sup|y|
-# with
-# the output y = ``left_out`` (`quakedesign.loop.layer`). Of β(v + R) the loop has β0·v and what is known of β0·R,
-# with
-# x2 = e2 − β0Y in place of e2 (`quakedesign.loop.layer`). So (β − β0)R comes into x2′ beside a, with the c of v
-# for
-# y: where the well's pressure moves, within a; where it steps, R fades after every step and is an input of its own.
-# What
+# **Layer between well and fault.** Its pressure is that of its modes, v, and what they leave out, R, |R| ≤ sup|y| with
+# the output y = ``left_out`` (`quakedesign.loop.layer`). Of β(v + R) the loop has β0·v and what is known of β0·R, with
+# x2 = e2 − β0Y in place of e2 (`quakedesign.loop.layer`). So (β − β0)R comes into x2′ beside a, with the c of v for y:
+# where the well's pressure moves, within a; where it steps, R fades after every step and is an input of its own. What
 # is past of a slow gain takes R as it takes v, with the same c. Two inputs more, F = 0 and c = 1 for y, are
-# ``awaited``,
-# β0Y in e1′ and x2′, and ``awaited_told``, what the law is told of it, as of noise, at the samples: e2 is measured,
-# not
-# x2. A bound of e2 is one of x2 and one of β0Y: the gain of ``awaited`` and what that adds at once. ∎
+# ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, what the law is told of it, as of noise, at the samples: e2 is
+# measured, not x2. A bound of e2 is one of x2 and one of β0Y: the gain of ``awaited`` and what that adds at once. ∎
 
 _ZERO = Fraction(0)
 OUTPUTS = ("slip_error", "slip_rate_error", "push")
@@ -203,6 +166,8 @@ class NoGuarantee:
     """
 
     proved: ClassVar[Literal[False]] = False
+    verdict: ClassVar[Verdict] = Verdict.UNDECIDED
+    bounds: ClassVar[Mapping[str, Bound]] = MappingProxyType({})
     reason: str
     small_gain: UpperBound | None
     needs: Fraction | None = None
@@ -453,13 +418,10 @@ def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:
 # e1/T_s ≥ 0, and the same mirrored where e1 ≤ 0.
 #
 # **Proof.** F(w) = w − e2 + q is strongly monotone, so w is at most ω wherever F(ω) holds a number that is not
-# negative.
-# For e2 ≤ R and 0 ≤ u ≤ E/T_s take ω = ε − γ0·u, where e1 + T_s·ω = T_s(ε + (1 − γ0)u). As q is odd, the lower line
-# is
-# the upper one of −e1: ω = ε + γ1·u, e1 + T_s·ω = T_s(ε − (1 − γ1)u). On a part of the range of u both arguments of q
-# are at least the smaller of their ends, and q never falls, with ⌈0⌋⁰ taken as 1; parts are halved until that shows ω
-# − R
-# + q ≥ 0 on each, or too small. ∎
+# negative. For e2 ≤ R and 0 ≤ u ≤ E/T_s take ω = ε − γ0·u, where e1 + T_s·ω = T_s(ε + (1 − γ0)u). As q is odd, the
+# lower line is the upper one of −e1: ω = ε + γ1·u, e1 + T_s·ω = T_s(ε − (1 − γ1)u). On a part of the range of u both
+# arguments of q are at least the smaller of their ends, and q never falls, with ⌈0⌋⁰ taken as 1; parts are halved until
+# that shows ω − R + q ≥ 0 on each, or too small. ∎
 
 Range = tuple[Fraction, Fraction]
 

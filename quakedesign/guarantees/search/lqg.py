@@ -363,10 +363,9 @@ def _ahead(task: FaultPlant, step: Fraction, delay: Fraction) -> ErrorPrediction
 # An e-LQR that holds slow sliding: LQ on the sampled plant through its path, fed by a Kalman observer of the slip.
 #
 # The model is scaled: slip error in D, pressures and stresses in N, time in 1/ρ = D/V; the law carries the slow modes
-# of
-# the layer of rock and a level of everything that it does not know. Whatever the numbers, its states rest where it
-# asks
-# for a constant pressure without errors: the gain of the level, and how the level moves the slip, follow from that.
+# of the layer of rock and a level of everything that it does not know. Whatever the numbers, its states rest where it
+# asks for a constant pressure without errors: the gain of the level, and how the level moves the slip, follow from
+# that.
 
 SLIDING_MODES = 4
 _DIGITS = 9

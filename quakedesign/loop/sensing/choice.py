@@ -127,20 +127,16 @@ def _function(unit: Differentiator) -> Any:
 # Whether λ_d and the sampling period go together with a law.
 #
 # A differentiator of order n_d = 1 needs |x1''| < λ_d, while the errors ε1, ε2 of its estimates, which grow with λ_d,
-# act
-# through the law on x1'' itself. With A the largest |x1''| of the loop with exact states and B the largest input
+# act through the law on x1'' itself. With A the largest |x1''| of the loop with exact states and B the largest input
 # gain,
 #
 #     A + B·max |p(e1 + ε1, e2 + ε2) − p(e1, e2)| < λ_d
 #
 # is self-consistent. For signed powers up to 1 the difference is largest astride the origin, at e = −ε/2. The left-
-# hand
-# side grows with λ_d as ε does for a linear law, so that the sampling period decides, and more slowly for a sliding
-# mode,
-# so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and there is none where the
-# pressure is held: x1'' jumps at every sample. The implicit discretisation needs none from rest, and what it then
-# tells
-# a linear law is proved (`quakedesign.loop.sensing.differentiator`).
+# hand side grows with λ_d as ε does for a linear law, so that the sampling period decides, and more slowly for a
+# sliding mode, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and there is
+# none where the pressure is held: x1'' jumps at every sample. The implicit discretisation needs none from rest, and
+# what it then tells a linear law is proved (`quakedesign.loop.sensing.differentiator`).
 #
 # The condition is what the differentiator asks for: no proof that the loop with estimates is stable, and loops may do
 # without it. It leaves out what lies between slip and differentiator; a mean of N readings lags by (N − 1)T/2 more.

@@ -49,8 +49,7 @@ from quakedesign.loop.sensing.measurement import Sensor, SlipStage
 #   Brogliato and Acary (2021), Int. J. Robust Nonlinear Control 31, 7679.
 #
 # In the implicit sliding mode z_i = ∇^i x/T^i, which lags: the i-th derivative is (−ln(1 − ∇))^i x/T^i, and the terms
-# of
-# that up to ∇^nd x are a combination of z_i … z_nd. `lag_free` has its coefficients i!/j!·|S1(j, i)|; with them the
+# of that up to ∇^nd x are a combination of z_i … z_nd. `lag_free` has its coefficients i!/j!·|S1(j, i)|; with them the
 # estimates have the accuracy T^(nd+1−i) of the continuous differentiator. For n_f = 0 this is the proper implicit
 # discretisation of Seeber (2024), arXiv:2404.02770.
 
@@ -153,11 +152,9 @@ def _stirling(j: int, i: int) -> int:
 #
 # Levant and Livne (2020), Robust exact filtering differentiators, European Journal of Control 55, 33, doi
 # 10.1016/j.ejcon.2019.08.006: λ̃_0 … λ̃_n for n = n_d + n_f = 0 … 12, rounded to about four digits. They are those of
-# the
-# recursive form with λ = 1.1, 1.5, 2, 3, 5, 7, 10, 12, 14, 17, 20, 26, 32 (there too, and up to n = 5 in Levant
-# (2003),
-# Higher-order sliding modes, differentiation and output-feedback control, Int. J. Control 76, 924), by
-# λ̃_n = λ_n and λ̃_j = λ_j·λ̃_(j+1)^(j/(j+1)).
+# the recursive form with λ = 1.1, 1.5, 2, 3, 5, 7, 10, 12, 14, 17, 20, 26, 32 (there too, and up to n = 5 in Levant
+# (2003), Higher-order sliding modes, differentiation and output-feedback control, Int. J. Control 76, 924), by λ̃_n =
+# λ_n and λ̃_j = λ_j·λ̃_(j+1)^(j/(j+1)).
 
 LONGEST = 12
 TABLES = (
@@ -372,19 +369,15 @@ def _next(entries: Iterator[Any], count: int) -> list[Any]:
 # ----------------------------------------------------------------------
 # What the implicit differentiator is, from rest, with a bound λ_d that is large enough: differences of readings.
 #
-# With y = (w_1 … w_nf, z_0 … z_nd) as in `quakedesign.loop.sensing.differentiator`, let before a reading x be w
-# = 0,
-# z_0 = x1 the reading before, and z_i = ∇ⁱx1/Tⁱ. Then b = y_1 + T(y_2 + … + T(z_0 − x + T·z_1 + …)) is
-# −T^nf·∇^(nd+1)x, and where |∇^(nd+1)x| ≤ λ̃_0·λ_d·T^(nd+1) the step gives s⁺ = 0. So w stays 0, z_0⁺ = x and, from
-# z_i⁺ = z_i + T·z_(i+1)⁺, z_(i+1)⁺ = ∇^(i+1)x/T^(i+1). At rest at slip 0 all of y is 0. By induction the
-# differentiator
-# is this filter for ever, whatever n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`),
-# and
-# a law that it tells is a law of the slip alone, whose guarantee counts all of its errors.
+# With y = (w_1 … w_nf, z_0 … z_nd) as in `quakedesign.loop.sensing.differentiator`, let before a reading x be w = 0,
+# z_0 = x1 the reading before, and z_i = ∇ⁱx1/Tⁱ. Then b = y_1 + T(y_2 + … + T(z_0 − x + T·z_1 + …)) is −T^nf·∇^(nd+1)x,
+# and where |∇^(nd+1)x| ≤ λ̃_0·λ_d·T^(nd+1) the step gives s⁺ = 0. So w stays 0, z_0⁺ = x and, from z_i⁺ = z_i +
+# T·z_(i+1)⁺, z_(i+1)⁺ = ∇^(i+1)x/T^(i+1). At rest at slip 0 all of y is 0. By induction the differentiator is this
+# filter for all t, whatever n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`), and a law
+# that it tells is a law of the slip alone, whose guarantee counts all of its errors.
 #
-# With |x1″| ≤ A and readings within ε, |∇^(nd+1)x| ≤ c·A·T² + 2^(nd+1)·ε: x1‴, which does not exist where the
-# pressure is
-# held, need not be bounded. ∇²x1 is the integral of x1″ with a triangle over two periods, so that c is the area of
+# With |x1″| ≤ A and readings within ε, |∇^(nd+1)x| ≤ c·A·T² + 2^(nd+1)·ε: x1‴, which does not exist where the pressure
+# is held, need not be bounded. ∇²x1 is the integral of x1″ with a triangle over two periods, so that c is the area of
 # ∇^(nd−1) of triangles, in size: straight lines between binomials of either sign, c = 1 for n_d = 1 and 3/2 for n_d =
 # 2.
 

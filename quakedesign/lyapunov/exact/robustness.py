@@ -27,10 +27,8 @@ from quakedesign.symbolic.terms import Term, cell_polynomial
 # How much a proved decrease withstands: numbers of a certificate alone, the same for every fault and every λ.
 #
 # Let V have degree m along a field of degree d. A perturbation w of the acceleration, e2' = β(ν + e3 + w), adds
-# β·∂V/∂e2·w to V'. For |w| ≤ g1|e1| + g2|e2| the quotients β|∂V/∂e2||e_i| / (−V'·V^{p_i}), p_i = (r_i − r_2 − d)/m,
-# are
-# homogeneous of degree 0, so they have largest values a_i, and V' stays negative where a1·g1·V^{p1} + a2·g2·V^{p2} <
-# 1.
+# β·∂V/∂e2·w to V'. For |w| ≤ g1|e1| + g2|e2| the quotients β|∂V/∂e2||e_i| / (−V'·V^{p_i}), p_i = (r_i − r_2 − d)/m, are
+# homogeneous of degree 0, so they have largest values a_i, and V' stays negative where a1·g1·V^{p1} + a2·g2·V^{p2} < 1.
 
 _PUSHED = 1
 """Index of e2, on which ν acts."""

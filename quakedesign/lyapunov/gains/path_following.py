@@ -531,11 +531,9 @@ class Objective(ABC):
 # ----------------------------------------------------------------------
 # Gains and V improved together: steps along the bilinear inequalities, each looked at again at the gains it finds.
 #
-# At gains k0 with V0 the products of changes of V and of k are left out, so that V and k move in one programme with
-# the
+# At gains k0 with V0 the products of changes of V and of k are left out, so that V and k move in one programme with the
 # largest margin (the path-following of Hassibi, How and Boyd, American Control Conference 1999). What a step finds
-# counts
-# only after a programme with these gains fixed has a margin too. Nothing here is proved.
+# counts only after a programme with these gains fixed has a margin too. Nothing here is proved.
 
 _ROUNDS = 100  # programmes of steps to solve at most
 

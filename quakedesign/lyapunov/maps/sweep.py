@@ -346,8 +346,7 @@ def _nested(loop: Loop) -> list[tuple[Fraction, ...]]:
 # ----------------------------------------------------------------------
 # Whether Lyapunov functions are found, followed from one point of a sweep to the next by bounds of their margin.
 #
-# The programme of a sweep (`parametric_cones`) has a centre for every τ > 0, where μ/τ − Σ log det S is least over
-# the
+# The programme of a sweep (`parametric_cones`) has a centre for every τ > 0, where μ/τ − Σ log det S is least over the
 # functionals L, with S = L(b bᵀ) of all blocks. Newton's step towards it bounds the margin from both sides:
 #
 # - where S + ΔS ≻ 0, the moved functional satisfies all equations, so that no margin is above its μ;

@@ -35,9 +35,8 @@ from quakedesign.sos.exact.work import limited
 # Regions of attraction by a Lyapunov function: what is claimed of a polynomial field, and whether its proof holds.
 #
 # V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite. Where a pure power of every state
-# is
-# in a basis of the squares of V, V is positive and grows without bound; where one is in a basis of σ_0 or σ_1, V̇ < 0
-# where V < level, but at the origin. Then {V < level} is bounded, is never left, and every solution in it tends to
+# is in a basis of the squares of V, V is positive and grows without bound; where one is in a basis of σ_0 or σ_1, V̇ <
+# 0 where V < level, but at the origin. Then {V < level} is bounded, is never left, and every solution in it tends to
 # zero.
 
 

@@ -185,11 +185,10 @@ class Expansion:
 # ----------------------------------------------------------------------
 # Polynomials and constraints read from text by a grammar of our own, in bounded time and memory.
 #
-# A polynomial is built from numbers (12, 0.5, 1e-8), names, + - * / ^ ** and parentheses. Products need their *,
-# powers
-# a whole number from 0 to 60, and only numbers divide. A constraint is two polynomials around >=, <= or ==.
-# A name that elsewhere is a number (pi, nan, …) is a variable only where the variables are given.
-# Nothing is ever handed to an interpreter, and every limit is enforced before the work that it limits.
+# A polynomial is built from numbers (12, 0.5, 1e-8), names, + - * / ^ ** and parentheses. Products need their *, powers
+# a whole number from 0 to 60, and only numbers divide. A constraint is two polynomials around >=, <= or ==. A name that
+# elsewhere is a number (pi, nan, …) is a variable only where the variables are given. Nothing is ever handed to an
+# interpreter, and every limit is enforced before the work that it limits.
 
 LENGTH = 20_000
 """Characters of one text."""

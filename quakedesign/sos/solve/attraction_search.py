@@ -157,9 +157,8 @@ def other_equilibrium(claim: Attraction) -> Point | None:
 #
 #     −V̇ − s·(1 − V),  1 − V − t·(β − shape)  and  V  sums of squares
 #
-# are found by `strict_proof` for the V at hand, and then V and β, the larger the better, by a programme that is
-# linear in
-# them (W. Tan and A. Packard, IEEE Trans. Automat. Contr. 53, 2008). Every V is proved anew by who asks.
+# are found by `strict_proof` for the V at hand, and then V and β, the larger the better, by a programme that is linear
+# in them (W. Tan and A. Packard, IEEE Trans. Automat. Contr. 53, 2008). Every V is proved anew by who asks.
 
 _ROUNDS = 30
 _GROWTH = Fraction(1002, 1000)  # of β in a round: less is no progress

@@ -48,8 +48,7 @@ from quakedesign.sos.solve.rounding import scaled
 # ----------------------------------------------------------------------
 # Multipliers of a polynomial on ℝⁿ: powers of the sum of squares, and sums of squares that are searched for it.
 #
-# A sum of squares σ of a degree with σ·P a sum of squares is a linear question. σ is found in floating point, in
-# scaled
+# A sum of squares σ of a degree with σ·P a sum of squares is a linear question. σ is found in floating point, in scaled
 # variables, then rounded, and proved to be a sum of squares; whether σ·P is one is decided exactly by who asks.
 
 _TERMS = 40  # of σ, so that the programme is solved within seconds

@@ -280,7 +280,7 @@ def test_an_implicit_step_begins_with_the_slip_rate_that_it_is_told_noise_includ
     noisy = guarantee(cta.task, held)
     assert (
         checker.verify(json.loads(guarantee_text(noisy)))[3].split("; ")[1]
-        == "from rest, along the reference, for ever"
+        == "from rest, along the reference, for all t >= 0"
     )
 
 

@@ -372,7 +372,7 @@ def test_a_dynamic_law_with_a_load_holds_it():
             lambda t, x, u=u: -x + 2 * (u - 0.5 * t), (0.1 * k, 0.1 * k + 0.1), [x], rtol=1e-9, max_step=0.02
         )
         reached, x = max(reached, np.abs(run.y).max()), run.y[0, -1]
-    assert 0.5 * float(found.bound("x")) < reached <= found.bound("x")
+    assert 0.5 * float(found.bounds["x"]) < reached <= found.bounds["x"]
     with pytest.raises(ParameterError, match="integral action"):
         qd.guarantee(plant, gains=[[1.5]], step="0.1")
     moved = qd.guarantee(plant, law=control.ss([[1 - 1e-9]], [[0.1]], [[-2]], [[-1.5]], 0.1))
@@ -418,9 +418,9 @@ def test_a_plant_of_python_control_has_its_names():
     system = control.ss([[0, 1], [-4, -1]], [[0], [1]], [[1, 0]], 0, inputs=["force"], outputs=["place"], name="arm")
     plant = qd.UncertainPlant.from_statespace(system, gains={"force": (0.9, 1.1)}, disturbances={"d": ([0, 1], 1)})
     found = qd.guarantee(plant, gains=[[1.0]], step="0.05")
-    assert found.bound("place") > 0
+    assert found.bounds["place"] > 0
     assert "|place|" in found.sentence()
-    assert found.to_dict()["peaks"]["place"] == found.bound("place").exact
+    assert found.to_dict()["peaks"]["place"] == found.bounds["place"].exact
 
 
 def friction_run(found, law, blocks, seed):

@@ -1,0 +1,95 @@
+"""Results of `guarantee` offer the same names, whatever friction and plant they are about."""
+
+from pathlib import Path
+
+import pytest
+
+import quakedesign as qd
+from quakedesign.errors import CertificateError
+from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.guarantees.guarantee_result import LoopAnswer, SlidingAnswer
+from quakedesign.guarantees.search.adversary import WorstSliding
+from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
+from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer
+from quakedesign.lyapunov.exact.claim import Verdict
+
+PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
+FAULT = qd.load_fault("real-fault")
+
+
+def stored(kind):
+    """Claim of the first stored certificate of a kind."""
+    claims = (
+        qd.load_guarantee(path) for path in sorted(PROOFS.glob("*.json")) if f'"kind": "{kind}"' in path.read_text()
+    )
+    return next(claims)
+
+
+def test_each_kind_of_result_has_the_bounds_of_its_claims_in_si():
+    sticking, slow = stored("stick_slip"), stored("slow_sliding")
+    printed = qd.guarantee(FAULT, law=qd.SampledLaw.from_pid(3e8, 1e8, 2e8, N=40, step="50 ms"))
+    seen = WorstStickSlip(behind=1e-6, ahead=3e-6, slip_rate=2e-6)
+    stick_slip = StickSlipAnswer(fault=FAULT, found=sticking, worst=seen)
+    sliding = SlidingAnswer(found=slow, task=slow.task, held=slow.held)
+    common = {"slip_error", "peak_slip_rate", "least_pressure", "largest_pressure"}
+    for result in (printed, stick_slip, sliding):
+        assert common <= result.bounds.keys()
+        assert result.bounds["least_pressure"] < result.bounds["largest_pressure"]
+        assert (result.verdict, result.reason) == (Verdict.PROVED, "")
+        assert result.sentence() == result.found.sentence()
+        assert result.controller == result.found.controller
+    written = printed.to_dict()
+    for name in ("slip_error", "slip_rate_error", "peak_slip_rate"):
+        assert printed.bounds[name].exact == written[name]
+    assert [printed.bounds[end].exact for end in ("least_pressure", "largest_pressure")] == written["pressure"]
+    assert stick_slip.bounds["slip_error"] == max(sticking.claims.slip_behind, sticking.claims.slip_ahead)
+    assert stick_slip.bounds["peak_slip_rate"] == sticking.claims.peak_slip_rate
+    assert [sliding.bounds[end] for end in ("least_pressure", "largest_pressure")] == list(slow.pressures)
+    assert stick_slip.worst_case == {"behind": 1e-6, "ahead": 3e-6, "slip_rate": 2e-6, "slip_error": 3e-6}
+    assert printed.worst_case["slip_error"] == written["worst_found"]["slip_error"] > 0
+    assert "least_pressure" not in printed.worst_case or printed.worst_case["least_pressure"] < 0
+
+
+def test_check_of_a_result_is_that_of_its_certificate(monkeypatch):
+    sticking = stored("stick_slip")
+    monkeypatch.setattr(type(sticking), "check", lambda _: Verdict.UNDECIDED)
+    assert StickSlipAnswer(fault=FAULT, found=sticking).check() is Verdict.UNDECIDED
+
+
+def test_a_result_is_saved_as_a_certificate_and_read_again(tmp_path):
+    slow = stored("slow_sliding")
+    SlidingAnswer(found=slow, task=slow.task, held=slow.held).save(tmp_path / "proof.json")
+    assert qd.load_guarantee(tmp_path / "proof.json") == slow
+
+
+def test_without_a_guarantee_there_is_a_reason_and_nothing_else(tmp_path):
+    none = LoopAnswer(fault=FAULT, found=NoGuarantee(reason="the gain is 2", small_gain=None))
+    assert (none.verdict, none.reason, none.bounds, none.worst_case) == (Verdict.UNDECIDED, "the gain is 2", {}, {})
+    assert none.check() is Verdict.UNDECIDED
+    with pytest.raises(CertificateError, match=r"must be proved.*Received none: the gain is 2"):
+        none.save(tmp_path / "proof.json")
+    with pytest.raises(CertificateError, match="must be proved"):
+        none.controller  # noqa: B018
+    assert not list(tmp_path.iterdir())
+    assert (none.found.verdict, dict(none.found.bounds)) == (Verdict.UNDECIDED, {})
+
+
+def test_a_result_about_an_own_plant_has_its_peaks_by_name():
+    plant = stored("uncertain_plant")
+    assert isinstance(plant, PlantGuarantee)
+    named = PlantGuarantee(
+        part=plant.part, law=plant.law, pieces=plant.pieces, inputs=plant.inputs, claims=plant.claims,
+        outputs=tuple(f"y{i}" for i, _ in enumerate(plant.claims.outputs)),
+        controls=tuple(f"u{i}" for i, _ in enumerate(plant.claims.controls)),
+    )  # fmt: skip
+    assert list(named.bounds.values()) == [*plant.claims.outputs, *plant.claims.controls]
+    assert list(named.bounds)[-1] == f"u{len(plant.claims.controls) - 1}"
+    assert (named.verdict, named.reason) == (Verdict.PROVED, "")
+
+
+def test_worst_slow_sliding_is_given_by_name(monkeypatch):
+    slow = stored("slow_sliding")
+    seen = WorstSliding(log_rate=0.1, slip_error=2e-6)
+    monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_sliding", lambda _: seen)
+    assert SlidingAnswer(found=slow, task=slow.task, held=slow.held).worst_case == {"log_rate": 0.1, "slip_error": 2e-6}
