@@ -93,9 +93,9 @@ def begun_at_truth(kind: str, seed: int) -> tuple[Fit, dict[str, float]]:
     made = kind.rpartition(", ")[2]
     nuisance = {TREND} if made.startswith("trend") else {START_STATE} if made == "unsteady beginning" else set()
     means, loading = prepared(raw)
-    choice: _Choice | None = _Choice(record=means, raw=raw, loading=loading, stiffness=None, seed=seed)
-    while choice is not None:  # until changes of rate are at the times that friction shows
-        now, record = choice, choice.record
+    now = _Choice(record=means, raw=raw, loading=loading, stiffness=None, seed=seed)
+    for moves in reversed(range(5)):  # at most, until changes of rate are at the times that friction shows
+        record = now.record
         setup = set_up(record, law, None, now.loading, nuisance)
         near = setup.experiment.near(truth | {TREND: -1.0 if made == "trend over slip" else synthetic.TRUE_TREND})
         best = fit(
@@ -106,7 +106,10 @@ def begun_at_truth(kind: str, seed: int) -> tuple[Fit, dict[str, float]]:
             near=near,
             search=FitSearch(least=1, most=0),
         )
-        choice = now._moved(_Fitted(kind=law, setup=setup, best=best))
+        moved = now._moved(_Fitted(kind=law, setup=setup, best=best)) if moves else None
+        if moved is None:
+            break
+        now = moved
     for _ in range(2):
         noise = now._noise(_Fitted(kind=law, setup=setup, best=best))
         best = settled(replace(best, correlated=noise), FitSearch())
