@@ -452,17 +452,17 @@ BUDGETS = {
     "sos": 6230,
     "laws": 3165,
     "loop": 4150,
-    "plant": 1325,
-    "guarantees": 12750,
+    "plant": 1340,
+    "guarantees": 12760,
     "lyapunov": 7000,
     "linear": 2400,
     "synthesis": 1840,
     "rocq": 600,
-    "simulation": 9110,
+    "simulation": 9715,
     "identification": 4471,
-    "studies": 3590,
-    "report": 3990,
-    "cli": 3390,
+    "studies": 3790,
+    "report": 3994,
+    "cli": 3475,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

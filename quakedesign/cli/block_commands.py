@@ -1,4 +1,4 @@
-"""What `fault`, `guarantee`, `design`, `compare`, `simulate` and `limits` do with a file of several blocks."""
+"""What the commands about one fault do with a file of several blocks."""
 
 import os
 from collections.abc import Collection
@@ -14,6 +14,7 @@ from quakedesign.files import hold, made_folder, require_room
 from quakedesign.text import counted
 
 if TYPE_CHECKING:
+    from quakedesign.cli.options import LawOptions
     from quakedesign.fault import BlockChain
     from quakedesign.studies.chains import ChainRun
 
@@ -45,10 +46,10 @@ def several_blocks(
         )
     if others:
         named = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(others))
-        has = {*known, "json"} | ({"force", "box"} & options.keys())
+        has = {*known, "json"} - {"state"} | ({"force", "box"} & options.keys())
         raise ParameterError(
             f"{command.__name__} has, of a fault of several blocks, the options "
-            f"{', '.join(f'--{name}' for name in sorted(has))}. Received {named}. Omit these."
+            f"{', '.join(f'--{name}' for name in sorted(has)).replace('_', '-')}. Received {named}. Omit these."
         )
     if chosen.get("accept_poor_fit"):
         chain = replace(chain, fault=with_accepted_fit(chain.fault, True))
@@ -56,20 +57,19 @@ def several_blocks(
 
 
 def _scope(found: Any, chain: "BlockChain") -> list[str]:
-    """What a statement about blocks depends on, and its units."""
+    """What a statement about blocks depends on, and what its words mean."""
     from quakedesign.studies.chains import farthest_balance
 
     blocks, wells = counted(len(chain.blocks), "block"), counted(len(chain.wells), "well")
-    pushed, meant = "m/s^2", "the load of a pressure is the pressure that balances the blocks on the reference"
+    meant = "the load of a pressure is the pressure that balances the blocks on the reference"
     if chain.ages:
         return [
             f"plant: {chain.name}, {blocks}, {wells}, its constants as they are, from steady sliding; the plan of the "
             "reference reaches the fault as it is",
-            "units: slip m, log state (ln of the state over D_c/V) 1, pull and pressure beside the "
-            "plan MPa; |y| is bounded for log states and pulls; a disturbance is the rate over V that the stress adds",
+            "a log state is ln of the state over D_c/V; |y| is bounded for log states and pulls [MPa]; the load of a "
+            "pressure is the plan; a disturbance is the rate over V that the stress adds",
         ]
     if (far := farthest_balance(chain, found)) is not None:
-        pushed += ", the second m/s"
         meant = (
             "the load of a pressure is the pressure that keeps the averages of the slips, one for each well, on the "
             "reference; slip errors are relative to the equilibrium of each block under these pressures, which is "
@@ -83,7 +83,7 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
         *([healed] if excess else []),
         f"plant: {chain.name}, {blocks}, {wells}, any constants of box {box.name}{springs}, without stick (friction "
         "continues to negative slip rates)",
-        f"units: slip m, slip rate m/s, disturbance {pushed}, pressure Pa, rate of a load Pa/s; {meant}",
+        meant,
     ]
 
 
@@ -123,17 +123,21 @@ def chain_limits(chain: "BlockChain", output: Output) -> int:
     return 0
 
 
-def block_law(named: str, usual: str) -> str:
+def block_law(named: str, usual: str, certificate: Path | None = None) -> str:
     """Kind of law of several blocks.
 
     Raises
     ------
+    ParameterError
+        For a kind beside a certificate, which has its own.
     UnknownNameError
     """
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
 
     if named == usual:
         return BLOCK_LAWS[0]
+    if certificate is not None:
+        raise ParameterError(f"--certificate contains the law. Received --controller {named} too. Omit --controller.")
     require_known(named, BLOCK_LAWS, "controller of several blocks", UnknownNameError)
     return named
 
@@ -209,6 +213,32 @@ def _run_facts(one: "ChainRun") -> dict[str, Any]:
     return {"guarantee": _facts(one.found, one.chain), "run": one.run.to_dict()}
 
 
+def export_chain(
+    chain: "BlockChain", law: "LawOptions", fmu: bool, out: Path | None, force: bool, output: Output
+) -> int:
+    """The command `export`: the law that is designed, or that of a certificate, where something is proved of it."""
+    from quakedesign.report.plain import export_lines
+    from quakedesign.simulation.export import FILES, block_step, require_free, write_step
+    from quakedesign.studies.chains import chain_law
+
+    _require_no_state(chain, "export")
+    controller = block_law(law.controller, "cta", law.certificate)
+    folder = out or Path(f"quakedesign-{chain.name}-{controller}")
+    require_free(folder, force)
+    with progress() as tell:
+        tell("design and proof", 0.0)
+        found = chain_law(chain, controller, law.certificate)
+    if not found.proved:
+        output.show(_facts(found, chain), [*_lines(found, chain), "nothing is exported, as no law is proved"])
+        return 1
+    step = block_step(chain, found.law, remarks=(f"proved: {found.sentence()}", *_scope(found, chain)))
+    exported = write_step(step, folder, fmu=fmu, force=force)
+    files = {"files": [str(folder / name) for name in (FILES if fmu else FILES[:2])], "premises": []}
+    answer = exported.to_dict() | files
+    output.show(answer | {"guarantee": _facts(found, chain)}, export_lines(answer))
+    return 0
+
+
 def run_chain(
     chain: "BlockChain",
     controller: str,
@@ -217,6 +247,7 @@ def run_chain(
     force: bool,
     output: Output,
     formats: Any = ("png",),
+    certificate: Path | None = None,
 ) -> int:
     """The commands `design` and `simulate`: a law, its proof, a run and, with a folder, files and a figure."""
     from quakedesign.report.folder import prepare
@@ -229,7 +260,7 @@ def run_chain(
         hold(out)
     with progress() as tell:
         tell("design, proof and run", 0.0)
-        one = run_of_chain(chain, controller, duration)
+        one = run_of_chain(chain, controller, duration, certificate=certificate)
     found, run, facts = one.found, one.run, _run_facts(one)
     if run is None:
         output.show(facts, [*_lines(found, chain), "nothing is simulated, as no law is proved"])
@@ -259,3 +290,33 @@ def run_chain(
         said.append(f"written: {out}/ (results.json, guarantee.json, {file_names('blocks', formats)})")
     output.show(facts, said)
     return 1 if run.reversed or run.opened else 0
+
+
+def run_sliding(chain: "BlockChain", plant: str, out: Path | None, force: bool, output: Output, **given: Any) -> int:
+    """The command `simulate` of blocks with rate-and-state friction."""
+    from quakedesign.report.folder import prepare
+    from quakedesign.simulation.slow_sliding import PLANTS
+    from quakedesign.studies.chains import run_sliding_chain
+
+    require_known(plant, PLANTS, "plant of rate-and-state friction")
+    if out is not None:
+        prepare(out, force=force)
+        require_room(out)
+        hold(out)
+    with progress() as tell:
+        tell("proof and run" if given["certificate"] else "run", 0.0)
+        one = run_sliding_chain(chain, inertia=PLANTS[plant], tell=lambda done: tell("run", done), **given)
+    proved, notes = ("", []) if one.found is None else (one.found.sentence(), _scope(one.found, chain))
+    facts = {"run": one.to_dict(), "guarantee": {"sentence": proved, "notes": notes} if proved else None}
+    said = [*([f"proved: {proved}", *notes] if proved else []), *one.lines()]
+    if out is not None:
+        from quakedesign.files import whole_folder
+        from quakedesign.report.block_figure import block_figure
+        from quakedesign.report.drawing import file_names, write_figures, write_results
+
+        with whole_folder(out) as folder:
+            write_figures(folder, {"blocks": block_figure(chain, one.run, proved)}, ("png",))
+            write_results(folder, facts)
+        said.append(f"written: {out}/ (results.json, {file_names('blocks', ('png',))})")
+    output.show(facts, said)
+    return 0

@@ -85,14 +85,34 @@ def simulate(
         NetCDF file to write; of a fault of several blocks, a folder.
     """
     options = dict(locals())
-    from quakedesign.cli.block_commands import block_law, run_chain, several_blocks
+    from quakedesign.cli.block_commands import block_law, run_chain, run_sliding, several_blocks
     from quakedesign.fault import load_fault
     from quakedesign.report.sentences import proved_line
     from quakedesign.simulation import Load
     from quakedesign.studies.runs import run_single
 
-    if (blocks := several_blocks(fault, simulate, options, ("duration", "out", "controller"))) is not None:
-        return run_chain(blocks, block_law(law.controller, "none"), run.duration, out, force, output)
+    known = ("duration", "out", "controller", "certificate", "plant", "drift", "stress", "stress_period", "state")
+    if (blocks := several_blocks(fault, simulate, options, known)) is not None:
+        kind = block_law(law.controller, "none", law.certificate)
+        loads = given({"stress": state.stress, "stress_period": state.stress_period})
+        if state != StateOptions(**loads):
+            raise ParameterError(
+                "several blocks have no --pressure, --start, --hold and --share. Received one of them. Omit these."
+            )
+        if blocks.ages and law.controller != "none":
+            raise ParameterError(
+                "blocks in slow sliding run under the law of a certificate. Received --controller. Use guarantee with "
+                "--out, then simulate with --certificate."
+            )
+        if blocks.ages:
+            loads |= {"certificate": law.certificate, "duration": run.duration, "loading_rate": run.drift}
+            return run_sliding(blocks, run.plant or "quasi-dynamic", out, force, output, **loads)
+        if run.plant or run.drift is not None or loads:
+            raise ParameterError(
+                "--plant, --drift and --stress of several blocks need friction with a state. Received "
+                f"{blocks.blocks[0].friction.name}. Omit these options."
+            )
+        return run_chain(blocks, kind, run.duration, out, force, output, certificate=law.certificate)
     new_file(out, "output file", force=force)
     loaded = load_fault(fault)
     if loaded.friction.state_names:
@@ -272,10 +292,16 @@ def export(
     out
         Output folder; ./quakedesign-FAULT-CONTROLLER by default.
     """
+    options = dict(locals())
+    from quakedesign.cli.block_commands import export_chain, several_blocks
     from quakedesign.fault import load_fault
     from quakedesign.report.plain import export_lines
     from quakedesign.studies.exporting import export_answer
 
+    if (
+        chain := several_blocks(fault, globals()["export"], options, ("controller", "certificate", "fmu", "out"))
+    ) is not None:
+        return export_chain(chain, law, fmu, out, force, output)
     loaded = load_fault(fault)
     chosen = law.choose(loaded, step)
     if chosen is None:

@@ -412,7 +412,7 @@ def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
     if {"block", "well"} & set(raw):
         raise ScenarioError(
             f"{name} must have no [[block]] and [[well]] tables here. Received a fault of several blocks. Use the "
-            "commands fault, design, guarantee, compare, simulate or limits (Python: quakedesign.load_chain)."
+            "commands fault, design, guarantee, compare, simulate, export or limits (Python: quakedesign.load_chain)."
         )
     problems = Problems()
     fault: Fault = fault_of_tables(Table(raw, problems), problems, allow_code)

@@ -126,6 +126,10 @@ def _parts(tasks: Sequence[FaultPlant], springs: Iterable[Spring], shares: Seque
             **{f"slip-rate error {i + 1}": rate[i] for i in range(N)},
         },
         "controls": tuple(f"pressure {k + 1}" for k in range(m)),
+        "units": {f"slip error {i + 1}": "m" for i in range(N)}
+        | {f"slip-rate error {i + 1}": "m/s" for i in range(N)}
+        | {f"pressure {k + 1}": "Pa" for k in range(m)}
+        | {name: "m/s" if name.startswith("balance") else "m/s²" for name in disturbances},
         "name": name,
     }
 

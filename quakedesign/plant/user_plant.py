@@ -98,6 +98,8 @@ class UncertainPlant:
         Largest measurement error by the name of a measurement.
     start : sequence of numbers, optional
         |x_i(0)| ≤ start_i; from rest unless given.
+    units : mapping of str to str
+        Units of outputs, controls and disturbances by their names, for what is printed: SI units, or MPa.
     name : str
 
     Raises
@@ -118,6 +120,7 @@ class UncertainPlant:
     measurements: Sequence[str] = ()
     noise: Mapping[str, Any] = field(default_factory=dict)
     start: Any = None
+    units: Mapping[str, str] = field(default_factory=dict)
     name: str = "plant"
 
     def __post_init__(self) -> None:
@@ -160,6 +163,12 @@ class UncertainPlant:
         keep("noise", _frozen(sizes))
         keep("start", start)
         keep("sectors", _frozen(dict(self.sectors)))
+        if unknown := set(self.units) - {*(self.outputs or ()), *self.controls, *self.disturbances}:
+            raise ParameterError(
+                "units of a plant must be of outputs, controls and disturbances. Received "
+                f"{', '.join(sorted(unknown))}. Use their names."
+            )
+        keep("units", _frozen(dict(self.units)))
         if len(self.sectors) + len(ends) > MOST or not 1 <= len(self.outputs or ()) <= MOST:
             raise ParameterError(f"a plant must have at most {MOST} sectors and gains, and 1 to {MOST} outputs.")
         if double := set(self.sectors) & set(ends):

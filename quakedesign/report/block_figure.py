@@ -7,12 +7,13 @@ import numpy as np
 from quakedesign.fault import BlockChain
 from quakedesign.report.drawing import SMALL, clock, figure, finish, scaled
 from quakedesign.simulation.block_run import BlockRun
+from quakedesign.simulation.coupled_sliders import SlidersRun
 
 _LINES = ("solid", "dashed", "dotted")
 _STAGES = 6
 
 
-def block_figure(chain: BlockChain, run: BlockRun, proved: str) -> Any:
+def block_figure(chain: BlockChain, run: BlockRun | SlidersRun, proved: str) -> Any:
     """A matplotlib figure; `proved` stands below it."""
     from matplotlib import colormaps
 
@@ -30,13 +31,16 @@ def block_figure(chain: BlockChain, run: BlockRun, proved: str) -> Any:
                 times, values[:, i] / factor, color=shades[i], linestyle=_LINES[i % 3], linewidth=0.8, label=label
             )
         axis.set_ylabel(f"{title} [{name}]", fontsize=SMALL)
-    factor, name = scaled(float(np.abs(run.pressure).max()) or 1.0, "Pa")
+    if chain.ages:
+        axes[0, 1].set_yscale("log")
+    factor, name = scaled(float(np.abs(run.pressure).max(initial=0.0)) or 1.0, "Pa")
     for j in range(run.pressure.shape[1]):
         axes[1, 0].plot(
             times, run.pressure[:, j] / factor, linewidth=0.8, linestyle=_LINES[j % 3], label=f"well {j + 1}"
         )
     axes[1, 0].set_ylabel(f"pressure [{name}]", fontsize=SMALL)
-    axes[1, 0].legend(fontsize=SMALL - 1, ncols=2)
+    if run.pressure.shape[1]:
+        axes[1, 0].legend(fontsize=SMALL - 1, ncols=2)
     for axis in (*axes[0], axes[1, 0]):
         axis.set_xlabel(f"time [{unit}]", fontsize=SMALL)
     edges = np.concatenate([[0], np.cumsum([float(v) for v in chain.lengths])]) / 1e3

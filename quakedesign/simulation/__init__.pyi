@@ -3,9 +3,15 @@ from .block_run import simulate_blocks as simulate_blocks
 from .closed_loop import EnergyBudget as EnergyBudget
 from .closed_loop import Load as Load
 from .closed_loop import Variation as Variation
+from .coupled_sliders import CoupledSliders as CoupledSliders
+from .coupled_sliders import natural_cycles as natural_cycles
+from .coupled_sliders import simulate_held_blocks as simulate_held_blocks
+from .coupled_sliders import simulate_sliders as simulate_sliders
 from .export import ControllerStep as ControllerStep
+from .export import block_step as block_step
 from .export import controller_step as controller_step
 from .export import export_controller as export_controller
+from .export import write_step as write_step
 from .inputs import PressureCourse as PressureCourse
 from .inputs import perturbation as perturbation
 from .inputs import pressure_course as pressure_course

@@ -67,6 +67,39 @@ class BlockRun:
         }
 
 
+def reference(chain: BlockChain, time: Any) -> tuple[Any, Any]:
+    """r [m] and r' [m/s] at a time [s], in CasADi."""
+    task = chain.fault.reference
+    stage = ca.fmin(time / task.operation_time, 1)
+    mean = task.target_slip / task.operation_time
+    return task.target_slip * task.shape(stage), mean * 30 * stage**2 * (1 - stage) ** 2
+
+
+def decided(chain: BlockChain, law: Any, count: Any, x: Any, v: Any, z: Any) -> tuple[Any, Any]:
+    """Pressures of the wells [Pa] that a law decides, and its states after that, in CasADi.
+
+    Parameters
+    ----------
+    chain : BlockChain
+    law : MatrixLaw
+        Of errors of all blocks, or of the averages of slip and slip rate that each well measures.
+    count : SX
+        Samples before this one [-].
+    x, v : SX
+        Slip [m] and slip rate [m/s] of every block.
+    z : SX
+        States of the law.
+    """
+    r, moved = reference(chain, count * float(law.step))
+    told = len(law.measured[0]) if law.measured else len(law.feedback[0])
+    weights = ca.DM(np.array(averages(chain.shares), dtype=float))
+    errors = ca.vertcat(x - r, v - moved)
+    seen = errors if told == 2 * len(chain.blocks) else ca.vertcat(weights @ x - r, weights @ v - moved)
+    F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
+    p = (ca.mtimes(H, z) if len(F) else 0) + ca.mtimes(D, seen)
+    return p, ca.mtimes(F, z) + ca.mtimes(G, seen) if len(F) else z
+
+
 @checked_dataclass(frozen=True, kw_only=True)
 class _Period:
     """One period of a chain under a law as a CasADi function of what is carried."""
@@ -79,13 +112,11 @@ class _Period:
         """What is carried from period to period: see `sizes`."""
         slip, speed = sp.Symbol("slip", real=True), sp.Symbol("speed", real=True)
         chain, fault, law = self.chain, self.chain.fault, self.law
-        N, q = len(chain.blocks), len(law.update)
-        told = len(law.measured[0]) if law.measured else len(law.feedback[0])
+        N = len(chain.blocks)
         parts = [ca.SX.sym(name, size) for name, size in self.sizes]
         x, v, z, _, count, worst, rate, peak, rest, room = parts
         step, h = float(law.step), float(law.step) / self.substeps
         shares = np.array(chain.shares, dtype=float)
-        share = fault.reference
         pulls = np.zeros((N, N))
         for i, j, K in chain.springs:
             pulls[i, j] += float(K)
@@ -99,19 +130,8 @@ class _Period:
             values = [to_casadi([mu], {slip: slips[i], speed: rates[i]})[0] for i, mu in enumerate(laws)]
             return ca.vertcat(*values)
 
-        def reference(time: Any) -> tuple[Any, Any]:
-            stage = ca.fmin(time / share.operation_time, 1)
-            mean = share.target_slip / share.operation_time
-            return share.target_slip * share.shape(stage), mean * 30 * stage**2 * (1 - stage) ** 2
-
         began = count * step
-        r, moved = reference(began)
-        errors = ca.vertcat(x - r, v - moved)
-        weights = ca.DM(np.array(averages(chain.shares), dtype=float))
-        seen = errors if told == 2 * N else ca.vertcat(ca.mtimes(weights, x) - r, ca.mtimes(weights, v) - moved)
-        F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
-        p = (ca.mtimes(H, z) if q else 0) + ca.mtimes(D, seen)
-        z = ca.mtimes(F, z) + ca.mtimes(G, seen) if q else z
+        p, z = decided(chain, law, count, x, v, z)
         acting = ca.mtimes(shares, p)
         static = friction(ca.SX.zeros(N), ca.SX.zeros(N))
         for k in range(self.substeps):
@@ -122,7 +142,7 @@ class _Period:
             drive += pushed + kicked.slip_growth * x + (kicked.rate_growth - fault.specific_damping) * v
             v = ca.fmax(v + h * (drive - strength), 0)
             x = x + h * v
-            r, moved = reference(time + h)
+            r, moved = reference(chain, time + h)
             worst, rate = ca.fmax(worst, ca.fabs(x - r)), ca.fmax(rate, ca.fabs(v - moved))
             peak, rest = ca.fmax(peak, v), rest + (v <= 0) / self.substeps
             room = ca.fmin(room, ca.vertcat(ca.mmin(drive + strength), ca.mmin(stress - acting)))

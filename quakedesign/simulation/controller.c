@@ -9,8 +9,8 @@ ${start}
   for (i = 0; i < CONTROLLER_MEMORY; ++i) memory[i] = start[i];
 }
 
-void controller_step(const double* measurement, const double* applied, double* memory, double* pressure) {
-  const double* arguments[${arguments}] = {measurement, applied ? applied : &memory[${held}], memory};
+void controller_step(const double* measurement, ${applied}double* memory, double* pressure) {
+  const double* arguments[${arguments}] = {measurement, ${given}memory};
   double after[CONTROLLER_MEMORY];
   double* results[${results}] = {after, pressure};
   casadi_int integers[${integers}];

@@ -18,13 +18,14 @@ import casadi as ca
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import OutputError, ParameterError
-from quakedesign.fault import Fault
+from quakedesign.fault import BlockChain, Fault
 from quakedesign.fault.model import require_positive
 from quakedesign.files import require_room, temporary_folder, whole_folder, write_whole
 from quakedesign.laws import Controller
 from quakedesign.loop import Scheme, simulation_scheme
 from quakedesign.loop.schemes import own_way
 from quakedesign.loop.schemes.base import Sampled
+from quakedesign.simulation.block_run import decided
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.compiled import c_file, compiler, expanded, shared_library
 from quakedesign.simulation.integrators import integrator
@@ -37,13 +38,26 @@ SOURCE, HEADER = "controller.c", "controller.h"
 _WIDTH = 110
 _USE = """
 Call controller_reset once, and controller_step every CONTROLLER_STEP seconds: it reads CONTROLLER_MEASUREMENTS
-numbers and the pressure [Pa] that was applied since the last call, updates CONTROLLER_MEMORY numbers, and writes the
-fluid pressure [Pa] to hold until the next call (zero-order hold). Where pump or valve limit the pressure, tell it what
-was applied: the law does not wind up then, as in simulate --saturation; else give a null pointer. The reference of
+numbers{told}, updates CONTROLLER_MEMORY numbers, and writes {written} to hold until the next call (zero-order hold).
+{limited} The reference of
 the fault is computed from the number of calls. The functions keep nothing between calls but the memory they are given,
 allocate nothing, and may be called from several threads with different memories. Numbers that
 are not finite are not caught: check measurement and pressure.
 """
+_USE_OF_ONE = {
+    "told": " and the pressure [Pa] that was applied since the last call",
+    "written": "the fluid pressure [Pa]",
+    "limited": "Where pump or valve limit the pressure, tell it what was applied: the law does not wind up then, as in "
+    "simulate --saturation; else give a null pointer.",
+}
+_USE_OF_WELLS = {
+    "told": "",
+    "written": "the fluid pressure [Pa] of CONTROLLER_PRESSURES wells",
+    "limited": "Where pump or valve limit a pressure, the law winds up: they must let the proved pressures pass.",
+}
+_TOLD_TO_IT = " and the pressure [Pa] applied since the last call"
+_APPLIED = """
+   applied may be a null pointer: then it was the pressure of the last call. Before the first call it is 0."""
 _COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and link with -lm."
 
 
@@ -54,7 +68,8 @@ class ControllerStep:
     Attributes
     ----------
     function : casadi.Function
-        (measurement, applied pressure since the last sample [Pa], memory) → memory, pressure [Pa].
+        (measurement, applied pressure since the last sample [Pa], memory) → memory, pressure [Pa]. Of several blocks
+        (measurement, memory) → memory, pressures of the wells [Pa].
     measurement : mapping of str to str
         Unit of every measured signal, in order.
     start : mapping of str to float
@@ -73,6 +88,17 @@ class ControllerStep:
     step: float
     facts: Mapping[str, str]
     remarks: tuple[str, ...] = ()
+
+    @property
+    def limited(self) -> bool:
+        """Whether it is told which pressure was applied."""
+        return bool(self.function.n_in() == 3)
+
+    @property
+    def pressures(self) -> tuple[str, ...]:
+        """Names of the pressures."""
+        count = self.function.size1_out(1)
+        return ("pressure",) if self.limited else tuple(f"pressure_{i + 1}" for i in range(count))
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able facts."""
@@ -95,7 +121,7 @@ def header_text(exported: ControllerStep) -> str:
         *said,
         "A sampled controller for a fault, in SI units.",
         "",
-        *_wrapped(_USE),
+        *_wrapped(_USE.format(**(_USE_OF_ONE if exported.limited else _USE_OF_WELLS))),
         "",
         _COMPILE,
         "",
@@ -104,7 +130,12 @@ def header_text(exported: ControllerStep) -> str:
     ]
     comment = _comment([*lines, "", "Where it comes from:", *facts])
     sizes = {"step": repr(exported.step), "measurements": len(exported.measurement), "memory": len(exported.start)}
-    return comment + c_file("controller.h", **sizes)
+    told = dict.fromkeys(("applied", "told", "about"), "")
+    if exported.limited:
+        told = {"applied": "const double* applied, ", "told": _TOLD_TO_IT, "about": _APPLIED}
+    return comment + c_file(
+        "controller.h", **sizes, pressures=len(exported.pressures), limited=int(exported.limited), **told
+    )
 
 
 def source_text(exported: ControllerStep, header: str) -> str:
@@ -112,13 +143,11 @@ def source_text(exported: ControllerStep, header: str) -> str:
     generator = ca.CodeGenerator("sampled_step.c", {"with_export": False})
     generator.add(exported.function)
     start = ",\n".join(f"    {value!r}" for value in exported.start.values())
-    return generator.dump() + c_file(
-        "controller.c",
-        header=header,
-        start=start,
-        held=list(exported.start).index("held_0"),
-        **_sizes(exported.function),
-    )
+    told = {"applied": "", "given": ""}
+    if exported.limited:
+        held = list(exported.start).index(HELD)
+        told = {"applied": "const double* applied, ", "given": f"applied ? applied : &memory[{held}], "}
+    return generator.dump() + c_file("controller.c", header=header, start=start, **told, **_sizes(exported.function))
 
 
 def _sizes(function: Any) -> dict[str, int]:
@@ -154,10 +183,11 @@ _PLATFORMS = {"Linux": ("linux64", "so"), "Darwin": ("darwin64", "dylib")}
 def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
     """Bytes of an FMU of a sampled step, and for which platform it holds a binary or why for none.
 
-    Inputs are the measurement and ``applied`` [Pa], what pump or valve let through of the pressure since the last
-    sample: all of it unless it is set after initialisation, and then again before every sample, since a law winds up
-    otherwise. The output ``pressure`` [Pa] is the commanded pressure since the last sample; the samples lie T_s apart
-    from the start of the experiment. The sources lie inside, so that any platform can compile them.
+    Inputs are the measurement and, of one block, ``applied`` [Pa], what pump or valve let through of the pressure since
+    the last sample: all of it unless it is set after initialisation, and then again before every sample, since a law
+    winds up otherwise. The output ``pressure`` [Pa], of several wells ``pressure_1`` and so on, is the commanded
+    pressure since the last sample; the samples lie T_s apart from the start of the experiment. The sources lie inside,
+    so that any platform can compile them.
 
     References
     ----------
@@ -199,7 +229,7 @@ def _description(exported: ControllerStep, guid: str) -> bytes:
     listed = ET.SubElement(ET.SubElement(root, "CoSimulation", kind), "SourceFiles")
     for file in (SOURCE, "fmu.c"):
         ET.SubElement(listed, "File", name=file)
-    signals = dict(exported.measurement) | {"pressure": "Pa", "applied": "Pa"}
+    signals = dict(exported.measurement) | dict.fromkeys([*exported.pressures, *["applied"] * exported.limited], "Pa")
     units = ET.SubElement(root, "UnitDefinitions")
     for unit in dict.fromkeys(signals.values()):
         ET.SubElement(ET.SubElement(units, "Unit", name=unit), "BaseUnit", _UNITS[unit])
@@ -207,12 +237,13 @@ def _description(exported: ControllerStep, guid: str) -> bytes:
     ET.SubElement(root, "DefaultExperiment", startTime="0", stepSize=repr(exported.step))
     variables = ET.SubElement(root, "ModelVariables")
     for reference, (name, unit) in enumerate(signals.items()):
-        is_output = name == "pressure"
+        is_output = name in exported.pressures
         variable = {"name": name, "valueReference": str(reference), "variability": "discrete"}
         variable |= {"causality": "output", "initial": "exact"} if is_output else {"causality": "input"}
         ET.SubElement(ET.SubElement(variables, "ScalarVariable", variable), "Real", unit=unit, start="0")
     outputs = ET.SubElement(ET.SubElement(root, "ModelStructure"), "Outputs")
-    ET.SubElement(outputs, "Unknown", index=str(len(exported.measurement) + 1), dependencies="")
+    for place in range(len(exported.pressures)):
+        ET.SubElement(outputs, "Unknown", index=str(len(exported.measurement) + place + 1), dependencies="")
     ET.indent(root)
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
 
@@ -324,9 +355,17 @@ def export_controller(
     OutputError
         When the folder exists, or cannot be written.
     """
-    target = Path(folder)
-    _require_free(target, force)
+    require_free(Path(folder), force)
     exported = controller_step(fault, controller, step=step, scheme=scheme, remarks=remarks)
+    return write_step(exported, folder, fmu=fmu, force=force)
+
+
+def write_step(
+    exported: ControllerStep, folder: str | Path, *, fmu: bool = False, force: bool = False
+) -> ControllerStep:
+    """Write the files of a sampled step; folder, fmu, force and errors as of `export_controller`."""
+    target = Path(folder)
+    require_free(target, force)
     contents: dict[str, str | bytes] = {HEADER: header_text(exported), SOURCE: source_text(exported, HEADER)}
     if fmu:
         contents[UNIT], platform = model_unit(exported)
@@ -337,7 +376,42 @@ def export_controller(
     return exported
 
 
-def _require_free(folder: Path, force: bool) -> None:
+def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) -> ControllerStep:
+    """Sampled step of a law for several blocks, as `simulate_blocks` takes it.
+
+    Parameters
+    ----------
+    chain : BlockChain
+        For its reference, and for the averages that wells measure.
+    law : MatrixLaw
+        Without delay, as that of a guarantee.
+    remarks : tuple of str
+        Sentences to be said first.
+
+    Raises
+    ------
+    ParameterError
+        For friction with a state.
+    """
+    N, states = len(chain.blocks), [f"state_{i + 1}" for i in range(len(law.update))]
+    chain.fault.require_memoryless("a controller in C")
+    measurement, memory = ca.SX.sym("measurement", 2 * N), ca.SX.sym("memory", 1 + len(states))
+    count, z = ca.vertsplit(memory, [0, 1, 1 + len(states)])
+    pressures, later = decided(chain, law, count, measurement[:N], measurement[N:], z)
+    outputs = ca.cse([ca.vertcat(count + 1, later), ca.densify(pressures)])
+    known = {"fault": chain.name, "blocks": str(N), "wells [m]": _text(chain.wells)}
+    return ControllerStep(
+        function=expanded(ca.Function("sampled_step", [measurement, memory], outputs)),
+        measurement={f"{name}_{i + 1}": unit for name, unit in (("slip", "m"), ("slip_rate", "m/s")) for i in range(N)},
+        start=dict.fromkeys(["sample", *states], 0.0),
+        step=float(law.step),
+        facts=known | library_versions("quakedesign", "casadi"),
+        remarks=remarks,
+    )
+
+
+def require_free(folder: Path, force: bool) -> None:
+    """Reject a folder that exists, or, where it may be replaced, holds something else than an export."""
     if os.path.exists(folder) and not force:
         raise OutputError(
             f"the folder of an export must be new. Received {folder}, which exists. Give --force to replace it."

@@ -15,9 +15,9 @@
 #else
 #define EXPORTED __attribute__((visibility("default")))
 #endif
-#define SIGNALS (CONTROLLER_MEASUREMENTS + 2)
 #define PRESSURE CONTROLLER_MEASUREMENTS
-#define APPLIED (CONTROLLER_MEASUREMENTS + 1)
+#define APPLIED (CONTROLLER_MEASUREMENTS + CONTROLLER_PRESSURES)
+#define SIGNALS (APPLIED + CONTROLLER_LIMITED)
 #define EARLY (1e-6 * CONTROLLER_STEP)
 
 typedef void* fmi2Component;
@@ -41,7 +41,7 @@ typedef struct {
 
 typedef struct {
   double memory[CONTROLLER_MEMORY];
-  double signals[SIGNALS]; /* measurement, then the pressure, then what was applied of it */
+  double signals[SIGNALS]; /* measurement, then the pressures, then what was applied of one */
   double start, time;
   long long samples;
   int running, told; /* whether initialisation is over, and an applied pressure was set since */
@@ -123,7 +123,7 @@ EXPORTED fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], s
   Unit* unit = c;
   size_t i;
   for (i = 0; i < n; ++i) {
-    if (r[i] >= SIGNALS || r[i] == PRESSURE) return refuse(unit, "only measurement and applied pressure are set");
+    if (r[i] >= SIGNALS || (r[i] >= PRESSURE && r[i] < APPLIED)) return refuse(unit, "only measurement and applied pressure are set");
     unit->state.signals[r[i]] = value[i];
     if (r[i] == APPLIED) unit->state.told = unit->state.running;
   }
@@ -141,9 +141,15 @@ EXPORTED fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real step, fmi
     if (!isfinite(state->signals[i])) return refuse(unit, "the measurement must be finite");
   if (state->told && !isfinite(state->signals[APPLIED])) return refuse(unit, "the applied pressure must be finite");
   for (; state->start + state->samples * CONTROLLER_STEP < now + step - EARLY; ++state->samples)
+#if CONTROLLER_LIMITED
     controller_step(state->signals, state->told ? &state->signals[APPLIED] : 0, state->memory, &state->signals[PRESSURE]);
+#else
+    controller_step(state->signals, state->memory, &state->signals[PRESSURE]);
+#endif
   state->time = now + step;
-  return isfinite(state->signals[PRESSURE]) ? fmi2OK : refuse(unit, "the pressure is not finite");
+  for (i = PRESSURE; i < APPLIED; ++i)
+    if (!isfinite(state->signals[i])) return refuse(unit, "the pressure is not finite");
+  return fmi2OK;
 }
 
 EXPORTED fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* kept) {

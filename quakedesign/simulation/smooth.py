@@ -146,7 +146,8 @@ class SmoothProblem:
 
     rates: Any  # casadi.Function
     scales: "np.ndarray"  # Size of each variable below which its error counts absolutely
-    watched: int  # Index of the variable whose upward crossings of `level` are found
+    # Index of the variable whose upward crossings of `level` are found, or of those of which the largest is watched
+    watched: int | slice
     level: float
 
     def integrate(
@@ -236,7 +237,7 @@ class SmoothProblem:
 
     def _crossing(self) -> Any:
         def crossing(_: float, y: "np.ndarray") -> float:
-            return float(y[self.watched]) - self.level
+            return float(np.max(y[self.watched])) - self.level
 
         crossing.direction = 1.0  # type: ignore[attr-defined]
         return crossing
@@ -255,8 +256,9 @@ class _Bound:
 
     @classmethod
     def of(cls, function: Any, index: int, load: Ramp, result: "np.ndarray") -> "_Bound":
-        inputs = [ca.SX.sym("y", function.size1_in(0)), ca.SX.sym("load", len(load.value))]
-        dense: Any = ca.Function("dense", inputs, [ca.densify(function(*inputs)[index])])
+        kind: Any = ca.SX if function.is_a("SXFunction") else ca.MX
+        inputs = [kind.sym("y", function.size1_in(0)), kind.sym("load", len(load.value))]
+        dense: Any = ca.Function("dense", inputs, [ca.densify(function.call(inputs)[index])])
         state, given = np.empty(function.size1_in(0)), np.empty(len(load.value))
         buffer, evaluate = dense.buffer()
         buffer.set_arg(0, state.data)

@@ -6,25 +6,39 @@ signs are those of ℓ, z grows from 0, as long as friction weakens so, unless �
 controller of any kind needs pressures that far from balance, with the largest β. A mode that no well reaches grows.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from quakedesign.errors import ParameterError
-from quakedesign.exact import UpperBound, rational
-from quakedesign.fault import BlockChain
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
-from quakedesign.plant import uncertain_plant
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.exact import LowerBound, UpperBound, rational
+from quakedesign.fault import BlockChain, SlidingReference
+from quakedesign.guarantees.exact.guarantee_files import load_guarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, named
+from quakedesign.guarantees.search.plant_search import linear_part
+from quakedesign.guarantees.search.sliding_block_design import covered_stress
+from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant import UncertainPlant, uncertain_plant
 from quakedesign.simulation.block_run import BlockRun, simulate_blocks, whole_periods
+from quakedesign.simulation.coupled_sliders import (
+    MPA,
+    BlockEvent,
+    SlidersRun,
+    natural_cycles,
+    simulate_held_blocks,
+)
+from quakedesign.simulation.state_plant import TIDE
 from quakedesign.synthesis import guarantee
 from quakedesign.synthesis.guarantee import BLOCK_LAWS
-from quakedesign.text import counted, quantity
+from quakedesign.text import counted, lasting, quantity
 
 _SAME = 1e-6  # poles that are one, relative to the largest
 _UNREACHED = 1e-9  # of a mode's vectors
+_NONE = UpperBound(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,7 +232,36 @@ class ChainRun:
         ]
 
 
-def run_of_chain(chain: BlockChain, controller: str = BLOCK_LAWS[0], duration: float | None = None) -> ChainRun:
+def chain_law(chain: BlockChain, controller: str = BLOCK_LAWS[0], certificate: str | Path | None = None) -> Any:
+    """Guarantee of a law for several blocks: designed, or that of a certificate, which is checked anew.
+
+    Raises
+    ------
+    CertificateError
+        For a file that does not hold, or is about another plant.
+    """
+    if certificate is None:
+        return guarantee(chain, controller)
+    claim, plant = load_guarantee(certificate), UncertainPlant.from_blocks(chain)
+    if not isinstance(claim, PlantGuarantee) or claim.part != linear_part(plant, {}):
+        raise CertificateError(
+            f"a certificate must be about the fault. Received {certificate}, about another plant than {plant.name}. "
+            f"Give a file of guarantee {chain.name} --out FILE."
+        )
+    if claim.law.delay or claim.check() is not Verdict.PROVED:
+        raise CertificateError(
+            f"a certificate must hold, for a law without delay. Received {certificate}. Prove it anew with guarantee."
+        )
+    return named(claim, plant)
+
+
+def run_of_chain(
+    chain: BlockChain,
+    controller: str = BLOCK_LAWS[0],
+    duration: float | None = None,
+    *,
+    certificate: str | Path | None = None,
+) -> ChainRun:
     """Design a law for several blocks, prove it, and run it on the stick–slip plant.
 
     Parameters
@@ -228,12 +271,175 @@ def run_of_chain(chain: BlockChain, controller: str = BLOCK_LAWS[0], duration: f
         ``centralised`` or ``decentralised``.
     duration : float, optional
         [s]; the operation time unless given.
+    certificate : str or Path, optional
+        File of a guarantee of this fault, whose law is run instead.
 
     Raises
     ------
-    ParameterError
+    ParameterError, CertificateError
     """
     whole_periods(chain, rational(chain.fault.sampling_time), duration)  # is refused before the long search
-    found: Any = guarantee(chain, controller)
+    found = chain_law(chain, controller, certificate)
     run = simulate_blocks(chain, found.law, duration=duration) if found.proved else None
     return ChainRun(chain=chain, controller=controller, found=found, run=run)
+
+
+# ----------------------------------------------------------------------
+# Blocks with rate-and-state friction: cycles without control, and runs of a law that is proved.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingChainRun:
+    """A run of blocks with rate-and-state friction: without control, or under the law of a guarantee."""
+
+    chain: BlockChain
+    run: SlidersRun
+    inertia: bool
+    found: PlantGuarantee | None = None
+    # Lag [s] and largest stress [Pa] that the guarantee covers, its bound of |ln(v/V)|, and the stress of the run [Pa]
+    lag: Fraction = Fraction(0)
+    covered: Fraction = Fraction(0)
+    log_rate: UpperBound = _NONE
+    stress: float = 0.0
+
+    @property
+    def events(self) -> tuple[BlockEvent, ...]:
+        """Events without control."""
+        fault = self.chain.fault
+        per_slip = [fault.shear_modulus * fault.area * float(v) / fault.length for v in self.chain.lengths]
+        return self.run.events(np.array(per_slip))
+
+    @property
+    def errors(self) -> dict[str, "np.ndarray"]:
+        """Largest slip error [m], |ln(v/V)| and |ln(θ/θ*)| of blocks, and pressure beside the plan [Pa] of wells."""
+        run, V = self.run, float(SlidingReference(task=self.chain.fault.reference).first_rate)
+        steady = np.array([float(block.friction.steady_state(V)[0]) for block in self.chain.blocks])
+        return {
+            "slip_error": np.abs(run.slip - run.reference[:, None]).max(axis=0),
+            "log_rate": np.abs(np.log(run.slip_rate / V)).max(axis=0),
+            "log_state": np.abs(np.log(run.state / steady)).max(axis=0),
+            "pressure_beside_plan": np.abs(run.pressure).max(axis=0),
+        }
+
+    @property
+    def within(self) -> bool:
+        """Whether all errors of a run under a law are within what is proved of their blocks and wells."""
+        assert self.found is not None
+        N, claims, errors = len(self.chain.blocks), self.found.claims, self.errors
+        told = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
+        proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
+        return bool((np.concatenate(told) <= np.array(proved, dtype=float)).all())
+
+    def lines(self) -> list[str]:
+        """For people."""
+        end = lasting(float(self.run.times[-1]))
+        if self.found is not None:
+            covered = LowerBound(self.covered).quantity("Pa")
+            said = [
+                f"run over {end} under a sine of {quantity(self.stress, 'Pa')} of shear on every block; proved for up "
+                f"to {covered}, a lag of {float(self.lag):g} s, with |ln(v/V)| <= {self.log_rate:.3g}",
+                *(
+                    f"block {i}: slip error {quantity(float(slip), 'm')}, |ln(v/V)| {rate:.3g}, |ln(state)| {state:.3g}"
+                    for i, (slip, rate, state) in enumerate(zip(*list(self.errors.values())[:3], strict=True), 1)
+                ),
+                *(
+                    f"well {i}: {quantity(float(v), 'Pa')} beside the plan"
+                    for i, v in enumerate(self.errors["pressure_beside_plan"], 1)
+                ),
+            ]
+            return [
+                *said,
+                f"{'within' if self.within else 'OUTSIDE'} what is proved of slips, slip rates, states and pressures",
+            ]
+        events = self.events
+        loaded = f"{self.chain.name}, loaded from afar at {quantity(self.run.loading_rate, 'm/s')}"
+        said = [f"{loaded}: {counted(len(events), 'event')} in {end}"]
+        said += [
+            f"event {i}: from {lasting(event.onset)}, slip "
+            + (", ".join(quantity(v, "m") for v in event.slip) if event.slip else "not ended")
+            + f", up to {', '.join(quantity(v, 'm/s') for v in event.peak_slip_rate)}"
+            + ("" if event.magnitude is None else f", magnitude {event.magnitude:.2f}")
+            for i, event in enumerate(events, 1)
+        ]
+        last = self.run.onsets[-2:]
+        return [*said, f"recurrence interval {lasting(float(last[1] - last[0]))}"] if len(last) > 1 else said
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI."""
+        run = self.run
+        facts: dict[str, Any] = {
+            "plant": "smooth" if self.inertia else "quasi-dynamic",
+            "duration": float(run.times[-1]),
+            "steps": len(run.times),
+        }
+        if self.found is not None:
+            errors = {f"max_{name}": values.tolist() for name, values in self.errors.items()}
+            told = {"lag": float(self.lag), "stress": self.stress, "covered_stress": float(self.covered)}
+            told |= {"proved_log_rate": float(self.log_rate)}
+            return facts | told | errors | {"within": self.within}
+        last = run.onsets[-2:]
+        return facts | {
+            "loading_rate": run.loading_rate,
+            "recurrence_interval": float(last[1] - last[0]) if len(last) > 1 else None,
+            "slip_events": [asdict(event) for event in self.events],
+        }
+
+
+def run_sliding_chain(
+    chain: BlockChain,
+    *,
+    certificate: str | Path | None = None,
+    stress: float | None = None,
+    stress_period: float = TIDE,
+    loading_rate: float | None = None,
+    duration: float | None = None,
+    inertia: bool = False,
+    tell: Callable[[float], None] = lambda _: None,
+) -> SlidingChainRun:
+    """Run blocks with rate-and-state friction without control, or under the law of a certificate that is checked anew.
+
+    Parameters
+    ----------
+    chain : BlockChain
+    certificate : str or Path, optional
+        File of a guarantee of this fault.
+    stress : float, optional
+        Amplitude of a sine of shear on every block, shifted by its share of a turn [Pa]; what is covered unless given.
+    stress_period : float
+        Its period [s].
+    loading_rate, duration, inertia
+        As of `natural_cycles`, or of `simulate_held_blocks` with a certificate.
+
+    Raises
+    ------
+    ParameterError, CertificateError, SimulationError
+    """
+    if certificate is None:
+        if stress is not None:
+            raise ParameterError("stress on blocks needs a law. Received no certificate. Give --certificate.")
+        run = natural_cycles(chain, duration, loading_rate=loading_rate, inertia=inertia)
+        return SlidingChainRun(chain=chain, run=run, inertia=inertia)
+    if loading_rate is not None:
+        raise ParameterError("the far end rests in slow sliding. Received a loading rate. Omit it.")
+    claim = load_guarantee(certificate)
+    if not isinstance(claim, PlantGuarantee):
+        raise CertificateError(
+            f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of guarantee."
+        )
+    lag, covered, rate = covered_stress(chain, claim)
+    if claim.check() is not Verdict.PROVED:
+        raise CertificateError(f"a certificate must hold. Received {certificate}. Prove it anew with guarantee.")
+    size = float(covered) if stress is None else stress
+    held = simulate_held_blocks(
+        chain,
+        claim.law,
+        lag=float(lag),
+        stress=size,
+        period=stress_period,
+        duration=duration,
+        inertia=inertia,
+        progress=tell,
+    )
+    return SlidingChainRun(
+        chain=chain, run=held, inertia=inertia, found=claim, lag=lag, covered=covered, log_rate=rate, stress=size
+    )

@@ -33,6 +33,8 @@ def test_an_unknown_command_is_refused(capsys):
 
 
 PROOF = Path(__file__).parents[2] / "proofs" / "certificates" / "guarantee_lab-fault.json"
+DATA = Path(__file__).parents[1] / "data"
+BLOCKS, SLIDING = DATA / "three_blocks.toml", DATA / "three_sliding_blocks.toml"
 QUICK = [
     "fault real-fault",
     "fault creeping-patch",
@@ -45,15 +47,28 @@ QUICK = [
     f"check {PROOF}",
     "completion bash",
     "errata 3",
+    f"fault {BLOCKS}",
+    f"limits {BLOCKS}",
+    f"simulate {SLIDING} --duration 1hour",
     *(
         pytest.param(line, marks=pytest.mark.slow)
-        for line in ("limits lab-fault", "guarantee lab-fault", "guarantee real-fault --step 2s", "compare lab-fault")
+        for line in (
+            "limits lab-fault",
+            "guarantee lab-fault",
+            "guarantee real-fault --step 2s",
+            "compare lab-fault",
+            f"guarantee {BLOCKS} --step 20s",
+            f"simulate {BLOCKS} --duration 1min",
+            f"export {BLOCKS} --force",
+            f"simulate {SLIDING} --certificate {SLIDING.with_suffix('.json')} --duration 1hour",
+        )
     ),
 ]
 
 
 @pytest.mark.parametrize("line", QUICK)
-def test_an_output_is_valid(line, capsys):
+def test_an_output_is_valid(line, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     command, *more = line.split()
     with pytest.raises(SystemExit):
         main([command, *more, "--json"])
@@ -68,8 +83,22 @@ def test_an_output_of_another_type_is_not_valid(broken, capsys):
     checked = jsonschema.Draft202012Validator(SCHEMAS["fault"])
     checked.validate(answer)
     (name,) = broken
-    assert name in SCHEMAS["fault"]["properties"]
+    assert name in SCHEMAS["fault"]["else"]["properties"]
     with pytest.raises(jsonschema.ValidationError):
         checked.validate(answer | broken)
     with pytest.raises(jsonschema.ValidationError, match="required"):
         checked.validate({key: value for key, value in answer.items() if key != name})
+
+
+@pytest.mark.parametrize(
+    ("line", "name"), [(f"fault {BLOCKS}", "shares"), (f"simulate {SLIDING} --duration 1hour", "run")]
+)
+def test_an_output_about_blocks_without_a_key_or_of_another_type_is_not_valid(line, name, capsys):
+    command, *more = line.split()
+    with pytest.raises(SystemExit):
+        main([command, *more, "--json"])
+    answer, checked = json.loads(capsys.readouterr().out), jsonschema.Draft202012Validator(SCHEMAS[command])
+    checked.validate(answer)
+    for broken in (answer | {name: "text"}, {key: value for key, value in answer.items() if key != name}):
+        with pytest.raises(jsonschema.ValidationError):
+            checked.validate(broken)

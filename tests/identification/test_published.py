@@ -73,8 +73,8 @@ def independent(record, first, near):
 def test_a_real_step_agrees_with_an_independent_fit_and_has_no_wrong_sign(name, at, near, sign, explained):
     """The independent one is of white noise and known rates: it lies in the box of the joint region, not in its middle.
 
-    The sign is 0 where it is open: after step 4 on basalt friction may drift or evolve. The means of step 3 on sepiolite
-    have few independent pieces of noise: they tell a - b, but a and b apart only together with it.
+    The sign is 0 where it is open: after step 4 on basalt friction may drift or evolve. The means of step 3 on
+    sepiolite have few independent pieces of noise: they tell a - b, but not a and b apart.
     """
     record = read_record(CUT / f"{name}.csv")
     own = independent(record, at, near)

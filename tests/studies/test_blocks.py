@@ -200,3 +200,13 @@ def test_a_decentralised_law_uses_the_signals_of_its_well_alone():
         crossed = [[bool(v) for v in row if v] for row in getattr(whole, name)]
         assert max(map(len, crossed)) > 1
         assert all(not v or i % 2 == j % 2 for i, row in enumerate(getattr(alone, name)) for j, v in enumerate(row))
+
+
+def test_a_search_leaves_the_slip_rates_no_larger_than_its_start(monkeypatch):
+    """Pressures in pascals are far larger numbers than slip rates; the search does not weigh them."""
+    monkeypatch.setattr(block_design, "_EVALUATIONS", (25, 10**6))
+    part = linear_part(plant := qd.UncertainPlant.from_blocks(CASES["two"]), {})
+    start = block_design._law_of(part, F("0.184"), np.array(block_design._START), False)
+    laws = (start, block_design.block_law(plant, F("0.184")))
+    before, after = (block_design.estimate(part, law)[1][len(part.A) // 2 : len(part.A)].max() for law in laws)
+    assert after <= before

@@ -13,13 +13,24 @@ from scipy.linalg import expm
 
 import quakedesign as qd
 from quakedesign.cli import main
-from quakedesign.errors import ParameterError
+from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.exact import UpperBound
+from quakedesign.guarantees.exact.guarantee_files import load_guarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantGuarantee
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
+from quakedesign.guarantees.search.plant_search import linear_part
+from quakedesign.guarantees.search.sliding_block_design import covered_stress
+from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
-from quakedesign.studies import chain_limits
+from quakedesign.studies import chain_limits, chains
 
 PATH = Path(__file__).parents[1] / "data" / "three_blocks.toml"
 CHAIN = qd.load_chain(PATH)
+SLIDING = PATH.with_name("three_sliding_blocks.toml")
+CERTIFICATES = Path(__file__).parents[2] / "proofs" / "certificates"
+TWO_BLOCKS, ONE_BLOCK = (
+    CERTIFICATES / f"{n}.json" for n in ("uncertain_plant_real-fault-2-blocks", "sliding_crustal-patch")
+)
 
 
 def alike(lengths, wells, modulus=None):
@@ -149,14 +160,13 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
     assert run("guarantee", PATH) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "plant: three-blocks, 3 blocks, 3 wells, any constants of box paper, without stick" in told
-    assert "units: slip m, slip rate m/s, disturbance m/s^2, pressure Pa, rate of a load Pa/s" in told
+    assert "the load of a pressure is the pressure that balances the blocks on the reference" in told
     assert "equilibrium of each block" not in told
     alone = PATH.read_text().split("[[block]]")[0] + '[[block]]\nlength = "2.5 km"\n' * 2
     (tmp_path / "blocks.toml").write_text(alone + '[[well]]\nposition = "1 km"\n')
     assert run("guarantee", tmp_path / "blocks.toml") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "2 blocks, 1 well," in told
-    assert "disturbance m/s^2, the second m/s," in told
     assert "slip errors are relative to the equilibrium of each block under these pressures" in told
     assert re.search(r"within 0\.\d+ m of the reference at every time", told)
     assert run("guarantee", PATH, "--json") == 0
@@ -219,8 +229,27 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
         (("simulate", PATH, "--controller", "cta"), "must be one of centralised, decentralised. Received 'cta'"),
         (("design", PATH, "--controller", "decentralized"), "Did you mean decentralised?"),
         (("compare", PATH, "--objective", "peak"), "Received --objective"),
-        (("export", PATH), "Use the commands fault, design, guarantee, compare, simulate or limits"),
-        (("derive", PATH), "Use the commands fault, design, guarantee, compare, simulate or limits"),
+        (("export", PATH, "--scheme", "implicit"), "--certificate, --controller, --fmu, --force, --json, --out"),
+        (
+            ("export", PATH, "--controller", "decentralised", "--certificate", SLIDING.with_suffix(".json")),
+            "Omit --con",
+        ),
+        (("export", SLIDING), "export of several blocks needs friction of slip and slip rate alone"),
+        (("simulate", PATH, "--drift", "1 nm/s"), "--plant, --drift and --stress of several blocks need friction with"),
+        (("simulate", PATH, "--stress", "1 kPa"), "--plant, --drift and --stress of several blocks need friction with"),
+        (("simulate", SLIDING, "--stress", "1 kPa"), "stress on blocks needs a law"),
+        (("simulate", SLIDING, "--start", "late"), "several blocks have no --pressure, --start"),
+        (("simulate", SLIDING, "--controller", "centralised"), "run under the law of a certificate"),
+        (("simulate", SLIDING, "--plant", "printed"), "must be one of smooth, quasi-dynamic"),
+        (("simulate", SLIDING, "--certificate", TWO_BLOCKS), "about these blocks in slow sliding"),
+        (("simulate", SLIDING, "--certificate", ONE_BLOCK), "must be about several blocks"),
+        (
+            ("simulate", SLIDING, "--certificate", SLIDING.with_suffix(".json"), "--drift", "1 nm/s"),
+            "the far end rests in slow sliding",
+        ),
+        (("simulate", PATH, "--certificate", TWO_BLOCKS), "about another plant than three-blocks"),
+        (("export", PATH, "--certificate", ONE_BLOCK), "about another plant than three-blocks"),
+        (("derive", PATH), "Use the commands fault, design, guarantee, compare, simulate, export or limits"),
     ],
 )
 def test_what_does_not_take_it_says_so_in_one_line(arguments, said, capsys):
@@ -252,3 +281,135 @@ def test_laws_are_compared_side_by_side(tmp_path, capsys):
     assert proved > max(one["run"]["max_slip_rate_error"])
     shown = float(re.search(r"([0-9.]+) µm/s", rows["decentralised"])[1])
     assert proved * 10**6 <= F(str(shown)) <= proved * F(101, 100) * 10**6
+
+
+# ----------------------------------------------------------------------
+# Laws of certificates: which plant they are about, and runs of them.
+
+
+def law_that_is_proved(chain=CHAIN):
+    """A guarantee without a search: weak feedback of the slip error, proved of nothing until it is checked."""
+    one = F(-(10**9))
+    law = MatrixLaw(
+        step=F("0.184"),
+        delay=F(0),
+        update=(),
+        measured=(),
+        output=((),) * 3,
+        feedback=tuple(tuple(one * (i == j) for j in range(6)) for i in range(3)),
+    )
+    plant = qd.UncertainPlant.from_blocks(chain)
+    part = linear_part(plant, {})
+    claims = PlantClaims(outputs=(UpperBound(1),) * 6, controls=(UpperBound(1),) * 3)
+    return PlantGuarantee(part=part, law=law, pieces=8, inputs=(F(0),) * len(part.sectors), claims=claims)
+
+
+def test_a_certificate_that_does_not_hold_or_is_of_other_blocks_gives_no_law(tmp_path, monkeypatch):
+    claim, path = law_that_is_proved(), tmp_path / "claimed.json"
+    monkeypatch.setattr(chains, "load_guarantee", lambda _: claim)
+    with pytest.raises(CertificateError, match="must hold"):
+        chains.chain_law(CHAIN, certificate=path)
+    monkeypatch.setattr(PlantGuarantee, "check", lambda _: Verdict.PROVED)
+    found = chains.chain_law(CHAIN, certificate=path)
+    assert found.law == claim.law
+    assert "|slip-rate error 2| <= 1 m/s" in found.sentence()
+    with pytest.raises(CertificateError, match="about another plant"):
+        chains.chain_law(replace(CHAIN, wells=(1000.0, 2500.0, 4000.0)), certificate=path)
+    late = replace(claim, law=replace(claim.law, delay=F(1, 100)))
+    monkeypatch.setattr(chains, "load_guarantee", lambda _: late)
+    with pytest.raises(CertificateError, match="without delay"):
+        chains.chain_law(CHAIN, certificate=path)
+
+
+def test_a_guarantee_of_slow_sliding_tells_its_lag_and_the_stress_that_it_covers():
+    """Proved for 10 kPa; what inertia adds to the stress is below a pascal."""
+    chain, claim = qd.load_chain(SLIDING), load_guarantee(SLIDING.with_suffix(".json"))
+    lag, stress, rate = covered_stress(chain, claim)
+    assert lag == 800
+    assert 0.07 < rate < 0.0739  # of the proof, with larger claims: 0.0738
+    assert 10_000 <= stress < 10_001
+    smaller = tuple((entry, size / 2) for entry, size in claim.part.disturbances)
+    _, half, _ = covered_stress(chain, replace(claim, part=replace(claim.part, disturbances=smaller)))
+    assert float(half) == pytest.approx(5000, abs=1)
+    friction = replace(chain.blocks[0].friction, evolution_effect=0.02)
+    others = (
+        replace(chain, blocks=tuple(replace(block, friction=friction) for block in chain.blocks)),
+        replace(chain, fault=replace(chain.fault, shear_modulus=32.05e9)),
+    )
+    for other in others:
+        with pytest.raises(CertificateError, match="about these blocks"):
+            covered_stress(other, claim)
+    for place in (0, 2):  # a sector that is narrower than that of the blocks
+        sector = claim.part.sectors[place]
+        low, high = sector.slopes
+        narrow = replace(sector, slopes=(low + (high - low) / 5, high))
+        sectors = (*claim.part.sectors[:place], narrow, *claim.part.sectors[place + 1 :])
+        with pytest.raises(CertificateError):
+            covered_stress(chain, replace(claim, part=replace(claim.part, sectors=sectors)))
+
+
+@pytest.mark.slow
+def test_a_run_of_slow_sliding_says_whether_it_stays_within_what_is_proved(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(PlantGuarantee, "check", lambda _: Verdict.PROVED)  # takes 17 s; decided in the slow tests
+    certificate = SLIDING.with_suffix(".json")
+    assert (
+        run("simulate", SLIDING, "--certificate", certificate, "--duration", "2 hours", "--out", tmp_path / "run") == 0
+    )
+    told = " ".join(capsys.readouterr().out.split())
+    assert "proved for up to 10 kPa, a lag of 800 s, with |ln(v/V)| <= 0.07" in told
+    assert "within what is proved of slips, slip rates, states and pressures" in told
+    facts = json.loads((tmp_path / "run" / "results.json").read_text())["run"]
+    assert facts["within"] is True
+    assert facts["stress"] == pytest.approx(10_000, rel=1e-4)
+    assert (tmp_path / "run" / "blocks.png").stat().st_size > 20_000
+    chain = qd.load_chain(SLIDING)
+    strong = chains.run_sliding_chain(chain, certificate=certificate, stress=2e5, duration=2e4, inertia=True)
+    assert not strong.within
+    assert "OUTSIDE what is proved" in strong.lines()[-1]
+    assert strong.to_dict()["plant"] == "smooth"
+
+
+@pytest.mark.slow
+def test_cycles_without_control_are_told(capsys, tmp_path):
+    assert run("simulate", SLIDING, "--duration", "1 year", "--drift", "1 nm/s", "--out", tmp_path / "run") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "loaded from afar at 1 nm/s: 1 event in 3.156e+07 s" in told
+    assert "recurrence" not in told
+    facts = json.loads((tmp_path / "run" / "results.json").read_text())["run"]
+    (event,) = facts["slip_events"]
+    assert event["magnitude"] == pytest.approx(2 / 3 * np.log10(32.04e9 * 5e3 * 15e3 * sum(event["slip"])) - 6.07)
+    assert facts["recurrence_interval"] is None
+    assert (tmp_path / "run" / "blocks.png").stat().st_size > 20_000
+
+
+@pytest.mark.slow
+def test_a_proved_law_of_slow_sliding_runs_within_its_claims_which_are_decided_anew(capsys):
+    assert run("simulate", SLIDING, "--certificate", SLIDING.with_suffix(".json"), "--duration", "2 day", "--json") == 0
+    facts = json.loads(capsys.readouterr().out)["run"]
+    assert facts["within"] is True
+    assert max(facts["max_log_rate"]) > 0.005
+
+
+@pytest.mark.slow
+def test_the_law_of_a_certificate_is_exported_and_run(capsys, tmp_path):
+    proof, out = tmp_path / "proved.json", tmp_path / "c"
+    assert run("guarantee", PATH, "--out", proof) == 0
+    capsys.readouterr()
+    assert run("export", PATH, "--certificate", proof, "--out", out, "--fmu") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "|slip-rate error 3| <=" in told
+    assert "µm/s" in told
+    header = (out / "controller.h").read_text(encoding="utf-8")
+    assert "#define CONTROLLER_PRESSURES 3" in header
+    assert "without stick" in header
+    assert run("simulate", PATH, "--certificate", proof, "--duration", "1 min") == 0
+    assert run("simulate", PATH, "--duration", "1 min", "--json") == 0
+
+
+@pytest.mark.slow
+def test_nothing_is_exported_where_nothing_is_proved(capsys, tmp_path):
+    path = tmp_path / "blocks.toml"
+    path.write_text(PATH.read_text().replace('"184 ms"', '"20 s"'))
+    assert run("export", path, "--out", tmp_path / "c") == 1
+    assert "nothing is exported, as no law is proved" in capsys.readouterr().out.replace("\n", " ")
+    assert not (tmp_path / "c").exists()

@@ -15,7 +15,8 @@ P_s, those with a bound strictly within it; as they are continuous and within it
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, ClassVar, Literal
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
@@ -35,6 +36,9 @@ from quakedesign.sos.exact.strict import (
     with_keys,
 )
 from quakedesign.text import counted
+
+if TYPE_CHECKING:
+    from quakedesign.plant import UncertainPlant
 
 MOST_PIECES = 64
 _MOST_LAW_STATES = 48
@@ -64,6 +68,8 @@ class PlantGuarantee:
     claims : PlantClaims
     outputs, controls : tuple of str
         Names for people.
+    units : tuple of str
+        Those of outputs, controls and disturbances, for people; without entries numbers have none.
     name : str
     notes : tuple of str
         What was changed when the law became one in exact numbers.
@@ -79,6 +85,7 @@ class PlantGuarantee:
     claims: PlantClaims
     outputs: tuple[str, ...] = ()
     controls: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
     name: str = "plant"
     notes: tuple[str, ...] = ()
 
@@ -89,7 +96,8 @@ class PlantGuarantee:
         named = [*self.outputs, *(f"{name} less its load" for name in self.controls)]
         bounds = (*self.claims.outputs, *self.claims.controls)
         named = named if len(named) == len(bounds) else [f"row {i}" for i in range(1, len(bounds) + 1)]
-        return [f"|{name}| <= {bound:.4g}" for name, bound in zip(named, bounds, strict=True)]
+        units = self.units[: len(bounds)] or [""] * len(bounds)
+        return [f"|{name}| <= {_told(bound, unit)}" for name, bound, unit in zip(named, bounds, units, strict=True)]
 
     @property
     def bounds(self) -> dict[str, UpperBound]:
@@ -121,9 +129,11 @@ class PlantGuarantee:
         said += f", for all uncertain terms in {counted(len(part.sectors), 'sector')}" if part.sectors else ""
         regions = [s.within for s in part.sectors if s.within is not None]
         said += f", {len(regions)} of which hold for |y| <= {_listed(regions)}" if regions else ""
-        sizes = [size for _, size in part.disturbances]
-        said += f", disturbances of at most {_listed(sizes)}" if sizes else ""
-        said += f", loads of rates of at most {_listed(load.rate for load in part.loads)}" if part.loads else ""
+        sizes, first = [size for _, size in part.disturbances], len(self.claims.outputs)
+        pushed = self.units[first + len(part.B[0]) :]
+        said += f", disturbances of at most {_listed(sizes, pushed)}" if sizes else ""
+        rates, unit = [load.rate for load in part.loads], self.units[first] if self.units else ""
+        said += f", loads of rates of at most {_listed(rates, [unit and f'{unit}/s'] * len(rates))}" if rates else ""
         said += f", measurement noise of at most {_listed(part.noise)}" if any(part.noise) else ""
         return f"{said}, for all t >= 0: {', '.join(self._peaks())}"
 
@@ -139,9 +149,16 @@ class PlantGuarantee:
         }
 
 
-def _listed(values: Iterable[Fraction]) -> str:
+def _listed(values: Iterable[Fraction], units: Iterable[str] = ()) -> str:
     """Different numbers that are covered, in their order."""
-    return ", ".join(dict.fromkeys(f"{LowerBound(v):.4g}" for v in values))
+    return ", ".join(dict.fromkeys(_told(LowerBound(v), unit) for v, unit in zip_longest(values, units, fillvalue="")))
+
+
+def _told(bound: LowerBound | UpperBound, unit: str) -> str:
+    """With four digits, and an engineering prefix of its unit."""
+    if unit.startswith("MPa"):
+        bound, unit = type(bound)(bound * 10**6), unit[1:]
+    return bound.quantity(unit, 4) if unit and bound else f"{bound:.4g}"
 
 
 def peaks(part: LinearPart, found: ResponseBounds, inputs: Row) -> Row | None:
@@ -318,6 +335,8 @@ def _read_law(raw: Any) -> MatrixLaw:
     )
 
 
-def named(claim: PlantGuarantee, outputs: tuple[str, ...], controls: tuple[str, ...], name: str) -> PlantGuarantee:
-    """A claim with names for people."""
-    return replace(claim, outputs=outputs, controls=controls, name=name)
+def named(claim: PlantGuarantee, plant: "UncertainPlant") -> PlantGuarantee:
+    """A claim with the names and units of its plant, for people."""
+    outputs, controls, units = tuple(plant.outputs or ()), tuple(plant.controls), plant.units
+    told = tuple(units.get(name, "") for name in (*outputs, *controls, *plant.disturbances)) if units else ()
+    return replace(claim, outputs=outputs, controls=controls, units=told, name=plant.name)

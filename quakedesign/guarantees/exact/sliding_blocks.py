@@ -241,6 +241,9 @@ class SlidingBlocks:
                 **{f"pull {i + 1}": pull for i, pull in enumerate(pulls)},
             },
             controls=tuple(f"pressure {k + 1}" for k in range(m)),
+            units={f"slip error {i + 1}": "m" for i in range(N)}
+            | {f"pull {i + 1}": "MPa" for i in range(N)}
+            | {f"pressure {k + 1}": "MPa" for k in range(m)},
             name=f"{self.chain.name}, {N} blocks, {counted(m, 'well')}",
         )
 

@@ -55,7 +55,7 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
             found = estimate(part, _law_of(part, step, values, decentralised))
         except ValueError:  # a mode that grows beyond floating point, or no solution of the equation of Riccati
             return 1e3
-        return found[0] if found[1] is None else float(np.log(found[1][blocks:].max())) - 100
+        return found[0] if found[1] is None else float(np.log(found[1][blocks : 2 * blocks].max())) - 100
 
     blocks = len(part.A) // 2
     simplex = np.vstack([np.zeros(len(_STEPS)), np.diag(_STEPS)])

@@ -14,6 +14,7 @@ from quakedesign.guarantees.exact.plant_guarantee import (
     MOST_PIECES,
     PlantClaims,
     PlantGuarantee,
+    named,
     peaks,
     row_bounds,
 )
@@ -105,16 +106,8 @@ def _claimed(
         return NoGuarantee(reason="; ".join(beyond) or "the numbers of the small gain do not close", small_gain=None)
     claimed = tuple(UpperBound(above(v * MARGIN)) for v in bounds)
     count = len(part.outputs)
-    return PlantGuarantee(
-        part=part,
-        law=law,
-        pieces=pieces,
-        inputs=inputs,
-        claims=PlantClaims(outputs=claimed[:count], controls=claimed[count:]),
-        outputs=tuple(plant.outputs or ()),
-        controls=tuple(plant.controls),
-        name=plant.name,
-    )
+    claims = PlantClaims(outputs=claimed[:count], controls=claimed[count:])
+    return named(PlantGuarantee(part=part, law=law, pieces=pieces, inputs=inputs, claims=claims), plant)
 
 
 def _numbers(plant: UncertainPlant, part: LinearPart, found: ResponseBounds) -> Row | NoGuarantee:

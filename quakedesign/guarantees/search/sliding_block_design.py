@@ -13,9 +13,11 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import minimize
 
+from quakedesign.errors import CertificateError
 from quakedesign.exact import LowerBound, UpperBound, rational
+from quakedesign.fault import BlockChain
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
-from quakedesign.guarantees.exact.plant_loop import MatrixLaw
+from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
 from quakedesign.guarantees.exact.sliding_blocks import MPA, BlockClaims, SlidingBlocks
 from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
@@ -34,6 +36,7 @@ _PIECES = 8  # of a period, which is short beside the times of the plant
 _ROOM = 1.03
 _LOST = 100.0
 _DIGITS = 10
+_HALVINGS = 20  # of a range of stresses
 
 
 def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuarantee | NoGuarantee:
@@ -68,6 +71,66 @@ def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuara
         if isinstance(found, PlantGuarantee) and max(found.claims.controls) * MPA < claims.push:
             return replace(found, notes=(_slip_rates(blocks, rate),))
     return NoGuarantee(reason="the bounds that an estimate finds are not proved", small_gain=None)
+
+
+def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, Fraction, UpperBound]:
+    """Lag [s] and largest shear stress [Pa] for which a guarantee is one of these blocks, and its bound of |ln(v/V)|.
+
+    The claims of the plant are read off its sectors, and Q off the bounds of its pressures: with a smaller one its
+    sectors and disturbances still cover the blocks.
+
+    Raises
+    ------
+    CertificateError
+        When it is about another plant.
+    """
+    part, size = claim.part, 2 * len(chain.blocks)
+    within = [sector.within for sector in part.sectors[:2]]
+    if len(part.A) <= size or not part.A[size][size] < 0 or len(within) < 2 or None in within:
+        raise _of_another(chain)
+    lag, push = -1 / part.A[size][size], max(claim.claims.controls) * MPA * (1 + Fraction(1, 10**9))
+    claims = BlockClaims(log_state=within[0], pull=within[1] * MPA, push=push)  # type: ignore[arg-type, operator]
+
+    def covers(stress: Fraction) -> bool:
+        plant = SlidingBlocks(chain=chain, lag=lag, stress=stress).plant(claims)
+        return plant is not None and _within(linear_part(plant, {}), part)
+
+    high = max((entry[1] for entry in part.disturbances), default=Fraction(0)) * MPA
+    high = high / min((s.slopes[1] for s in part.sectors[1::3] if s.slopes[1] > 0), default=Fraction(1))
+    low = high / 2**_HALVINGS
+    if not low or not covers(low):
+        raise _of_another(chain)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if covers(middle) else (low, middle)
+    rate = SlidingBlocks(chain=chain, lag=lag, stress=low).log_rate(claims)
+    assert rate is not None  # as the plant is known
+    return lag, low, rate
+
+
+def _within(asked: LinearPart, proved: LinearPart) -> bool:
+    """Whether a plant is another one, or has narrower sectors and smaller disturbances."""
+    same = all(getattr(asked, name) == getattr(proved, name) for name in ("A", "B", "C", "loads", "noise", "start"))
+    if not same or asked.outputs != proved.outputs or len(asked.sectors) != len(proved.sectors):
+        return False
+    narrower = all(
+        (a.entry, a.row, a.within) == (b.entry, b.row, b.within)
+        and b.slopes[0] <= a.slopes[0] <= a.slopes[1] <= b.slopes[1]
+        for a, b in zip(asked.sectors, proved.sectors, strict=True)
+    )
+    pushed = zip(asked.disturbances, proved.disturbances, strict=False)
+    return (
+        narrower
+        and len(asked.disturbances) == len(proved.disturbances)
+        and all(a[0] == b[0] and a[1] <= b[1] for a, b in pushed)
+    )
+
+
+def _of_another(chain: BlockChain) -> CertificateError:
+    return CertificateError(
+        f"a certificate must be about these blocks in slow sliding. Received one about another plant than "
+        f"{chain.name}. Give a file of guarantee {chain.name} --out FILE."
+    )
 
 
 def _slip_rates(blocks: SlidingBlocks, rate: UpperBound) -> str:

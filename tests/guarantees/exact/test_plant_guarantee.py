@@ -19,6 +19,7 @@ import quakedesign as qd
 from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, read_guarantee, save_guarantee
+from quakedesign.guarantees.exact.plant_guarantee import named
 from quakedesign.guarantees.exact.plant_loop import response_bounds
 
 CHECK = Path(__file__).parents[3] / "proofs" / "check.py"
@@ -405,6 +406,19 @@ def test_a_sentence_names_every_size_that_it_covers_rounded_inward():
     ):
         (shown,) = re.findall(rf"\|{name}\| <= ([0-9.e-]+)", found.sentence())
         assert bound <= Fraction(shown) < bound * (1 + 2000 * half)
+    told = named(found, replace(plant, units={"y1": "m", "u1": "MPa", "d": "m/s²"})).sentence()
+    assert "disturbances of at most 66.66 mm/s², loads of rates of at most 16.66 kPa/s, measurement" in told
+    prefixes = {"m": Fraction(1, 1000), "": Fraction(1), "k": Fraction(1000), "M": Fraction(10**6)}
+    for name, unit, bound in (("y1", "m", found.bounds["y1"]), ("u1 less its load", "Pa", found.bounds["u1"] * 10**6)):
+        ((shown, prefix),) = re.findall(rf"\|{name}\| <= ([0-9.]+) ([mkM]?){unit}\b", told)
+        assert bound <= Fraction(shown) * prefixes[prefix] < bound * Fraction(1002, 1000)
+    assert "|y2| <= 0" in told
+    assert "/s, measurement" not in named(found, replace(plant, units={"y1": "m"})).sentence()
+
+
+def test_units_of_unknown_names_are_refused():
+    with pytest.raises(ParameterError, match="Received y3"):
+        qd.UncertainPlant(A=[[-1]], B=[[1]], units={"y3": "m"})
 
 
 def test_slopes_that_are_steep_only_far_from_the_start_let_no_mode_escape():

@@ -248,7 +248,6 @@ def run(*arguments):
         (("guarantee", PATH), "give stress, lag and, if you like, step"),
         (("guarantee", PATH, "--stress", "10 kPa"), "positive lag and a positive bound of the shear stress"),
         (("guarantee", PATH, "--stress", "10 kPa", "--lag", "800 s", "--delay", "1 s"), "Received --delay"),
-        (("simulate", PATH), "a run of several blocks needs friction of slip and slip rate alone"),
         (("design", PATH, "--out", "unwritten"), "Use guarantee with --lag and --stress"),
         (("compare", PATH), "Use guarantee with --lag and --stress"),
         (("limits", PATH), "Use guarantee with --lag and --stress"),

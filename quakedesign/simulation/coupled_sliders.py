@@ -1,0 +1,506 @@
+"""Blocks with rate-and-state friction that elasticity couples: cycles, runs under a law, and diffusing pressure.
+
+With ζ the slip less that of the far end, N = σ' − p and S the stress on a block per slip of every block, for each block
+
+    ζ' = v − v_∞,    mv' = τ_0 − Sζ + s − Nμ(v, θ) − Hv,    θ' of the law.
+
+Without mass the right-hand side is 0, and its derivative gives v' (quasi-dynamic). Rates and states are followed in
+their logarithms. Pressures of cells or wells obey h' = Fh + Gu, and p is a combination of them.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import sympy as sp
+
+from quakedesign.arguments import checked_dataclass
+from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.fault import BlockChain, FrictionLaw, SlidingReference
+from quakedesign.fault.model import magnitude, require_positive
+from quakedesign.plant.block_plant import averages
+from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
+from quakedesign.simulation.smooth import Ramp, SmoothProblem
+from quakedesign.simulation.state_plant import TIDE, slip
+from quakedesign.simulation.stick_slip import direct_strength
+from quakedesign.symbolic.casadi_printer import to_casadi
+from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
+
+MOST_EXPANDED = 40  # blocks whose equations are written out; more are matrices
+MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
+_LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
+_LONGEST_RUN = 1e5 * _LONGEST  # s
+_FARTHEST = 1e6  # critical slips that the far end travels: some thousand cycles
+_MOST_PERIODS = 10**5  # of a run under a law
+_ONSET = 10.0  # times the loading rate
+_EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # of a run that shows a cycle: events, and loads of aσ'
+_RTOL = 1e-9
+_SMALL = 1e3  # Pa, below which errors of a pressure count absolutely
+_TIGHT = 1e-11  # of runs under a law
+_SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run under a law is recorded
+_WIDEST = 50.0  # change of the logarithm of a rate at the start
+
+
+@checked_dataclass(frozen=True, eq=False, kw_only=True)
+class CoupledSliders:
+    """Blocks per unit of area, and the pressures that act on them.
+
+    Attributes
+    ----------
+    laws : tuple of FrictionLaw
+        With one state each.
+    stiffness : ndarray
+        S [Pa/m], blocks × blocks: what the stress on a block loses per slip of every block.
+    normal_stress : tuple of float
+        σ' [Pa] of every block.
+    damping : float
+        H [Pa·s/m].
+    mass : float
+        m [kg/m²]; 0: quasi-dynamic.
+    flow : ndarray
+        F [1/s] of the pressures of cells or wells; without rows there are none.
+    source : ndarray
+        G, rows for these pressures and columns for inputs u.
+    shares : ndarray
+        Share of every such pressure (columns) in that of every block (rows) [-].
+    """
+
+    laws: tuple[FrictionLaw, ...]
+    stiffness: Any
+    normal_stress: tuple[float, ...]
+    damping: float
+    mass: float = 0.0
+    flow: Any = ()
+    source: Any = ()
+    shares: Any = ()
+
+    def __post_init__(self) -> None:
+        wrong = [law.name for law in self.laws if len(law.state_names) != 1]
+        if wrong:
+            raise ParameterError(f"coupled blocks need friction with one state. Received {wrong[0]}. Change the law.")
+
+    @classmethod
+    def of(cls, chain: BlockChain, *, inertia: bool = False, lag: float | None = None) -> "CoupledSliders":
+        """Blocks of a file; with a lag [s] pressures of its wells, beside what is planned, behind it."""
+        N, m, fault = len(chain.blocks), len(chain.wells), chain.fault
+        stiffness, mass = np.diag([fault.stiffness / fault.area] * N), fault.mass / fault.area
+        for i, j, K in chain.springs:
+            stiffness[i, j] -= float(K) * mass
+            stiffness[i, i] += float(K) * mass
+        wells = {} if lag is None else {"flow": -np.eye(m) / lag, "source": np.eye(m) / lag}
+        return cls(
+            laws=tuple(block.friction for block in chain.blocks),
+            stiffness=stiffness,
+            normal_stress=tuple(block.effective_normal_stress for block in chain.blocks),
+            damping=fault.damping / fault.area,
+            mass=mass if inertia else 0.0,
+            shares=() if lag is None else np.array(chain.shares, dtype=float),
+            **wells,
+        )
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Numbers of blocks, and of pressures of cells or wells."""
+        return len(self.laws), len(self.flow)
+
+    def start(self, rates: Sequence[float], states: Sequence[float]) -> "np.ndarray":
+        """Vector y of slips [m], logarithms of rates [m/s] and states [s], and pressures [Pa], the first and last 0."""
+        require_positive("", slip_rate=min(rates), state=min(states))
+        return np.concatenate([np.zeros(len(rates)), np.log(rates), np.log(states), np.zeros(len(self.flow))])
+
+    @cached_property
+    def _friction(self) -> list[Any]:
+        """CasADi Functions (log v, log θ) → μ, ∂μ/∂log v, ∂μ/∂log θ, (log θ)', and its share of (log N)', per block."""
+        known: dict[FrictionLaw, Any] = {}
+        for law in self.laws:
+            if law not in known:
+                log_rate, log_state = ca.SX.sym("log_rate"), ca.SX.sym("log_state")
+                exact, states = law.exact(), state_symbols(law.state_names)
+                parts = [
+                    without_overflow(exact.coefficient(slip, rate, *states)),
+                    *exact.state_rates(slip, rate, *states),
+                ]
+                values = {rate: ca.exp(log_rate), states[0]: ca.exp(log_state), slip: ca.SX(0)}
+                mu, change = to_casadi([sp.sympify(part) for part in parts], values)
+                by = [ca.jacobian(mu, x) for x in (log_rate, log_state)]
+                outputs = [mu, *by, change / values[states[0]], ca.SX(law.stress_exponents[0])]
+                known[law] = ca.Function("friction", [log_rate, log_state], outputs)
+        return [known[law] for law in self.laws]
+
+    def _of_friction(self, log_rate: Any, log_state: Any) -> list[Any]:
+        """Outputs of `_friction` as columns, one entry a block."""
+        functions, N = self._friction, len(self.laws)
+        if len(set(self.laws)) == 1:
+            return [row.T for row in functions[0].map(N)(log_rate.T, log_state.T)]
+        rows = [f(log_rate[i], log_state[i]) for i, f in enumerate(functions)]
+        return [ca.vertcat(*column) for column in zip(*rows, strict=True)]
+
+    def field(self, y: Any, load: Any, stress: Any = 0, stress_rate: Any = 0) -> Any:
+        """y' in CasADi.
+
+        Parameters
+        ----------
+        y : MX
+        load : MX
+            v_∞ [m/s], pressure on all blocks beside that of cells or wells and its rate [Pa, Pa/s], τ_0 of every block
+            [Pa] where there is mass, and inputs u.
+        stress, stress_rate : MX
+            s [Pa] of every block and its rate [Pa/s].
+        """
+        N, n = self.sizes
+        behind, log_rate, log_state, h = ca.vertsplit(y, [0, N, 2 * N, 3 * N, 3 * N + n])
+        v, pressure, change, moved = ca.exp(log_rate), load[1], load[2], y[:0]
+        held = 3 + N * (self.mass > 0)
+        if n:
+            flow = ca.DM(ca.sparsify(ca.DM(self.flow)))
+            moved = ca.mtimes(flow, h)
+            if np.size(self.source):
+                moved += ca.mtimes(ca.DM(self.source), load[held:])
+            shares = ca.DM(ca.sparsify(ca.DM(self.shares)))
+            pressure, change = pressure + ca.mtimes(shares, h), change + ca.mtimes(shares, moved)
+        normal = ca.DM(self.normal_stress) - pressure
+        mu, by_rate, by_state, aged, exponent = self._of_friction(log_rate, log_state)
+        aged -= exponent * change / normal
+        S = ca.DM(self.stiffness)
+        if self.mass:
+            driven = load[3:held] - ca.mtimes(S, behind) + stress - normal * mu - self.damping * v
+            faster = driven / (self.mass * v)
+        else:
+            loaded = stress_rate - ca.mtimes(S, v - load[0]) + change * mu - normal * by_state * aged
+            faster = loaded / (normal * by_rate + self.damping * v)
+        return ca.vertcat(v - load[0], faster, aged, moved)
+
+    def rates(self, inputs: int = 0) -> Any:
+        """CasADi Function (y, load) → y', and the Jacobian where the equations are written out."""
+        N, n = self.sizes
+        y, load = ca.MX.sym("y", 3 * N + n), ca.MX.sym("load", 3 + N * (self.mass > 0) + inputs)
+        found = ca.Function("rates", [y, load], [ca.densify(self.field(y, load))])
+        if N > MOST_EXPANDED:
+            return found
+        state, told = ca.SX.sym("y", y.size1()), ca.SX.sym("load", load.size1())
+        field = ca.cse([found(state, told)])[0]
+        return ca.Function("rates", [state, told], [field, ca.jacobian(field, state)])
+
+    def resisting(self, y: "np.ndarray") -> "np.ndarray":
+        """Nμ + Hv [Pa] of every block."""
+        N, n = self.sizes
+        normal = np.array(self.normal_stress) - (np.asarray(self.shares) @ y[3 * N :] if n else 0)
+        mu = [float(f(*pair)[0]) for f, pair in zip(self._friction, y[N : 3 * N].reshape(2, N).T, strict=True)]
+        return np.asarray(normal * mu + self.damping * np.exp(y[N : 2 * N]))
+
+    def stressed(self, y: "np.ndarray", stress: "np.ndarray") -> "np.ndarray":
+        """Vector y after a step of the stress [Pa] on every block; with mass the same."""
+        from scipy.optimize import brentq
+
+        if self.mass:
+            return y
+        wanted, found = self.resisting(y) + stress, y.copy()
+        N = len(self.laws)
+
+        def excess(value: float, i: int) -> float:
+            tried = y.copy()
+            tried[N + i] = value
+            return float(self.resisting(tried)[i] - wanted[i])
+
+        for i in range(N):
+            found[N + i] = brentq(excess, y[N + i] - _WIDEST, y[N + i] + _WIDEST, args=(i,), xtol=1e-14)
+        return found
+
+
+# ----------------------------------------------------------------------
+# Runs without control.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockEvent:
+    """One event of several blocks: from when the fastest passes the onset rate to when the fastest is below again."""
+
+    onset: float  # [s]
+    arrest: float | None  # [s]; None where the run ends before
+    slip: tuple[float, ...] | None  # Of every block [m]
+    peak_slip_rate: tuple[float, ...]  # Of every block [m/s]
+    magnitude: float | None  # M_w [-]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidersRun:
+    """A run of coupled blocks. Arrays of instants × blocks, or cells and wells for the pressure.
+
+    Attributes
+    ----------
+    times, slip, slip_rate, state, pressure : ndarray
+        [s], [m], [m/s], [s], [Pa].
+    reference : ndarray
+        Displacement of the far end, or r of a run under a law [m].
+    onsets : ndarray
+        Times [s] at which the fastest block passes the onset rate.
+    onset_rate, loading_rate : float
+        [m/s].
+    evaluations : int
+    """
+
+    times: "np.ndarray"
+    slip: "np.ndarray"
+    slip_rate: "np.ndarray"
+    state: "np.ndarray"
+    pressure: "np.ndarray"
+    reference: "np.ndarray"
+    onsets: "np.ndarray"
+    onset_rate: float
+    loading_rate: float
+    evaluations: int
+
+    @property
+    def fastest(self) -> "np.ndarray":
+        """Slip rate of the fastest block [m/s]."""
+        return np.asarray(self.slip_rate.max(axis=1))
+
+    def events(self, moment_per_slip: "np.ndarray | None" = None) -> tuple[BlockEvent, ...]:
+        """Events, with the seismic moment of every block per slip [N] for the magnitude."""
+        below, found = self.fastest <= self.onset_rate, []
+        falls = np.flatnonzero(~below[:-1] & below[1:])
+        for onset in self.onsets:
+            after = falls[self.times[falls + 1] > onset]
+            end = int(after[0]) if len(after) else None
+            arrest, moved = None, None
+            if end is not None:
+                fast, slow = self.fastest[end : end + 2]
+                part = (fast - self.onset_rate) / (fast - slow)
+                arrest = float(self.times[end] + part * (self.times[end + 1] - self.times[end]))
+                pairs = [np.interp([onset, arrest], self.times, column) for column in self.slip.T]
+                moved = tuple(float(b - a) for a, b in pairs)
+            during = (self.times >= onset) & (self.times <= (np.inf if arrest is None else arrest))
+            size = None
+            if moved is not None and moment_per_slip is not None:
+                size = magnitude(float(moment_per_slip @ moved))
+            found.append(
+                BlockEvent(
+                    onset=float(onset),
+                    arrest=arrest,
+                    slip=moved,
+                    peak_slip_rate=tuple(map(float, self.slip_rate[during].max(axis=0, initial=0.0))),
+                    magnitude=size,
+                )
+            )
+        return tuple(found)
+
+
+def simulate_sliders(
+    sliders: CoupledSliders,
+    start: "np.ndarray",
+    duration: float,
+    *,
+    loading_rate: float = 0.0,
+    inputs: Sequence[tuple[float, Sequence[float]]] = (),
+    onset_rate: float = math.inf,
+    times: Sequence[float] = (),
+    method: str = "radau",
+    rtol: float = _RTOL,
+) -> SlidersRun:
+    """Follow coupled blocks that are loaded from afar.
+
+    Parameters
+    ----------
+    sliders : CoupledSliders
+    start : ndarray
+        Vector of `CoupledSliders.start`; the stresses at the start balance friction.
+    duration : float
+        [s].
+    loading_rate : float
+        v_∞ [m/s].
+    inputs : sequence of (float, sequence of float)
+        Times [s] from 0 on at which inputs u change, and what they are from then on.
+    onset_rate : float
+        [m/s], whose passing begins an event.
+    times : sequence of float, optional
+        Ascending instants to return [s] beside the start, changes of inputs and the end; every step unless given.
+    method, rtol
+        As of `simulate_state`.
+
+    Raises
+    ------
+    ParameterError, SimulationError
+    """
+    require_positive(duration=duration)
+    slips = [float(law.critical_slip) for law in sliders.laws]  # type: ignore[attr-defined]
+    if duration > _LONGEST_RUN or duration * loading_rate > _FARTHEST * min(slips):
+        raise ParameterError(
+            f"a run of blocks must last at most {_LONGEST_RUN:g} s, in which the far end moves at most {_FARTHEST:g} "
+            f"critical slips. Received {duration:g} s at {loading_rate:g} m/s. Shorten the duration."
+        )
+    N, n = sliders.sizes
+    prestress = tuple(sliders.resisting(start)) if sliders.mass else ()
+    scales = np.array([*slips, *[1.0] * (2 * N), *[_SMALL] * n])
+    level = math.log(onset_rate) if math.isfinite(onset_rate) else math.inf
+    told = tuple(inputs[0][1]) if inputs else ()
+    problem = SmoothProblem(sliders.rates(len(told)), scales, slice(N, 2 * N), level)
+    breaks = {float(time) for time, _ in inputs if 0 < time < duration}
+    breaks |= {i * _LONGEST for i in range(1, math.ceil(duration / _LONGEST))}
+    y, pieces, crossings, evaluations = start, list[tuple[Any, Any]](), [], 0
+    for now, end in pairwise((0.0, *sorted(breaks), duration)):
+        told = next((tuple(u) for time, u in reversed(inputs) if time <= now), told)
+        load = (loading_rate, 0.0, 0.0, *prestress, *told)
+        ramp = Ramp(now, load, (0.0,) * len(load))
+        instants = np.array([now, *(time for time in times if now < time < end), end])
+        part = problem.integrate(y, ramp, instants, every_step=not len(times), method=method, rtol=rtol)
+        first = int(bool(pieces))
+        pieces.append((part.time[first:], part.values[:, first:]))
+        crossings.append(part.crossings)
+        evaluations += part.evaluations
+        y = part.values[:, -1]
+    passed = np.concatenate([time for time, _ in pieces])
+    values = np.concatenate([value for _, value in pieces], axis=1).T
+    return SlidersRun(
+        times=passed,
+        slip=values[:, :N] + loading_rate * passed[:, None],
+        slip_rate=np.exp(values[:, N : 2 * N]),
+        state=np.exp(values[:, 2 * N : 3 * N]),
+        pressure=values[:, 3 * N :],
+        reference=loading_rate * passed,
+        onsets=np.concatenate(crossings),
+        onset_rate=onset_rate,
+        loading_rate=loading_rate,
+        evaluations=evaluations,
+    )
+
+
+def natural_cycles(
+    chain: BlockChain,
+    duration: float | None = None,
+    *,
+    loading_rate: float | None = None,
+    inertia: bool = False,
+    method: str = "radau",
+    rtol: float = _RTOL,
+) -> SlidersRun:
+    """Blocks loaded from afar; block i of N begins at the loading rate, with 1 + i/N times its steady state.
+
+    Parameters
+    ----------
+    chain : BlockChain
+        With rate-and-state friction.
+    duration : float, optional
+        [s]; unless given as long as three events take, or a thousand times the load of the direct effect of block 1.
+    loading_rate : float, optional
+        v_∞ [m/s]; the reference rate of the friction of the first block unless given.
+    inertia : bool
+        Whether blocks have their mass.
+    method, rtol
+        As of `simulate_state`.
+    """
+    far = float(chain.blocks[0].friction.operating_rate) if loading_rate is None else loading_rate
+    require_positive(loading_rate=far)
+    sliders, N, fault = CoupledSliders.of(chain, inertia=inertia), len(chain.blocks), chain.faults[0]
+    older = [float(law.steady_state(far)[0]) * (1 + i / N) for i, law in enumerate(sliders.laws, 1)]
+    start = sliders.start([far] * N, older)
+    settings: dict[str, Any] = {"method": method, "rtol": rtol, "loading_rate": far, "onset_rate": _ONSET * far}
+    if duration is not None:
+        return simulate_sliders(sliders, start, duration, **settings)
+    unit, loads = direct_strength(fault) * fault.area / (fault.stiffness * far), _FIRST_LOADS
+    while True:
+        run = simulate_sliders(sliders, start, loads * unit, **settings)
+        loads *= 2
+        if len(run.onsets) >= _EVENTS or loads > _MOST_LOADS:
+            return run
+
+
+# ----------------------------------------------------------------------
+# Runs under a law of slow sliding.
+
+
+def simulate_held_blocks(
+    chain: BlockChain,
+    law: Any,
+    *,
+    lag: float,
+    stress: float = 0.0,
+    period: float = TIDE,
+    duration: float | None = None,
+    inertia: bool = False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> SlidersRun:
+    """Blocks under a sampled law along the reference of slow sliding, from steady sliding at its first rate.
+
+    The planned pressure reaches the blocks as it is; what the law asks for beside it goes through the lag. The far end
+    rests. Each block has a sine of the stress, shifted by its share of a turn, which acts at once.
+
+    Parameters
+    ----------
+    chain : BlockChain
+    law : MatrixLaw
+        From slip errors [m], or their averages, one for each well, to pressures [MPa].
+    lag : float
+        [s].
+    stress, period : float
+        Amplitude [Pa] and period [s].
+    duration : float, optional
+        [s]; the operation time unless given.
+    inertia : bool
+        Whether blocks have their mass.
+
+    Returns
+    -------
+    SlidersRun
+        Four instants a period; its pressures are those of the wells beside the plan.
+
+    Raises
+    ------
+    ParameterError, SimulationError
+    """
+    length, step = chain.fault.reference.operation_time if duration is None else duration, float(law.step)
+    require_positive(duration=length, stress_period=period, lag=lag)
+    if length > _MOST_PERIODS * step:
+        raise ParameterError(
+            f"a run of blocks under a law must last at most {_MOST_PERIODS:g} samples, {_MOST_PERIODS * step:g} s. "
+            f"Received {length:g} s. Shorten the duration."
+        )
+    sliders, course = CoupledSliders.of(chain, inertia=inertia, lag=lag), SlidingReference(task=chain.fault.reference)
+    (N, m), V = sliders.sizes, float(course.first_rate)
+    steady = float(chain.blocks[0].friction.steady_coefficient(V))
+    per_slip = chain.fault.stiffness / chain.fault.area / steady
+    turn, phases = 2 * math.pi / period, 2 * np.pi * np.arange(N) / N
+    y = sliders.start([V] * N, [float(one.steady_state(V)[0]) for one in sliders.laws])
+    prestress = sliders.resisting(y)
+    y = sliders.stressed(y, stress * np.sin(phases))
+    time, told, state = ca.MX.sym("t"), ca.MX.sym("told", m), ca.MX.sym("y", len(y))
+    planned = per_slip * course.slip(time)
+    load = ca.vertcat(0, planned, ca.jacobian(planned, time), ca.DM(prestress) if inertia else ca.MX(0, 1), told)
+    pushed = stress * ca.sin(turn * time + ca.DM(phases)), stress * turn * ca.cos(turn * time + ca.DM(phases))
+    rates = ca.Function("rates", [time, state, told], [ca.densify(sliders.field(state, load, *pushed))])
+    slips = [float(one.critical_slip) for one in sliders.laws]  # type: ignore[attr-defined]
+    scales = [*slips, *[1.0] * (2 * N), *[MPA] * m]
+    flow = adaptive_integrators()["cvodes"].flow(rates.expand(), scales, _SHARES, rtol=_TIGHT)
+    F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
+    weights = np.array(averages(chain.shares), dtype=float) if D.shape[1] < N else np.eye(N)
+    z, rows, times = np.zeros(len(F)), [y], [0.0]
+    for k in range(math.ceil(length / step)):
+        now = k * step
+        seen = weights @ y[:N] - float(course.slip(now))
+        u = MPA * (H @ z + D @ seen)
+        z = F @ z + G @ seen if len(F) else z
+        try:
+            found = flow.follow(now, step, y, u)[0]
+        except StoppedError as error:
+            raise SimulationError(f"the run stopped at {now:g} s: {error}. Reduce the stress.") from None
+        rows += list(found.T)
+        times += [now + share * step for share in _SHARES]
+        y = found[:, -1]
+        progress(min(1.0, (now + step) / length))
+    values = np.array(rows)
+    return SlidersRun(
+        times=np.array(times),
+        slip=values[:, :N],
+        slip_rate=np.exp(values[:, N : 2 * N]),
+        state=np.exp(values[:, 2 * N : 3 * N]),
+        pressure=values[:, 3 * N :],
+        reference=np.asarray(course.slip(np.array(times))),
+        onsets=np.empty(0),
+        onset_rate=math.inf,
+        loading_rate=0.0,
+        evaluations=0,
+    )
