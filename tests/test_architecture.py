@@ -462,7 +462,7 @@ BUDGETS = {
     "identification": 4471,
     "studies": 3790,
     "report": 3994,
-    "cli": 3475,
+    "cli": 3480,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 
