@@ -71,7 +71,7 @@ def row(name, fault, options):
         name,
         f"{float(claims.peak_slip_rate):.3g} m/s",
         f"{float(claims.slip_behind):.3g} … {float(claims.slip_ahead):.3g} m",
-        f"{answer.worst.slip_rate / float(claims.peak_slip_rate):.2f}",
+        f"{answer.worst.peak_slip_rate / float(claims.peak_slip_rate):.2f}",
         str(len(answer.found.reach.facets)),
         f"{spent:.1f} s",
         "proved" if checked.returncode == 0 else "REFUSED",

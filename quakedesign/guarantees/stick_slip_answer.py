@@ -69,9 +69,9 @@ class StickSlipAnswer(LoopResult):
         ]
         if self.worst is not None:
             said.append(
-                f"worst case found: slip rate {quantity(self.worst.slip_rate, 'm/s')}, slip "
-                f"{quantity(self.worst.behind, 'm')} behind and {quantity(self.worst.ahead, 'm')} ahead of the "
-                "reference"
+                f"worst case found: slip rate {quantity(self.worst.peak_slip_rate, 'm/s')}, slip "
+                f"{quantity(self.worst.slip_behind, 'm')} behind and {quantity(self.worst.slip_ahead, 'm')} ahead of "
+                "the reference"
             )
         said += self.limit_lines()
         return said if self.compensation is None else [*said, self.compensation.sentence()]
@@ -92,9 +92,9 @@ class StickSlipAnswer(LoopResult):
             "worst_found": worst
             and {
                 "slip_error": worst.slip_error,
-                "slip_rate": worst.slip_rate,
-                "slip_behind": worst.behind,
-                "slip_ahead": worst.ahead,
+                "slip_rate": worst.peak_slip_rate,
+                "slip_behind": worst.slip_behind,
+                "slip_ahead": worst.slip_ahead,
             },
             "limit": None if (least := self.least_slip_rate) is None else {"slip_rate": least.exact},
             "step": str(self.found.held.step),

@@ -133,7 +133,7 @@ def worst_slip_rate(
     if isinstance(worst, WorstSliding):
         assert isinstance(found, SlidingGuarantee)
         return float(found.task.rate) * exp(worst.log_rate)
-    return worst.slip_rate if isinstance(worst, WorstStickSlip) else worst.slip_rate_error
+    return worst.peak_slip_rate if isinstance(worst, WorstStickSlip) else worst.slip_rate_error
 
 
 def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:

@@ -787,20 +787,20 @@ class WorstStickSlip:
 
     Attributes
     ----------
-    behind, ahead : float
+    slip_behind, slip_ahead : float
         Slip behind and ahead of the reference [m].
-    slip_rate : float
+    peak_slip_rate : float
         [m/s].
     """
 
-    behind: float
-    ahead: float
-    slip_rate: float
+    slip_behind: float
+    slip_ahead: float
+    peak_slip_rate: float
 
     @property
     def slip_error(self) -> float:
         """Larger of both [m]."""
-        return max(self.behind, self.ahead)
+        return max(self.slip_behind, self.slip_ahead)
 
 
 def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstStickSlip:
@@ -833,4 +833,4 @@ def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstSt
         points[:, 0] -= float(found.held.slip_noise)
         extremes = np.maximum(extremes, [-points[:, 0].min(), points[:, 0].max(), points[:, 1].max()])
     behind, ahead, rate = (float(v) for v in extremes)
-    return WorstStickSlip(behind=behind, ahead=ahead, slip_rate=rate)
+    return WorstStickSlip(slip_behind=behind, slip_ahead=ahead, peak_slip_rate=rate)
