@@ -460,8 +460,8 @@ BUDGETS = {
     "rocq": 600,
     "simulation": 9715,
     "identification": 4471,
-    "studies": 3790,
-    "report": 3994,
+    "studies": 3793,
+    "report": 3997,
     "cli": 3480,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

@@ -113,6 +113,7 @@ def guarantee(
     options = dict(locals())
     from quakedesign.cli.block_commands import guarantee_chain, several_blocks
     from quakedesign.fault import load_fault, with_accepted_fit
+    from quakedesign.studies.facts import box_sentence
     from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
 
@@ -142,7 +143,9 @@ def guarantee(
         if isinstance(found[0], QuakedesignError):
             raise found[0]
         written = f"written: {files[0]}" if _proved(found[0]) else f"{files[0]} is not written, as nothing is proved"
-        output.show(_facts(found[0], files[0]) | said, [*found[0].lines(), *([written] if files[0] else [])])
+        box_of = [box_sentence(faults[0])] if _proved(found[0]) and not faults[0].friction.state_names else []
+        lines = [*found[0].lines(), *box_of, *([written] if files[0] else [])]
+        output.show(_facts(found[0], files[0]) | said, lines)
     else:
         each = zip(faults, found, files, strict=True)
         facts = [{"fault": one.name} | _facts(proof, path) for one, proof, path in each]

@@ -12,6 +12,8 @@ from quakedesign.exact import UpperBound
 from quakedesign.report.summary import Row, Summary, summary, summary_lines
 from quakedesign.text import plain, power_of, quantity
 
+REAL = qd.load_fault("real-fault")
+
 
 @pytest.mark.parametrize(
     ("value", "shown"),
@@ -110,7 +112,7 @@ def compared(monkeypatch, *entries, natural="earthquake"):
     monkeypatch.setattr("quakedesign.report.summary.pressure_extremes", lambda run: (-1e6, 2e6))
     outcome = SimpleNamespace(kind=natural, peak_slip_rate=0.01)
     return SimpleNamespace(
-        fault=SimpleNamespace(name="mine", source="a paper", assumed=("a well",)),
+        fault=SimpleNamespace(name="mine", source="a paper", assumed=("a well",), friction=REAL.friction, box=REAL.box),
         uncontrolled=SimpleNamespace(outcome=outcome),
         of=lambda origin: tuple(e for e in entries if e.origin == origin),
         left_out={},
@@ -126,7 +128,9 @@ def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthqu
         "earthquake's 10 mm/s), and the slip stays within 20 µm of the reference"
     )
     assert said.conditions == "B (designed), proved: the sentence of B (designed)"
-    assert said.notes == ("assumed: a well", "no controller does better")
+    assumed, box, limit = said.notes
+    assert (assumed, limit) == ("assumed: a well", "no controller does better")
+    assert box.startswith("box paper: every friction from 0.2353 to 0.3353")
     stable = summary(compared(monkeypatch, entry("A (designed)", 3e-4, 1e-5), natural="creep"))
     assert "earthquake" not in stable.answer
 
