@@ -3,7 +3,8 @@
     python benchmarks/stick_slip_attack.py proofs/certificates/stick_slip_real-fault.json
 
 Friction is any function of the slip with the slopes of the file, the disturbance turns within periods, and r' is any
-number of its range in each period. For every facet the courses that come nearest to it are continued. Printed are the
+number of its range in each period. A sliding mode runs as it is: the end of its implicit step is found by bisection,
+wherever it lies. For every facet the courses that come nearest to it are continued. Printed are the
 largest facet value, which the file says never exceeds 1, and the largest values over the claims.
 """
 
@@ -15,12 +16,34 @@ from pathlib import Path
 
 import numpy as np
 
-SUBSTEPS, BRANCHES = 48, 24
+SUBSTEPS, BRANCHES, HALVINGS = 48, 24, 60
 
 
 def numbers(raw):
     """Floats of the texts of a table."""
     return {name: float(Fraction(v)) for name, v in raw.items() if isinstance(v, str) and name != "name"}
+
+
+def pulled(terms, slip, rate):
+    """q of an implicit step at the slip error and slip-rate error at its end."""
+    total = 0 * slip
+    for term in terms:
+        inner = term["of"]
+        value = {"slip": slip, "rate": rate}[inner] if isinstance(inner, str) else pulled(inner, slip, rate)
+        factor = sum(float(Fraction(end)) for end in term["factor"]) / 2
+        total = total + factor * np.sign(value) * abs(value) ** float(Fraction(term["power"]))
+    return total
+
+
+def end_of_step(terms, step, slip, rate):
+    """The w at which w - e2 + q(e1 + T w, w) changes its sign: it rises, and q has the sign of its arguments."""
+    low = np.minimum(np.minimum(-slip / step, 0), rate) - 1e-12
+    high = np.maximum(np.maximum(-slip / step, 0), rate) + 1e-12
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        above = middle - rate + pulled(terms, slip + step * middle, middle) > 0
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return (low + high) / 2
 
 
 @dataclass
@@ -47,7 +70,7 @@ class Attack:
 
     def __init__(self, document, seed=0):
         fault, friction = numbers(document["fault"]), numbers(document["fault"]["friction"])
-        self.law, self.claims = numbers(document["loop"]), document["claims"]
+        self.law, self.claims, self.pull = numbers(document["loop"]), document["claims"], document["loop"].get("pull")
         self.facets = np.array([[float(Fraction(v)) for v in row] for row in document["set"]["facets"]])
         self.random, self.friction = np.random.default_rng(seed), friction
         mass = fault["density"] * fault["length"]
@@ -84,7 +107,9 @@ class Attack:
             np.where(random.random(count) < 0.7, random.choice([0.0, 1.0], count), random.random(count)),
         )
         rate = rate * self.fastest
-        v = rate - law["return_rate"] * (one.x + one.noise - one.r)
+        error = one.x + one.noise - one.r
+        back = -law["return_rate"] * error
+        v = rate + (back if self.pull is None else end_of_step(self.pull, step, error, one.y - rate))
         p = -law["rate_gain"] * one.y + law["target_gain"] * v - one.level
         turn, sign = random.uniform(0, 1, count), random.choice([-1.0, 1.0], count)
         turn = np.where(random.random(count) < 0.3, 1.0, turn)

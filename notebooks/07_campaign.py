@@ -61,7 +61,7 @@ print("the same digits in batches of another size:", same)
 # %%
 metric = "max_slip_rate_error"
 worst = whole.worst(metric)
-print(worst, f"guaranteed: {design.guarantee.claims.slip_rate_error:.3g} m/s", sep="\n")
+print(worst, f"guaranteed: {design.guarantee.slip_rate_error:.3g} m/s", sep="\n")
 figure = whole.plot()
 
 # %%
@@ -75,4 +75,4 @@ print(f"sample {index}: {values[index]:.4g} m/s in the campaign, {trajectory.met
 
 # %%
 assert same and whole.resumed and not whole.failures
-assert trajectory.metrics.max_slip_rate_error == values[index] <= design.guarantee.claims.slip_rate_error
+assert trajectory.metrics.max_slip_rate_error == values[index] <= design.guarantee.slip_rate_error

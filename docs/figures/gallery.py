@@ -35,7 +35,7 @@ def sampling_times():
     found = [qd.guarantee(fault, step=f"{time} ms") for time in times]
     figure, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
     axes.plot(times, [1e6 * float(each.bounds["peak_slip_rate"]) for each in found], "o-", label="proved")
-    axes.plot(times, [1e6 * each.worst_case["slip_rate"] for each in found], "s--", label="worst case found")
+    axes.plot(times, [1e6 * each.worst_case["peak_slip_rate"] for each in found], "s--", label="worst case found")
     axes.plot(times, [1e6 * float(each.least_slip_rate) for each in found], ":", label="limit of every controller")
     axes.set(xlabel="sampling time [ms]", ylabel="largest slip rate [µm/s]", ylim=(0, None), title=fault.name)
     axes.legend()

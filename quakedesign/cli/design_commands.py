@@ -60,24 +60,22 @@ class DesignOptions(WellOptions):
         change is bounded by the fault's too, and it starts at 0, such as a tide.
     scheme
         Scheme of the runs of gains from --continuous: continuous (default, as in the paper), or sampled with a
-        zero-order hold: explicit, implicit, semi-implicit, compensated. Other designs run as designed.
+        zero-order hold: explicit, implicit, semi-implicit, compensated, stick-slip. Other designs run as designed.
     stress
-        Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; by default about the largest
-        with a guarantee.
+        Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; default: about the largest proved.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     published_scheme
         Scheme of the runs of published gains, see --scheme.
     plant
-        Plant of the runs and of the e-LQR's guarantee: stick-slip (friction holds the fault at rest), or printed (the
+        Plant of the runs and of the guarantee: stick-slip (friction holds the fault at rest), or printed (the
         paper's, continued to negative slip rates). By default the runs are on stick-slip, and so is the guarantee if
         one is found there; otherwise it is on printed. Not for rate-and-state faults, which never rest.
     whole_task
         Rate-and-state faults: simulate the whole task instead of 500 D_c/V of it. The proof covers the whole task in
         either case.
     accept_poor_fit
-        Continue although the friction law does not explain the laboratory record of the fault, or the record cannot
-        tell; results are labelled.
+        Continue although the laboratory record does not support the friction law of the fault; results are labelled.
     """
 
     controller: str = "all"

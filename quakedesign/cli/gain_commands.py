@@ -74,7 +74,7 @@ def synthesise(
     step
         Objective sampled: sampling time T_s, in s or with a unit; the fault's by default.
     scheme
-        Objective sampled: explicit (default), implicit, semi-implicit or compensated.
+        Objective sampled: explicit (default), implicit, semi-implicit, compensated or stick-slip.
     metric
         Objective sampled: max_slip_rate_error (default) or another metric that is better when smaller.
     out

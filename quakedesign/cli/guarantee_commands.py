@@ -85,27 +85,26 @@ def guarantee(
     law
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
-        Sliding modes: compensated (default); no other scheme has a guarantee. The e-LQR runs in explicit.
+        Sliding modes: stick-slip (default), or compensated on the plant without stick; no other scheme has a guarantee.
+        The e-LQR runs in explicit.
     step
         Sampling time T_s, such as '184 ms' or 7/50 (s); the fault's by default.
     measured
         Measurement of the e-LQR: slip-and-rate; slip, from which a designed law estimates the slip rate; or
         differentiator (implicit, n_d = 2, any n_f): its smallest λ_d is printed.
     disturbance_class
-        amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of change is bounded by the fault's
-        too, and it starts at 0.
+        amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of change is bounded too.
     plant
-        stick-slip: friction holds the fault at rest, and it never slips backward (designed e-LQR, exact slip rate, a
-        pressure without delay); printed: the plant without stick, continued to negative slip rates. By default
-        stick-slip where it has a proof, else printed.
+        stick-slip: friction holds the fault at rest, and it never slips backward (designed e-LQR or sliding mode, exact
+        slip rate, a pressure without delay); printed: the plant without stick, continued to negative slip rates. By
+        default stick-slip where it has a proof, else printed.
     stress
         Rate-and-state faults (slow sliding, e-LQR through a diffusion path or a lag): bound of the shear stress
         disturbance, such as '25 kPa'; by default about the largest with a guarantee.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     accept_poor_fit
-        Continue although the friction law does not explain the laboratory record of the fault, or the record cannot
-        tell; results are labelled.
+        Continue although the laboratory record does not support the friction law of the fault; results are labelled.
     workers
         Number of processes for several faults.
     out
@@ -114,6 +113,7 @@ def guarantee(
     options = dict(locals())
     from quakedesign.cli.block_commands import guarantee_chain, several_blocks
     from quakedesign.fault import load_fault, with_accepted_fit
+    from quakedesign.studies.facts import box_sentence
     from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
 
@@ -143,7 +143,9 @@ def guarantee(
         if isinstance(found[0], QuakedesignError):
             raise found[0]
         written = f"written: {files[0]}" if _proved(found[0]) else f"{files[0]} is not written, as nothing is proved"
-        output.show(_facts(found[0], files[0]) | said, [*found[0].lines(), *([written] if files[0] else [])])
+        box_of = [box_sentence(faults[0])] if _proved(found[0]) and not faults[0].friction.state_names else []
+        lines = [*found[0].lines(), *box_of, *([written] if files[0] else [])]
+        output.show(_facts(found[0], files[0]) | said, lines)
     else:
         each = zip(faults, found, files, strict=True)
         facts = [{"fault": one.name} | _facts(proof, path) for one, proof, path in each]

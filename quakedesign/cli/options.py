@@ -306,9 +306,9 @@ class RunOptions:
     Parameters
     ----------
     scheme
-        Sampled with a zero-order hold: explicit, implicit, semi-implicit or compensated; or continuous, with the law in
-        every stage of the integrator. By default continuous in simulate and explicit in campaign. Designed laws have
-        their own scheme.
+        Sampled with a zero-order hold: explicit, implicit, semi-implicit, compensated or stick-slip; or continuous,
+        with the law in every stage of the integrator. By default continuous in simulate and explicit in campaign.
+        Designed laws have their own scheme.
     method
         Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: cvodes or
         idas, for single runs without control also radau or dop853.
@@ -322,8 +322,7 @@ class RunOptions:
     substeps
         Integrator steps per sample.
     drift
-        Loading velocity, at the far end of the spring, such as '3 cm/year'; by default 0, for rate-and-state faults
-        the reference rate.
+        Loading velocity, such as '3 cm/year'; by default 0, for rate-and-state faults the reference rate.
     perturbation
         Extra disturbance in m/s^2: an expression of slip, slip_rate and time.
     """
@@ -630,9 +629,8 @@ class StateOptions:
     Parameters
     ----------
     pressure
-        Constant pressure, '5 MPa'; or pressures at given times with linear interpolation, where a time that is given
-        twice makes a step: '0 s: 0 MPa, 1 day: 0 MPa, 1 day: 5 MPa'; or FILE.csv with columns 'time [s]' and
-        'pressure [Pa]' in any units.
+        '5 MPa'; or pressures at times, linear in between, with a step at a repeated time: '0 s: 0 MPa, 1 day: 0 MPa,
+        1 day: 5 MPa'; or FILE.csv with columns 'time [s]' and 'pressure [Pa]' in any units.
     start
         Initial state: steady (sliding; default), locked (far end at rest for --hold) or late (in the seismic cycle, see
         --share).

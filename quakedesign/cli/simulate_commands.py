@@ -76,7 +76,7 @@ def simulate(
     Parameters
     ----------
     weight
-        Weight of the disturbance estimate in the scheme compensated, above 0, at most 1.
+        Weight of the disturbance estimate in the schemes compensated and stick-slip, above 0, at most 1.
     authority
         B0 of a sampled scheme in m^2/kg; guarantee prints weight and authority of the sliding modes that it proves.
     seed
@@ -286,7 +286,7 @@ def export(
     step
         Sampling time, also of designed gains; the fault's by default.
     scheme
-        explicit (default), implicit, semi-implicit or compensated.
+        explicit (default), implicit, semi-implicit, compensated or stick-slip.
     fmu
         Also write controller.fmu for co-simulation (FMI 2.0).
     out

@@ -524,8 +524,9 @@ def _beyond(fault: Fault, stress: Fraction, around: Around) -> str:
     if far is None or around.get("diffusion", 0) <= far:
         return ""
     return (
-        f"no controller whatever whose pressure is within {LowerBound(most).quantity('Pa')} of what the reference "
-        f"needs holds the nominal fault, linearised, through rock of L^2/D above {far.quantity('s')}"
+        f"no controller whose pressure stays within {LowerBound(most).quantity('Pa')} of what the reference needs can "
+        f"hold the fault through rock of L^2/D above {far.quantity('s')} (nominal parameters, linearised, against this "
+        "stress from one time on)"
     )
 
 

@@ -76,7 +76,8 @@ class LoopResult:
         CertificateError
             Without a guarantee.
         """
-        return self._proof().controller
+        found, sliding = self._proof(), getattr(self, "compensation", None)
+        return found.controller if sliding is None else sliding.limited
 
     def save(self, path: str | Path) -> None:
         """Write the certificate for `load_guarantee`, ``quakedesign check`` and ``proofs/check.py``.

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, ClassVar
+from typing import Any
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, rational
@@ -12,7 +12,9 @@ from quakedesign.guarantees.exact.impossibility import smallest_stick_slip_rate
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.guarantees.loop_result import LoopResult
+from quakedesign.guarantees.search.compensated_search import Compensation, design_sticking
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip, design_stick_slip, worst_stick_slip
+from quakedesign.laws import SlidingMode
 from quakedesign.laws.stick_slip_law import GAIN_UNITS
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.plant.of_fault import uncertain_plant
@@ -29,12 +31,14 @@ class StickSlipAnswer(LoopResult):
     found : StickSlipGuarantee or NoGuarantee
     worst : WorstStickSlip or None
         Largest values that a search reaches on the same loop: lower bounds of the worst case; None without a guarantee.
+    compensation : Compensation or None
+        Of a sliding mode: its gains, scale and settings in the scheme ``stick-slip``.
     """
 
     fault: Fault
     found: StickSlipGuarantee | NoGuarantee
     worst: WorstStickSlip | None = None
-    compensation: ClassVar[None] = None
+    compensation: Compensation | None = None
 
     @property
     def least_slip_rate(self) -> LowerBound | None:
@@ -65,11 +69,12 @@ class StickSlipAnswer(LoopResult):
         ]
         if self.worst is not None:
             said.append(
-                f"worst case found: slip rate {quantity(self.worst.slip_rate, 'm/s')}, slip "
-                f"{quantity(self.worst.behind, 'm')} behind and {quantity(self.worst.ahead, 'm')} ahead of the "
-                "reference"
+                f"worst case found: slip rate {quantity(self.worst.peak_slip_rate, 'm/s')}, slip "
+                f"{quantity(self.worst.slip_behind, 'm')} behind and {quantity(self.worst.slip_ahead, 'm')} ahead of "
+                "the reference"
             )
-        return said + self.limit_lines()
+        said += self.limit_lines()
+        return said if self.compensation is None else [*said, self.compensation.sentence()]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
@@ -87,14 +92,15 @@ class StickSlipAnswer(LoopResult):
             "worst_found": worst
             and {
                 "slip_error": worst.slip_error,
-                "slip_rate": worst.slip_rate,
-                "slip_behind": worst.behind,
-                "slip_ahead": worst.ahead,
+                "slip_rate": worst.peak_slip_rate,
+                "slip_behind": worst.slip_behind,
+                "slip_ahead": worst.slip_ahead,
             },
             "limit": None if (least := self.least_slip_rate) is None else {"slip_rate": least.exact},
             "step": str(self.found.held.step),
             **{name: str(size) for name, size in self.found.held.noise.items()},
             "law": {name: str(getattr(law, name)) for name in GAIN_UNITS},
+            **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
 
 
@@ -107,6 +113,7 @@ def answer_stick_slip(
     setup: LoopSetup,
     *,
     objective: str = "tracking",
+    sliding: SlidingMode | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> StickSlipAnswer:
     """Design a law for the stick–slip plant and prove its bounds.
@@ -119,6 +126,8 @@ def answer_stick_slip(
         Only its sampling time and noise of the slip may be given.
     objective : str
         ``tracking`` or ``peak``.
+    sliding : SlidingMode, optional
+        Whose base gains count; an e-LQR is designed unless given.
     progress : callable, optional
         Called with what the search does, and the fraction done [-].
 
@@ -136,10 +145,19 @@ def answer_stick_slip(
     step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)
     tell = progress or (lambda what, done: None)
     healing = rational(fault.friction.rest_excess)
-    found = design_stick_slip(task, step, objective=objective, slip_noise=setup.slip_noise, healing=healing, tell=tell)
-    return attacked_stick_slip(fault, found)
+    wanted: Any = {"objective": objective, "slip_noise": setup.slip_noise, "healing": healing, "tell": tell}
+    if sliding is None:
+        return attacked_stick_slip(fault, design_stick_slip(task, step, **wanted))
+    made = design_sticking(task, sliding, step, **wanted)
+    if isinstance(made, NoGuarantee):
+        return attacked_stick_slip(fault, made)
+    assert isinstance(made.found, StickSlipGuarantee)
+    return attacked_stick_slip(fault, made.found, made)
 
 
-def attacked_stick_slip(fault: Fault, found: StickSlipGuarantee | NoGuarantee) -> StickSlipAnswer:
+def attacked_stick_slip(
+    fault: Fault, found: StickSlipGuarantee | NoGuarantee, compensation: Compensation | None = None
+) -> StickSlipAnswer:
     """A guarantee with the worst case found on its loop."""
-    return StickSlipAnswer(fault=fault, found=found, worst=worst_stick_slip(found) if found.proved else None)
+    worst = worst_stick_slip(found) if found.proved else None
+    return StickSlipAnswer(fault=fault, found=found, worst=worst, compensation=compensation)

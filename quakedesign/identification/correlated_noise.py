@@ -41,8 +41,13 @@ class CorrelatedNoise:
 
     @property
     def pieces(self) -> float:
-        """Independent ones of the noise that fades; at least 4."""
-        return max(float(np.ptp(self.along)) / (2 * self.length), 4.0) if self.share else np.inf
+        """Degrees of freedom of the estimated noise of slow changes: one every four lengths of the way.
+
+        By Satterthwaite, 2 over the relative variance of the spectral density at frequency zero, 2·share·length. That
+        of the likeliest process over a way T is 8·length/T: share/length is sharp, and 1/length has the variance
+        2/(length·T).
+        """
+        return float(np.ptp(self.along)) / (4 * self.length) if self.share else np.inf
 
     @cached_property
     def covariance(self) -> "np.ndarray":
@@ -126,9 +131,13 @@ def noise_of(
     time: "np.ndarray",
     path: "np.ndarray | None",
     kept: "np.ndarray",
+    most: int = _MOST_DENSE,
 ) -> CorrelatedNoise | None:
-    """Likeliest noise of residuals, by slopes of what was fitted; None where independent samples are as likely."""
-    if not 3 * slopes.shape[1] < kept.sum() <= _MOST_DENSE:
+    """Likeliest noise of residuals, by slopes of what was fitted; None where independent samples are as likely.
+
+    None as well where fewer samples than three a slope, or more than `most`, are kept.
+    """
+    if not 3 * slopes.shape[1] < kept.sum() <= most:
         return None
     scale = np.linalg.norm(slopes[kept], axis=0)
     basis, values, _ = np.linalg.svd(slopes[kept][:, scale > 0] / scale[scale > 0], full_matrices=False)

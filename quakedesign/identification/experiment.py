@@ -115,10 +115,16 @@ TREND, TREND_IN_TIME = "trend", "trend_in_time"
 
 @dataclass(frozen=True, kw_only=True)
 class Widened(Experiment):
-    """An experiment, `whole`, with further coordinates, which come last."""
+    """An experiment, `whole`, with further coordinates, which come last and move friction in proportion to `columns`.
+
+    Trends move it by themselves, for their columns are displacement [m] or time [s]. Delays of changes of rate [s] move
+    it against its growth, to first order; their columns say which samples follow each change, up to the next.
+    """
 
     whole: Any
     coordinates: tuple[Coordinate, ...]
+    columns: "np.ndarray"  # of shape (samples, further coordinates)
+    delays: bool = False
 
     @property
     def law(self) -> FrictionLaw:  # type: ignore[override]
@@ -129,6 +135,20 @@ class Widened(Experiment):
     def own(self, fitted: "np.ndarray") -> "np.ndarray":
         """Coordinates of the experiment without the others."""
         return fitted[: len(self.whole.coordinates)]
+
+    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Friction of the experiment, moved by the further coordinates."""
+        own = self.own(fitted)
+        with np.errstate(invalid="ignore", over="ignore"):
+            moved = self.columns @ fitted[len(own) :] * (-self.whole.growth(own) if self.delays else 1.0)
+            friction: np.ndarray = self.whole.friction(own) + moved
+        return friction
+
+    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+        """Derivatives, at delays that are small against what follows the changes."""
+        own = self.own(fitted)
+        moved = -self.whole.growth(own)[:, None] * self.columns if self.delays else self.columns
+        return np.column_stack([self.whole.slopes(own), moved])
 
     def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
         """Those of the experiment."""
@@ -146,65 +166,25 @@ class Widened(Experiment):
         return self if finer is self.whole else replace(self, whole=finer)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Trended(Widened):
-    """An experiment whose friction changes with displacement [m] or time [s], `along`, as well [1/m or 1/s]."""
-
-    along: "np.ndarray"
-
-    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
-        """Friction of the experiment and the trend."""
-        friction: np.ndarray = self.whole.friction(self.own(fitted)) + fitted[-1] * self.along
-        return friction
-
-    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
-        """Derivatives; that by the trend is what it is along."""
-        return np.column_stack([self.whole.slopes(self.own(fitted)), self.along])
-
-
-@dataclass(frozen=True, kw_only=True)
-class Delayed(Widened):
-    """An experiment whose changes of rate come later by what is fitted [s], to first order.
-
-    `after`, of shape (samples, changes), says which samples follow each change, up to the next.
-    """
-
-    after: "np.ndarray"
-
-    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
-        """Friction of the experiment, less its growth over the delays."""
-        own = self.own(fitted)
-        with np.errstate(invalid="ignore", over="ignore"):
-            late = self.whole.growth(own) * (self.after @ fitted[len(own) :])
-            friction: np.ndarray = self.whole.friction(own) - late
-        return friction
-
-    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
-        """Derivatives at delays that are small against what follows the changes."""
-        own = self.own(fitted)
-        return np.column_stack([self.whole.slopes(own), -self.whole.growth(own)[:, None] * self.after])
-
-
 DELAY = "delay"
 
 
 def delayed(whole: Any, after: "np.ndarray", most: "np.ndarray") -> Experiment:
-    """An experiment with a delay of each change of rate, of at most so much [s]."""
+    """An experiment with a delay of each change of rate, of at most so much [s]; as `Widened` has their columns."""
     if not after.shape[1]:
         return whole  # type: ignore[no-any-return]
-    names = [f"{DELAY}_{place}" for place in range(1, after.shape[1] + 1)]
-    delays = [
-        Coordinate(name=name, unit="s", low=-end, high=end, start=(-1e-3 * end, 1e-3 * end), logarithmic=False)
-        for name, end in zip(names, most.tolist(), strict=True)
-    ]
-    return Delayed(whole=whole, after=after, coordinates=(*whole.coordinates, *delays))
+    delays = [_about_zero(f"{DELAY}_{place}", "s", end) for place, end in enumerate(most.tolist(), start=1)]
+    return Widened(whole=whole, coordinates=(*whole.coordinates, *delays), columns=after, delays=True)
 
 
-def trended(whole: Experiment, along: "np.ndarray", size: float, name: str = TREND) -> Trended:
-    """An experiment with a trend, of at most ten times a friction over the whole way."""
-    most, unit = 10 * size / float(np.ptp(along)), "1/m" if name == TREND else "1/s"
-    trend = Coordinate(name=name, unit=unit, low=-most, high=most, start=(-1e-3 * most, 1e-3 * most), logarithmic=False)
-    return Trended(whole=whole, along=along, coordinates=(*whole.coordinates, trend))
+def trended(whole: Experiment, along: "np.ndarray", size: float, name: str = TREND) -> Widened:
+    """An experiment with a trend along displacement [m] or time [s], of at most ten frictions over the whole way."""
+    trend = _about_zero(name, "1/m" if name == TREND else "1/s", 10 * size / float(np.ptp(along)))
+    return Widened(whole=whole, coordinates=(*whole.coordinates, trend), columns=along[:, None])
+
+
+def _about_zero(name: str, unit: str, most: float) -> Coordinate:
+    return Coordinate(name=name, unit=unit, low=-most, high=most, start=(-1e-3 * most, 1e-3 * most), logarithmic=False)
 
 
 @dataclass(frozen=True, kw_only=True)

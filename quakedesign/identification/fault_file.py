@@ -7,7 +7,7 @@ friction, as a fault has, and its box another half-width of N̂.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from itertools import product
@@ -31,21 +31,9 @@ _OF_TASK = ("target slip", "operation time")
 _RATE_AND_STATE = ("direct_effect", "evolution_effect", "critical_slip")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Cover:
-    """A law and a box that hold all laws of ranges.
-
-    Attributes
-    ----------
-    law : FrictionLaw
-    box : UncertaintyBox
-    """
-
-    law: FrictionLaw
-    box: UncertaintyBox
-
-
-def cover(law: FrictionLaw, ranges: Mapping[str, tuple[float, float]], box: UncertaintyBox) -> Cover:
+def cover(
+    law: FrictionLaw, ranges: Mapping[str, tuple[float, float]], box: UncertaintyBox
+) -> tuple[FrictionLaw, UncertaintyBox]:
     """Law that weakens with slip, and box, that cover every law of ranges of residual, drop and critical slip.
 
     The bounds and the slope of the scaled laws are monotone in each of the three, so corners are enough; numbers are
@@ -75,7 +63,7 @@ def cover(law: FrictionLaw, ranges: Mapping[str, tuple[float, float]], box: Unce
     width = _decimal(max(abs(s / static - 1) for s in statics), up=True)
     authority = box.authority + width + box.authority * width
     held = replace(law, **{name: float(value) for name, value in values.items()})  # type: ignore[type-var]
-    return Cover(law=held, box=replace(box, name="own", authority=authority))
+    return held, replace(box, name="own", authority=authority)
 
 
 def _decimal(value: Fraction, *, up: bool, digits: int = _DIGITS) -> Fraction:
@@ -109,34 +97,27 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         When the record does not tell every parameter, or tells a friction that no fault file holds.
     """
     if len(identification.law.state_names) > 1 or getattr(identification.law, "evolution_effect", 1.0) <= 0:
-        told = "two states" if len(identification.law.state_names) > 1 else "an evolution effect that is not positive"
-        raise RecordError(
-            f"a fault file holds friction with one state whose effect is positive. Received {told}. "
-            + (
-                "Omit --states for a file."
-                if "two" in told
-                else "It strengthens with rate: there is nothing to control."
-            )
-        )
+        told = "an evolution effect that is not positive. It strengthens with rate: there is nothing to control."
+        if len(identification.law.state_names) > 1:
+            told = "two states. Omit --states for a file."
+        raise RecordError(f"a fault file holds friction with one state whose effect is positive. Received {told}")
     if not identification.determined:
         raise RecordError(
             f"a fault file needs every parameter. Received {identification.record.name}: {identification.untold()[0]}."
         )
-    held = (
-        cover(identification.law, identification.box, fault.box)
-        if covers(identification.law)
-        else Cover(law=_at_rate_of(fault, identification.law), box=fault.box)
-    )
+    law, box = _at_rate_of(fault, identification.law), fault.box
+    if covers(law):
+        law, box = cover(law, identification.box, box)
     if _step_follows(identification, fault):
-        step = sliding_step(held.law, fault.reference)
         shaken = Disturbance() if _gains_a_state(identification, fault) else fault.disturbance
-        fault = replace(fault, friction=held.law, sampling_time=step, disturbance=shaken)
+        step = sliding_step(law, fault.reference)
+        fault = replace(fault, friction=law, sampling_time=step, disturbance=shaken)
     return replace(
         fault,
         name=f"{fault.name[:40].rstrip()}-identified",
         source=f"friction identified from {identification.record.name}; everything else: {fault.source}",
-        friction=held.law,
-        box=held.box,
+        friction=law,
+        box=box,
         assumed=(),
         poor_fit=poor_fit(identification),
     )
@@ -145,13 +126,9 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
 def poor_fit(identification: Identification) -> str:
     """Why a controller must not be built on a record unless this is accepted; nothing where it is explained."""
     assessment = identification.assessment
-    if assessment.verdict == EXPLAINS:
-        return ""
-    return (
-        f"the fit {assessment}"
-        if assessment.verdict == EXPLAINS_NOT
-        else f"the record cannot tell: {assessment.open[0]}"
-    )
+    if assessment.verdict == EXPLAINS_NOT:
+        return f"the fit {assessment}"
+    return "" if assessment.verdict == EXPLAINS else f"the record cannot tell: {assessment.open[0]}"
 
 
 def other_parts(identification: Identification, fault: Fault) -> str:

@@ -4,12 +4,13 @@ The fit uses several initial values, removes outliers, and estimates the noise f
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import stats
 from scipy.optimize import least_squares
+from scipy.signal import correlate
 
 from quakedesign.errors import RecordError
 from quakedesign.identification.correlated_noise import CorrelatedNoise
@@ -94,7 +95,7 @@ class Fit:
 
     @property
     def freedom_of_noise(self) -> float:
-        """Degrees of freedom of the size of noise; where noise fades, pieces of twice its length."""
+        """Degrees of freedom of the size of noise; where noise fades, its pieces."""
         return min(self.freedom, self.pieces, self.correlated.pieces if self.correlated is not None else math.inf)
 
     @property
@@ -114,9 +115,7 @@ class Fit:
         Summed over lags up to five times itself (Sokal 1997, in Functional Integration, NATO ASI B361, 131).
         """
         kept = self.whitened
-        size = 1 << (2 * len(kept) - 1).bit_length()
-        spectrum = np.abs(np.fft.rfft(kept, size)) ** 2
-        covariance = np.fft.irfft(spectrum, size)[: len(kept) // 2]
+        covariance = correlate(kept, kept, method="fft")[len(kept) - 1 :][: len(kept) // 2]
         sums = 2 * np.cumsum(covariance / covariance[0]) - 1
         window = np.flatnonzero(np.arange(len(sums)) >= 5 * sums)
         return float(max(sums[window[0] if len(window) else -1], 1.0))
@@ -125,9 +124,9 @@ class Fit:
         """How far a sum of squares is above the smallest, in variances of the noise of independent samples."""
         return (squares - self.squares) / (self.noise**2 * self.correlation)
 
-    def threshold(self, count: int) -> float:
-        """`excess` that so many parameters jointly stay below with the confidence of `CONFIDENCE` (Fisher's F)."""
-        return float(count * stats.f.ppf(CONFIDENCE, count, self.freedom_of_noise))
+    def threshold(self, count: int, chance: float = 1 - CONFIDENCE) -> float:
+        """`excess` that so many parameters jointly pass by noise alone with a chance (Fisher's F)."""
+        return float(count * stats.f.isf(chance, count, self.freedom_of_noise))
 
     def distance(self, fitted: "np.ndarray") -> float:
         """`excess` of given coordinates, infinite where there is no such experiment."""
@@ -388,83 +387,82 @@ class BetterFit(Exception):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _ProfilePlace:
+class ProfilePoint:
     """Coordinates on a profile, and the experiment there with the coordinates that its steps are made for."""
 
     experiment: Experiment
     resolved_at: "np.ndarray"
     fitted: "np.ndarray"
+    step: float = 0.0  # of the coordinate from the fit
+    distance: float = 0.0  # root of the excess
 
 
-def interval(
-    fit: Fit, place: int, threshold: float, inside: tuple[float, float] = (math.nan, math.nan)
-) -> tuple[float, float]:
-    """Where the profile of the coordinate at a `place` passes a threshold of `Fit.excess` on either side.
+@dataclass(frozen=True)
+class Profile:
+    """The excess along one coordinate, by its place, with the others at their best, at the points that were tried."""
 
-    As it is fitted; infinite where the record sets no end. The interval of a lower threshold may be known (`inside`).
+    fit: Fit
+    place: int
+    points: list[ProfilePoint] = field(default_factory=list)
 
-    Raises
-    ------
-    BetterFit
-    """
-    return _end(fit, place, threshold, -1, inside[0]), _end(fit, place, threshold, 1, inside[1])
+    def interval(self, threshold: float) -> tuple[float, float]:
+        """Where `Fit.excess` passes a threshold on either side, as it is fitted; infinite where the record sets no end.
+
+        Raises
+        ------
+        BetterFit
+        """
+        return self._end(threshold, -1), self._end(threshold, 1)
+
+    def _end(self, threshold: float, side: int) -> float:
+        """End on one side: the root of the distance from the fit, which grows about linearly (bracketed secant).
+
+        Where the distance grows slowly, the limit of the coordinate is tried next, so that a flat profile costs little.
+        An end is none that lies at that limit, or where the experiment cannot be followed.
+        """
+        fit, place, wanted = self.fit, self.place, math.sqrt(threshold)
+        furthest = abs(fit.experiment.bounds[(side + 1) // 2][place] - fit.fitted[place])
+        start = ProfilePoint(experiment=fit.experiment, resolved_at=fit.fitted, fitted=fit.fitted)
+        known = [each for each in self.points if each.step * side > 0]
+        below = max((p for p in known if p.distance < wanted), key=lambda p: abs(p.step), default=start)
+        far = replace(start, step=side * math.inf, distance=math.inf)
+        above = min((p for p in known if p.distance >= wanted), key=lambda p: abs(p.step), default=far)
+        deviation = fit.deviations[place]
+        first = wanted * deviation if np.isfinite(deviation) else _FIRST
+        for trial in range(_MOST_TRIALS):
+            near, end = abs(below.step), abs(above.step)
+            if near >= furthest or above.distance <= (1 + _CLOSE) * wanted or end - near <= _CLOSE * near:
+                break
+            slow = math.isinf(end) and trial >= _PATIENCE
+            length = furthest if slow else _next(below, above, wanted) if near or np.isfinite(end) else first
+            there = self._point(side * min(length, furthest), below)
+            self.points.append(there)
+            below, above = (there, above) if there.distance < wanted else (below, there)
+        followed = math.isfinite(above.distance) and abs(below.step) < _LIMIT * furthest
+        return float(fit.fitted[place] + above.step) if followed else side * math.inf
+
+    def _point(self, step: float, near: ProfilePoint) -> ProfilePoint:
+        """The best of all other coordinates with this one moved, and the root of its excess."""
+        fit, place = self.fit, self.place
+        start = near.fitted + fit.along(place) * (step - near.step)
+        logarithmic = [c.logarithmic for c in fit.experiment.coordinates]
+        if np.max(np.abs(start - near.resolved_at)[logarithmic], initial=0) > _FAR:
+            near = replace(near, experiment=near.experiment.resolved(start, fit.accuracy), resolved_at=start)
+        fixed = np.arange(len(start)) == place
+        others, squares = minimised(near.experiment, fit.measured, fit.weights, start, fixed=fixed, steps=15)
+        if fit.excess(squares) < -_BETTER:
+            raise BetterFit(others)
+        distance = math.sqrt(max(fit.excess(squares), 0)) if np.isfinite(squares) else math.inf
+        return replace(near, fitted=others, step=step, distance=distance)
 
 
-def _end(fit: Fit, place: int, threshold: float, side: int, inside: float) -> float:
-    """End on one side: the root of the distance from the fit, which grows about linearly (bracketed secant).
-
-    Where the distance grows slowly, the limit of the coordinate is tried next, so that a flat profile costs little. An
-    end is none that lies at that limit, or where the experiment cannot be followed.
-    """
-    if math.isinf(inside):
-        return inside
-    wanted = math.sqrt(threshold)
-    furthest = abs(fit.experiment.bounds[(side + 1) // 2][place] - fit.fitted[place])
-    deviation = fit.deviations[place]
-    step = wanted * deviation if np.isfinite(deviation) else _FIRST
-    step = min(step if math.isnan(inside) else 1.2 * abs(inside - fit.fitted[place]), furthest)
-    below, above = (0.0, 0.0), (math.inf, math.inf)
-    near = _ProfilePlace(experiment=fit.experiment, resolved_at=fit.fitted, fitted=fit.fitted)
-    for trial in range(_MOST_TRIALS):
-        distance, there = _distance(fit, place, side * step, near)
-        if wanted <= distance <= (1 + _CLOSE) * wanted:
-            return float(fit.fitted[place] + side * step)
-        if distance < wanted:
-            below, near = (step, distance), there
-            if step >= furthest:
-                return side * math.inf
-        else:
-            above = (step, distance)
-        if above[0] - below[0] <= _CLOSE * below[0]:
-            break
-        slow = math.isinf(above[0]) and trial >= _PATIENCE
-        step = furthest if slow else min(_next(below, above, wanted), furthest)
-    followed = math.isfinite(above[1]) and below[0] < _LIMIT * furthest
-    return float(fit.fitted[place] + side * above[0]) if followed else side * math.inf
-
-
-def _next(below: tuple[float, float], above: tuple[float, float], wanted: float) -> float:
-    """Next step to try, a little beyond where the distance should be reached."""
-    aim = wanted * (1 + _CLOSE / 2)
-    if math.isinf(above[0]):
-        return below[0] * min(max(aim / below[1], 1.01), 3.0) if below[1] > 0 else 3 * below[0]
-    if math.isinf(above[1]):
-        return (below[0] + above[0]) / 2
-    straight = below[0] + (above[0] - below[0]) * (aim - below[1]) / (above[1] - below[1])
-    tenth = 0.05 * (above[0] - below[0])
-    return min(max(straight, below[0] + tenth), above[0] - tenth)
-
-
-def _distance(fit: Fit, place: int, step: float, near: _ProfilePlace) -> tuple[float, _ProfilePlace]:
-    """Root of the excess with one coordinate moved and all others at their best, and where that is."""
-    start = near.fitted + fit.along(place) * (fit.fitted[place] + step - near.fitted[place])
-    logarithmic = [c.logarithmic for c in fit.experiment.coordinates]
-    if np.max(np.abs(start - near.resolved_at)[logarithmic], initial=0) > _FAR:
-        near = replace(near, experiment=near.experiment.resolved(start, fit.accuracy), resolved_at=start)
-    fixed = np.zeros(len(start), dtype=bool)
-    fixed[place] = True
-    others, squares = minimised(near.experiment, fit.measured, fit.weights, start, fixed=fixed, steps=15)
-    if fit.excess(squares) < -_BETTER:
-        raise BetterFit(others)
-    distance = math.sqrt(max(fit.excess(squares), 0)) if np.isfinite(squares) else math.inf
-    return distance, replace(near, fitted=others)
+def _next(below: ProfilePoint, above: ProfilePoint, wanted: float) -> float:
+    """Length of the next step to try, a little beyond where the distance should be reached."""
+    aim, near, end = wanted * (1 + _CLOSE / 2), abs(below.step), abs(above.step)
+    if math.isinf(end):
+        return near * min(max(aim / below.distance, 1.01), 3.0) if below.distance > 0 else 3 * near
+    if math.isinf(above.distance):
+        return (near + end) / 2
+    straight = near + (end - near) * (aim - below.distance) / (above.distance - below.distance)
+    tenth = 0.05 * (end - near)
+    return min(max(straight, near + tenth), end - tenth)

@@ -12,7 +12,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import FrictionLaw
 from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT, Assessment, Check
-from quakedesign.identification.fitting import CONFIDENCE, Fit
+from quakedesign.identification.fitting import CONFIDENCE, Fit, Profile
 from quakedesign.identification.record import Record
 
 _BESIDE = "delay", "start_rate"  # which may stay open: nothing else hangs on them then
@@ -33,6 +33,9 @@ class ParameterEstimate:
         Of this parameter alone; infinite (or 0) where the record sets no end.
     least, most : float
         Of all parameters at once: ends of the smallest box around their joint region.
+    profile : tuple of (float, float)
+        Values that were tried, ascending, and the roots of the excess of their squares in variances of the noise, all
+        other parameters at their best.
     """
 
     name: str
@@ -42,6 +45,7 @@ class ParameterEstimate:
     high: float
     least: float
     most: float
+    profile: tuple[tuple[float, float], ...] = ()
 
     @property
     def identified(self) -> bool:
@@ -240,18 +244,21 @@ class Identification:
         }
 
 
-def estimate(fit: Fit, place: int, alone: tuple[float, float], jointly: tuple[float, float]) -> ParameterEstimate:
-    """Estimate of one coordinate from the ends of its profiles as they are fitted."""
-    coordinate = fit.experiment.coordinates[place]
+def estimate(profile: Profile, alone: tuple[float, float], jointly: tuple[float, float]) -> ParameterEstimate:
+    """Estimate of one coordinate from its profile and the ends there, as they are fitted."""
+    fit, best = profile.fit, float(profile.fit.fitted[profile.place])
+    coordinate = fit.experiment.coordinates[profile.place]
+    points = [(0.0, 0.0), *((each.step, each.distance) for each in profile.points)]
     low, high, least, most = (coordinate.outward(end) if math.isfinite(end) else end for end in (*alone, *jointly))
     return ParameterEstimate(
         name=coordinate.name,
         unit=coordinate.unit,
-        value=coordinate.outward(float(fit.fitted[place])),
+        value=coordinate.outward(best),
         low=low,
         high=high,
         least=min(least, low),
         most=max(most, high),
+        profile=tuple((coordinate.outward(best + step), distance) for step, distance in sorted(points)),
     )
 
 

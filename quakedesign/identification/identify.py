@@ -34,7 +34,7 @@ from quakedesign.identification.experiment import (
     delayed,
     trended,
 )
-from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, advantage, fit, interval, minimised, settled
+from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, Profile, advantage, fit, minimised, settled
 from quakedesign.identification.identification_result import Identification, ParameterEstimate, Rival, estimate
 from quakedesign.identification.loading import Loading, prepared
 from quakedesign.identification.record import FAR_OFF, Record, read_record, scatter
@@ -249,6 +249,7 @@ TREND_CHOICES = "auto", *_ONE_TREND, "none"
 _STAYS = 0.5  # deviations: a delay as small needs no move
 _UNFELT = 0.1  # deviations of the whole record by which an error of a rate moves friction unseen
 _UNSEEN = 1e-5  # of the range of friction
+_CHANCE = 0.01  # of a trend or an unsteady beginning that is fitted to noise: they move a - b
 
 
 def identify(
@@ -446,7 +447,7 @@ class _Choice:
         taken = own
         if self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE:
             taken = TREND_IN_TIME
-        if taken and not _needed(found[taken][0].best, found[""][1]):
+        if taken and not needed(found[taken][0].best, found[""][1]):
             taken = ""
         others = {
             _TRENDS.get(name, "without a trend"): (found[name][0], aic[name] - aic[taken])
@@ -553,14 +554,14 @@ class _Choice:
             return fitted
         wider, _ = self._among(fitted, {*_nuisance(fitted), START_STATE})
         told = replace(wider, best=replace(wider.best, kept=fitted.best.kept))
-        return _again(wider) if _needed(told.best, fitted.best.squares, len(_START)) else fitted
+        return _again(wider) if needed(told.best, fitted.best.squares, len(_START)) else fitted
 
     def _without_start(self, fitted: _Fitted) -> _Fitted:
         """Without an unsteady beginning, where a region of 95 % holds a steady one."""
         if START_STATE not in _nuisance(fitted):
             return fitted
         narrower, squares = self._among(fitted, _nuisance(fitted) - {START_STATE})
-        return fitted if _needed(fitted.best, squares, len(_START)) else _again(narrower)
+        return fitted if needed(fitted.best, squares, len(_START)) else _again(narrower)
 
     def _among(self, fitted: _Fitted, nuisance: Collection[str]) -> tuple[_Fitted, float]:
         """Fit with other nuisance parameters at the same samples with the same noise, and its sum of squares."""
@@ -602,11 +603,14 @@ def profiled(
     )
 
 
-def _needed(best: Fit, squares: float, fewer: int = 1) -> bool:
-    """Whether a fit is likelier than one with so many parameters fewer, at 95 %, and by more than machines measure."""
+def needed(best: Fit, squares: float, fewer: int = 1) -> bool:
+    """Whether noise leaves so much better a fit than with so many parameters fewer in 1 record of 100, or none at all.
+
+    By Fisher's F with the pieces of the noise; what no machine measures does not count.
+    """
     floor = _UNSEEN * float(np.ptp(best.measured))
     seen = squares - best.squares > floor**2 * best.freedom
-    return seen and best.excess(squares) > best.threshold(fewer)
+    return seen and best.excess(squares) > best.threshold(fewer, _CHANCE)
 
 
 def _nuisance(fitted: _Fitted) -> set[str]:
@@ -619,9 +623,8 @@ def _again(fitted: _Fitted) -> _Fitted:
 
 def _settled(best: Fit, noise: CorrelatedNoise | None) -> Fit:
     """A fit with another noise."""
-    if noise is None and best.correlated is None:
-        return best
-    return settled(replace(best, correlated=noise), FitSearch())
+    white = noise is None and best.correlated is None
+    return best if white else settled(replace(best, correlated=noise), FitSearch())
 
 
 def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, ParameterEstimate]:
@@ -635,42 +638,28 @@ def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, Pa
     if len(effects) < 2:
         return {name: _estimate(best, i) for i, name in enumerate(names) if wanted is None or name in wanted}
     direct, *others = effects
-    others_turned = _Turned(best, direct, tuple(others))
-    first_turned = _Turned(best, others[0], (direct,)) if len(others) == 1 else None
-    return {
-        name: (_estimate(best, i) if first_turned is None else first_turned.estimate(i))
-        if i == direct
-        else others_turned.estimate(i)
-        for i, name in enumerate(names)
-        if wanted is None or name in wanted
-    }
+    found = {}
+    for i, name in enumerate(names):
+        if wanted is None or name in wanted:
+            first, seconds = (others[0], (direct,)) if i == direct else (direct, tuple(others))
+            found[name] = _estimate(best, i) if len(others) > 1 and i == direct else _turned(best, i, first, seconds)
+    return found
 
 
 def _difference(best: Fit, jointly: bool = True) -> ParameterEstimate | None:
     """Estimate of the difference of the direct effect and all evolution effects."""
     names = [c.name for c in best.experiment.coordinates]
-    effects = [names.index(name) for name in _EFFECTS_OF if name in names]
-    if len(effects) < 2:
-        return None
-    return _Turned(best, effects[0], tuple(effects[1:])).estimate(effects[0], jointly)
+    first, *seconds = [names.index(name) for name in _EFFECTS_OF if name in names] or [0]
+    return _turned(best, first, first, tuple(seconds), jointly) if seconds else None
 
 
-@dataclass(frozen=True)
-class _Turned:
-    """A fit in coordinates with the difference of some in place of the first of them."""
-
-    best: Fit
-    first: int
-    seconds: tuple[int, ...]
-
-    def estimate(self, place: int, jointly: bool = True) -> ParameterEstimate:
-        turned = Difference(whole=self.best.experiment, first=self.first, seconds=self.seconds)
-        try:
-            return _estimate(
-                replace(self.best, experiment=turned, fitted=turned.difference(self.best.fitted)), place, jointly
-            )
-        except BetterFit as better:
-            raise BetterFit(turned.whole_of(better.fitted)) from None
+def _turned(best: Fit, place: int, first: int, seconds: tuple[int, ...], jointly: bool = True) -> ParameterEstimate:
+    """Estimate in coordinates with the difference of some in place of the first of them."""
+    turned = Difference(whole=best.experiment, first=first, seconds=seconds)
+    try:
+        return _estimate(replace(best, experiment=turned, fitted=turned.difference(best.fitted)), place, jointly)
+    except BetterFit as better:
+        raise BetterFit(turned.whole_of(better.fitted)) from None
 
 
 def _open(told: ParameterEstimate) -> ParameterEstimate:
@@ -679,6 +668,8 @@ def _open(told: ParameterEstimate) -> ParameterEstimate:
 
 
 def _estimate(best: Fit, place: int, jointly: bool = True) -> ParameterEstimate:
-    alone = interval(best, place, best.threshold(1))
-    of_all = interval(best, place, best.threshold(len(best.fitted)), alone) if jointly else alone
-    return estimate(best, place, alone, of_all)
+    """Estimate of one coordinate, alone and of all at once where that is wanted too."""
+    profile = Profile(best, place)
+    alone = profile.interval(best.threshold(1))
+    of_all = profile.interval(best.threshold(len(best.fitted))) if jointly else alone
+    return estimate(profile, alone, of_all)

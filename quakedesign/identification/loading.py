@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from quakedesign.errors import RecordError
+from quakedesign.identification.correlated_noise import noise_of
 from quakedesign.identification.record import FAR_OFF, Record, reading_step, scatter, thinned
 from quakedesign.identification.sliding_experiment import Drive
 
@@ -316,7 +317,10 @@ def _refined(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray") -> "np.ndarr
 
 
 def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float) -> "np.ndarray":
-    """Knots without those that explain no more than noise, and those at which the rate hardly changes."""
+    """Knots without those that explain no more than noise, and those at which the rate hardly changes.
+
+    Two that less than two points part stand for one: a mean of samples before and after a change lies off both lines.
+    """
     left = y - _hinges(u, y, knots)[1]
     noise = max(float(left @ left) / len(u) * _spread(left), floor)
     allowed = _ODDS * np.log(len(u)) * noise
@@ -326,7 +330,9 @@ def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float)
         changes = np.abs(np.diff(rates)) / np.maximum(np.maximum(np.abs(rates[1:]), np.abs(rates[:-1])), 1e-300)
         fewer = [_refined(u, y, np.delete(knots, i)) for i in range(len(knots))]
         losses = np.array([float(np.sum((y - _hinges(u, y, others)[1]) ** 2)) for others in fewer])
-        losses = np.where(changes < _LEAST_CHANGE, -1.0, losses - squares)
+        losses, near = np.maximum(losses - squares, 0), np.diff(knots) < 2 / len(u)
+        doubled = np.append(near, False) | np.insert(near, 0, False)
+        losses = np.where(changes < _LEAST_CHANGE, -1.0, np.where(doubled, -1 / (1 + losses), losses))
         least = int(np.argmin(losses))
         if losses[least] >= allowed:
             break
@@ -337,11 +343,19 @@ def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float)
 def _rate_errors(u: "np.ndarray", left: "np.ndarray", knots: "np.ndarray") -> "np.ndarray":
     """Standard deviation of the slope of each piece: of a separate line, as the knots are free.
 
-    By the long-run variance of what is left: that of AR(1) noise is `_spread` times its variance.
+    By the long-run variance of what is left, the sum of its covariance over all lags. It is that of the likeliest white
+    noise and process that fades: readings in steps hide in the first correlation alone how long the process lasts.
     """
     ends = np.concatenate([u[:1], knots, u[-1:]])
     inside = np.maximum(np.histogram(u, ends)[0], 1)
-    noise = np.std(left) * np.sqrt(_spread(left))
+    unknowns = np.hstack([_design(u, knots), -1.0 * (u[:, None] > knots)])
+    ones = np.ones(len(u))
+    shared = noise_of(left, unknowns, ones, u, None, ones > 0, most=len(u)) if np.any(left) else None
+    spread = 1.0
+    if shared is not None:
+        fading = np.exp(-np.mean(np.diff(u)) / shared.length)
+        spread = (1 + shared.share * (1 + fading) / (1 - fading)) / (1 + shared.share)
+    noise = np.std(left) * np.sqrt(spread)
     errors: np.ndarray = noise * np.sqrt(12 / inside) / np.maximum(np.diff(ends), 1e-300)
     return errors
 

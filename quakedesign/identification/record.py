@@ -146,10 +146,24 @@ def read_record(
     UnitError
         For a column whose unit is unknown or of another dimension.
     """
+    return read_windows(path, [(begin, end)], normal_stress=normal_stress, columns=columns)[0]
+
+
+def read_windows(
+    path: str | Path,
+    windows: Sequence[tuple[str | None, str | None]],
+    *,
+    normal_stress: float | None = None,
+    columns: str = "",
+) -> list[Record]:
+    """A record of each window of a file, which is read once; as `read_record`."""
     given, remarks = _given(read_columns(path), columns)
     given, told = _measured(given)
-    given, left = _weighted(_window(given, begin, end))
-    return _record(Path(path).stem, given, normal_stress, (*remarks, *told, *left))
+    found = []
+    for window in windows:
+        inside, left = _weighted(_window(given, *window))
+        found.append(_record(Path(path).stem, inside, normal_stress, (*remarks, *told, *left)))
+    return found
 
 
 def part(record: Record, inside: "np.ndarray", name: str) -> Record:
@@ -387,7 +401,13 @@ def _require_sizes(given: dict[str, "np.ndarray"]) -> None:
 def _friction(given: dict[str, "np.ndarray"], stress: float | None) -> "tuple[np.ndarray, np.ndarray, str]":
     """Friction coefficient, what is normal to it, and the unit of that."""
     given = _without_repetition(given)
-    measured = _one_of(given, ("friction", *_SHEAR), "friction, shear_stress or shear_force")
+    found = [name for name in ("friction", *_SHEAR) if name in given]
+    if len(found) != 1:
+        raise RecordError(
+            "a record must have exactly one column friction, shear_stress or shear_force. Received "
+            f"{', '.join(found) or 'none'}."
+        )
+    measured = found[0]
     across = _SHEAR.get(measured) or next((n for n in _SHEAR.values() if n in given), "normal_stress")
     if across in given and stress is not None:
         raise RecordError(f"the normal stress must be given once. Received it beside the column {across}.")
@@ -444,26 +464,17 @@ def _load_point(given: "dict[str, np.ndarray]") -> "tuple[np.ndarray | None, np.
 
     A recorded rate is that which was commanded from its sample on, a staircase.
     """
-    names = [name for name in ("load_point_displacement", "load_point_rate") if name in given]
-    if not names:
+    name = next((name for name in ("load_point_displacement", "load_point_rate") if name in given), None)
+    if name is None:
         return None, None, []
-    if len(names) == 2:
-        given = {name: column for name, column in given.items() if name != "load_point_rate"}
-    column = given[_one_of(given, ("load_point_displacement", "load_point_rate"), "load_point_displacement or _rate")]
-    backward = float(column[-1] - column[0] if names[0] == "load_point_displacement" else np.sum(column)) < 0
+    column, displaced = given[name], name == "load_point_displacement"
+    backward = float(column[-1] - column[0] if displaced else np.sum(column)) < 0
     column = -column if backward else column
-    turned = [f"{names[0]} falls: its sign is changed"] if backward else []
-    if names[0] == "load_point_displacement":
+    turned = [f"{name} falls: its sign is changed"] * backward
+    if displaced:
         return column - column[0], None, turned
     moved = np.concatenate([[0.0], np.cumsum(np.diff(given["time"]) * column[:-1])])
     return moved, column, turned
-
-
-def _one_of(given: dict[str, "np.ndarray"], names: Sequence[str], what: str) -> str:
-    found = [name for name in names if name in given]
-    if len(found) != 1:
-        raise RecordError(f"a record must have exactly one column {what}. Received {', '.join(found) or 'none'}.")
-    return found[0]
 
 
 # ----------------------------------------------------------------------

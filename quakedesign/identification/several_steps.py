@@ -21,7 +21,7 @@ from quakedesign.identification.fitting import Fit, minimised, weighed
 from quakedesign.identification.identification_result import Identification
 from quakedesign.identification.identify import Setup, identified_as, kinds_of, profiled
 from quakedesign.identification.loading import prepared
-from quakedesign.identification.record import Record, part, read_record
+from quakedesign.identification.record import Record, part, read_record, read_windows
 from quakedesign.identification.sliding_experiment import STIFFNESS
 from quakedesign.text import counted, shown
 
@@ -73,11 +73,11 @@ def read_steps(
             f"--from and --to are for one window. Received them beside --steps {shown(steps)}. Omit them."
         )
     found: list[Record] = []
-    for window in (each.strip() for each in steps.split(",")):
-        ends = window.split(" to ")
-        if len(ends) != 2:
-            raise RecordError(f"--steps must name windows as 0 s to 60 s, 60 s to 120 s. Received {shown(window)}.")
-        record = read_record(path, begin=ends[0].strip(), end=ends[1].strip(), **how)
+    windows = [[end.strip() for end in each.split(" to ")] for each in steps.split(",")]
+    if wrong := [" to ".join(ends) for ends in windows if len(ends) != 2]:
+        raise RecordError(f"--steps must name windows as 0 s to 60 s, 60 s to 120 s. Received {shown(wrong[0])}.")
+    records = read_windows(path, [(begin, end) for begin, end in windows], **how)
+    for window, record in zip([" to ".join(ends) for ends in windows], records, strict=True):
         for other in found:
             shared = np.isin((record.origin + record.time).round(9), (other.origin + other.time).round(9))
             if shared.sum() > 1:

@@ -1,6 +1,6 @@
 """The sampled law for friction that sticks as a controller that simulations run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -9,11 +9,38 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
-from quakedesign.errors import UnsupportedError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import to_sympy
 from quakedesign.laws.base import Controller, Sampling, Signals
 from quakedesign.laws.loop_field import LoopField
 from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
+
+
+def level_after(
+    states: Sequence[Any], seen: tuple[Any, Any], period: Any, gains: tuple[Any, Any, Any], *, sticks: bool = True
+) -> sp.Expr:
+    """Level D [Pa] after a sample.
+
+    Parameters
+    ----------
+    states : sequence of four
+        Level D [Pa], predicted slip rate [m/s], and slip rate [m/s] and slip [m] measured last.
+    seen : (slip, slip rate)
+        As measured [m], [m/s].
+    period : expression
+        T_s [s].
+    gains : (level_gain, slip_gain, rest_slip)
+        Of `StickSlipLaw`.
+    sticks : bool
+        Whether the innovation of the slip is cut off at rest.
+    """
+    (level, predicted, last_rate, last_slip), (slip, rate) = states, seen
+    level_gain, slip_gain, rest_slip = gains
+    innovation = slip - last_slip - period * (last_rate + predicted) / 2
+    if sticks:
+        least = sp.Max(innovation, -period * predicted / 2 - rest_slip)
+        innovation = sp.Piecewise((least, rate <= 0), (innovation, True))
+    return level + level_gain * (rate - predicted) + slip_gain * innovation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +56,11 @@ class StickSlipController(Controller):
         T_s [s].
     sticks : bool
         Whether the predicted slip rate and the innovation at rest are cut off; without, the law is linear.
+
+    Raises
+    ------
+    ParameterError
+        For the law of a sliding mode, which the scheme ``stick-slip`` runs.
     """
 
     name: ClassVar[str] = "stick-slip"
@@ -43,6 +75,11 @@ class StickSlipController(Controller):
     sticks: bool = True
 
     def __post_init__(self) -> None:
+        if self.law.pull:
+            raise ParameterError(
+                "a StickSlipController needs a law with a linear target rate, got one with an implicit step: run its "
+                "sliding mode in the scheme stick-slip"
+            )
         object.__setattr__(self, "gains", MappingProxyType({name: getattr(self.law, name) for name in GAIN_UNITS}))
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
@@ -69,14 +106,9 @@ class StickSlipController(Controller):
 
     def _step(self, signals: Signals) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
         """Pressure [Pa], and the states after the sample."""
-        law, period = self.law, to_sympy(self.step)
-        level, predicted, last_rate, last_slip = signals.integrals
-        slip, rate = signals.slip, signals.slip_rate
-        innovation = slip - last_slip - period * (last_rate + predicted) / 2
-        lowest = -period * predicted / 2 - to_sympy(law.rest_slip)
-        if self.sticks:
-            innovation = sp.Piecewise((sp.Max(innovation, lowest), rate <= 0), (innovation, True))
-        level += to_sympy(law.level_gain) * (rate - predicted) + to_sympy(law.slip_gain) * innovation
+        law, slip, rate = self.law, signals.slip, signals.slip_rate
+        gains = to_sympy(law.level_gain), to_sympy(law.slip_gain), to_sympy(law.rest_slip)
+        level = level_after(signals.integrals, (slip, rate), to_sympy(self.step), gains, sticks=self.sticks)
         target = rate - signals.slip_rate_error - to_sympy(law.return_rate) * signals.slip_error
         pressure = -to_sympy(law.rate_gain) * rate + to_sympy(law.target_gain) * target - level
         return pressure, (level, sp.Max(target, 0) if self.sticks else target, rate, slip)

@@ -1,10 +1,11 @@
 """A sampled law for friction that sticks: its predicted slip rate is never negative, and it uses the measured slip."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from fractions import Fraction
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
+from quakedesign.laws.implicit_root import Power
 
 GAIN_UNITS = {
     "rate_gain": "Pa s/m",
@@ -33,6 +34,9 @@ class StickSlipLaw:
     fault between samples at which it rests. At rest that innovation is cut off below: an early stop must not lower D.
     Noise of the slip would add up in D at rest if rest_slip were less than twice its bound.
 
+    Of a sliding mode v = r′ + w instead, where w is the end of its implicit step, see `quakedesign.laws.implicit_root`.
+    Where that step is deadbeat, w = −e/T, the law is the one above with return_rate = 1/T.
+
     Attributes
     ----------
     rate_gain, target_gain : Fraction
@@ -45,6 +49,8 @@ class StickSlipLaw:
         [Pa/m], 0 or more.
     rest_slip : Fraction
         [m], 0 or more: measured slips of a fault at rest may be as far apart; 0 for exact ones.
+    pull : tuple of Power
+        q [m/s] of the implicit step of a sliding mode; empty for a law whose target rate is linear.
 
     Raises
     ------
@@ -58,10 +64,11 @@ class StickSlipLaw:
     level_gain: Fraction
     slip_gain: Fraction
     rest_slip: Fraction = Fraction(0)
+    pull: tuple[Power, ...] = ()
 
     def __post_init__(self) -> None:
-        for part in fields(self):
-            value, positive = getattr(self, part.name), part.name in ("rate_gain", "target_gain", "return_rate")
+        for name in GAIN_UNITS:
+            value, positive = getattr(self, name), name in ("rate_gain", "target_gain", "return_rate")
             if value < 0 or (positive and not value):
                 least = "positive" if positive else "0 or more"
-                raise ParameterError(f"{part.name} of a stick-slip law must be {least}, got {shortly(value)}")
+                raise ParameterError(f"{name} of a stick-slip law must be {least}, got {shortly(value)}")

@@ -10,7 +10,7 @@ import numpy as np
 from quakedesign.errors import OutputError
 from quakedesign.files import write_whole
 from quakedesign.identification.assessment import CANNOT_TELL, EXPLAINS_NOT
-from quakedesign.identification.experiment import DELAY, Trended
+from quakedesign.identification.experiment import DELAY, TREND, TREND_IN_TIME, Widened
 from quakedesign.identification.fitting import Fit, weighed
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
 from quakedesign.identification.several_steps import Steps
@@ -22,6 +22,8 @@ _MOST_OUTLIERS = 8
 _MOST_PANELS = 4
 _SHOWN = 12.0  # critical slips after a step
 _LAGS = 40
+_SMALL_EFFECT = 0.1  # of friction, that is written in thousandths
+_SYMBOLS = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "$D_c$"}
 _SHORT, _LONG = 2e-7, 0.01  # D_c [m] that no gouge of a laboratory has
 
 
@@ -204,14 +206,22 @@ def identification_figure(identification: Identification) -> Any:
     if steps:
         rows.append([f"step {i}" for i in range(len(steps)) for _ in range(columns // len(steps))])
     rows.append(["correlation"] * (columns // 2) + ["region"] * (columns // 2))
+    profiles = [each for each in _profiled(identification) if len(each.profile) > 1]
+    columns = math.lcm(columns, max(len(profiles), 1))
+    rows = [[name for name in row for _ in range(columns // len(row))] for row in rows]
+    if profiles:
+        rows.append([f"profile {each.name}" for each in profiles for _ in range(columns // len(profiles))])
     heights = [2.0 if row[0] == "friction" else 0.8 if row[0] in ("rate", "residual") else 1.4 for row in rows]
     drawing, axes = figure(0, 1.1 * sum(heights) + 1.0, mosaic=rows, height_ratios=heights)
     _friction(axes["friction"], identification, way, slice(None))
     if rates is not None:
         axes["rate"].plot(way, rates * 1e6, color=_FITTED, linewidth=1.0, drawstyle="steps-mid")
-        axes["rate"].set_ylabel("rate [um/s]", fontsize=SMALL)
+        axes["rate"].set_ylabel("rate [µm/s]", fontsize=SMALL)
         if steps and np.min(rates) > 0:
+            ends = [1e6 * float(np.min(rates)), 1e6 * float(np.max(rates))]
             axes["rate"].set_yscale("log")
+            axes["rate"].set_yticks(ends, [f"{end:.3g}" for end in ends])
+            axes["rate"].set_yticks([], minor=True)
         else:
             axes["rate"].set_ylim(0, 1.2e6 * np.max(rates))
     below = axes["residual"]
@@ -230,7 +240,7 @@ def identification_figure(identification: Identification) -> Any:
         far = min(far, way[steps[i + 1]] - way[place]) if i + 1 < len(steps) else far
         near = np.flatnonzero((way >= way[place] - 0.2 * far) & (way <= way[place] + far))
         _friction(axes[f"step {i}"], identification, way, slice(int(near[0]), int(near[-1]) + 1))
-        axes[f"step {i}"].set_title(f"step at {way[place]:.4g} um", fontsize=SMALL)
+        axes[f"step {i}"].set_title(f"step at {way[place]:.4g} µm", fontsize=SMALL)
     _correlation(axes["correlation"], fit)
     _region(axes["region"], identification)
     boxes = [(e.low, e.high) for e in (identification.estimates[name] for name in _pair(fit))]
@@ -238,7 +248,13 @@ def identification_figure(identification: Identification) -> Any:
         for end in box:
             if math.isfinite(end):
                 line(end, color=NATURAL, linewidth=0.6, linestyle=(0, (4, 2)))
-    note = f"dashed: twice the noise, {fit.noise:.3g}; crosses beyond eight times it stand at its edge"
+    for each in profiles:
+        _profile(axes[f"profile {each.name}"], each, fit)
+        axes[f"profile {each.name}"].tick_params(labelleft=each is profiles[0])
+    if profiles:
+        axes[f"profile {profiles[0].name}"].set_ylabel("distance [deviations]", fontsize=SMALL)
+    note = f"dashed: twice the noise, {fit.noise:.3g}; crosses beyond eight times it stand at its edge; profiles: "
+    note += "dashed at 95 % of one parameter, dotted of all at once"
     title = f"{record.name}: {identification.law.name} {identification.assessment}"
     return finish(drawing, title, [], note, legend=axes["friction"])
 
@@ -255,8 +271,9 @@ def _friction(axis: Any, identification: Identification, way: "np.ndarray", part
     simulated = fit.measured - fit.residuals
     axis.plot(way[part], fit.measured[part], ".", color=_MEASURED, markersize=2, label="measured")
     axis.plot(way[part], simulated[part], color=_FITTED, linewidth=1.2, label=f"fitted: {identification.law.name}")
-    if isinstance(fit.experiment, Trended):
-        line = simulated[0] + fit.fitted[-1] * (fit.experiment.along - fit.experiment.along[0])
+    if isinstance(fit.experiment, Widened) and fit.experiment.coordinates[-1].name in (TREND, TREND_IN_TIME):
+        along = fit.experiment.columns[:, 0]
+        line = simulated[0] + fit.fitted[-1] * (along - along[0])
         axis.plot(way[part], line[part], color=NATURAL, linewidth=0.8, linestyle=(0, (4, 2)), label="trend")
     left = np.flatnonzero(~fit.kept[part]) + (part.start or 0)
     if len(left):
@@ -271,14 +288,35 @@ def _correlation(axis: Any, fit: Fit) -> None:
         (fit.whitened, _FITTED, "made independent"),
     ):
         off = left - left.mean()
-        lags = np.arange(min(_LAGS, len(off) - 1) + 1)
-        each = [float(off[: len(off) - lag] @ off[lag:]) for lag in lags.tolist()]
-        axis.plot(lags, np.array(each) / max(each[0], 1e-300), ".-", color=colour, markersize=3, label=label)
+        each = np.correlate(off, off, "full")[len(off) - 1 :][: _LAGS + 1]
+        axis.plot(each / max(each[0], 1e-300), ".-", color=colour, markersize=3, label=label)
     for level in (-2.0, 2.0):
         axis.axhline(level / len(fit.whitened) ** 0.5, color=NATURAL, linewidth=0.6, linestyle=(0, (4, 2)))
     axis.set_xlabel("lag [samples]", fontsize=SMALL)
     axis.set_ylabel("autocorrelation [-]", fontsize=SMALL)
     axis.legend(fontsize=SMALL - 1, frameon=False)
+
+
+def _profiled(identification: Identification) -> list[ParameterEstimate]:
+    """Parameters whose profiles are drawn: a, b, a - b and D_c, or those of friction that weakens with slip."""
+    names = identification.law.quantities().keys() - {"reference_coefficient"}
+    found = [each for name, each in identification.estimates.items() if name in names]
+    return [*found[:3], *([identification.difference] if identification.difference else [])]
+
+
+def _profile(axis: Any, estimate: ParameterEstimate, fit: Fit) -> None:
+    """Root of the excess at the values that were tried, with the thresholds for one parameter and for all."""
+    alone, jointly = (math.sqrt(fit.threshold(count)) for count in (1, len(fit.fitted)))
+    small = not estimate.unit and abs(estimate.value) < _SMALL_EFFECT
+    power = power_of(estimate.value) if estimate.unit in _PREFIXED else -3 * small
+    value, distance = np.array([point for point in estimate.profile if point[1] <= 1.5 * jointly]).T
+    axis.plot(value / 10.0**power, distance, ".-", color=_FITTED, linewidth=1.0, markersize=3)
+    for level, style in ((alone, (0, (4, 2))), (jointly, (0, (1, 2)))):
+        axis.axhline(level, color=NATURAL, linewidth=0.6, linestyle=style)
+    axis.set_ylim(0, 1.3 * jointly)
+    axis.locator_params(axis="x", nbins=3)
+    name = "a - b" if " - " in estimate.name else _SYMBOLS.get(estimate.name, estimate.name)
+    axis.set_xlabel(f"{name} [{'$10^{-3}$' if small else PREFIXES[power] + (estimate.unit or '-')}]", fontsize=SMALL)
 
 
 def _pair(fit: Fit) -> list[str]:

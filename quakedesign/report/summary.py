@@ -13,6 +13,7 @@ from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
 from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines
 from quakedesign.studies.comparison import pressure_extremes
+from quakedesign.studies.facts import box_sentence
 from quakedesign.studies.runs import StateRun
 from quakedesign.text import PREFIXES, plain, power_of, quantity
 
@@ -133,7 +134,7 @@ def worst_slip_rate(
     if isinstance(worst, WorstSliding):
         assert isinstance(found, SlidingGuarantee)
         return float(found.task.rate) * exp(worst.log_rate)
-    return worst.slip_rate if isinstance(worst, WorstStickSlip) else worst.slip_rate_error
+    return worst.peak_slip_rate if isinstance(worst, WorstStickSlip) else worst.slip_rate_error
 
 
 def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
@@ -143,6 +144,8 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
     if isinstance(comparison.uncontrolled, StateRun):
         yield cycle_sentence(comparison.uncontrolled)
     yield from (f"assumed: {said}" for said in fault.assumed)
+    if best is not None and not fault.friction.state_names:
+        yield box_sentence(fault)
     for entry in designed:
         if (entry.guaranteed is None and best is not None) or ", but " in grade(entry):
             yield f"{entry.label}: {grade(entry)}"

@@ -210,7 +210,7 @@ def _answer(fault: Fault, design: Design) -> LoopAnswer | SlidingAnswer | StickS
     if isinstance(found, SlidingGuarantee):
         return design.sliding
     if isinstance(found, StickSlipGuarantee):
-        return attacked_stick_slip(fault, found)
+        return attacked_stick_slip(fault, found, design.compensation)
     tried = str(design.details.get("not_at_rest", ""))
     return replace(attacked(fault, found), compensation=design.compensation, not_at_rest=tried)
 

@@ -412,18 +412,21 @@ def _rock(fault: Fault) -> list[str]:
         f"{name} {getattr(law, name):.4g} {told.metadata['unit']}".strip() for name, told in law.quantities().items()
     )
     rock = f"shear waves {speed:.4g} m/s{unlikely}, effective normal stress {stress}"
-    return [f"{rock}, friction {law.name}: {numbers}", *([] if law.state_names else [_box(fault)])]
+    return [f"{rock}, friction {law.name}: {numbers}", *([] if law.state_names else [box_sentence(fault)])]
 
 
-def _box(fault: Fault) -> str:
-    """What a guarantee takes for possible of friction without a state."""
+def box_sentence(fault: Fault) -> str:
+    """Friction without a state and parameters for which a guarantee holds."""
     (low, high), law = fault.friction.bounds, fault.friction
     slopes = [f"{law.slip_slope:.4g} per m of slip"] * (law.slip_slope > 0)
     slopes += [f"{law.rate_slope:.4g} per m/s"] * (law.rate_slope > 0)
-    return (
-        f"guarantees are for every friction from {low:.4g} to {high:.4g} that changes by at most {', '.join(slopes)} "
-        f"(box {fault.box.name})"
-    )
+    widths = {
+        name: getattr(fault.box, name) for name in ("stiffness", "damping", "authority") if getattr(fault.box, name)
+    }
+    off = [f"{name.replace('authority', 'area per mass')} within {float(100 * v):g} %" for name, v in widths.items()]
+    friction = f"every friction from {low:.4g} to {high:.4g} that changes by at most {', '.join(slopes)}"
+    exact = "stiffness, damping and area per mass are exact"
+    return f"box {fault.box.name}: {friction}; {', '.join(off) or exact}"
 
 
 def _event(fault: Fault) -> list[str]:

@@ -580,8 +580,10 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
             f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
             f"{'; '.join(apart)}. Give the fault that it is about, or prove a new one with guarantee."
         )
-    if isinstance(claim, Guarantee) and claim.held.law.root is not None:
-        controller: Controller = recovered(claim).limited
+    if isinstance(claim, StickSlipGuarantee) and claim.held.law.pull:
+        controller: Controller = recovered(claim).controller
+    elif isinstance(claim, Guarantee) and claim.held.law.root is not None:
+        controller = recovered(claim).limited
     else:
         controller = claim.controller
     if claim.check() is not Verdict.PROVED:

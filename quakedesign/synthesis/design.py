@@ -160,7 +160,7 @@ class Design:
     def guarantee(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee:
         """Guarantee of the sampled law with zero-order hold, or the reason why there is none.
 
-        A law of samples has its own T_s, a sliding mode of samples runs in the scheme ``compensated``; the integrals of
+        A law of samples has its own T_s, a sliding mode of samples its own scheme; the integrals of
         an e-LQR in continuous time are summed over the T_s of the fault. Computed when asked for unless it is known.
         """
         law = self.controller
@@ -175,7 +175,7 @@ class Design:
     def compensation(self) -> Compensation | None:
         """A sampled sliding mode with its guarantee; None for another law."""
         law, found = self.controller, self.guarantee
-        if law is None or law.sampling is None or isinstance(found, SlidingGuarantee | StickSlipGuarantee):
+        if law is None or law.sampling is None or isinstance(found, SlidingGuarantee):
             return None
         return method_of(type(law)).compensation(law, found)
 
@@ -227,8 +227,9 @@ def design(
     guarantee where the fault's own has none; see `Design.guarantee`.
 
     2-CTA, 2-DIA: base gains (families.toml) are proved in continuous time for the fault's range of β; λ = ρ⁶ (ρ
-    rational, so that every scaled gain is rational), weight and authority of the scheme ``compensated`` are chosen by
-    what is guaranteed. e-LQR: feedback with an estimate of the disturbance.
+    rational, so that every scaled gain is rational) and the settings of the scheme ``stick-slip``, or of
+    ``compensated`` on the plant without stick, are chosen by what is guaranteed. e-LQR: feedback with an estimate of
+    the disturbance.
 
     With `continuous` those of the paper, without a guarantee of the loop that runs. 2-CTA, 2-DIA: λ grows until L̄
     exceeds by a tenth what the reference and the disturbance need; so does it where no T_s has a guarantee. e-LQR:
@@ -255,8 +256,8 @@ def design(
     continuous : bool
         The paper's design in continuous time.
     plant : str, optional
-        ``printed`` for a guarantee on the plant without stick; unless given an e-LQR has one on the stick–slip plant
-        where it can be proved.
+        ``printed`` for a guarantee on the plant without stick; unless given it is on the stick–slip plant where it can
+        be proved.
     stress : str, float or Fraction, optional
         Of rate-and-state friction: bound of the shear stress disturbance [Pa]; the largest that the design withstands
         unless given.

@@ -121,7 +121,8 @@ def guarantee(
         k1 to k4 of an e-LQR whose integrals are summed once per sample, run by the scheme ``explicit``; base gains of a
         sliding mode. A matrix of one row, as the K of ``control.dlqr``, is its row.
     scheme : str, optional
-        Of a sliding mode: ``compensated`` unless given, the only one with a guarantee; of the e-LQR ``explicit``.
+        Of a sliding mode: ``stick-slip`` unless given, or ``compensated`` on the plant without stick; no other has a
+        guarantee. Of the e-LQR ``explicit``.
     disturbance_class : str
         ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
     stress : str, float or Fraction, optional
@@ -130,8 +131,9 @@ def guarantee(
     spread : str, float or Fraction
         Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
     plant : str
-        ``stick-slip``: friction holds the fault at rest and it never slips backward; an e-LQR is designed whose
-        predicted slip rate is never negative (`StickSlipLaw`), for an exact slip rate and a pressure that acts at once.
+        ``stick-slip``: friction holds the fault at rest and it never slips backward; an e-LQR or a sliding mode is
+        designed whose predicted slip rate is never negative (`StickSlipLaw`), for an exact slip rate and a pressure
+        that acts at once.
         ``printed``: the plant without stick, its friction continued to negative slip rates. Unless given the first
         where it applies and has a proof, else the second.
     progress : callable, optional
@@ -208,21 +210,25 @@ def guarantee(
         task = uncertain_plant(fault, rate_limited=disturbance_class == "rate")
         return method_of(type(law)).given(fault, task, law, setup)
     assert not isinstance(controller, Controller)
-    if plant == STICK_SLIP:
+    if STICK_SLIP in (plant, scheme) and plant != PRINTED:
         if fault.friction.state_names:
             raise ParameterError(
                 f"friction with a state never rests, so that the stick-slip plant is no other. Received "
                 f"{fault.friction.name}. Omit plant."
             )
         require_known(disturbance_class, CLASSES, "class")  # what is proved for the first holds for the second
-        usual = (control_law(controller).name, tuple(gains), scheme) == ("elqr", (), None)
+        family = control_law(controller)
+        usual = (family.name, tuple(gains), scheme) == ("elqr", (), None)
+        if method_of(family).takes_base_gains:
+            usual = scheme in (None, STICK_SLIP)
         if not usual or stress is not None or exact_value(spread, "", "spread"):
             raise ParameterError(
-                "the stick-slip plant is guaranteed with a designed elqr and friction without a state: omit "
-                "controller, gains, scheme, stress and spread"
+                "the stick-slip plant is guaranteed with a designed elqr, or a sliding mode in the scheme stick-slip, "
+                "and friction without a state: omit gains of an elqr, scheme, stress and spread"
             )
         require_known(objective, OBJECTIVES, "objective")
-        return answer_stick_slip(fault, setup, objective=objective, progress=progress)
+        mode = method_of(family).base_law(uncertain_plant(fault), family, _exact_texts(gains))
+        return answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
     least = None if stress is None else exact_value(stress, "Pa", "stress")
     off = exact_value(spread, "", "spread")
     if fault.friction.state_names:
@@ -251,8 +257,10 @@ def guarantee(
     task, family = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
     wanted = Wanted(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
     without = ""
-    if plant is None and not wanted.gains and scheme is None and may_stick(family, setup, disturbance_class):
-        sticking = answer_stick_slip(fault, setup, objective=objective, progress=progress)
+    usual = scheme is None and (method_of(family).takes_base_gains or not wanted.gains)
+    if plant is None and usual and may_stick(family, setup, disturbance_class):
+        mode = method_of(family).base_law(task, family, wanted.gains)
+        sticking = answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
         if isinstance(sticking.found, StickSlipGuarantee):
             return sticking
         without = sticking.found.reason

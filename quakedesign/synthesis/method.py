@@ -30,7 +30,7 @@ from quakedesign.guarantees import (
 )
 from quakedesign.guarantees.search.adversary import worst_found
 from quakedesign.guarantees.search.estimate import spectral_radius
-from quakedesign.laws import Controller, SampledController, Signals, control_laws
+from quakedesign.laws import Controller, SampledController, Signals, SlidingMode, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.laws.sampled_law import steady_states
 from quakedesign.linear.robust_stability import sector_loop
@@ -214,12 +214,15 @@ class DesignMethod(Generic[L]):
         Whether it finds gains for a fault.
     without_state : str
         Why it finds none for friction with a state; empty where it does.
+    takes_base_gains : bool
+        Whether it scales base gains, as of a sliding mode.
     """
 
     name: ClassVar[str] = "any"
     family: ClassVar[type] = Controller
     designs: ClassVar[bool] = False
     without_state: ClassVar[str] = MEMORYLESS
+    takes_base_gains: ClassVar[bool] = False
 
     def design(self, problem: GainProblem[Designed], law: type[L]) -> Designed:
         """Find gains with a proof.
@@ -245,7 +248,9 @@ class DesignMethod(Generic[L]):
         known = linear_about_a_reference(controller)
         return tuple(linear_premises(fault, controller, certificate)) if known else (), None
 
-    def guarantee(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> Guarantee | NoGuarantee:
+    def guarantee(
+        self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup
+    ) -> Guarantee | StickSlipGuarantee | NoGuarantee:
         """Guarantee of the sampled law on a task of the fault, with the noise of a loop setup."""
         return NoGuarantee(
             reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
@@ -255,8 +260,12 @@ class DesignMethod(Generic[L]):
         """Certified peaks of slip, slip rate and pressure in continuous time."""
         return NoGuarantee(reason=f"no bound of peaks of {controller.title} is known here", small_gain=None)
 
-    def compensation(self, controller: L, found: Guarantee | NoGuarantee) -> Compensation | None:
-        """Sampled law that runs in the scheme ``compensated``, with its guarantee; None for other laws."""
+    def compensation(self, controller: L, found: Guarantee | StickSlipGuarantee | NoGuarantee) -> Compensation | None:
+        """Sampled sliding mode with its guarantee; None for other laws."""
+        return None
+
+    def base_law(self, task: FaultPlant, law: type[L], gains: tuple[str, ...]) -> SlidingMode | None:
+        """Sliding mode with base gains, or the first ones known for it; None for other laws."""
         return None
 
     def held_loop(self, fault: Fault, controller: L) -> HeldLoop | None:

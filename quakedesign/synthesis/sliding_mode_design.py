@@ -13,11 +13,12 @@ from quakedesign.guarantees import (
     Guarantee,
     LoopAnswer,
     NoGuarantee,
+    StickSlipGuarantee,
     attacked,
     guarantee_of,
     sampled_sliding_mode,
 )
-from quakedesign.guarantees.search.compensated_search import GUARANTEED
+from quakedesign.guarantees.search.compensated_search import GUARANTEED, design_sticking
 from quakedesign.guarantees.search.defaults import deadbeat, sliding_mode
 from quakedesign.guarantees.search.linear_design import longest_step, nearest_setup
 from quakedesign.laws import BaseGains, Controller, SlidingMode
@@ -30,6 +31,7 @@ from quakedesign.lyapunov.exact.premises import Premise, Variant, feedforward_va
 from quakedesign.lyapunov.search.search import find_certificate
 from quakedesign.plant import FaultPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
+from quakedesign.synthesis.state_feedback import may_stick, sticking_options
 
 _HEADROOM = Fraction(11, 10)
 _SHARES = (Fraction(99, 100), Fraction(9, 10), Fraction(1, 2))
@@ -41,13 +43,14 @@ class SlidingModes(DesignMethod[SlidingMode]):
     name: ClassVar[str] = "sliding-mode"
     family: ClassVar[type] = SlidingMode
     designs: ClassVar[bool] = True
+    takes_base_gains: ClassVar[bool] = True
     without_state: ClassVar[str] = (
         "sliding modes of second order do not apply to friction with a state, where the slip rate follows the pressure "
         "at once (it is algebraic without inertia)"
     )
 
     def design(self, problem: GainProblem[Designed], law: type[SlidingMode]) -> Designed:
-        """λ for what is guaranteed in the scheme ``compensated``, or for L̄ in continuous time."""
+        """λ for what is guaranteed in the scheme ``stick-slip`` or ``compensated``, or for L̄ in continuous time."""
         if problem.setup.measured != MEASURED[0]:
             raise ParameterError(
                 f"a sliding mode needs slip and slip rate. Received {problem.setup.measured!r} for {law.name}. "
@@ -95,11 +98,17 @@ class SlidingModes(DesignMethod[SlidingMode]):
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SlidingMode, setup: LoopSetup
-    ) -> Guarantee | NoGuarantee:
-        """In the scheme ``compensated``, and in no other."""
+    ) -> Guarantee | StickSlipGuarantee | NoGuarantee:
+        """In the scheme ``compensated`` or ``stick-slip``, and in no other."""
         return guarantee_of(task, controller, **setup.noise)
 
-    def compensation(self, controller: SlidingMode, found: Guarantee | NoGuarantee) -> Compensation:
+    def base_law(self, task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...]) -> SlidingMode:
+        """Given base gains, or the first ones known."""
+        return deadbeat(task, law, gains).controller
+
+    def compensation(
+        self, controller: SlidingMode, found: Guarantee | StickSlipGuarantee | NoGuarantee
+    ) -> Compensation:
         """With the weight and the authority of its scheme."""
         return Compensation(controller=controller, found=found)
 
@@ -128,7 +137,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
                 asked = step if known else None
                 return LoopAnswer(fault=fault, found=none, shorter=known, asked_step=asked, nearest=nearest)
             made = again
-        return replace(attacked(fault, made.found), compensation=made)
+        return replace(attacked(fault, made.without_stick), compensation=made)
 
 
 def _proved_base(fault: Fault, law: type[SlidingMode]) -> tuple[BaseGains[SlidingMode], Certificate | None]:
@@ -145,10 +154,25 @@ def _proved_base(fault: Fault, law: type[SlidingMode]) -> tuple[BaseGains[Slidin
 def _compensated(
     problem: GainProblem[Designed], base: BaseGains[SlidingMode], certificate: Certificate | None
 ) -> Designed:
-    """As it runs with a guarantee; in continuous time where no T_s has one."""
+    """On the stick–slip plant where that is proved, else on the plant without; in continuous time if no T_s has one."""
     fault = problem.fault
     law = base.law.with_divisor(least_authority(fault))
     step = rational(fault.sampling_time)
+    without: dict[str, Any] = {}
+    if problem.plant != Guarantee.plant and may_stick(type(law), problem.setup, problem.disturbance_class):
+        sticking = design_sticking(problem.task, law, step, **sticking_options(problem))
+        if isinstance(sticking, Compensation):
+            assert isinstance(sticking.found, StickSlipGuarantee)
+            details = {
+                "objective": problem.objective,
+                "step": str(step),
+                "reason": None,
+                **{name: str(value) for name, value in sticking.found.held.noise.items()},
+                "rho": str(smallest_root(sticking.controller.scale)),
+                **_origin(base),
+            }
+            return problem.judged(sticking.controller, certificate, details=details, runs=sticking.found)
+        without = {"not_at_rest": sticking.reason}
     made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, **problem.setup.noise)
     if found.runs is None:
         none = NoGuarantee(reason=f"run in the scheme compensated, {found.reason}", small_gain=None)
@@ -160,6 +184,7 @@ def _compensated(
         **{name: str(value) for name, value in found.runs.held.noise.items()},
         "rho": str(smallest_root(made.controller.scale)),
         **_origin(base),
+        **without,
     }
     return problem.judged(made.limited, certificate, details=details, runs=found.runs, premises=found.premises())
 

@@ -41,7 +41,7 @@ from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.search.search import claims_of, find_certificate, finish, quadratic_margin
 from quakedesign.plant import FaultPlant
-from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
+from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted, method_of
 
 
 class StateFeedback(DesignMethod[ExtendedLQR]):
@@ -71,7 +71,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: ExtendedLQR, setup: LoopSetup
-    ) -> Guarantee | NoGuarantee:
+    ) -> Guarantee | StickSlipGuarantee | NoGuarantee:
         """With integrals summed over the T_s of the fault."""
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
             return super().guarantee(fault, task, controller, setup)
@@ -134,7 +134,14 @@ def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
 
 def may_stick(law: type[Controller], setup: LoopSetup, disturbance_class: str) -> bool:
     """Whether a design is one that the theorem of the stick–slip plant takes, which does not use a bounded change."""
-    return law is ExtendedLQR and not setup.given().keys() - TAKEN and disturbance_class == CLASSES[0]
+    known = law is ExtendedLQR or method_of(law).takes_base_gains
+    return known and not setup.given().keys() - TAKEN and disturbance_class == CLASSES[0]
+
+
+def sticking_options(problem: GainProblem[Any]) -> dict[str, Any]:
+    """Options of `design_stick_slip` for a problem."""
+    healing, noise = rational(problem.fault.friction.rest_excess), problem.setup.slip_noise
+    return {"objective": problem.objective, "slip_noise": noise, "healing": healing, "tell": problem.tell}
 
 
 def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
@@ -143,14 +150,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     step, task, setup = rational(fault.sampling_time), problem.task, problem.setup
     without: dict[str, Any] = {}
     if problem.plant != Guarantee.plant and may_stick(law, setup, problem.disturbance_class):
-        sticking = design_stick_slip(
-            task,
-            step,
-            objective=problem.objective,
-            slip_noise=setup.slip_noise,
-            healing=rational(fault.friction.rest_excess),
-            tell=problem.tell,
-        )
+        sticking = design_stick_slip(task, step, **sticking_options(problem))
         if isinstance(sticking, StickSlipGuarantee):
             details = {"objective": problem.objective, "step": str(step), "reason": None, "measured": setup.measured}
             details |= {name: str(value) for name, value in sticking.held.noise.items()}

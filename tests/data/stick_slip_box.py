@@ -1,9 +1,15 @@
 """A small file of the kind stick_slip: five facets that bound a box, and a few more within it. It proves nothing."""
 
 import copy
+import json
 from fractions import Fraction as F
 
+import pytest
 from standalone_guarantee import CHECK
+
+from quakedesign.errors import CertificateError
+from quakedesign.guarantees import read_guarantee
+from quakedesign.lyapunov.exact.claim import Verdict
 
 STICK = CHECK.beside("guarantee.stick_slip")
 CLAIMS = ("slip_behind", "slip_ahead", "peak_slip_rate", "least_pressure", "largest_pressure")
@@ -75,3 +81,35 @@ def period_of(document):
     rock, task = STICK.read_rock(document["fault"]), STICK.read_task(document)
     law, reach = STICK.read_law(document["loop"]), STICK.read_reach(document["set"])
     return STICK.Period(rock, task, F(document["reference"]["target_slip"]), growths, law, reach)
+
+
+def changed(document, *changes):
+    """A copy with other entries: pairs of a path, and a value or what makes it of the old one."""
+    document = copy.deepcopy(document)
+    for path, new in changes:
+        holder = document
+        for key in path[:-1]:
+            holder = holder[key]
+        holder[path[-1]] = new(holder[path[-1]]) if callable(new) else new
+    return document
+
+
+def times(share):
+    """A number of a file, or all of a list, times another one."""
+    return lambda old: [times(share)(v) for v in old] if isinstance(old, list) else str(F(old) * F(share))
+
+
+def refused(document, reason=None):
+    """The standalone checker refuses it, for a reason."""
+    with pytest.raises(CHECK.Refused, match=reason):
+        CHECK.check(json.dumps(document))
+    return True
+
+
+def package_refuses(document):
+    """Whether the package does not read or prove it."""
+    try:
+        claim = read_guarantee(document)
+    except CertificateError:
+        return True
+    return claim.check() is not Verdict.PROVED

@@ -1,10 +1,14 @@
 """Restricted likelihood against dense matrices, and noises that come back."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 
 from quakedesign.identification.correlated_noise import CorrelatedNoise, noise_of, restricted_likelihood
-from quakedesign.identification.fitting import outliers
+from quakedesign.identification.experiment import Coordinate, Experiment
+from quakedesign.identification.fitting import Fit, outliers, weighed
+from quakedesign.identification.identify import needed
 
 NUMBER = 400
 ALONG = np.cumsum(np.random.default_rng(0).uniform(0.2, 2.0, NUMBER))
@@ -92,6 +96,83 @@ def test_correlated_noise_makes_no_outliers():
     assert sum(outliers(one, 2).sum() for one in each) <= 4
 
 
-@pytest.mark.parametrize(("share", "length", "pieces"), [(0.5, 2.0, 10.0), (0.5, 30.0, 4.0), (0.0, 2.0, np.inf)])
-def test_noise_that_fades_has_pieces_of_twice_its_length_and_at_least_four(share, length, pieces):
-    assert CorrelatedNoise(share, length, np.linspace(5, 45, 9), np.ones(9), True).pieces == pieces
+def test_pieces_of_noise_that_fades_are_satterthwaites_of_its_slow_part():
+    """The spectral density of an AR(1) process at frequency zero, from its likelihood.
+
+    Of n samples, the variance of the innovations has the relative variance 2/n, and the coefficient f the variance
+    (1 - f^2)/n (Box and Jenkins 1976, section 7.2.6). White noise has as many degrees of freedom as samples.
+    """
+    samples, fading = 5000, 0.99
+    relative = 2 / samples + 4 * (1 - fading**2) / samples / (1 - fading) ** 2
+    along = np.arange(samples) + 5.0
+    known = CorrelatedNoise(0.5, -1 / np.log(fading), along, np.ones(samples), True)
+    assert known.pieces == pytest.approx(2 / relative, rel=0.01)
+    assert CorrelatedNoise(0.0, 2.0, along, np.ones(samples), True).pieces == np.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Linear(Experiment):
+    """Friction of a level, a step with what fades after it, and a trend."""
+
+    columns: np.ndarray
+    coordinates: tuple
+
+    def friction(self, fitted):
+        return self.columns @ fitted
+
+    def slopes(self, fitted):
+        return self.columns
+
+
+def fitted(columns, measured, noise=None):
+    coordinates = tuple(
+        Coordinate(name=str(i), unit="", low=-99, high=99, start=(-1, 1), logarithmic=False)
+        for i in range(columns.shape[1])
+    )
+    ones = np.ones(len(measured))
+    best = Fit(
+        experiment=Linear(columns=columns, coordinates=coordinates),
+        fitted=np.zeros(columns.shape[1]),
+        measured=measured,
+        counts=ones,
+        kept=ones > 0,
+        agreeing=1,
+        starts=1,
+        correlated=noise,
+    )
+    solution = np.linalg.lstsq(weighed(best.weights, columns), weighed(best.weights, measured), rcond=None)[0]
+    return replace(best, fitted=solution)
+
+
+def trends(records, trend, fading, white):
+    """In how many records of AR(1) and white noise a trend is kept."""
+    time, count = np.linspace(0, 1, 200), 0
+    after = np.maximum(time - 0.5, 0)
+    columns = np.column_stack([np.ones(200), time > 0.5, (time > 0.5) * np.exp(-after / 0.03), time])
+    for seed in range(records):
+        draw = np.random.default_rng(seed)
+        noise = draw.standard_normal(200)
+        for i in range(1, 200):
+            noise[i] = fading * noise[i - 1] + (1 - fading**2) ** 0.5 * noise[i]
+        measured = noise + white * draw.standard_normal(200) + trend * time
+        plain = fitted(columns, measured)
+        likely = noise_of(plain.residuals, columns, plain.counts, time, None, plain.kept)
+        best = fitted(columns, measured, likely)
+        without = np.linalg.lstsq(weighed(best.weights, columns[:, :-1]), weighed(best.weights, measured), rcond=None)
+        left = weighed(best.weights, measured - columns[:, :-1] @ without[0])
+        count += needed(best, float(left @ left))
+    return count
+
+
+def test_noise_without_a_trend_has_one_in_a_record_of_100_and_a_trend_is_seen():
+    """Of 25 records, one in 100 gives more than 2 with a chance of 0.2 %; the trend is of 20 deviations."""
+    deviation = (12 / 200 * ((1 + 0.8) / (1 - 0.8) + 0.3**2)) ** 0.5
+    assert trends(25, 0.0, 0.8, 0.3) <= 2
+    assert trends(8, 20 * deviation, 0.8, 0.3) == 8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("fading", "white", "most"), [(0.0, 0.0, 8), (0.5, 0.0, 8), (0.9, 0.0, 8), (0.9, 0.6, 12)])
+def test_of_300_records_without_a_trend_about_3_have_one(fading, white, most):
+    """At most 8, which 3 in 300 exceed with a chance of 0.4 %; 1 in 25 where white noise hides how the other fades."""
+    assert trends(300, 0.0, fading, white) <= most

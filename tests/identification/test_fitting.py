@@ -8,7 +8,17 @@ import pytest
 
 from quakedesign.errors import RecordError
 from quakedesign.identification.experiment import Coordinate, Experiment
-from quakedesign.identification.fitting import Fit, FitSearch, _finite, _starts, advantage, fit, minimised, outliers
+from quakedesign.identification.fitting import (
+    Fit,
+    FitSearch,
+    Profile,
+    _finite,
+    _starts,
+    advantage,
+    fit,
+    minimised,
+    outliers,
+)
 
 
 def coordinate(name, low=-10.0, high=10.0, start=(-1.0, 1.0)):
@@ -330,3 +340,30 @@ def test_a_move_along_a_valley_leaves_what_is_not_felt():
         starts=1,
     )
     assert told.along(1) == pytest.approx([-1.0, 1.0, 0.0])
+
+
+def test_the_profile_of_a_line_is_straight_and_its_ends_are_those_of_students_t():
+    """Root of the excess: |q - best| over its deviation, which NumPy's inverse gives; ends within 1 % beyond it."""
+    matrix, measured = line(12).matrix, np.sin(np.arange(12.0))
+    best = np.linalg.lstsq(matrix, measured, rcond=None)[0]
+    found = made(line(12), measured, fitted=best)
+    deviation = (np.linalg.inv(matrix.T @ matrix)[1, 1] * np.sum((measured - matrix @ best) ** 2) / 10) ** 0.5
+    profile = Profile(found, 1)
+    low, high = profile.interval(2.228**2)  # Student's t of 10 at 97.5 %
+    assert [best[1] - low, high - best[1]] == pytest.approx([2.239 * deviation] * 2, rel=6e-3)
+    wide = profile.interval(9.0)
+    assert [best[1] - wide[0], wide[1] - best[1]] == pytest.approx([3.015 * deviation] * 2, rel=6e-3)
+    assert len(profile.points) <= 6
+    for point in profile.points:
+        assert point.distance == pytest.approx(abs(point.step) / deviation, rel=1e-6)
+
+
+def test_a_profile_without_an_end_is_tried_at_the_limit_and_not_again():
+    """Friction of a sample of q alone in the noise of others, for q from -10 to 10."""
+    found = made(Linear(np.column_stack([np.ones(8), 1e-3 * np.arange(8.0)])), np.resize([1.0, -1.0], 8))
+    profile = Profile(found, 1)
+    assert profile.interval(4.0) == (-np.inf, np.inf)
+    tried = len(profile.points)
+    assert profile.interval(9.0) == (-np.inf, np.inf)
+    assert len(profile.points) == tried
+    assert {abs(point.step) for point in profile.points} >= {10.0}

@@ -155,18 +155,18 @@ def test_a_cover_holds_every_law_of_its_ranges():
     law = friction_law("exponential-slip-weakening")(residual=0.4, drop=0.17, critical_slip=2.5e-3)
     ranges = {"residual": (0.39, 0.41), "drop": (0.16, 0.18), "critical_slip": (2.3e-3, 2.7e-3)}
     box = load_fault("lab-fault", box="ten-percent").box
-    held = cover(law, ranges, box)
-    static = rational(held.law.residual) + rational(held.law.drop)
-    slope = rational(held.law.drop) / rational(held.law.critical_slip)
+    friction, covering = cover(law, ranges, box)
+    static = rational(friction.residual) + rational(friction.drop)
+    slope = rational(friction.drop) / rational(friction.critical_slip)
     inner = itertools.product(*(np.linspace(*ends, 4) for ends in ranges.values()))
     for residual, drop, critical_slip in ([rational(float(value)) for value in corner] for corner in inner):
         scale = static / (residual + drop)
-        assert residual * scale >= rational(held.law.residual)
+        assert residual * scale >= rational(friction.residual)
         assert drop / critical_slip * scale <= slope
-        assert (1 - box.authority) / scale >= 1 - held.box.authority
-        assert (1 + box.authority) / scale <= 1 + held.box.authority
-    assert (held.box.stiffness, held.box.damping) == (box.stiffness, box.damping)
-    assert held.box.authority < Fraction(1, 5)
+        assert (1 - box.authority) / scale >= 1 - covering.authority
+        assert (1 + box.authority) / scale <= 1 + covering.authority
+    assert (covering.stiffness, covering.damping) == (box.stiffness, box.damping)
+    assert covering.authority < Fraction(1, 5)
 
 
 def test_the_file_is_a_fault_that_covers_the_truth(weak, tmp_path):

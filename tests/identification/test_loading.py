@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import RecordError
-from quakedesign.identification.loading import given_pieces, prepared, staircase, straight_pieces
+from quakedesign.identification.loading import _needed, given_pieces, prepared, staircase, straight_pieces
 from quakedesign.identification.record import Record, reading_step, scatter
 
 TIME = np.arange(0.0, 120.0, 0.05)
@@ -118,6 +118,18 @@ def test_a_column_of_rates_is_a_staircase():
     assert pieces.rates.tolist() == [1e-6, 1e-5]
     _, loading = prepared(made(pieces.position(TIME), load_rates=rates))
     assert loading.pieces.begins.tolist() == [0.0, 40.0]
+
+
+def test_two_knots_within_two_points_are_one():
+    """Means of pairs of samples without noise, of which one pair has the change in its middle."""
+    fine = np.arange(400) / 400
+    u, y = (each.reshape(-1, 2).mean(axis=1) for each in (fine, np.maximum(fine - 200.5 / 400, 0)))
+    left = np.array([200.2 / 400, 203.8 / 400])
+    (knot,) = _needed(u, y, left, 1e-30)
+    assert knot == pytest.approx(200.5 / 400, abs=1 / 400)
+    apart = np.array([0.25, 0.5])
+    bent = np.maximum(u - apart[0], 0) + np.maximum(u - apart[1], 0)
+    assert _needed(u, bent, apart, 1e-30) == pytest.approx(apart, abs=1e-9)
 
 
 def test_changes_of_rate_between_samples_are_instants_of_their_own():

@@ -63,17 +63,18 @@ def independent(record, first, near):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "at", "near", "sign"),
+    ("name", "at", "near", "sign", "explained"),
     [
-        ("basalt_7", 2.51, (0.01, 1e-5), -1),
-        ("basalt_4", 30.0, (0.01, 1e-4), 0),
-        ("sepiolite_3", 3265.0, (-0.008, 1e-4), 1),
+        ("basalt_7", 2.51, (0.01, 1e-5), -1, True),
+        ("basalt_4", 30.0, (0.01, 1e-4), 0, False),
+        ("sepiolite_3", 3265.0, (-0.008, 1e-4), 1, False),
     ],
 )
-def test_a_real_step_agrees_with_an_independent_fit_and_has_no_wrong_sign(name, at, near, sign):
+def test_a_real_step_agrees_with_an_independent_fit_and_has_no_wrong_sign(name, at, near, sign, explained):
     """The independent one is of white noise and known rates: it lies in the box of the joint region, not in its middle.
 
-    The sign is that of the verdict, 0 where it is open: after step 4 on basalt friction may drift or evolve.
+    The sign is 0 where it is open: after step 4 on basalt friction may drift or evolve. The means of step 3 on
+    sepiolite have few independent pieces of noise: they tell a - b, but not a and b apart.
     """
     record = read_record(CUT / f"{name}.csv")
     own = independent(record, at, near)
@@ -85,7 +86,7 @@ def test_a_real_step_agrees_with_an_independent_fit_and_has_no_wrong_sign(name, 
     assert found.difference.least < difference < found.difference.most
     (check,) = [check for check in found.assessment.checks if check.name == "sign"]
     assert np.sign(check.value) * check.passed == sign
-    assert (found.assessment.verdict == "explains the record") == (sign != 0)
+    assert (found.assessment.verdict == "explains the record") == explained
 
 
 @pytest.mark.slow

@@ -1,13 +1,14 @@
 """Records are read with their units; what is wrong is said in one line."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from quakedesign.errors import QuakedesignError, RecordError
 from quakedesign.fault.units import si_value
-from quakedesign.identification.record import read_record
+from quakedesign.identification.record import COLUMNS, _meant, read_record
 
 HEAD = "time [ms], load_point_displacement [um], shear_stress [MPa], normal_stress [kPa]"
 ROWS = ["0, 5, 3, 5000", "100, 6, 3.1, 5000", "300, 8, 3.2, 6000"]
@@ -164,3 +165,44 @@ def test_a_column_of_weights_counts_samples_and_leaves_out_those_of_weight_0(tmp
         path.write_text("\n".join(rows))
         with pytest.raises(RecordError, match=rf"weight must be positive, or 0 for what is left out. Received {ends}"):
             read_record(path)
+
+
+def test_names_of_columns_on_the_page_are_understood():
+    page = (Path(__file__).parents[2] / "docs" / "explanation" / "identification.md").read_text(encoding="utf-8")
+    rows = [row.split("|")[1:3] for row in page.splitlines() if row.startswith("| `") and row.split("`")[1] in COLUMNS]
+    assert {name for meant, _ in rows for name in re.findall("`(.+?)`", meant)} == {*COLUMNS} - {"slip", "weight"}
+    for meant, names in rows:
+        for name, others in zip(re.findall("`(.+?)`", meant), names.split(";"), strict=False):
+            for other in re.findall("`(.+?)`", others):
+                assert _meant(other) == name
+
+
+def test_what_falls_is_turned_and_what_slows_down_is_not(tmp_path):
+    """A displacement above zero that falls, and rates that are positive and fall."""
+    record = read_record(written(tmp_path, "time [s], displ [um], mu", "0, 100, 0.6", "1, 80, 0.61", "2, 50, 0.6"))
+    assert record.load_point.tolist() == pytest.approx([0, 20e-6, 50e-6])
+    assert "load_point_displacement falls: its sign is changed" in record.remarks
+    record = read_record(written(tmp_path, "time [s], velocity [um/s], mu", "0, 10, 0.6", "1, 3, 0.61", "2, 1, 0.6"))
+    assert record.load_point.tolist() == pytest.approx([0, 10e-6, 13e-6])
+    assert not any("sign is changed" in remark for remark in record.remarks)
+
+
+@pytest.mark.parametrize(
+    ("head", "remedy"),
+    [
+        (
+            "clock, displ [um], mu",
+            r"Received load_point_displacement, friction, and 'clock', unknown.*'time=clock \[s\]'",
+        ),
+        (
+            "displ [um], mu, tau [MPa]",
+            r"Received load_point_displacement, friction, shear_stress\. Add.*'time=1 \[s\]'",
+        ),
+        ("time [s], displ [um], tau [MPa]", r"needs the column normal_stress or a constant normal stress\. Received"),
+        ("time [s], displ [um], shear_force [kN]", r"needs the column normal_force\. Received .*Add it\."),
+        ("time [s], tau [MPa], normal_force [kN]", r"Divide the force by the area that slides\."),
+    ],
+)
+def test_a_missing_column_is_named_with_its_remedy(head, remedy, tmp_path):
+    with pytest.raises(RecordError, match=remedy):
+        read_record(written(tmp_path, head, "0, 1, 0.6", "1, 2, 0.61", "2, 3, 0.6"))

@@ -10,7 +10,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import friction_law
 from quakedesign.identification.assessment import Assessment
 from quakedesign.identification.experiment import Coordinate, Experiment
-from quakedesign.identification.fitting import Fit
+from quakedesign.identification.fitting import Fit, Profile
 from quakedesign.identification.identification_result import Identification, Outlier, ParameterEstimate, Rival, estimate
 from quakedesign.identification.record import Record
 
@@ -76,15 +76,15 @@ def identification(fit=None, *, estimates=None, difference=None, rival=None, law
 
 def test_the_box_of_all_holds_the_ends_of_each():
     """e to the ends; a joint region that came out smaller than one of its sides is widened to it."""
-    wide = estimate(made(), 0, (0.0, 1.0), (-1.0, 2.0))
+    wide = estimate(Profile(made(), 0), (0.0, 1.0), (-1.0, 2.0))
     ends = [wide.low, wide.high, wide.least, wide.most]
     assert ends == pytest.approx([1.0, math.e, math.exp(-1), math.exp(2)], rel=1e-15)
     assert (wide.name, wide.unit, wide.value) == ("drop", "", pytest.approx(2.0, rel=1e-15))
-    tight = estimate(made(), 0, (0.0, 1.0), (0.25, 0.75))
+    tight = estimate(Profile(made(), 0), (0.0, 1.0), (0.25, 0.75))
     assert (tight.least, tight.most) == (tight.low, tight.high) == (1.0, math.e)
-    open_ = estimate(made(), 0, (-math.inf, math.inf), (-math.inf, math.inf))
+    open_ = estimate(Profile(made(), 0), (-math.inf, math.inf), (-math.inf, math.inf))
     assert (open_.low, open_.high, open_.identified) == (-math.inf, math.inf, False)
-    straight = estimate(made(), 1, (-1.0, math.inf), (-math.inf, math.inf))
+    straight = estimate(Profile(made(), 1), (-1.0, math.inf), (-math.inf, math.inf))
     assert (straight.low, straight.high, straight.least) == (-1.0, math.inf, -math.inf)
 
 

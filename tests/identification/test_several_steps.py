@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import RecordError
-from quakedesign.identification import several_steps
+from quakedesign.identification import record, several_steps
 from quakedesign.identification.assessment import Assessment, Check
 from quakedesign.identification.correlated_noise import CorrelatedNoise
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
@@ -56,9 +56,9 @@ def test_steps_of_one_rock_have_one_law_that_is_sharper_than_that_of_each(agreei
 
 
 def test_the_size_of_shared_noise_is_known_from_its_pieces_in_all_steps(agreeing):
-    """Noise that fades over 2 s of 40 s has 10 pieces, over 1 s of 60 s 30: F of 1 and 40 has 4.085 (tables)."""
+    """Noise that fades over 1 s of 40 s has 10 pieces, over 0.5 s of 60 s 30: F of 1 and 40 has 4.085 (tables)."""
     told = []
-    for length, most, step in zip((2.0, 1.0), (40.0, 60.0), agreeing.steps, strict=True):
+    for length, most, step in zip((1.0, 0.5), (40.0, 60.0), agreeing.steps, strict=True):
         along = np.linspace(0, most, len(step.fit.measured))
         noise = CorrelatedNoise(share=1e-9, length=length, along=along, counts=step.fit.counts, of_time=True)
         told.append(replace(step, fit=replace(step.fit, correlated=noise)))
@@ -210,6 +210,14 @@ def test_a_record_is_cut_midway_between_changes_of_rate_and_no_sample_counts_twi
     assert (half.counts[0], half.load_rates[0], half.slip, len(half.normal)) == (11.0, 20.0, None, len(numbers) - 10)
     with pytest.raises(RecordError, match=r"must have two changes of rate by a quarter. Received 1. Name the windows"):
         cut(step(UP, 0))
+
+
+def test_a_file_with_windows_is_read_once(tmp_path, monkeypatch):
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["time [s], friction", *(f"{t}, {0.6 + 0.001 * (t % 3)}" for t in range(9))]))
+    monkeypatch.setattr(record, "read_columns", Mock(side_effect=record.read_columns))
+    assert [len(each.time) for each in read_steps(path, "0 s to 2 s, 3 s to 4 s, 5 s to 8 s")] == [3, 2, 4]
+    assert record.read_columns.call_count == 1
 
 
 def test_windows_of_a_file_are_steps(tmp_path):

@@ -391,7 +391,7 @@ def test_behind_a_lag_and_rock_a_fault_that_sticks_does_not_wind_up(name):
 
 def test_the_compensated_step_is_told_what_is_applied():
     """Deadbeat, p = (−e1/T_s − e2)/(T_sB0) − d, d ← d + a[(e2 − e2⁻)/(T_sB0) − p⁻ − d] with the p⁻ that was applied."""
-    made = qd.guarantee(REAL, controller="cta").compensation
+    made = qd.guarantee(REAL, controller="cta", plant="printed").compensation
     weight, authority, per_slip = float(made.weight), float(made.authority), float(made.found.rest_limit.per_slip)
     assert dict(made.limited.sampling.settings)["rest_width"] == made.found.rest_limit.width
     law, gain = replace(made.controller, sampling=None), 0.184 * authority

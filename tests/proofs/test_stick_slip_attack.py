@@ -15,9 +15,11 @@ def stored(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["stick_slip_real-fault.json", "stick_slip_noise_real-fault.json"])
-def test_no_course_leaves_the_polytope_or_passes_a_claim(name):
-    found = Attack(stored(name)).run(periods=150)
+@pytest.mark.parametrize(
+    "name", ["stick_slip_real-fault.json", "stick_slip_noise_real-fault.json", "stick_slip_cta_real-fault.json"]
+)
+def test_no_course_leaves_the_polytope_or_passes_a_claim(kind):
+    found = Attack(stored(f"stick_slip_{kind}real-fault.json")).run(periods=150)
     assert 0.7 < found["facet"] < 1
     assert 0.6 < found["slip_rate"] < 1
     assert max(found["behind"], found["ahead"]) < 1

@@ -1,6 +1,5 @@
 """Files of the kind stick_slip in both checkers: what is proved, what is refused, and numbers that both derive."""
 
-import copy
 import json
 from fractions import Fraction as F
 from functools import cache
@@ -8,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from standalone_guarantee import CHECK
-from stick_slip_box import CLAIMS, STICK, box, period_of
+from stick_slip_box import CLAIMS, STICK, box, changed, package_refuses, period_of, refused, times
 
 from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError
@@ -22,35 +21,6 @@ PATH = Path(__file__).parents[2] / "proofs" / "certificates" / "stick_slip_real-
 @cache
 def stored():
     return json.loads(PATH.read_text())
-
-
-def changed(document, *changes):
-    document = copy.deepcopy(document)
-    for path, new in changes:
-        holder = document
-        for key in path[:-1]:
-            holder = holder[key]
-        holder[path[-1]] = new(holder[path[-1]]) if callable(new) else new
-    return document
-
-
-def times(share):
-    """A number of a file, or all of a list, times another one."""
-    return lambda old: [times(share)(v) for v in old] if isinstance(old, list) else str(F(old) * F(share))
-
-
-def refused(document, reason=None):
-    with pytest.raises(CHECK.Refused, match=reason):
-        CHECK.check(json.dumps(document))
-    return True
-
-
-def package_refuses(document):
-    try:
-        claim = read_guarantee(document)
-    except CertificateError:
-        return True
-    return claim.check() is not Verdict.PROVED
 
 
 @pytest.mark.slow

@@ -28,7 +28,7 @@ def test_every_step_has_a_panel_and_the_rate_is_that_of_the_load_point(stepped):
     drawing = identification_figure(stepped)
     titles = [axis.get_title() for axis in drawing.axes if axis.get_title()]
     assert [float(title.split()[2]) for title in titles] == pytest.approx([20, 170, 195], abs=3)
-    rate = next(axis for axis in drawing.axes if axis.get_ylabel() == "rate [um/s]")
+    rate = next(axis for axis in drawing.axes if axis.get_ylabel() == "rate [µm/s]")
     assert set(np.round(rate.lines[0].get_ydata(), 1)) >= {1.0, 10.0, 3.0}
 
 
@@ -50,6 +50,23 @@ def test_the_region_touches_the_ellipse_of_the_slopes(stepped):
     a, b = (names.index(name) for name in ("direct_effect", "evolution_effect"))
     assert np.ptp(np.log(axis.lines[0].get_xdata())) == pytest.approx(2 * far[a], rel=0.01)
     assert np.ptp(axis.lines[0].get_ydata()) == pytest.approx(2 * far[b], rel=0.01)
+
+
+def test_profiles_pass_the_thresholds_at_the_ends_of_the_intervals(stepped):
+    """Of a, b, a - b and D_c; along a straight line between the points that were tried."""
+    drawing = identification_figure(stepped)
+    symbols = {"direct_effect": "a [$10^{-3}$]", "evolution_effect": "b [$10^{-3}$]", "critical_slip": "$D_c$ [µm]"}
+    units = {"direct_effect": 1e3, "evolution_effect": 1e3, "critical_slip": 1e6}
+    panels = {axis.get_xlabel(): axis for axis in drawing.axes}
+    assert "a - b [$10^{-3}$]" in panels
+    for name, label in symbols.items():
+        told, (line, alone, jointly) = stepped.estimates[name], panels[label].lines
+        value, distance = line.get_data()
+        assert np.interp(told.value * units[name], value, distance) == pytest.approx(0, abs=1e-9)
+        levels = [level.get_ydata()[0] for level in (alone, jointly)]
+        assert levels == pytest.approx([stepped.fit.threshold(n) ** 0.5 for n in (1, len(stepped.fit.fitted))])
+        for ends, level in (((told.low, told.high), levels[0]), ((told.least, told.most), levels[1])):
+            assert np.interp(np.array(ends) * units[name], value, distance) == pytest.approx(level, rel=0.02)
 
 
 @pytest.mark.parametrize("kind", ["png", "pdf", "svg"])

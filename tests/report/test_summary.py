@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -10,6 +11,8 @@ import quakedesign as qd
 from quakedesign.exact import UpperBound
 from quakedesign.report.summary import Row, Summary, summary, summary_lines
 from quakedesign.text import plain, power_of, quantity
+
+REAL = qd.load_fault("real-fault")
 
 
 @pytest.mark.parametrize(
@@ -109,7 +112,7 @@ def compared(monkeypatch, *entries, natural="earthquake"):
     monkeypatch.setattr("quakedesign.report.summary.pressure_extremes", lambda run: (-1e6, 2e6))
     outcome = SimpleNamespace(kind=natural, peak_slip_rate=0.01)
     return SimpleNamespace(
-        fault=SimpleNamespace(name="mine", source="a paper", assumed=("a well",)),
+        fault=SimpleNamespace(name="mine", source="a paper", assumed=("a well",), friction=REAL.friction, box=REAL.box),
         uncontrolled=SimpleNamespace(outcome=outcome),
         of=lambda origin: tuple(e for e in entries if e.origin == origin),
         left_out={},
@@ -125,7 +128,9 @@ def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthqu
         "earthquake's 10 mm/s), and the slip stays within 20 µm of the reference"
     )
     assert said.conditions == "B (designed), proved: the sentence of B (designed)"
-    assert said.notes == ("assumed: a well", "no controller does better")
+    assumed, box, limit = said.notes
+    assert (assumed, limit) == ("assumed: a well", "no controller does better")
+    assert box.startswith("box paper: every friction from 0.2353 to 0.3353")
     stable = summary(compared(monkeypatch, entry("A (designed)", 3e-4, 1e-5), natural="creep"))
     assert "earthquake" not in stable.answer
 
@@ -139,6 +144,23 @@ def test_the_worst_case_on_the_stick_slip_plant_is_reported_with_why_nothing_is_
         "worst case found on the stick-slip plant: slip error 1.2 µm, slip-rate error 30 µm/s; no proof there: T_s is "
         "too long"
     )
+
+
+def test_proofs_without_stick_are_named_where_the_best_one_is_with_it(monkeypatch):
+    """With the stored certificates of both kinds."""
+    folder = Path(__file__).parents[2] / "proofs" / "certificates"
+    stick, plain = (qd.load_guarantee(folder / f"{name}_real-fault.json") for name in ("stick_slip", "guarantee"))
+    one, two, three = (entry(f"{name} (designed)", "1e-4", "1e-5") for name in "ABC")
+    one.guaranteed, two.guaranteed, three.guaranteed = stick, plain, plain
+    said = summary(compared(monkeypatch, one, two, three))
+    assert ". With the A (designed) the slip rate" in said.answer
+    assert ", whether the fault slides or sticks, and the slip stays" in said.answer
+    assert "B, C: proved on the plant without stick" in said.notes
+    without = summary(compared(monkeypatch, two, three))
+    assert ". On the plant without stick, with the B (designed), the slip rate" in without.answer
+    assert "whether the fault slides or sticks" not in without.answer
+    assert not any("proved on the plant without stick" in note for note in without.notes)
+    assert not any("proved on the plant" in note for note in summary(compared(monkeypatch, one)).notes)
 
 
 def test_a_share_is_rounded_up_from_the_numbers_themselves(monkeypatch):

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from fractions import Fraction as F
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -11,6 +12,7 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, fault_toml, load_fault
 from quakedesign.simulation import Load, natural_earthquake, simulate
+from quakedesign.simulation.stick_slip_plant import StickSlipLoop
 
 REAL = load_fault("real-fault")
 CONSTANT = dataclasses.replace(REAL, damping=0.0, friction=dataclasses.replace(REAL.friction, drop=0.0))
@@ -67,6 +69,52 @@ def test_a_driven_block_slips_in_events_of_one_size():
     assert len(rests) >= 3
     releases = run.time[1:][(run.slip_rate[1:] > 0) & (run.slip_rate[:-1] == 0)]
     assert releases[:2] == pytest.approx([reload / 2, reload / 2 + tau + reload], rel=1e-3)
+
+
+SHARE = 0.25  # of the strength in slip, that healing adds
+
+
+def resting(push):
+    """A block at rest with a load of 1 + push strengths of its friction in slip."""
+    unit = CONSTANT.friction.residual * CONSTANT.authority * CONSTANT.effective_normal_stress
+    block = healing(CONSTANT, SHARE * CONSTANT.friction.residual)
+    return StickSlipLoop(block.with_disturbance(Disturbance(constant=push * unit))), unit
+
+
+@pytest.mark.parametrize(
+    ("push", "pressure", "rate", "stress"),
+    [
+        (-0.5, 0.0, 0.0, 0.5),
+        (0.1, 0.0, 0.0, 1.1),
+        (0.5, 0.0, 0.0, 1 + SHARE),
+        (-0.5, 0.2, 0.0, 0.5),
+        (0.5, 0.2, 0.0, 0.8 * (1 + SHARE)),
+        (0.5, 0.0, 1e-9, 1.0),
+    ],
+)
+def test_at_rest_the_shear_stress_is_the_load_up_to_the_strength_with_healing(push, pressure, rate, stress):
+    """In units of the strength in slip without pressure; a fault that slides has lost its healing."""
+    loop, _ = resting(push)
+    sigma, friction = CONSTANT.effective_normal_stress, CONSTANT.friction.residual
+    found = loop.shear_stress(0.0, ca.DM([0.0, rate]), pressure * sigma, friction)
+    assert float(found) / (friction * sigma) == pytest.approx(stress, rel=1e-9)
+
+
+@pytest.mark.parametrize("pressure", [0.0, 0.2])
+def test_the_loads_between_which_it_rests_are_twice_the_strength_with_healing_apart(pressure):
+    loop, unit = resting(0.1)
+    forward, backward = loop.resting_load(0.0, ca.DM(0.0), pressure * CONSTANT.effective_normal_stress)
+    strength = (1 - pressure) * (1 + SHARE)
+    assert float(forward) / unit == pytest.approx(1.1 - strength, rel=1e-9)
+    assert float(backward) / unit == pytest.approx(1.1 + strength, rel=1e-9)
+
+
+@pytest.mark.parametrize(("push", "reverses"), [(-2.1, False), (-2.3, True)])
+def test_healing_holds_the_block_backward_too(push, reverses):
+    """A load of -1.1 and of -1.3 strengths, against 1.25 of them."""
+    loop, _ = resting(push)
+    assert bool(float(loop.reversing(0.0, ca.DM([0.0, 0.0]), 0.0))) == reverses
+    assert not float(loop.reversing(0.0, ca.DM([0.0, 1e-9]), 0.0))
 
 
 def test_a_natural_earthquake_begins_as_it_is_released():

@@ -6,7 +6,7 @@ import pytest
 from thinned import few
 
 from quakedesign.fault import load_fault
-from quakedesign.studies.facts import fault_sentences
+from quakedesign.studies.facts import box_sentence, fault_sentences
 
 REAL, PATCH = load_fault("real-fault"), load_fault("crustal-patch")
 
@@ -18,9 +18,11 @@ def test_friction_is_told_as_it_was_read_with_its_box_in_numbers():
         "shear waves 3464 m/s, effective normal stress 50 MPa, friction exponential-slip-weakening: residual 0.2353, "
         "drop 0.1, critical_slip 0.2763 m"
     )
-    assert told[2].startswith("guarantees are for every friction from 0.2353 to 0.3353 that changes by at most 0.3619")
-    assert told[2].endswith("per m of slip (box paper)")
-    assert not any("guarantees are for" in line for line in fault_sentences(PATCH))
+    friction = "every friction from 0.2353 to 0.3353 that changes by at most 0.3619 per m of slip"
+    assert told[2] == f"box paper: {friction}; stiffness, damping and area per mass are exact"
+    wide = box_sentence(REAL.with_box("ten-percent"))
+    assert wide == f"box ten-percent: {friction}; stiffness within 10 %, damping within 10 %, area per mass within 10 %"
+    assert not any("box" in line for line in fault_sentences(PATCH))
 
 
 @pytest.mark.slow

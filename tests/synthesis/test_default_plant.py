@@ -9,15 +9,20 @@ from types import SimpleNamespace
 import pytest
 
 import quakedesign as qd
-from quakedesign.guarantees import LoopAnswer, NoGuarantee, StickSlipAnswer, load_guarantee
-from quakedesign.laws import StickSlipController
+from quakedesign.guarantees import LoopAnswer, NoGuarantee, StickSlipAnswer, guarantee_of, load_guarantee
+from quakedesign.guarantees.search import compensated_search as COMPENSATED
+from quakedesign.guarantees.search.compensated_search import recovered, sorted_terms, sticking_loop
+from quakedesign.laws import StickSlipController, control_law
+from quakedesign.plant import uncertain_plant
 from quakedesign.report.sentences import sentences
 from quakedesign.report.summary import _answer
 from quakedesign.studies.comparison import Entry
 
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
 REAL = qd.load_fault("real-fault")
-GUARANTEE, FEEDBACK = (import_module(f"quakedesign.synthesis.{name}") for name in ("guarantee", "state_feedback"))
+GUARANTEE, FEEDBACK, SLIDING = (
+    import_module(f"quakedesign.synthesis.{name}") for name in ("guarantee", "state_feedback", "sliding_mode_design")
+)
 NONE = NoGuarantee(reason="no polytope", small_gain=None)
 
 
@@ -87,12 +92,89 @@ def test_a_guarantee_hands_down_what_the_theorem_takes(monkeypatch, sticking):
     seen, answer = {}, StickSlipAnswer(fault=REAL, found=sticking)
     monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda fault, setup, **given: seen.update(given) or answer)
     assert qd.guarantee(REAL, objective="peak", progress=print) is answer
-    assert seen == {"objective": "peak", "progress": print}
+    assert seen == {"objective": "peak", "sliding": None, "progress": print}
+
+
+def test_a_sliding_mode_is_guaranteed_on_the_stick_slip_plant_with_its_base_gains(monkeypatch, sticking):
+    seen, answer = [], StickSlipAnswer(fault=REAL, found=sticking)
+    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, sliding, **__: seen.append(sliding) or answer)
+    monkeypatch.setattr(GUARANTEE, "_sampled", None)
+    asked = [{}, {"gains": ("7", "6", "2.3", "1.1")}, {"scheme": "stick-slip"}, {"plant": "stick-slip"}]
+    assert all(qd.guarantee(REAL, "cta", **given) is answer for given in asked)
+    assert [float(law.gains["k2"]) for law in seen] == [5, 6, 5, 5]
+    assert {law.divisor for law in seen} == {F(2353, 125 * 10**9)}
+
+
+@pytest.mark.parametrize(
+    "asked", [{"plant": "printed"}, {"scheme": "compensated"}, {"rate_noise": "1 um/s"}, {"disturbance_class": "rate"}]
+)
+def test_a_sliding_mode_is_guaranteed_without_stick_where_that_is_asked_for(monkeypatch, asked):
+    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", None)
+    monkeypatch.setattr(GUARANTEE, "_sampled", lambda *_: NONE)
+    assert qd.guarantee(REAL, "cta", **asked) is NONE
+
+
+def test_the_scheme_for_friction_that_sticks_has_no_guarantee_without_stick():
+    said = qd.guarantee(REAL, "cta", scheme="stick-slip", plant="printed").found.reason
+    assert said.startswith("the estimate of the scheme stick-slip is cut off at rest")
+
+
+def test_a_sliding_mode_is_designed_on_the_stick_slip_plant_where_it_is_proved(monkeypatch):
+    """The linear law's guarantee is stored; λ is that for which the step is deadbeat, and the design checks itself."""
+    stored = load_guarantee(PROOFS / "stick_slip_cta_real-fault.json")
+    linear = replace(stored, held=replace(stored.held, law=replace(stored.held.law, pull=())))
+    monkeypatch.setattr(COMPENSATED, "design_stick_slip", lambda *_, implicit, **__: linear)
+    monkeypatch.setattr(SLIDING, "sampled_sliding_mode", None)  # not searched as well
+    design = qd.design(REAL, "cta")
+    assert str(design.verdict) == "proved"
+    assert design.controller.sampling.scheme == "stick-slip"
+    assert design.compensation.controller is design.controller
+    assert "in the scheme stick-slip with slip weight 0.5, weight 0.3 and B0 = " in design.compensation.sentence()
+    assert "its implicit step is deadbeat" in design.compensation.sentence()
+    found = design.guarantee.held
+    assert sorted_terms(found.law.pull) == sorted_terms(stored.held.law.pull)
+    assert replace(found, law=replace(found.law, pull=())) == linear.held
+    again = recovered(design.guarantee)
+    assert sticking_loop(again.controller).law.target_gain == found.law.target_gain
+    assert guarantee_of(uncertain_plant(REAL), design.controller, rate_noise=F(1)).reason.endswith("rate_noise")
+    without = replace(design.controller.sampling, settings=design.controller.sampling.settings[:2])
+    bare = replace(design.controller, gains=dict(design.controller.gains), sampling=without)
+    assert "rest_slip, slip_weight given" in guarantee_of(uncertain_plant(REAL), bare).reason
+
+
+def test_the_controller_of_a_result_is_the_sliding_mode_itself():
+    """On both plants, read off stored certificates; it has the scheme of its plant."""
+    for name, scheme in (("stick_slip_cta", "stick-slip"), ("guarantee_cta", "compensated")):
+        found = load_guarantee(PROOFS / f"{name}_real-fault.json")
+        kind = StickSlipAnswer if scheme == "stick-slip" else LoopAnswer
+        controller = kind(fault=REAL, found=found, compensation=recovered(found)).controller
+        assert (controller.name, controller.sampling.scheme) == ("cta", scheme)
+
+
+def test_a_sliding_mode_without_that_proof_falls_back_and_says_why(monkeypatch, plain):
+    monkeypatch.setattr(COMPENSATED, "design_stick_slip", lambda *_, **__: NONE)
+    made = SimpleNamespace(controller=control_law("cta").base_gains()[0].law, limited=None)
+    made.limited = made.controller
+    sampled = SimpleNamespace(runs=plain, reason="", premises=tuple)
+    monkeypatch.setattr(SLIDING, "sampled_sliding_mode", lambda *_, **__: (made, sampled))
+    design = qd.design(REAL, "cta")
+    assert design.guarantee is plain
+    assert design.details["not_at_rest"] == "no polytope"
+
+
+def test_where_no_scale_makes_the_step_deadbeat_there_is_no_guarantee(monkeypatch):
+    stored = load_guarantee(PROOFS / "stick_slip_cta_real-fault.json")
+    linear = replace(stored, held=replace(stored.held, law=replace(stored.held.law, pull=())))
+    monkeypatch.setattr(COMPENSATED, "design_stick_slip", lambda *_, **__: linear)
+    monkeypatch.setattr(COMPENSATED, "holds", lambda root, *_: root.slopes[0] < 1)  # nearly deadbeat is not enough
+    base = control_law("cta").base_gains()[0].law.with_divisor(stored.task.authority)
+    found = COMPENSATED.design_sticking(stored.task, base, stored.held.step)
+    assert found.reason == "the implicit step is deadbeat for no scale that is tried"
 
 
 @pytest.mark.parametrize(
     "given",
-    [{"controller": "cta"}, {"gains": (1, 1, 1, 1)}, {"scheme": "compensated"}],
+    [{"gains": (1, 1, 1, 1)}, {"scheme": "compensated"}],
     ids=lambda given: next(iter(given)),
 )
 def test_other_laws_are_guaranteed_without_stick(monkeypatch, given):

@@ -13,6 +13,7 @@ from typing import Any
 from .matrices import exponential
 from .polytope import NOTHING, ONE, Constraint, Function, Near, Polytope
 from .reading import Row, entries, keys, lower, matrix, need, number, numbers, upper
+from .root import MAX_TERMS, Root, Sum, count_terms, read_sum, root_within
 from .task import Rock, Task, read_rock, read_task
 
 MAX_FACETS, MAX_BASES = 400, 40_000
@@ -42,7 +43,7 @@ class End:
 
 @dataclass
 class Law:
-    """Gains of the law, its period, what it takes for rest, and noise of its measurements."""
+    """Gains of the law, its period, what it takes for rest, noise of its measurements, and its implicit step."""
 
     step: Fraction
     rate: Fraction
@@ -52,6 +53,7 @@ class Law:
     slip: Fraction
     rest_slip: Fraction
     slip_noise: Fraction
+    pull: Sum
 
     @property
     def told(self) -> Fraction:
@@ -74,11 +76,16 @@ class Reach:
 
 def read_law(value: Any) -> Law:
     """Gains and period."""
-    given = keys(value, "loop", "step", *LAW, "slip_noise")
-    law = Law(*(number(given[name], name) for name in ("step", *LAW, "slip_noise")))
+    implicit = type(value) is dict and "pull" in value
+    given = keys(value, "loop", "step", *LAW, "slip_noise", *(("pull",) if implicit else ()))
+    pull = read_sum(given["pull"]) if implicit else []
+    law = Law(*(number(given[name], name) for name in ("step", *LAW, "slip_noise")), pull)
     need(min(law.step, law.rate, law.target, law.back) > 0, "step, rate, target and return gains must be > 0")
     need(min(law.level, law.slip) >= 0, "level_gain and slip_gain must be >= 0")
     need(0 <= 2 * law.slip_noise <= law.rest_slip, "slip_noise must be from 0 to half of rest_slip")
+    need(count_terms(pull) <= MAX_TERMS, f"an implicit step must have at most {MAX_TERMS} terms")
+    deadbeat = law.rate == law.target and law.back * law.step == 1
+    need(deadbeat or not pull, "of a sliding mode target_gain must be rate_gain, and return_rate 1/step")
     return law
 
 
@@ -392,6 +399,11 @@ def verify(document: dict[str, Any]) -> list[str]:
     for name, claim in claims.items():
         holds = found[name] >= claim if name.startswith("least") else found[name] <= claim
         need(holds, f"the claim {name} must follow from the set. It does not")
+    if law.pull:
+        slip = max(found["slip_behind"], found["slip_ahead"]) + law.slip_noise
+        rate = max(found["peak_slip_rate"], task.reference_rate)
+        deadbeat = Root(law.pull, [Fraction(1), Fraction(1)], Fraction(0))
+        need(root_within(deadbeat, law.step, slip, rate), "the implicit step must be deadbeat in the set. It may not")
     period.verify()
     return [*statement(document, period, claims), *entries(document)]
 
@@ -410,8 +422,9 @@ def statement(document: dict[str, Any], period: Period, claims: dict[str, Fracti
         f"derived accelerations: of a slip within a period [{lower(period.slope[0])}, {upper(period.slope[1])}] 1/s^2, "
         f"of a slip rate less [{lower(period.damping[0])}, {upper(period.damping[1])}] 1/s, of a pressure "
         f"{upper(task.b)} m^2/kg times [1, {upper(task.beta[1])}]",
-        f"law for friction that sticks, every {document['loop']['step']} s, its pressure held, {measured}; a set of "
-        f"{len(period.reach.facets)} facets",
+        f"{'sliding mode' if law.pull else 'law'} for friction that sticks, every {document['loop']['step']} s, its "
+        f"pressure held, {measured}; a set of {len(period.reach.facets)} facets"
+        + ("; its implicit step is deadbeat, w = -e1/step, on this set" if law.pull else ""),
         f"disturbance: {kind}; from rest, along the reference, for all t >= 0",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",
         f"the slip is at most {upper(claims['slip_behind'])} m behind and {upper(claims['slip_ahead'])} m ahead of the "

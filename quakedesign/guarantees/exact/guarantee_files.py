@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any, TypeVar, Union, cast
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound, exact_text
 from quakedesign.files import write_whole
+from quakedesign.guarantees.exact.implicit_root_files import read_root, root_document
 from quakedesign.guarantees.exact.invariant_set import MOST_FACETS, MOST_PIECES, InvariantPolytope, require_fit
 from quakedesign.guarantees.exact.loop import Held
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, plant_document, read_plant_guarantee
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.guarantees.exact.statement import Claims, ContinuousPeaks, Guarantee, SlidingGuarantee
-from quakedesign.laws import ImplicitRoot, LinearLaw, Power
-from quakedesign.laws.implicit_root import MOST_TERMS
+from quakedesign.laws import LinearLaw
 from quakedesign.loop import ContinuousLaw
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.certificate_files import (
@@ -229,7 +229,7 @@ def _loop(claim: Guarantee | ContinuousPeaks) -> dict[str, Any]:
         moved = claim.held.law.of_reference
         own |= {"of_reference": [texts(row) for row in moved]} if moved else {}
         root = claim.held.law.root
-        own |= {} if root is None else {"root": _root_document(root)}
+        own |= {} if root is None else {"root": root_document(root)}
         noise = claim.held.noise
         own |= {"noise": {name: str(noise.get(f"{name}_noise", 0)) for name in _NOISE}} if any(noise.values()) else {}
         jitter = dict(zip(_JITTER, (claim.held.jitter, claim.held.delay_jitter), strict=True))
@@ -367,7 +367,7 @@ def _start(raw: Any) -> dict[str, Fraction]:
 def _held(raw: Any, start: dict[str, Fraction]) -> Held:
     given = _MORE & set(raw) if isinstance(raw, dict) else set[str]()
     with_keys(raw, {*_TIMES, "update", *_LAW} | given)
-    root = _read_root(raw["root"]) if "root" in given else None
+    root = read_root(raw["root"]) if "root" in given else None
     first = _first(raw) if "first" in given else ()
     applied = read_row(raw["applied"], "applied", length=_count(raw)) if "applied" in given else ()
     moved = raw["of_reference"] if "of_reference" in given else None
@@ -496,35 +496,3 @@ def _rest(raw: dict[str, Any]) -> dict[str, Any]:
         "output": read_row(raw["output"], "output", len(names)),
         "feedback": read_row(raw["feedback"], "feedback", 3),
     }
-
-
-def _root_document(root: ImplicitRoot) -> dict[str, Any]:
-    return {"pull": _sum_document(root.pull), "slopes": texts(root.slopes), "remainder": exact_text(root.remainder)}
-
-
-def _sum_document(terms: tuple[Power, ...]) -> list[dict[str, Any]]:
-    return [
-        {
-            "factor": texts(term.factor),
-            "power": exact_text(term.exponent),
-            "of": term.argument if isinstance(term.argument, str) else _sum_document(term.argument),
-        }
-        for term in terms
-    ]
-
-
-def _read_root(raw: Any) -> ImplicitRoot:
-    with_keys(raw, {"pull", "slopes", "remainder"})
-    slopes, remainder = read_ends(raw["slopes"], "slopes"), read_rational(raw["remainder"])
-    return ImplicitRoot(pull=_read_sum(raw["pull"]), slopes=slopes, remainder=remainder)
-
-
-def _read_sum(raw: Any) -> tuple[Power, ...]:
-    return tuple(_read_term(term) for term in listed(raw, "a sum of an implicit step", MOST_TERMS))
-
-
-def _read_term(raw: Any) -> Power:
-    with_keys(raw, {"factor", "power", "of"})
-    factor, inner = read_ends(raw["factor"], "a factor"), raw["of"]
-    argument = inner if isinstance(inner, str) else _read_sum(inner)
-    return Power(factor=factor, exponent=read_rational(raw["power"]), argument=argument)

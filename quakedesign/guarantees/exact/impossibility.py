@@ -366,7 +366,7 @@ def too_slow(task: FaultPlant, withdrawal: Fraction, step: Fraction, delay: Frac
         return ""
     most = LowerBound(withdrawal).quantity("Pa")
     how = f"with T_s and delay above {late.quantity('s')} in all"
-    return f"no controller whatever that withdraws at most {most} holds it {how}"
+    return f"no controller that withdraws at most {most} can hold the fault {how}{_ASSUMED}"
 
 
 def hopeless(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffusion: Fraction) -> str:
@@ -388,7 +388,13 @@ def hopeless(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffusion:
     else:
         return ""
     most = LowerBound(withdrawal).quantity("Pa")
-    return f"no controller whatever that withdraws at most {most} holds it {way}, whatever T_s"
+    return f"no controller that withdraws at most {most} can hold the fault {way}, for any T_s{_ASSUMED}"
+
+
+_ASSUMED = (
+    " (for some friction of the box, against the largest disturbance from one time on, even if the controller knows "
+    "both)"
+)
 
 
 def _least(task: FaultPlant | SlidingPush, value: Callable[[_Pushed | SlidingPush], Any]) -> UpperBound | None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from quakedesign.exact import exact_text
+from quakedesign.guarantees.exact.implicit_root_files import read_sum, sum_document
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.guarantees.exact.stick_slip_set import (
     COMBINATIONS,
@@ -14,6 +15,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
     StickSlipClaims,
     StickSlipPolytope,
 )
+from quakedesign.laws.implicit_root import ImplicitRoot, Power
 from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
 from quakedesign.plant.ranges import FaultPlant
 from quakedesign.sos.exact.strict import listed, need, read_exactly, read_row, texts, with_keys
@@ -27,6 +29,7 @@ def stick_slip_document(claim: StickSlipGuarantee) -> dict[str, Any]:
         "loop": {
             **{name: exact_text(getattr(claim.held, name)) for name in _OF_LOOP},
             **{name: exact_text(getattr(claim.held.law, name)) for name in GAIN_UNITS},
+            **({"pull": sum_document(claim.held.law.pull)} if claim.held.law.pull else {}),
         },
         "set": set_document(claim.reach),
     }
@@ -51,8 +54,12 @@ def read_stick_slip(raw: Any, task: FaultPlant, claims: Callable[[type], Any]) -
         When the file breaks a rule of FORMAT.md.
     """
     need(task.change is None, "a bounded change of the disturbance is not used where the fault sticks")
-    loop = read_exactly(raw["loop"], (*_OF_LOOP, *GAIN_UNITS))
-    law = StickSlipLaw(**{name: loop[name] for name in GAIN_UNITS})
+    given = dict(raw["loop"]) if isinstance(raw["loop"], dict) else raw["loop"]
+    pull: tuple[Power, ...] = ()
+    if isinstance(given, dict) and "pull" in given:
+        pull = ImplicitRoot(pull=read_sum(given.pop("pull"))).pull
+    loop = read_exactly(given, (*_OF_LOOP, *GAIN_UNITS))
+    law = StickSlipLaw(**{name: loop[name] for name in GAIN_UNITS}, pull=pull)
     return StickSlipGuarantee(
         task=task,
         held=SampledStickSlip(law=law, **{name: loop[name] for name in _OF_LOOP}),

@@ -5,7 +5,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from quakedesign import laws
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.stick_slip_set import (
@@ -64,7 +64,18 @@ class StickSlipGuarantee:
 
     @property
     def controller(self) -> "StickSlipController":
-        """The law for `simulate`."""
+        """The law for `simulate`.
+
+        Raises
+        ------
+        UnsupportedError
+            For a sliding mode, which is a controller of its own with a scheme.
+        """
+        if self.held.law.pull:
+            raise UnsupportedError(
+                "a certificate of a sliding mode states its implicit step, got no gains of a law: use the controller "
+                "of the design, or recovered of the certificate"
+            )
         return laws.StickSlipController(law=self.held.law, step=self.held.step)
 
     def covered_healing(self, disturbance: Fraction = Fraction(0)) -> LowerBound:

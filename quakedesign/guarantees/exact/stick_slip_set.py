@@ -37,6 +37,10 @@ of ξ stand for it, which is at most |n3·s|ψ/b larger, and ξ ≥ 0: products 
 takes off. Where U < 0 let the chord of β·m1, over β: all that has U is convex in β. So |n3·s|ψ/b counts with y and H
 alone.
 
+**Sliding mode.** Its target rate is r′ + w, w the end of its implicit step. That step is shown to be deadbeat, w =
+−e/T, for every slip error and slip rate of the polytope, as measured: then the law is the linear one with return_rate =
+1/T, whose states stay in the polytope.
+
 **Law.** `StickSlipLaw`; d = D_level + p*(x1) moves by −σξ [Pa] besides, σ = S_chord/(bβ). State at the samples: z =
 (e1, y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet exceeds 1 after either map; each is the largest
 value of a linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
@@ -65,7 +69,9 @@ from flint import arb, ctx, fmpq
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, shortly
 from quakedesign.guarantees.exact.norms import absolute, ball, majorant, matrix
+from quakedesign.guarantees.exact.small_gain import holds
 from quakedesign.guarantees.exact.statement import above
+from quakedesign.laws.implicit_root import ImplicitRoot
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.ranges import FaultPlant, Range
 
@@ -153,8 +159,8 @@ class StickSlipPolytope:
             ),
             f"have at most {MOST_BASES} bases": len(bases) <= MOST_BASES,
         }
-        for condition, holds in conditions.items():
-            if not holds:
+        for condition, fits in conditions.items():
+            if not fits:
                 raise ParameterError(f"a polytope of the stick-slip plant must {condition}. Search for it again.")
 
     @property
@@ -178,7 +184,8 @@ class SampledStickSlip:
     Raises
     ------
     ParameterError
-        For a step that is not positive, or noise out of its range.
+        For a step that is not positive, noise out of its range, or a sliding mode with other gains than a deadbeat
+        step has.
     """
 
     law: StickSlipLaw
@@ -192,6 +199,13 @@ class SampledStickSlip:
             raise ParameterError(
                 f"slip_noise must be from 0 to half of rest_slip, {shortly(self.law.rest_slip)} m, "
                 f"got {shortly(self.slip_noise)} m"
+            )
+        deadbeat = self.law.rate_gain == self.law.target_gain and self.law.return_rate * self.step == 1
+        if self.law.pull and not deadbeat:
+            raise ParameterError(
+                "a sliding mode must have target_gain = rate_gain and return_rate = 1/T_s, got "
+                f"{shortly(self.law.target_gain)} and {shortly(self.law.rate_gain)} Pa s/m, and "
+                f"{shortly(self.law.return_rate)} 1/s"
             )
 
     @property
@@ -208,6 +222,10 @@ class SampledStickSlip:
     def push_noise(self) -> Fraction:
         """What noise adds to U at most [Pa]."""
         return self.law.slip_gain * self.slip_noise
+
+    def errors(self, task: FaultPlant, slip: Fraction, rate: Fraction) -> tuple[Fraction, Fraction]:
+        """Bounds of the measured slip error [m] and slip-rate error [m/s] from those of slip error and slip rate."""
+        return slip + self.slip_noise, max(rate, task.reference_rates[0])
 
     @property
     def path(self) -> dict[str, Fraction]:
@@ -802,6 +820,12 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
     if any(row[0] * held.slip_noise + max(row[2], _ZERO) * held.push_noise > 1 for row in reach.facets):
         raise ParameterError("noise of the first measurement may put the loop outside of the polytope")
     fastest = task.reference_rates[0]
+    moved = fastest * held.step
+    behind, before = lag + held.slip_noise + moved, ahead - held.slip_noise + moved
+    if held.law.pull:
+        root = ImplicitRoot(pull=held.law.pull)
+        if not holds(root, held.step, *held.errors(task, max(behind, before), rate)):
+            raise ParameterError("the implicit step may not be deadbeat everywhere in the polytope")
     sizes = [max(ahead, lag), rate, max(up, down)]
     push = _push(task, held, reach, sizes)
     found = ranges(task, ahead + fastest * held.step, push, rate * held.step)
@@ -828,10 +852,9 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
                 raise ParameterError(f"the state may leave the polytope through facet {facet} in a period that {kind}")
     if _bracket(task, held, found, push[1]) > task.amplitude:
         raise ParameterError("the disturbance is too small against what the range of the input gain makes of U")
-    moved = fastest * held.step
     return StickSlipClaims(
-        slip_behind=UpperBound(lag + held.slip_noise + moved),
-        slip_ahead=UpperBound(ahead - held.slip_noise + moved),
+        slip_behind=UpperBound(behind),
+        slip_ahead=UpperBound(before),
         peak_slip_rate=UpperBound(rate),
         least_pressure=LowerBound(found.rest_pressure[0] - push[1]),
         largest_pressure=UpperBound(found.rest_pressure[1] - push[0]),

@@ -24,6 +24,8 @@ from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, holds
 from quakedesign.guarantees.exact.statement import Guarantee, guarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip
 from quakedesign.guarantees.search.estimate import BoundsEstimate, closeness, estimated, spectral_radius
 from quakedesign.guarantees.search.linear_design import (
     MOST_DELAY,
@@ -35,10 +37,12 @@ from quakedesign.guarantees.search.linear_design import (
     search_near,
     unpredictable,
 )
+from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
 from quakedesign.laws import Controller, ImplicitRoot, Power, Sampling, SlidingMode
 from quakedesign.laws import compensated as compensated_law
 from quakedesign.laws.cta import ContinuousTwisting
 from quakedesign.laws.dia import DiscontinuousIntegral
+from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw
 from quakedesign.loop.schemes.compensated import Compensated
@@ -112,6 +116,8 @@ def _enclosed(value: sp.Expr) -> tuple[Fraction, Fraction]:
 # A sliding mode in the scheme ``compensated``: scale, weight and authority chosen by what can be guaranteed.
 
 GUARANTEED = "compensated"
+STICK_SLIP = "stick-slip"  # the scheme for the stick–slip plant
+_NAMED = ("weight", "slip_weight", "rest_slip", "authority")  # settings besides the limit at rest
 WEIGHTS = tuple(Fraction(k, 20) for k in range(2, 11))
 _RATIOS = tuple(Fraction(k, 20) for k in range(17, 22))  # of B0 to the middle of the input gain
 _ROOM = Fraction(5, 4)  # share of the smallest peak that `tracking` may spend
@@ -128,17 +134,24 @@ _ROOTS = tuple(Fraction(f"{10 ** (k / 24):.1e}") for k in range(-48, 73))  # ρ 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Compensation:
-    """A sliding mode that runs in the scheme ``compensated``, and what is guaranteed of it.
+    """A sliding mode that runs in a scheme with an estimate of the disturbance, and what is guaranteed of it.
 
     Attributes
     ----------
     controller : SlidingMode
         A law of samples, see its `sampling`.
-    found : Guarantee or NoGuarantee
+    found : Guarantee, StickSlipGuarantee or NoGuarantee
+        In the scheme ``compensated``, or of the second kind in ``stick-slip``.
     """
 
     controller: SlidingMode
-    found: Guarantee | NoGuarantee
+    found: Guarantee | StickSlipGuarantee | NoGuarantee
+
+    @property
+    def without_stick(self) -> Guarantee | NoGuarantee:
+        """What is guaranteed in the scheme ``compensated``."""
+        assert not isinstance(self.found, StickSlipGuarantee)
+        return self.found
 
     @property
     def weight(self) -> Fraction:
@@ -164,16 +177,23 @@ class Compensation:
         """Settings for people, and how the step ends."""
         law = self.controller
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in law.gains.items())
+        numbers = _settings(law)
         settings = f"weight {float(self.weight):g} and B0 = {float(self.authority):.4g} m²/kg"
+        if "slip_weight" in numbers:
+            settings = f"slip weight {float(numbers['slip_weight']):g}, {settings}"
         return (
             f"{law.title} with {gains}, λ = {float(law.scale):.4g} and the divisor {float(law.divisor):.6g} m²/kg, in "
-            f"the scheme compensated with {settings}{self._end()}"
+            f"the scheme {self._scheme} with {settings}{self._end()}"
         )
 
+    @property
+    def _scheme(self) -> str:
+        return self.controller.sampling.scheme if self.controller.sampling else GUARANTEED
+
     def _end(self) -> str:
-        if not self.found.proved or self.found.held.law.root is None:
+        root = _root(self.found)
+        if root is None:
             return ""
-        root = self.found.held.law.root
         low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
         if low == high == 1 and not root.remainder:
             deadbeat = "; its implicit step is deadbeat, e1 + T_s·w = 0, for all errors that are claimed"
@@ -187,13 +207,19 @@ class Compensation:
         """Exact numbers as texts."""
         law = self.controller
         return {
-            "scheme": GUARANTEED,
+            "scheme": self._scheme,
             "gains": {name: str(v) for name, v in law.gains.items()},
             "scale": str(law.scale),
             "divisor": str(law.divisor),
-            "weight": str(self.weight),
-            "authority": str(self.authority),
+            **{name: str(value) for name, value in _settings(law).items() if name in _NAMED},
         }
+
+
+def _root(found: Guarantee | StickSlipGuarantee | NoGuarantee) -> ImplicitRoot | None:
+    """Implicit step of a proved sliding mode."""
+    if isinstance(found, StickSlipGuarantee):
+        return ImplicitRoot(pull=found.held.law.pull) if found.held.law.pull else None
+    return None if isinstance(found, NoGuarantee) else found.held.law.root
 
 
 def compensated(
@@ -320,7 +346,7 @@ class Deadbeat(Kind):
 
     def proved(self, task: FaultPlant, found: Closest) -> Guarantee | NoGuarantee:
         """Of the smallest λ for which the step is deadbeat."""
-        return self.made(task, found.held.step, found.numbers, **found.held.around).found
+        return self.made(task, found.held.step, found.numbers, **found.held.around).without_stick
 
     def made(self, task: FaultPlant, step: Fraction, numbers: np.ndarray, **around: Unpack[Around]) -> Compensation:
         """The controller with these numbers, and what is guaranteed of it."""
@@ -361,7 +387,7 @@ def _settled(task: FaultPlant, numbers: np.ndarray) -> tuple[Fraction, Fraction]
     return Fraction(f"{numbers[0]:.3g}"), _short(Fraction(float(numbers[1])) * task.model.gain)
 
 
-def recovered(found: Guarantee) -> Compensation:
+def recovered(found: Guarantee | StickSlipGuarantee) -> Compensation:
     """The sliding mode whose implicit step a guarantee is about, its gains read off the step; of 2-CTA and 2-DIA.
 
     The law with these gains must be exactly that of the guarantee.
@@ -371,6 +397,11 @@ def recovered(found: Guarantee) -> Compensation:
     UnsupportedError
         For the step of another law, or of gains that with λ = 1 are not rational.
     """
+    if isinstance(found, StickSlipGuarantee):
+        again = _sticking(found)
+        if again is not None:
+            return again
+        raise UnsupportedError(_NOT_RECOVERED)
     held, law, root = found.held, found.held.law, found.held.law.root
     if root is not None and len(law.measured) == 3 and law.feedback[2] > 0 and 0 < law.measured[2][1] <= 1:
         gain, weight = 1 / law.feedback[2], law.measured[2][1]
@@ -379,13 +410,104 @@ def recovered(found: Guarantee) -> Compensation:
         sampling = Sampling(step=held.step, scheme=GUARANTEED, settings=settings, **held.path)
         for base in _with_gains(root.pull, held.step, authority):
             controller = replace(base, gains=dict(base.gains), sampling=sampling)
-            again = replace(root, pull=implicit_pull(controller, held.step, authority))
-            if compensated_law(again, weight, gain) == law:
+            known = sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(root.pull)
+            if known and compensated_law(root, weight, gain) == law:
                 return Compensation(controller=controller, found=found)
-    raise UnsupportedError(
-        "gains follow from a certificate of a 2-CTA or a 2-DIA in the scheme compensated. Received a certificate of "
-        "another law. Use the controller of its design, or its gains, scale, weight and authority in that scheme."
+    raise UnsupportedError(_NOT_RECOVERED)
+
+
+_NOT_RECOVERED = (
+    "gains follow from a certificate of a 2-CTA or a 2-DIA in the scheme compensated or stick-slip. Received a "
+    "certificate of another law. Use the controller of its design, or its gains, scale and settings in that scheme."
+)
+
+
+def _sticking(found: StickSlipGuarantee) -> Compensation | None:
+    """The same on the stick–slip plant."""
+    held, law = found.held, found.held.law
+    authority = 1 / (held.step * law.target_gain)
+    for base in _with_gains(law.pull, held.step, authority) if law.pull else ():
+        controller = sticking_controller(base, held)
+        if sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(law.pull):
+            return Compensation(controller=controller, found=found)
+    return None
+
+
+def sticking_controller(controller: SlidingMode, held: SampledStickSlip) -> SlidingMode:
+    """A sliding mode in the scheme ``stick-slip`` with the estimate of a law, whose target gain is 1/(T_s·B0)."""
+    law, step = held.law, held.step
+    settings = {
+        "authority": 1 / (step * law.target_gain),
+        "weight": law.level_gain / law.target_gain,
+        "slip_weight": law.slip_gain * step / law.target_gain,
+        "rest_slip": law.rest_slip,
+    }
+    sampling = Sampling(step=step, scheme=STICK_SLIP, settings=tuple(settings.items()))
+    return replace(controller, gains=dict(controller.gains), sampling=sampling)
+
+
+def sticking_loop(controller: SlidingMode, slip_noise: Fraction = Fraction(0)) -> SampledStickSlip:
+    """Law that a sliding mode is in the scheme ``stick-slip``; slip_noise [m].
+
+    Raises
+    ------
+    ParameterError
+        For noise of more than half of rest_slip.
+    UnsupportedError
+        As `implicit_pull`.
+    """
+    assert controller.sampling is not None
+    step, told = controller.sampling.step, _settings(controller)
+    per_rate = 1 / (step * told["authority"])
+    law = StickSlipLaw(
+        rate_gain=per_rate,
+        target_gain=per_rate,
+        return_rate=1 / step,
+        level_gain=told["weight"] * per_rate,
+        slip_gain=told["slip_weight"] * per_rate / step,
+        rest_slip=told["rest_slip"],
+        pull=implicit_pull(controller, step, told["authority"]),
     )
+    return SampledStickSlip(law=law, step=step, slip_noise=slip_noise)
+
+
+def design_sticking(
+    task: FaultPlant, controller: SlidingMode, step: Fraction, **wanted: Any
+) -> Compensation | NoGuarantee:
+    """Sliding mode with given base gains and a guarantee on the stick–slip plant.
+
+    The estimate and B0 are those with which a deadbeat step has a guarantee; λ = ρ⁶ is the smallest of a ladder for
+    which the step is deadbeat everywhere in its polytope.
+
+    Parameters
+    ----------
+    task : FaultPlant
+    controller : SlidingMode
+        Its base gains count.
+    step : Fraction
+        T_s [s].
+    **wanted
+        As in `design_stick_slip`.
+    """
+    found = design_stick_slip(task, step, implicit=True, **wanted)
+    if not isinstance(found, StickSlipGuarantee):
+        return found
+    held, claims = found.held, found.claims
+    errors = held.errors(task, claims.slip_error, claims.peak_slip_rate)
+    authority = 1 / (step * held.law.target_gain)
+    try:
+        scale = _smallest_scale(controller, authority, step, errors, _SLOPES[:1])
+    except UnsupportedError as error:
+        return NoGuarantee(reason=str(error), small_gain=None)
+    if scale is None:
+        return NoGuarantee(reason="the implicit step is deadbeat for no scale that is tried", small_gain=None)
+    law = sticking_controller(controller.scaled(scale), held)
+    return Compensation(controller=law, found=replace(found, held=sticking_loop(law, held.slip_noise)))
+
+
+def sorted_terms(terms: tuple[Power, ...]) -> tuple[Power, ...]:
+    """Terms of a sum in an order that does not depend on their factors."""
+    return tuple(sorted(terms, key=lambda term: (term.exponent, str(term.argument))))
 
 
 def _with_gains(pull: tuple[Power, ...], step: Fraction, authority: Fraction) -> Iterator[SlidingMode]:
@@ -400,11 +522,11 @@ def _with_gains(pull: tuple[Power, ...], step: Fraction, authority: Fraction) ->
         values = third, root.factor[0] / step, jump.factor[0] / step**2, fourth
         yield DiscontinuousIntegral.from_values(tuple(map(str, values)), divisor=authority)
     one = ContinuousTwisting.from_values(("1",) * 4, divisor=authority)
-    units = implicit_pull(one, step, authority)
+    pull, units = sorted_terms(pull), sorted_terms(implicit_pull(one, step, authority))
     if [(t.exponent, t.argument) for t in units] == [(t.exponent, t.argument) for t in pull]:
         sizes = [t.factor[0] / unit.factor[0] for t, unit in zip(pull, units, strict=True)]
         doubled = {name: replace(one, gains={**one.gains, name: Fraction(2)}) for name in one.gains}
-        pulls = {name: implicit_pull(other, step, authority) for name, other in doubled.items()}
+        pulls = {name: sorted_terms(implicit_pull(other, step, authority)) for name, other in doubled.items()}
         gains = {name: sizes[next(i for i, t in enumerate(pulls[name]) if t != units[i])] for name in one.gains}
         yield replace(one, gains=gains)
 
@@ -455,17 +577,29 @@ def _deadbeat_search(
 
 def _scale(controller: SlidingMode, authority: Fraction, step: Fraction, errors: tuple[Fraction, Fraction]) -> Fraction:
     """Smallest λ of a ladder for which the step is deadbeat, or nearly, for errors of a size and a little more."""
+    scale = _smallest_scale(controller, authority, step, errors, _SLOPES[:_NEARLY])
+    return controller.scale if scale is None else scale
+
+
+def _smallest_scale(
+    controller: SlidingMode,
+    authority: Fraction,
+    step: Fraction,
+    errors: tuple[Fraction, Fraction],
+    slopes: tuple[Fraction, ...],
+) -> Fraction | None:
+    """Smallest λ of the ladder for the first slope for which the root lies between its line and a deadbeat step."""
     slip, rate = (_MARGIN * v for v in errors)
 
     def deadbeat(slope: Fraction, root: Fraction) -> bool:
         pull = implicit_pull(controller.scaled(root**6), step, authority)
         return holds(ImplicitRoot(pull=pull, slopes=(slope, Fraction(1))), step, slip, rate)
 
-    for slope in _SLOPES[:_NEARLY]:
+    for slope in slopes:
         index = bisect_left(_ROOTS, True, key=partial(deadbeat, slope))
         if index < len(_ROOTS):
             return _ROOTS[index] ** 6
-    return controller.scale
+    return None
 
 
 def _held(root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, around: Around) -> Held:

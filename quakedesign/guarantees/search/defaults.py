@@ -1,6 +1,6 @@
 """Default designs of a fault: e-LQR and sliding mode for its own T_s or the longest proved.
 
-The second chapter states which schemes of a sliding mode have a guarantee (``compensated`` only) and why.
+The second chapter states which schemes of a sliding mode have a guarantee (``compensated`` and ``stick-slip``) and why.
 """
 
 from dataclasses import replace
@@ -8,17 +8,20 @@ from fractions import Fraction
 from typing import Any, Unpack
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import require_known
+from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.loop import Around
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.statement import Guarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.guarantees.search.compensated_search import (
     GUARANTEED,
+    STICK_SLIP,
     Compensation,
     Deadbeat,
     compensated,
     design_compensated,
+    sticking_loop,
 )
 from quakedesign.guarantees.search.linear_design import (
     continued,
@@ -28,6 +31,7 @@ from quakedesign.guarantees.search.linear_design import (
     longest_step,
     tightened,
 )
+from quakedesign.guarantees.search.stick_slip_design import proved
 from quakedesign.laws import SlidingMode
 from quakedesign.loop import schemes
 from quakedesign.loop.loop_setup import MEASURED
@@ -141,9 +145,9 @@ def sampled_sliding_mode(
     reason = made.found.reason if isinstance(made.found, NoGuarantee) else ""
     if reason and longest is not None:
         made = laws.at(task, longest, objective)
-    if isinstance(made.found, NoGuarantee):
+    if isinstance(made.without_stick, NoGuarantee):
         return made, SampledDesign(step=step, runs=None, reason=reason)
-    runs = tightened(made.found)
+    runs = tightened(made.without_stick)
     held = runs.held
     delayed = longest_delay(task, held.step, kind=laws, **noise)
     return replace(made, found=runs), SampledDesign(
@@ -159,9 +163,22 @@ def sampled_sliding_mode(
 # What is guaranteed of a sliding mode as a scheme runs it, and why most schemes have nothing.
 
 
-def guarantee_of(task: FaultPlant, law: SlidingMode, **noise: Unpack[Around]) -> Guarantee | NoGuarantee:
-    """What is guaranteed of a sliding mode as it runs: something only of one for the scheme ``compensated``."""
+def guarantee_of(
+    task: FaultPlant, law: SlidingMode, **noise: Unpack[Around]
+) -> Guarantee | StickSlipGuarantee | NoGuarantee:
+    """What is guaranteed of a sliding mode as it runs: in the scheme ``compensated``, or in ``stick-slip``."""
     own = law.sampling
+    if own is not None and own.scheme == STICK_SLIP:
+        if missing := {"authority", "weight", "slip_weight", "rest_slip"} - dict(own.settings).keys():
+            reason = f"the scheme {STICK_SLIP} has a guarantee with {', '.join(sorted(missing))} given in its settings"
+            return NoGuarantee(reason=reason, small_gain=None)
+        if unknown := {name for name, value in noise.items() if value} - {"slip_noise"}:
+            reason = f"the stick-slip plant is proved without {', '.join(sorted(unknown))}"
+            return NoGuarantee(reason=reason, small_gain=None)
+        try:
+            return proved(task, sticking_loop(law, noise.get("slip_noise", Fraction(0))))
+        except UnsupportedError as error:
+            return NoGuarantee(reason=str(error), small_gain=None)
     if own is None or own.scheme != GUARANTEED:
         scheme, step = ("continuous", Fraction(0)) if own is None else (own.scheme, own.step)
         return NoGuarantee(reason=_why_none(task, type(law), scheme, step), small_gain=None)
@@ -209,7 +226,7 @@ def sliding_mode(
     if scheme != GUARANTEED:
         return NoGuarantee(reason=_why_none(task, law, scheme, step), small_gain=None)
     made = design_compensated(task, known.controller, step, objective=objective, **around)
-    return replace(made, found=tightened(made.found))
+    return replace(made, found=tightened(made.without_stick))
 
 
 def deadbeat(task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...] = ()) -> Deadbeat:
@@ -221,6 +238,8 @@ def deadbeat(task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...] = 
 def _why_none(task: FaultPlant, law: type[SlidingMode], scheme: str, step: Fraction) -> str:
     if scheme == "continuous":
         return f"a pressure that follows {law.title} at every instant is run by no sampled controller{_REMEDY}"
+    if scheme == STICK_SLIP:
+        return f"the estimate of the scheme {STICK_SLIP} is cut off at rest, so that no linear loop covers it{_REMEDY}"
     if scheme == "implicit":
         rest = UpperBound(step**2 * task.authority * max(map(abs, task.rest_pressure)))
         return (

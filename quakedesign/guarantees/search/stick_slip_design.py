@@ -45,6 +45,8 @@ TUNINGS = {
     "peak": ((0.3, 0.5, 0.1, 1.3), (0.5, 0.5, 0.1, 1.3), (0.5, 0.5, 0.3, 1.3)),
 }
 """Shares of the innovations that the estimate takes, of the slip error that a period takes back, and the input gain."""
+DEADBEAT = ((0.3, 0.5, 1.0, 1.4), (0.5, 0.7, 1.0, 1.4), (0.5, 0.5, 1.0, 1.4), (0.3, 0.5, 1.0, 1.3))
+"""The same of a deadbeat step, which takes all of it back, for both objectives."""
 _VERTICES, _SETTLED = 250, 1e-4  # of the reached states that are kept, and change of their extents at the end
 _ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of one: they only propose
 _FACETS = 130  # of the first polytope
@@ -84,7 +86,12 @@ FLOATS = Numbers(
 
 
 def tuned(
-    task: FaultPlant, step: Fraction, tuning: Sequence[float], slip_noise: Fraction = Fraction(0)
+    task: FaultPlant,
+    step: Fraction,
+    tuning: Sequence[float],
+    slip_noise: Fraction = Fraction(0),
+    *,
+    implicit: bool = False,
 ) -> SampledStickSlip:
     """Deadbeat feedback for the middle of the damping, with the shares of a tuning.
 
@@ -97,16 +104,19 @@ def tuned(
         As in `TUNINGS`.
     slip_noise : Fraction
         Bound of the measurement error of the slip [m].
+    implicit : bool
+        Whether the feedback is that of a deadbeat implicit step, which knows no damping and takes back all of the slip
+        error.
     """
     level, slip, back, gain = tuning
-    damping, period = float(sum(task.rate_chord)) / 2, float(step)
+    damping, period = 0.0 if implicit else float(sum(task.rate_chord)) / 2, float(step)
     decay = np.exp(-damping * period)
     held = -np.expm1(-damping * period) / damping if damping else period
     per_rate = 1 / (gain * held * float(task.authority))
     law = StickSlipLaw(
         rate_gain=short(decay * per_rate, _DIGITS),
         target_gain=short(per_rate, _DIGITS),
-        return_rate=short(back / period, _DIGITS),
+        return_rate=1 / step if implicit else short(back / period, _DIGITS),
         level_gain=short(level * per_rate, _DIGITS),
         slip_gain=short(slip * per_rate / period, _DIGITS),
         rest_slip=2 * slip_noise,
@@ -716,6 +726,7 @@ def design_stick_slip(
     objective: str = "tracking",
     slip_noise: Fraction = Fraction(0),
     healing: Fraction = Fraction(0),
+    implicit: bool = False,
     tell: Tell = lambda said, done: None,
 ) -> StickSlipGuarantee | NoGuarantee:
     """Gains with a guarantee on the stick–slip plant: the first tuning of an objective that has one.
@@ -731,6 +742,8 @@ def design_stick_slip(
         Bound of the measurement error of the slip [m].
     healing : Fraction
         Δμ_h [-], proved as a larger disturbance, see `StickSlipGuarantee.covered_healing`.
+    implicit : bool
+        Whether the law is a deadbeat implicit step; of it one tuning serves both objectives.
     tell : callable
         Called with what is done, and the fraction done [-].
     """
@@ -738,9 +751,9 @@ def design_stick_slip(
         reason = "the stick-slip theorem needs a disturbance above 0 m/s^2: give amplitude in [disturbance]"
         return NoGuarantee(reason=reason, small_gain=None)
     none = list[StickSlipGuarantee | NoGuarantee]()
-    for tuning in TUNINGS[objective]:
+    for tuning in DEADBEAT if implicit else TUNINGS[objective]:
         try:
-            held = tuned(task, step, tuning, slip_noise)
+            held = tuned(task, step, tuning, slip_noise, implicit=implicit)
         except (ParameterError, ArithmeticError, ValueError):
             return NoGuarantee(reason="no gains of this size are floats", small_gain=None)
         found = _healed(task, held, healing, tell)
@@ -774,20 +787,20 @@ class WorstStickSlip:
 
     Attributes
     ----------
-    behind, ahead : float
+    slip_behind, slip_ahead : float
         Slip behind and ahead of the reference [m].
-    slip_rate : float
+    peak_slip_rate : float
         [m/s].
     """
 
-    behind: float
-    ahead: float
-    slip_rate: float
+    slip_behind: float
+    slip_ahead: float
+    peak_slip_rate: float
 
     @property
     def slip_error(self) -> float:
         """Larger of both [m]."""
-        return max(self.behind, self.ahead)
+        return max(self.slip_behind, self.slip_ahead)
 
 
 def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstStickSlip:
@@ -820,4 +833,4 @@ def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstSt
         points[:, 0] -= float(found.held.slip_noise)
         extremes = np.maximum(extremes, [-points[:, 0].min(), points[:, 0].max(), points[:, 1].max()])
     behind, ahead, rate = (float(v) for v in extremes)
-    return WorstStickSlip(behind=behind, ahead=ahead, slip_rate=rate)
+    return WorstStickSlip(slip_behind=behind, slip_ahead=ahead, peak_slip_rate=rate)

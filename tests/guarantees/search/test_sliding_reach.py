@@ -84,7 +84,7 @@ def test_a_well_that_no_controller_reaches_the_fault_through_is_said_to_be_one()
     assert _beyond(FAULT, Fraction(10**4), {"diffusion": found * Fraction(999, 1000)}) == ""
     assert _beyond(FAULT, Fraction(10**4), {"lag": found * 2}) == ""
     said = _beyond(FAULT, Fraction(10**4), {"diffusion": found * Fraction(21, 20)})
-    assert said.startswith("no controller whatever whose pressure is within 40 MPa of what the reference needs")
+    assert said.startswith("no controller whose pressure stays within 40 MPa of what the reference needs")
 
 
 @pytest.mark.parametrize(("step", "suits"), [(20, 20), (60, 60), (15, 33), (120, 33)])

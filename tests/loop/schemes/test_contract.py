@@ -170,7 +170,7 @@ def test_no_error_and_no_disturbance_means_no_pressure(name):
         ({"substeps": 0}, "substeps"),
         ({"substeps": 1.5}, "substeps"),
         ({"authority": 0.0}, "authority"),
-        ({"weight": 0.5}, "weight are for the schemes compensated. Received explicit"),
+        ({"weight": 0.5}, "weight are for the schemes compensated, stick-slip. Received explicit"),
     ],
 )
 def test_meaningless_settings_are_refused(options, said):
