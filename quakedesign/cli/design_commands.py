@@ -62,7 +62,7 @@ class DesignOptions(WellOptions):
         Scheme of the runs of gains from --continuous: continuous (default, as in the paper), or sampled with a
         zero-order hold: explicit, implicit, semi-implicit, compensated, stick-slip. Other designs run as designed.
     stress
-        Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; default: about the largest proved.
+        Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; default: the largest proved.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     published_scheme
