@@ -453,7 +453,7 @@ BUDGETS = {
     "laws": 3205,
     "loop": 4240,
     "plant": 1340,
-    "guarantees": 13010,
+    "guarantees": 13006,
     "lyapunov": 7000,
     "linear": 2400,
     "synthesis": 1880,
@@ -461,8 +461,8 @@ BUDGETS = {
     "simulation": 9715,
     "identification": 4471,
     "studies": 3793,
-    "report": 3997,
-    "cli": 3480,
+    "report": 4008,
+    "cli": 3484,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

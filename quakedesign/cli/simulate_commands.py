@@ -87,7 +87,7 @@ def simulate(
     options = dict(locals())
     from quakedesign.cli.block_commands import block_law, run_chain, run_sliding, several_blocks
     from quakedesign.fault import load_fault
-    from quakedesign.report.sentences import proved_line
+    from quakedesign.report.sentences import exceeded_line, proved_line
     from quakedesign.simulation import Load
     from quakedesign.studies.runs import run_single
 
@@ -143,16 +143,20 @@ def simulate(
         )
     if out is not None:
         trajectory.save(out)
-    proved, outside = None, list[str]()
+    proved, outside, exceeded = None, list[str](), ""
     if chosen and chosen.claim:
         changed = changed_options(simulate, options)
         proved, outside = chosen.claim.sentence(), _outside(changed, chosen.claim, trajectory.provenance["plant"])
+        pressures = getattr(chosen.claim.claims, "pressures", ())
+        exceeded = exceeded_line(trajectory.metrics, *pressures[-1]) if trajectory.metrics and pressures else ""
     answer = _answer(trajectory, loaded, premises) | {
         "guarantee": {"sentence": proved} if proved else None,
         "outside": outside,
     }
     warning = chosen.controller.warning_at_rest if chosen else ""
-    output.show(answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside), warning))
+    output.show(
+        answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside, exceeded), warning)
+    )
     return 0
 
 

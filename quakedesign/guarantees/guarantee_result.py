@@ -202,7 +202,7 @@ class LoopAnswer(LoopResult):
         change = UpperBound(self.fault.disturbance_bounds[1])
         return [
             f"this covers disturbances that jump; the fault's own changes by at most {change:.3g} m/s^3, for which the "
-            "class rate may prove much less"
+            "class rate may prove much smaller bounds"
         ]
 
     @property

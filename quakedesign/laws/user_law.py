@@ -278,10 +278,14 @@ class SampledLaw(SampledController):
         label = str(given.pop("label", Path(path).stem))[:60]
         if step is None:
             raise ScenarioError(f"law {path} must have the key step, its sampling time [s]. Received none.")
-        if set(given) == {"pid"} and isinstance(given["pid"], dict):
-            named = {name: given["pid"].pop(name) for name in ("kp", "ki", "kd", "N") if name in given["pid"]}
-            if given["pid"] or "kp" not in named:
-                raise ScenarioError(f"pid of law {path} must have the keys kp, ki, kd and N, kp at least.")
+        if "pid" in given:
+            pid = dict(given.pop("pid")) if isinstance(given["pid"], dict) else {}
+            named = {name: pid.pop(name) for name in ("kp", "ki", "kd", "N") if name in pid}
+            if pid or given or "kp" not in named:
+                raise ScenarioError(
+                    f"pid of law {path} must have the keys kp, ki, kd and N, kp at least, and nothing but step beside "
+                    'it: {"step": "50 ms", "pid": {"kp": 4e8, "ki": 1e8, "kd": 3e8, "N": 50}}.'
+                )
             return cls.from_pid(**named, step=step, label=label)
         if set(given) in ({"gains"}, {"gains", "inputs"}):
             return cls.from_gains(**given, step=step, label=label)

@@ -9,7 +9,7 @@ from fractions import Fraction
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.exact import LowerBound, UpperBound, rational
+from quakedesign.exact import Bound, LowerBound, UpperBound, rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees import ContinuousPeaks, Guarantee, NoGuarantee
 from quakedesign.laws import control_laws
@@ -24,10 +24,11 @@ from quakedesign.simulation.natural import waiting
 from quakedesign.simulation.run import STICK_SLIP
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, Entry, pressure_extremes, shortfall
 from quakedesign.synthesis import Design
-from quakedesign.text import lasting
+from quakedesign.text import lasting, quantity
 
 if TYPE_CHECKING:
     from quakedesign.guarantees import SlidingGuarantee, StickSlipGuarantee
+    from quakedesign.simulation.recorder import Metrics
     from quakedesign.studies.runs import StateRun
 
 
@@ -522,13 +523,23 @@ def left_out_lines(comparison: "Compared") -> list[str]:
     return [f"Not designed, {', '.join(titles)}: {why}" for why, titles in named.items()]
 
 
-def proved_line(sentence: str | None, outside: list[str]) -> str:
+def proved_line(sentence: str | None, outside: list[str], exceeded: str = "") -> str:
     """What is proved of the law of a run, and which options of the run the proof does not know; empty without one."""
     if sentence is None:
         return ""
     if outside:
-        return f"NOT proved of this run, which differs in {', '.join(outside)}; the proof says: {sentence}"
+        beyond = f"{exceeded}; " if exceeded else ""
+        return f"NOT proved of this run, which differs in {', '.join(outside)}; {beyond}the proof says: {sentence}"
     return f"proved: {sentence}"
+
+
+def exceeded_line(metrics: "Metrics", least: Bound, largest: Bound) -> str:
+    """How the pressures of a run [Pa] exceed proved ones; empty if they do not."""
+    low, high = metrics.min_pressure, metrics.max_pressure
+    if low is None or high is None or (low >= least and high <= largest):
+        return ""
+    ran = f"{quantity(low, 'Pa')} to {quantity(high, 'Pa')}"
+    return f"its pressure EXCEEDS the proved range: {ran}, proved {least.quantity('Pa')} to {largest.quantity('Pa')}"
 
 
 def sliding_run_lines(answer: dict[str, Any]) -> list[str]:

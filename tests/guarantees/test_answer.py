@@ -55,7 +55,7 @@ def test_a_claim_that_a_course_with_stick_leaves_is_that_of_any_gain(monkeypatch
 def test_a_disturbance_that_is_slow_has_a_class_of_its_own(monkeypatch):
     found = stuck(monkeypatch, 0.0, 0.0)
     given = found.fault.disturbance
-    said = [line for line in found.lines() if "class rate may prove much less" in line]
+    said = [line for line in found.lines() if "class rate may prove much smaller bounds" in line]
     assert len(said) == 1
     assert f"changes by at most {given.amplitude * given.frequency:.3g}"[:-1] in said[0]
     for other in (replace(given, constant=1e-6), replace(given, frequency=0.0)):

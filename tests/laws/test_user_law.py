@@ -156,6 +156,8 @@ MATRICES = {"A": [[1]], "B": [[1, 0]], "C": [[1]], "D": [[0, 0]], "inputs": ERRO
         (json.dumps({"step": 1, "gains": [1], "A": [[1]]}), "must have the keys A, B, C, D and inputs"),
         (json.dumps(MATRICES | {"more": 1}), "must have the keys A, B, C, D and inputs"),
         (json.dumps({"step": 1, "pid": {"ki": 1}}), "kp at least"),
+        (json.dumps({"step": 1, "pid": [1, 2, 3]}), "kp at least"),
+        (json.dumps({"step": 1, "pid": {"kp": 1}, "N": 50}), "nothing but step beside it"),
         (json.dumps({"step": 1, "pid": {"kp": 1, "K": 2}}), "kp at least"),
         (json.dumps({"step": [1], "gains": [1]}), "step of .* must be a text or a number"),
         (json.dumps({"step": 0, "gains": [1]}), "step of a law must be positive"),

@@ -1,12 +1,14 @@
 """What a run is said to have come to, how far a proof reaches, and when a comparison is a positive answer."""
 
 import dataclasses
+from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from quakedesign.cli.design_commands import positive
+from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import ContinuousPeaks
 from quakedesign.laws import SampledLaw, control_law
@@ -14,7 +16,14 @@ from quakedesign.linear.sampled_stability import HeldLoop
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.report import headline
-from quakedesign.report.sentences import grade, outcome_sentence, pressure_sentence, sentences
+from quakedesign.report.sentences import (
+    exceeded_line,
+    grade,
+    outcome_sentence,
+    pressure_sentence,
+    proved_line,
+    sentences,
+)
 from quakedesign.simulation import simulate
 from quakedesign.studies import Entry
 from quakedesign.synthesis import Design
@@ -115,3 +124,16 @@ def test_a_held_pressure_is_not_what_is_proved(slow):
     runs = SimpleNamespace(verdict=Verdict.REFUTED)
     unstable = HeldLoop(runs=runs, longest=None, radius=1.1)
     assert grade(entry(slow, FINE, held=unstable)) == "proved for this loop and task; UNSTABLE if p is held over T_s"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "beyond"), [(-14e6, 2e6, False), (-30e6, 0.0, True), (0.0, 3e6, True), (None, None, False)]
+)
+def test_a_run_says_how_its_pressure_exceeds_the_proved_range(low, high, beyond):
+    metrics = SimpleNamespace(min_pressure=low, max_pressure=high)
+    said = exceeded_line(metrics, LowerBound(Fraction(-14_300_000)), UpperBound(Fraction(2_500_000)))
+    assert bool(said) == beyond
+    if low == -30e6:
+        assert said == "its pressure EXCEEDS the proved range: -30 MPa to 0 Pa, proved -14.3 MPa to 2.5 MPa"
+        line = proved_line("the slip stays", ["plant"], said)
+        assert line == f"NOT proved of this run, which differs in plant; {said}; the proof says: the slip stays"
