@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# The one place where numbers become exact: decimal text and floats in, `fractions.Fraction` out.
+# Conversion of decimal text and floats to `fractions.Fraction`, in this module only.
 
 _DIGITS = 308  # so that float() of the number neither overflows nor vanishes
 _NUMBER = re.compile(r"[+-]?(\d+(/\d+)?|(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)", re.ASCII)
@@ -69,7 +69,7 @@ def _read(value: object, name: str) -> Fraction:
 
 
 def _instead(written: str) -> str:
-    """A number that may be meant."""
+    """Number to suggest in a message in place of a text."""
     share = written.removesuffix("%").strip()
     if share != written and len(share) <= 20 and _NUMBER.fullmatch(share) and "/" not in share:
         return f"{float(share) / 100:g}"
@@ -100,7 +100,7 @@ def end_of(ball: Any) -> Fraction:
 
 
 def fraction_of_float(value: "sp.Float") -> Fraction:
-    """Fraction of a float of SymPy: as `rational` reads it where it is one of Python's, else its exact value."""
+    """Fraction of a SymPy float: that of `rational` if it equals a Python float, else its exact value."""
     import sympy as sp
 
     near = float(value)
@@ -117,7 +117,7 @@ def to_sympy(value: Fraction) -> "sp.Rational":
 def exact_text(value: Any) -> str:
     """A rational as p/q, or p, whatever its length: ``str`` refuses more than 4300 digits, `Decimal` none.
 
-    What is no rational of Python is written by ``str``.
+    Values of other types are written by ``str``.
     """
     if not isinstance(value, Rational):
         return str(value)
@@ -140,7 +140,7 @@ def float_below(value: Fraction) -> float:
 
 
 def shortly(value: Fraction | float) -> str:
-    """A number as floats are written, or six digits of one that no float holds."""
+    """Text of a number as that of a float, or six digits if it is outside the range of floats."""
     try:
         number = float(value)
     except OverflowError:
@@ -149,7 +149,7 @@ def shortly(value: Fraction | float) -> str:
 
 
 def apart(*values: Fraction) -> tuple[str, ...]:
-    """Numbers in few digits, at least six, that tell those apart which differ: a value and the limit that it misses."""
+    """Texts of numbers, with six digits or as many as show the difference between a value and its limit."""
     texts, count = tuple(map(shortly, values)), len(set(values))
     for digits in (9, 12, 24):
         if len(set(map(Fraction, texts))) == count:
@@ -159,15 +159,15 @@ def apart(*values: Fraction) -> tuple[str, ...]:
 
 
 def six_digits(value: Fraction) -> str:
-    """Six digits, to nearest, for people; Decimal has no largest number as floats have."""
+    """Six digits, rounded to nearest, by `Decimal`, which has no largest number."""
     return f"{Decimal(value.numerator) / Decimal(value.denominator):.6g}"
 
 
 # ----------------------------------------------------------------------
-# Certified numbers, which are printed on their outer side only: an upper bound is rounded up, a lower one down.
+# Certified numbers, printed with outward rounding only: an upper bound is rounded up, a lower one down.
 #
-# A bound is a `fractions.Fraction`, so that it is compared and computed with exactly. What is computed from it is a
-# plain fraction: whether that is a bound again, and of which side, says the code that computed it.
+# A bound is a `fractions.Fraction`, so that comparison and arithmetic are exact. A result of arithmetic is a plain
+# fraction; the code that computes it declares whether it is a bound, and of which side.
 
 _SPEC = re.compile(
     r"(?P<align>.?[<>^])?(?P<sign>[-+ ]?)(?P<width>([1-9]\d*)?)(\.(?P<digits>\d+))?(?P<kind>[eEfFgG%]?)", re.ASCII
@@ -177,8 +177,8 @@ _SPEC = re.compile(
 class Bound(Fraction):
     """Exact bound of a certified quantity; `UpperBound` and `LowerBound` are its two sides.
 
-    ``str`` and ``repr`` show six digits, ``format`` as many as it is told, ``float`` the nearest float, all on the
-    outer side. `exact` is the only text that is the number itself.
+    ``str`` and ``repr`` show six digits, ``format`` a specified number of digits, ``float`` the nearest float, all
+    rounded outward. Only the text `exact` is not rounded.
     """
 
     __slots__ = ()
@@ -197,7 +197,7 @@ class Bound(Fraction):
         unit : str
             One that takes prefixes, such as Pa, m or m/s.
         digits : int
-            Significant ones, at least those before the point.
+            Number of significant digits; digits before the point are always shown.
         """
         _, exponent = self._significant(digits)
         power = min(max(3 * (exponent // 3), -18), 18)
@@ -211,7 +211,7 @@ class Bound(Fraction):
         return f"{type(self).__name__}('{self}')"
 
     def __format__(self, spec: str) -> str:
-        """Decimal on the outer side, within a unit of its last digit.
+        """Decimal rounded outward, within a unit of its last digit.
 
         Parameters
         ----------
@@ -262,7 +262,7 @@ class Bound(Fraction):
 
 
 class UpperBound(Bound):
-    """Not exceeded: a peak, a settling time, what a premise requires. Rounded up."""
+    """Upper bound of a quantity, such as a peak, a settling time or the requirement of a premise. Rounded up."""
 
     __slots__ = ()
     _side = ROUND_CEILING
@@ -272,7 +272,7 @@ class UpperBound(Bound):
 
 
 class LowerBound(Bound):
-    """Reached at least: a longest step, a margin, a decay rate, what a certificate covers. Rounded down."""
+    """Lower bound of a quantity, such as a longest step, a margin, a decay rate or a certified range. Rounded down."""
 
     __slots__ = ()
     _side = ROUND_FLOOR
@@ -283,7 +283,7 @@ class LowerBound(Bound):
 
 @dataclass(frozen=True, slots=True)
 class Enclosure:
-    """Interval that contains a quantity: printed, it contains it still.
+    """Interval that contains a quantity, also after the outward rounding of its printed ends.
 
     Raises
     ------
@@ -311,7 +311,7 @@ class Enclosure:
 
 
 def _mantissa(number: Decimal, exponent: int, digits: int) -> str:
-    """Number over its power of ten, with so many places; exact, since it has no more digits."""
+    """Number divided by its power of ten, with a number of places; exact, since it has no further digits."""
     sign, figures, _ = number.as_tuple()
     written = "".join(map(str, figures)).ljust(digits + 1, "0")
     whole = f"{written[0]}.{written[1:]}" if digits else written[0]
@@ -326,5 +326,5 @@ def _fixed(count: int, places: int) -> str:
 
 
 def _bare(text: str) -> str:
-    """Decimal text without the zeros that say nothing."""
+    """Decimal text without trailing zeros."""
     return text.rstrip("0").rstrip(".") if "." in text else text

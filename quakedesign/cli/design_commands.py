@@ -56,27 +56,26 @@ class DesignOptions(WellOptions):
         Measurement of the sampled e-LQR: slip-and-rate, or slip, from which it estimates the slip rate. Sliding modes
         measure both.
     disturbance_class
-        Disturbances of the guarantee: amplitude, any of the fault's amplitude; rate, also with the fault's rate of
-        change, starting at 0, such as a tide.
+        Disturbances of the guarantee. amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of
+        change is bounded by the fault's too, and it starts at 0, such as a tide.
     scheme
         Scheme of the runs of gains from --continuous: continuous (default, as in the paper), or sampled with a
         zero-order hold: explicit, implicit, semi-implicit, compensated, stick-slip. Other designs run as designed.
     stress
-        Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; by default the largest that the
-        design withstands.
+        Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; default: the largest proved.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     published_scheme
         Scheme of the runs of published gains, see --scheme.
     plant
         Plant of the runs and of the guarantee: stick-slip (friction holds the fault at rest), or printed (the
-        paper's, continued to negative slip rates). By default stick-slip; the guarantee is on the plant without stick
-        where it has no proof on this one. Not for rate-and-state faults, which never rest.
+        paper's, continued to negative slip rates). By default the runs are on stick-slip, and so is the guarantee if
+        one is found there; otherwise it is on printed. Not for rate-and-state faults, which never rest.
     whole_task
         Rate-and-state faults: simulate the whole task instead of 500 D_c/V of it. The proof covers the whole task in
         either case.
     accept_poor_fit
-        Continue although the record of the fault does not explain its friction or leaves it open; results are labelled.
+        Continue although the laboratory record does not support the friction law of the fault; results are labelled.
     """
 
     controller: str = "all"

@@ -101,7 +101,7 @@ def scale(
     controller
         cta, dia or elqr.
     gains
-        published, or the gains of the law (λ = 1, divisor μ_res·N̂_min of the source).
+        published, or the numbers of the gains (λ = 1, divisor μ_res·N̂_min of the source).
     clock
         Time scale from operation-time or natural-period; by default the one on which both faults agree.
     """
@@ -210,17 +210,17 @@ def identify(
 
     Velocity steps and slide-hold-slide tests give rate-and-state parameters; slip or a test with a stiff machine gives
     slip-weakening parameters. The first line is the verdict: the fit explains the record, does not, or cannot tell.
-    Exit code 0 only if it explains it and every parameter is determined.
+    Exit code 0 only if the fit explains the record and every parameter is determined.
 
     Parameters
     ----------
     data
         Text with headings and units, such as 'time [s], load_point_displacement [um], shear_stress [MPa],
-        normal_stress [MPa]' (load_point_rate, shear_force, normal_force, friction and slip are accepted too); any sign
-        between columns; xlook's text and reduced binary; vectors of a MATLAB file. A column weight (1/variance of
-        friction, in any unit) says how much each sample counts.
+        normal_stress [MPa]' (load_point_rate, shear_force, normal_force, friction and slip are accepted too), with any
+        column separator; xlook's text and reduced binary; vectors of a MATLAB file. A column weight (1/variance of
+        friction, in any unit) weights the samples.
     more
-        Further files, each a step of the same experiment: every step is fitted by itself, and one law to all.
+        Further files, each with a step of the same experiment. Each step is fitted alone, then one law to all steps.
     law
         Friction law. By default rate-and-state-aging and rate-and-state-slip are fitted and the better one is taken;
         others are regularised-rate-and-state, exponential-slip-weakening and linear-slip-weakening.
@@ -229,22 +229,22 @@ def identify(
     normal_stress
         Constant normal stress, such as '5 MPa', if the record has no such column.
     columns
-        Which heading is which column, such as 'time=Time(s), friction=mu_corr'; a number is the place of a column,
-        and a unit may follow: 'time=1 [s]'.
+        Headings of the columns, such as 'time=Time(s), friction=mu_corr'; a number is the position of a column, and a
+        unit may follow: 'time=1 [s]'.
     begin
-        Where the part to fit begins: a time ('8110 s') or a load-point displacement ('1600 um') of the file.
+        Start of the part to fit: a time ('8110 s') or a load-point displacement ('1600 um') of the file.
     end
-        Where it ends.
+        End of the part to fit.
     steps
-        Windows of a file that are steps of their own, such as '0 s to 60 s, 60 s to 120 s', or auto, which cuts
-        midway between changes of rate.
+        Windows of a file that are separate steps, such as '0 s to 60 s, 60 s to 120 s', or auto, which cuts midway
+        between changes of rate.
     rates
         Rates of the load point one after the other, such as '1 um/s, 10 um/s', where they are known; from its
         displacement by default.
     states
-        2 for friction with a second state, which may explain what one does not; no fault file holds it.
+        Number of friction states; 2 may explain a record that 1 does not, but a fault file cannot state it.
     trend
-        Along what friction drifts: displacement, time or none; chosen by likelihood by default.
+        Drift of friction, linear in displacement or time, or none; chosen by likelihood by default.
     seed
         Seed of the random starting points.
     fault
@@ -315,8 +315,8 @@ def identify(
 def schema(command: str, /, *, output: Output = PLAIN) -> int:
     """Print the JSON Schema (draft 2020-12) of what a command prints with --json.
 
-    For faults of one block. Required keys are in every output; options add others, which may be null. Units are in the
-    table of keys (docs/reference/json.md).
+    The schema is for faults of one block. Required keys are in every output; options add others, which may be null.
+    Units are in the table of keys (docs/reference/json.md).
 
     Parameters
     ----------

@@ -54,13 +54,13 @@ def synthesise(
         Objective sampled: preset or path of a .toml file.
     objective
         norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: fastest certified decay, as the
-        inverse of the settling time from where no error exceeds the bound on |h'|. beta: widest certified range of the
-        control coefficient. sampled: smallest simulated error of proved gains on a fault.
+        inverse of the settling time from initial errors of at most the bound on |h'|. beta: widest certified range of
+        the control coefficient. sampled: smallest simulated error of proved gains on a fault.
     lipschitz
         Bound on |h'|, in the unit of ν per second; 1 by default, for sampled a tenth above what the fault needs.
     gain_range
-        b_m and b_M, the range of the control coefficient β; 1 1 by default, for sampled that of the fault. For beta it
-        must be covered, and its middle is kept.
+        b_m and b_M, the range of the control coefficient β; 1 1 by default, for sampled that of the fault. For beta
+        the certified range contains it and has the same middle.
     bound
         Objectives decay and beta: largest norm of the gains; by default the smallest of the sets from the literature.
     degree
@@ -204,7 +204,7 @@ def gain_map(
     """Map where two gains are certified, at one or more levels of |h'|, with certificates, figure and table.
 
     Every grid point is screened in floating point. All points at the edges and a random sample inside are then proved
-    exactly; figure and table distinguish both. Exit code 0 if something is certified and every edge point is proved.
+    exactly; figure and table distinguish both. Exit code 0 if some point is certified and every edge point is proved.
 
     Parameters
     ----------

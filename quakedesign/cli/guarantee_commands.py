@@ -69,9 +69,9 @@ def guarantee(
 ) -> int:
     """Prove bounds of slip, slip rate and pressure of the sampled loop, for all t >= 0.
 
-    For every friction law and all constant parameters of the box and every disturbance of the class, along the
-    reference, from rest or from initial errors. The controller is designed for the loop setup unless gains are given.
-    Exit code 0 only if every fault has a proof.
+    The bounds hold along the reference for every friction law and all constant parameters of the box, for every
+    disturbance of the class, and from rest or from bounded initial errors. The controller is designed for the loop
+    setup unless gains are given. Exit code 0 only if every fault has a proof.
 
     Parameters
     ----------
@@ -93,18 +93,18 @@ def guarantee(
         Measurement of the e-LQR: slip-and-rate; slip, from which a designed law estimates the slip rate; or
         differentiator (implicit, n_d = 2, any n_f): its smallest λ_d is printed.
     disturbance_class
-        amplitude: any disturbance of the fault's amplitude; rate: also with the fault's rate of change, starting at 0.
+        amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of change is bounded too.
     plant
         stick-slip: friction holds the fault at rest, and it never slips backward (designed e-LQR or sliding mode, exact
-        slip rate, a pressure that acts at once); printed: the plant without stick, continued to negative slip rates. By
-        default the first where it has a proof, else the second.
+        slip rate, a pressure without delay); printed: the plant without stick, continued to negative slip rates. By
+        default stick-slip where it has a proof, else printed.
     stress
         Rate-and-state faults (slow sliding, e-LQR through a diffusion path or a lag): bound of the shear stress
-        disturbance, such as '25 kPa'; by default the largest that the design withstands.
+        disturbance, such as '25 kPa'; by default about the largest with a guarantee.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     accept_poor_fit
-        Continue although the record of the fault does not explain its friction or leaves it open; results are labelled.
+        Continue although the laboratory record does not support the friction law of the fault; results are labelled.
     workers
         Number of processes for several faults.
     out
@@ -209,17 +209,19 @@ def blocks(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Say whether one block may stand for a fault: what is proved when it is cut into several blocks.
+    """Check whether one block is an adequate model of a fault: guarantees of the fault cut into several blocks.
 
-    Each block has its own friction law of the box and its own disturbance, with springs between neighbours; a law is
+    Each block has its own friction law of the box and its own disturbance. Springs connect neighbours. A law is
     designed for each number of blocks. Exit code 0 only if every number of blocks has a proof.
 
     Parameters
     ----------
-    most, least
-        Numbers of blocks, from the least to the most.
+    most
+        Largest number of blocks.
+    least
+        Smallest number of blocks.
     wells
-        one well for all blocks, whose law measures the means of slip and slip rate; or a well for each.
+        one: one well for all blocks, whose law measures the means of slip and slip rate; each: a well for each block.
     coupling
         Stiffness of a spring over the mass of a block in 1/s^2; that of elastic strips by default.
     step
@@ -264,10 +266,10 @@ def limits(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Give performance limits of every controller on a fault, and what a designed controller is proved to reach.
+    """Give performance limits of every controller on a fault, with the proved bounds of a designed controller.
 
-    Smallest slip-rate error, longest T_s, delay and diffusion time, farthest well and smallest withdrawal, for any
-    disturbance of the fault's amplitude.
+    The limits are the smallest slip-rate error, the longest T_s, delay and diffusion time, the farthest well and the
+    smallest withdrawal, for any disturbance bounded by the fault's amplitude.
 
     Parameters
     ----------
@@ -278,7 +280,7 @@ def limits(
         the slip-rate error of every controller.
     stress
         Rate-and-state faults (limits of the plant linearised about slow sliding): bound of the shear stress
-        disturbance, such as '25 kPa'; by default the largest that a design withstands.
+        disturbance, such as '25 kPa'; by default about the largest with a guarantee.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c in the proofs, such as 0.1; the limits are those of
         the nominal values.

@@ -184,7 +184,7 @@ class Output:
     json
         Print JSON in SI units.
     quiet
-        Print no text and no progress; the exit code is the answer.
+        Print no text and no progress; the exit code gives the result.
     log_level
         Messages on stderr: info for every step, debug for all progress.
     no_cache
@@ -232,18 +232,18 @@ class LawOptions:
     Parameters
     ----------
     controller
-        cta, dia or elqr, or your own law as module:Class; none where a command runs without control.
+        cta, dia or elqr, or your own law as module:Class; none for a run without control, where the command has one.
     gains
         published, designed (for the T_s, delay, lag and diffusion of the command), continuous (designed in continuous
-        time), or the gains of the law (λ = 1, divisor μ_res·N̂_min). Rate-and-state faults: designed.
+        time), or the numbers of the gains (λ = 1, divisor μ_res·N̂_min). Rate-and-state faults: designed.
     scale
         λ of a sliding mode instead of that of the gains, decimal or p/q.
     feedforward
         none, nominal or centred: feed-forward of a sliding mode from the known plant; not with designed gains.
     certificate
-        Certificate file of guarantee --out instead of the options above: its law runs with its T_s, limit, noise,
-        delay, lag and diffusion path. In slow sliding the shear stress is a sine of the certified amplitude unless
-        --stress is given.
+        Certificate file of guarantee --out instead of the options above. The law runs with the T_s, pressure limit at
+        rest, noise, delay, lag and diffusion path of the file. In slow sliding the shear stress is a sine of the
+        certified amplitude unless --stress is given.
     law
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) instead of the options above.
     """
@@ -318,11 +318,11 @@ class RunOptions:
     step
         Length of one step; the fault's sampling time by default.
     duration
-        The operation time by default. Without a controller the fault runs under its own disturbance.
+        Duration of the run; the operation time by default. The disturbance of the fault acts with and without control.
     substeps
         Integrator steps per sample.
     drift
-        Velocity of the far end, such as '3 cm/year'; by default none, for rate-and-state faults the reference rate.
+        Loading velocity, such as '3 cm/year'; by default 0, for rate-and-state faults the reference rate.
     perturbation
         Extra disturbance in m/s^2: an expression of slip, slip_rate and time.
     """
@@ -556,11 +556,11 @@ class SensorOptions(EstimateOptions):
         Standard deviation of Gaussian noise of the measured slip, such as '1 um'. --slip-noise of guarantee and design
         is a bound.
     rate_noise
-        The same of the slip rate, such as '1 um/s'.
+        Standard deviation of Gaussian noise of the measured slip rate, such as '1 um/s'.
     bandwidth
         Bandwidth of the transducer before a differentiator, such as '100 Hz'.
     slip_quantum
-        Resolution of this transducer, such as '0.15 um'.
+        Resolution of the transducer, such as '0.15 um'.
     """
 
     slip_noise: Annotated[Metres, Parameter(name="--slip-noise-deviation")] = 0.0
@@ -629,19 +629,19 @@ class StateOptions:
     Parameters
     ----------
     pressure
-        '5 MPa'; or times and pressures, linear between them, a time twice for a step: '0 s: 0 MPa, 1 day: 0 MPa, 1 day:
-        5 MPa'; or FILE.csv with columns 'time [s]' and 'pressure [Pa]' in any units.
+        '5 MPa'; or pressures at times, linear in between, with a step at a repeated time: '0 s: 0 MPa, 1 day: 0 MPa,
+        1 day: 5 MPa'; or FILE.csv with columns 'time [s]' and 'pressure [Pa]' in any units.
     start
         Initial state: steady (sliding; default), locked (far end at rest for --hold) or late (in the seismic cycle, see
         --share).
     hold
-        Time at rest of the far end before the run, such as '100 year'.
+        Time before the run in which the far end is at rest, such as '100 year'.
     share
         Fraction of the recurrence interval before the run; 0.9 by default.
     stress
         With --controller elqr: amplitude of a sinusoidal shear stress, such as '20 kPa'.
     stress_period
-        Its period; by default that of the tide, 12.42 hours.
+        Period of this stress; by default that of the tide, 12.42 hours.
     """
 
     pressure: str | None = None
@@ -728,7 +728,7 @@ class SpreadOptions:
     stress
         Bound of a sinusoidal shear stress, such as '25 kPa'; by default the certified bound of the design.
     stress_period
-        Its period; by default that of the tide, 12.42 hours.
+        Period of this stress; by default that of the tide, 12.42 hours.
     """
 
     spread: str = "0"

@@ -50,8 +50,8 @@ def certify(
         Sliding mode: lipschitz (largest bound on |h'|; with --lipschitz also the smallest scale for it), beta (upper
         end of its range), beta-factor (f in [b/f, b·f]) or decay (with a bound of the settling time).
     gain_range
-        Sliding mode: b_m and b_M, the range of the control coefficient β; 1 1 by default. One value b twice to maximise
-        the range.
+        Sliding mode: b_m and b_M, the range of the control coefficient β; 1 1 by default. Give one
+        value b twice to maximise the range.
     box
         e-LQR: uncertainty box, paper or ten-percent.
     feedback

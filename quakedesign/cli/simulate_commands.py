@@ -217,15 +217,15 @@ def sampling(
 ) -> int:
     """Show effects of sampling: every scheme with the published controllers, orders of accuracy, sensitivities.
 
-    Writes results.json and figures. Errors count after a quarter of each run; runs with noise last a sixteenth of the
-    task.
+    Writes results.json and figures. Errors are evaluated after the first quarter of each run. Runs with noise last a
+    sixteenth of the task.
 
     Parameters
     ----------
     controller
         cta, dia or elqr.
     gains
-        designed (in continuous time), published, or the gains of the law (λ = 1, divisor μ_res·N̂_min).
+        designed (in continuous time), published, or the numbers of the gains (λ = 1, divisor μ_res·N̂_min).
     scale
         Further values of λ for a sliding mode, decimal or p/q.
     schemes

@@ -32,13 +32,13 @@ _PLAIN: dict[str, dict[str, str]] = {
     "1/s": {"1/s": "1"},
     "1/s^2": {"1/s^2": "1"},
 }
-"""Sizes of the usual units in SI units: pint, which knows all others and says the same of these, loads for half a
-second."""
+"""Sizes of common units in SI units. pint knows these with the same values, and all others, but takes half a second
+to load."""
 _WRITTEN = re.compile(r"([+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d{1,3})?)(?: ([A-Za-z1][A-Za-z0-9/^]*))?", re.ASCII)
 
 
 def _plain(quantity: Any, unit: str) -> Decimal | None:
-    """Value of a number with a usual unit; None for anything else."""
+    """Value of a number with a common unit; None for any other text."""
     match = _WRITTEN.fullmatch(quantity) if isinstance(quantity, str) and len(quantity) <= 100 else None
     size = _PLAIN.get(unit, {}).get(match[2] or "") if match else None
     return Decimal(match[1]) * Decimal(size) if match and size else None
@@ -50,7 +50,7 @@ _WITHIN_A_UNIT = re.compile(r"^1\s*(?=/)|(\^|\*\*)\s*[+-]?\d+|(?<=[A-Za-z])\d+",
 
 @cache
 def _words_of_units() -> frozenset[str]:
-    """Every word of the definitions that come with pint, names of units and prefixes among them; none if not found."""
+    """Every word of the definition file of pint, including names of units and prefixes; empty without the file."""
     spec = find_spec("pint")
     files = Path(spec.origin).parent.glob("*_en.txt") if spec and spec.origin else ()
     texts = (re.sub("#.*", "", file.read_text(encoding="utf-8")) for file in files)
@@ -58,7 +58,7 @@ def _words_of_units() -> frozenset[str]:
 
 
 def _is_no_unit(written: str) -> bool:
-    """Whether a word is none that pint can know, a name, one after a prefix, or its plural: told without loading it."""
+    """Whether a word is no unit of pint (name, name with a prefix, or plural), decided without loading pint."""
     known, singular = _words_of_units(), written.removesuffix("s")
     ends = {end[i:] for end in (written, singular) for i in range(len(end)) if not i or end[:i] in known}
     return bool(known) and written.isascii() and written.isalpha() and known.isdisjoint(ends)
@@ -72,7 +72,7 @@ def _registry() -> Any:
 
 
 def si_value(quantity: Any, unit: str, name: str) -> float:
-    """Value in an SI unit of a text such as ``"30 GPa"``; converted in decimal arithmetic, so nothing is rounded twice.
+    """Value in an SI unit of a text such as ``"30 GPa"``; conversion in decimal arithmetic, rounded once.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
     unit : str
         SI unit, empty for dimensionless.
     name : str
-        What the quantity is, for the message.
+        Name of the quantity in messages.
 
     Raises
     ------
     UnitError
-        For an unknown unit, a wrong dimension, a missing unit or no number at all; and for hertz where an
-        angular frequency is wanted, because pint takes 1 Hz for 1 rad/s.
+        For an unknown unit, a wrong dimension, a missing unit or no number; and for hertz where an angular
+        frequency is required, because pint converts 1 Hz to 1 rad/s.
     """
     if (known := _plain(quantity, unit)) is not None:
         return float(known)
@@ -139,7 +139,7 @@ def units_of(kind: Any) -> dict[str, str]:
 
 
 def exact_value(quantity: str | float | Fraction, unit: str, name: str) -> Fraction:
-    """Exact number of a quantity: one in the SI unit, decimal or p/q, or a text with a unit.
+    """Exact value of a quantity, given in the SI unit (number, decimal or p/q), or as a text with a unit.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def _plain_number(number: float, unit: str, received: str) -> float:
 
 
 def _is_plural_of_a_symbol(word: str) -> bool:
-    """Whether pint made a plural of a unit's symbol, as MPas of MPa; hours are the plural of a name."""
+    """Whether pint reads a word as the plural of a symbol, as MPas of MPa; hours is the plural of a name."""
     if not word.endswith("s"):
         return False
     for _, unit, _ in _registry().parse_unit_name(word)[:1]:

@@ -17,7 +17,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound, exact_text, float_above, rational, shortly
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS
-from quakedesign.guarantees.exact.impossibility import SlidingPush, SmallestPeak, longest_diffusion, smallest_peak
+from quakedesign.guarantees.exact.limit_theorems import SlidingPush, SmallestPeak, longest_diffusion, smallest_peak
 from quakedesign.guarantees.exact.loop import Around, Held
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.statement import Guarantee, SlidingGuarantee, guarantee

@@ -8,7 +8,7 @@ from typing import Any
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, rational
 from quakedesign.fault import Fault
-from quakedesign.guarantees.exact.impossibility import smallest_stick_slip_rate
+from quakedesign.guarantees.exact.limit_theorems import smallest_stick_slip_rate
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.guarantees.loop_result import LoopResult

@@ -61,7 +61,7 @@ class Sampling:
         From measurement to valve, time constant of the pump and L²/D of the rock [s] for which it is meant: between law
         and fault in every run, and in `loop_transfer`, by default.
     longest : Fraction
-        By no clock: each sample comes T_s to this after the last [s], in `simulate`; 0 where a clock tells.
+        Longest sampling interval [s] of aperiodic sampling in `simulate`, T_s the shortest; 0 for periodic sampling.
     """
 
     step: Fraction
@@ -96,7 +96,7 @@ class BaseGains(Generic[L]):
         [m/s³]
     source : str
     literature : bool
-        False for gains that were found with this package.
+        False for gains that were computed with this package.
     """
 
     law: L
@@ -142,7 +142,7 @@ class Law(ABC):
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
-        if "__repr__" not in vars(cls):  # dataclasses write one of their own otherwise
+        if "__repr__" not in vars(cls):  # otherwise a dataclass defines its own
             type.__setattr__(cls, "__repr__", Law.__repr__)
 
     def __repr__(self) -> str:
@@ -214,7 +214,7 @@ class Law(ABC):
     ) -> Mapping[str, Mapping[str, Fraction]] | None:
         """Suggest a Filippov equilibrium away from the origin, as ``parameters``, ``point`` and ``weights``.
 
-        Only a suggestion, to be checked in exact arithmetic; None where the law knows of none.
+        The suggestion is to be checked in exact arithmetic; None if the law has none.
         """
         return None
 
@@ -229,8 +229,8 @@ Designed = TypeVar("Designed", covariant=True)
 class DesignProblem(Protocol[Designed]):
     """Design problem of a law for a fault, with the services that its design may use.
 
-    Searches for proofs stand behind it, so that a law need not know them; see `quakedesign.synthesis.design`, also for
-    its options ``objective``, ``continuous``, ``feedforward``, ``measured`` and ``noise``.
+    It gives a law access to the searches for proofs without importing them. The options ``objective``, ``continuous``,
+    ``feedforward``, ``measured`` and ``noise`` are those of `quakedesign.synthesis.design`.
     """
 
     @property
@@ -305,7 +305,7 @@ class Controller(Law):
 
     @classmethod
     def for_authority(cls, values: "tuple[str | float | Fraction, ...]", authority: Fraction) -> Self:
-        """Return a law from gains in order, as they are given for a fault with the least μN̂ of `authority` [m²/kg]."""
+        """Return a law from gains in order, for a fault whose least μN̂ is `authority` [m²/kg]."""
         return cls.from_values(values)
 
     def scaled(self, scale: str | float | Fraction) -> Self:
@@ -326,11 +326,11 @@ class Controller(Law):
 
     @classmethod
     def design(cls, problem: DesignProblem[Designed]) -> Designed:
-        """Return gains with a proof for a fault, by the method of the law's family; a law may have a way of its own."""
+        """Return gains with a proof for a fault, by the method of the law's family; a law may override it."""
         return problem.by_method(cls)
 
     def premises(self, fault: Fault, certificate: Any) -> tuple[Any, ...]:
-        """Premises of its proofs on a fault beside those of its family, see `quakedesign.lyapunov.exact.premises`."""
+        """Premises of its proofs on a fault besides those of its family (`quakedesign.lyapunov.exact.premises`)."""
         return ()
 
     @abstractmethod

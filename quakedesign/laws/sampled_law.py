@@ -17,7 +17,7 @@ from quakedesign.exact import fraction_of, shortly
 from quakedesign.laws.implicit_root import ImplicitRoot
 
 # ----------------------------------------------------------------------
-# Linear laws that run once per sample, as exact matrices.
+# Sampled linear laws as exact matrices.
 
 Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
@@ -32,7 +32,7 @@ MOST_STATES = 12
 class LinearLaw:
     """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z from 0 by default.
 
-    With an implicit root the law is linear but for w, the end of an implicit step from e1 and e2, and y = (e1, e2, w).
+    With an implicit root the law is linear in y = (e1, e2, w), where w solves an implicit step from e1 and e2.
 
     Attributes
     ----------
@@ -47,13 +47,13 @@ class LinearLaw:
     feedback : (Fraction, Fraction)
         D [Pa/m, Pa·s/m]; a third entry for w [Pa·s/m].
     root : ImplicitRoot, optional
-        What w solves; None for a linear law.
+        Equation of w; None for a linear law.
     first : tuple of rows
         S, two columns: z = S(e1, e2) at the first sample, as they are measured then; without rows 0.
     applied : tuple of Fraction
-        What z⁺ gains per Pa that is applied beyond p, where limits cut it off; without entries the law is not told.
+        Change of z⁺ per Pa of (applied pressure − p) under limits; empty if the law has no anti-windup.
     of_reference : tuple of rows
-        Two columns, for r [m] and r′ [m/s]: what they add to z⁺, row by row, and in a last row to p [Pa]. A law that
+        Two columns, for r [m] and r′ [m/s]: terms of z⁺, row by row, and in a last row of p [Pa]. A law that
         measures the slip x1 = e1 + r has the same entries here as in `measured` and `feedback`. Without rows 0.
 
     Raises
@@ -94,7 +94,7 @@ class LinearLaw:
 
     @property
     def of_slip_alone(self) -> bool:
-        """Whether it does without the slip rate."""
+        """Whether the law does not use the slip rate."""
         return self.root is None and not any(row[1] for row in (*self.measured, self.feedback))
 
 
@@ -143,13 +143,13 @@ class Prediction:
     Attributes
     ----------
     of_slip, of_rate : Fraction
-        Of e1 and e2 now, for e2 at the next sample.
+        Coefficients of the present e1 and e2 for e2 at the next sample.
     of_pushes : tuple of Fraction
-        γ_j [s]: what βb·p + d adds to that, p being what was asked for j samples ago, from 0 on.
+        γ_j [s]: coefficients of βb·p + d for it, p being the pressure commanded j samples ago, from j = 0 on.
     ahead : tuple of rows
-        Of e1 and e2 now, for both when the pressure asked for now arrives; the unit matrix without delay.
+        Coefficients of the present e1 and e2 for both when the present command arrives; the unit matrix without delay.
     ahead_of_pushes : tuple of (Fraction, Fraction)
-        What βb·p + d adds to these [s², s], p being what was asked for j samples ago, from 1 on.
+        Coefficients of βb·p + d for these [s², s], p being the pressure commanded j samples ago, from j = 1 on.
 
     Raises
     ------
@@ -173,7 +173,7 @@ class Prediction:
 
 
 def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
-    """The e-LQR as it is sampled: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1⁺ = ξ1 + T_s·e1, ξ2⁺ = ξ2 + T_s·ξ1 if k4 ≠ 0.
+    """The sampled e-LQR: p = −k1e1 − k2e2 − k3ξ1 − k4ξ2, ξ1⁺ = ξ1 + T_s·e1, ξ2⁺ = ξ2 + T_s·ξ1 if k4 ≠ 0.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
         raise ParameterError(f"gains of summed_integrals must be four. Received {len(gains)}. Give k1 to k4.")
     k1, k2, k3, k4 = gains
     zero, one = Fraction(0), Fraction(1)
-    if not k4:  # a PID, of which ξ2 is no part
+    if not k4:  # a PID has no ξ2
         return LinearLaw(
             states=("xi1",), update=((one,),), measured=((step, zero),), output=(-k3,), feedback=(-k1, -k2)
         )
@@ -209,10 +209,10 @@ def disturbance_estimate(
 ) -> LinearLaw:
     """Feedback of slip and slip rate, with an estimate d of the disturbance over the last period.
 
-    d ← d + a(e2 − π)/Σγ_j, p = −k1ê1 − k2ê2 − d/(βb) with ê = e as expected when p arrives, and
+    d ← d + a(e2 − π)/Σγ_j, p = −k1ê1 − k2ê2 − d/(βb) with ê the prediction of e when p arrives, and
     π ← of_slip·e1 + of_rate·e2 + Σγ_j(βb·p_j + d). The estimate follows the innovation of the slip rate and has no
-    trend, so that it does not wind up while the fault sticks. States: π [m/s], d [m/s²], and the pressures p_1, p_2 …
-    asked for before [Pa].
+    trend, so that it does not wind up while the fault is at rest. States: π [m/s], d [m/s²], and the earlier commands
+    p_1, p_2 … [Pa].
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def _delayed(
     of_pushes: Matrix,
     prediction: "Prediction | ErrorPrediction",
 ) -> LinearLaw:
-    """Law of rows that act on its states and then on e1 and e2; pressures on their way move one place on."""
+    """Law from rows for its states, then e1 and e2; the delay line shifts by one place."""
     require_gain(gain)
     one, late = Fraction(1), len(prediction.ahead_of_pushes)
     waiting = [unit_row(len(level), {len(names) + j: one}) for j in range(late)]
@@ -302,7 +302,7 @@ def combined(*parts: tuple[Fraction, Row]) -> Row:
 
 
 def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
-    """Steady states z of a law with zero errors: Mz = v and Cz = p; 0 where any will do.
+    """Steady states z of a law with zero errors: Mz = v and Cz = p; free components are 0.
 
     Raises
     ------
@@ -324,7 +324,7 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
 
 
 # ----------------------------------------------------------------------
-# A law of samples that measures the slip alone: an observer of both errors and of the disturbance.
+# Sampled law that measures the slip alone: observer of both errors and of the disturbance.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -386,7 +386,7 @@ def slip_observer(
 
 
 # ----------------------------------------------------------------------
-# Laws that carry a model of what stands between their pressure and the fault.
+# Laws with a model of the path between their pressure and the fault.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -398,16 +398,16 @@ class PathModel:
     of_errors : tuple of rows
         Φ: of e1 and e2 now, for both at the next sample.
     of_pressures : tuple of rows
-        m_i [s², s]: what βb·q_i adds to either, q_i being the pressures of the path.
+        m_i [s², s]: coefficients of βb·q_i for either, q_i being the pressures of the path.
     of_asked : tuple of Fraction
-        n [s², s]: what βb·p adds to either, p being what is asked for now.
+        n [s², s]: coefficients of βb·p for either, p being the present command.
     kept : tuple of rows
         R with q⁺ = Rq + (1 − R1)p, so that q = p where p is constant.
 
     Raises
     ------
     ParameterError
-        When sizes do not fit, or no pressure moves the fault.
+        When sizes do not fit, or the pressure has no effect on the fault.
     """
 
     of_errors: Matrix
@@ -432,7 +432,7 @@ class PathModel:
 
     @property
     def of_constant(self) -> Row:
-        """Γ [s², s]: what βb·p adds where p is constant."""
+        """Γ [s², s]: coefficients of βb·p for constant p."""
         return tuple(sum(row, own) for row, own in zip(self.of_pressures, self.of_asked, strict=True))
 
 
@@ -440,7 +440,7 @@ def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: 
     """Feedback of slip, slip rate and path pressures, with an estimate d of the disturbance.
 
     d ← d + a(e2 − π)/Γ2, p = −k1e1 − k2e2 − Σ k_i(q_i + d/(βb)) − d/(βb), π ← Φ2e + βb(Σ m_2iq_i + n2p) + Γ2d, and q ←
-    Rq + (1 − R1)p, which is not measured but known. States: π [m/s], d and βb·q [m/s²], for numbers of one size.
+    Rq + (1 − R1)p, which is computed, not measured. States: π [m/s], d and βb·q [m/s²], of similar magnitude.
 
     Parameters
     ----------
@@ -518,19 +518,19 @@ def _through(
 
 
 # ----------------------------------------------------------------------
-# A limit of the pressure while the fault rests, so that a law does not wind up while friction holds it.
+# Limit of the pressure while the fault is at rest, against windup of the law.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class RestLimit:
-    """Limit at rest: the pressure is at most a width below any earlier one while the fault rests.
+    """Limit at rest: lower limit of the pressure relative to all earlier pressures while the fault is at rest.
 
-    And, beyond `width`, than `per_slip` for what the reference moved since. A loop whose pressure stays within P of p*,
-    where dp*/dr is at most `per_slip`, never reaches a limit with a width of 2P: it takes nothing from what is proved.
-    Where friction holds the fault, what is measured does not answer, and an integral goes on; ahead of its reference it
-    clamps a fault that rests anyway, without end. Then the pressure is cut off here, and the law is told. As soon as
-    the fault moves this is over, whatever moves it. Pressures that are proved never to be passed are cut off as well,
-    at rest and after it, unless the fault moves faster than is proved: then the law is free.
+    The pressure is at least any earlier one minus `width` minus `per_slip` times the motion of the reference since. A
+    loop whose pressure stays within P of p*, with dp*/dr at most `per_slip`, never reaches a limit with a width of 2P,
+    so that the limit does not affect a guarantee. While friction holds the fault, measurements do not respond to the
+    pressure, and an integral ahead of the reference would lower the pressure without end. The limit then saturates the
+    pressure, with anti-windup of the law. It ends when the fault moves, whatever moves it. The proved range of pressure
+    limits the pressure too, at rest and after it, unless the fault moves faster than is proved.
 
     Attributes
     ----------
@@ -539,14 +539,14 @@ class RestLimit:
     per_slip : Fraction
         [Pa/m].
     resolution : Fraction
-        Slip between two samples, as it is measured, up to which a fault rests [m].
+        Largest measured slip between two samples of a fault at rest [m].
     least, largest : Fraction, optional
-        Pressures that are never passed where the loop is as it is proved [Pa]; both or none.
+        Proved range of the pressure [Pa]; both or none.
     fastest : Fraction
-        Slip between two samples, as it is measured, up to which they are not passed [m].
+        Largest measured slip between two samples for which this range applies [m].
     STATES : tuple of str
-        Largest p + per_slip·r of all samples so far [Pa], r being the reference, which never falls, and the slip that
-        was measured last [m].
+        Largest p + per_slip·r of all samples so far [Pa], r being the reference, which never decreases, and the last
+        measured slip [m].
 
     Raises
     ------

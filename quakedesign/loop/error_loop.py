@@ -26,10 +26,10 @@ from quakedesign.loop.layer import MODES, Layer
 from quakedesign.loop.periodic import EVEN, Fading, Instants, PeriodicLoop, Pulse, Segment
 
 # ----------------------------------------------------------------------
-# A linear law around a fault: sample, hold, delay, lag, and diffusion between well and fault.
+# Sampled linear law on a fault: sample, zero-order hold, delay, lag, and diffusion between well and fault.
 
 MOST_PERIODS = 8
-SHORTEST = 32  # parts of a step: the modes of a faster layer are gone sooner than bounds can follow
+SHORTEST = 32  # parts of a step: faster modes of a layer decay within less than the resolution of the bounds
 BENT = tuple(
     Fraction(v, 128) for v in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)
 )  # as a lag and the modes of a layer do
@@ -48,7 +48,7 @@ def held_loop(
     noisy: Collection[str] = (),
     instants: Instants | None = None,
 ) -> PeriodicLoop:
-    """The error loop of a fault about p*, the pressure that holds it at rest at the reference.
+    """Error loop of a fault about p*, the equilibrium pressure at the reference.
 
     Order of events: at every multiple of T_s the law measures e1 and e2, finds p, and updates its states; p reaches the
     valve after the delay and stays for T_s; the pressure in the well follows the valve with the lag, that in the fault
@@ -86,7 +86,7 @@ def held_loop(
     noisy : collection of str
         Which of ``slip_noise`` and ``rate_noise`` are inputs.
     instants : Instants, optional
-        How far they may be off; None where they are not and the last step does not matter. Not through a layer.
+        Timing errors; None for exact timing if the last step is not needed. Not with a layer.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def held_loop(
 
 
 def _off_schedule(loop: PeriodicLoop, instants: Instants, path: "_Path") -> PeriodicLoop:
-    """A loop whose last state is the valve's last step, with what is early and late."""
+    """Loop whose last state is the last step of the valve, with the inputs of early and late pressures."""
     instants.require_within(path.step, path.part)
     n, pushed, off = path.size, loop.flow[1][path.valve], instants.arrived
     outputs, pulses, at_once = {**loop.outputs, "stepped": _unit(n, n - 1)}, {}, dict[tuple[str, str], Fraction]()
@@ -159,7 +159,7 @@ def starts(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Path:
-    """The way of a pressure from a law with so many states of its own to the fault, and its places in the loop."""
+    """Path of the pressure from a law with a number of states to the fault, with the indices of its states."""
 
     own: int
     step: Fraction
@@ -194,22 +194,22 @@ class _Path:
 
     @property
     def part(self) -> Fraction:
-        """From a sample to the arrival of a pressure between two [s]; 0 where it arrives with a sample."""
+        """Time from a sample to the arrival of a pressure [s]; 0 if it arrives with a sample."""
         return self.delay % self.step
 
     @property
     def waiting(self) -> int:
-        """Pressures on their way."""
+        """Number of pressures in the delay line."""
         return int(self.delay // self.step) + (1 if self.part else 0)
 
     @property
     def valve(self) -> int:
-        """Place of the valve's pressure."""
+        """Index of the pressure at the valve."""
         return 2 + self.own + self.waiting
 
     @property
     def behind(self) -> tuple[str, ...]:
-        """What follows the valve: the well, the modes of a layer, and its last step where that counts."""
+        """States behind the valve: the well, the modes of a layer, and the last step of the valve if needed."""
         layer = [f"layer{i}" for i in range(MODES)] * (self.diffusion > 0)
         stepped = self.watched or (self.diffusion > 0 and not self.lag)
         return (*["behind"] * (self.lag > 0), *layer, *["stepped"] * stepped)
@@ -221,7 +221,7 @@ class _Path:
 
     @property
     def modes(self) -> dict[int, int]:
-        """Places of the modes of the layer, with their numbers."""
+        """Indices of the modes of the layer, with their numbers."""
         first = self.valve + (2 if self.lag else 1)
         return {first + i: i for i in range(MODES if self.diffusion else 0)}
 
@@ -231,7 +231,7 @@ def _unit(n: int, place: int) -> Row:
 
 
 def _drift(law: LinearLaw, authority: Fraction, path: _Path) -> Row:
-    """What a change of p* does to the states, which are counted from those that ask for p*."""
+    """Effect of a change of p* on the states, which are relative to those at which the law commands p*."""
     still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
     steady = steady_states(still, law.output, (Fraction(0),) * path.own, Fraction(1))
     zero, pressures = Fraction(0), [Fraction(-1)] * (path.waiting + 1)
@@ -239,7 +239,7 @@ def _drift(law: LinearLaw, authority: Fraction, path: _Path) -> Row:
 
 
 def _reference_drift(law: LinearLaw, path: _Path) -> Row:
-    """What a change of r does to the states, which are counted from those that ask for p* at r."""
+    """Effect of a change of r on the states, which are relative to those at which the law commands p* at r."""
     still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
     rates = tuple(-row[0] for row in law.of_reference[:-1])
     moved = steady_states(still, law.output, rates, -law.of_reference[-1][0])
@@ -248,7 +248,7 @@ def _reference_drift(law: LinearLaw, path: _Path) -> Row:
 
 
 def _push(path: _Path) -> Row:
-    """What the states say of the fault's pressure."""
+    """Pressure in the fault as a row of the states."""
     push = [Fraction(i == path.valve or (i == path.valve + 1 and path.lag > 0)) for i in range(path.size)]
     for place, number in path.modes.items():
         push[place] = Layer(time=path.diffusion).share(number)
@@ -271,7 +271,7 @@ def _flow(path: _Path, push: Row, model: NominalModel, gain: Fraction) -> Matrix
 
 
 def _left_out(path: _Path) -> tuple[dict[str, Row], dict[str, Fading]]:
-    """Bound of what the modes of a layer leave out, as an output, and how it fades where the well steps."""
+    """Output that bounds the truncation error of the modes of a layer, and its decay after a step of the well."""
     if not path.diffusion:
         return {}, {}
     n, layer = path.size, Layer(time=path.diffusion)
@@ -285,7 +285,7 @@ def _left_out(path: _Path) -> tuple[dict[str, Row], dict[str, Fading]]:
 
 
 def _events(law: LinearLaw, authority: Fraction, path: _Path) -> tuple[Matrix, Matrix]:
-    """The sample, with columns more for w and r′, and the arrival of a pressure between samples, if there is one."""
+    """Jump of a sample, with further columns for w and r′, and of a pressure that arrives between samples, if any."""
     n, valve, first, zero = path.size, path.valve, 2 + path.own, Fraction(0)
     jump = [list(_unit(n + 2, i)) for i in range(n)]
     asked = [zero] * (n + 2)
@@ -306,7 +306,7 @@ def _events(law: LinearLaw, authority: Fraction, path: _Path) -> tuple[Matrix, M
 
 
 def _stepped(jump: list[list[Fraction]], path: _Path) -> Matrix:
-    """What follows the valve's pressure at once stays where it is while that jumps; its step is kept."""
+    """Leave the states behind the valve unchanged while its pressure jumps, and store its step."""
     step = [v - (j == path.valve) for j, v in enumerate(jump[path.valve])]
     for place, name in enumerate(path.behind, path.valve + 1):
         if name == "stepped":
@@ -317,7 +317,7 @@ def _stepped(jump: list[list[Fraction]], path: _Path) -> Matrix:
 
 
 # ----------------------------------------------------------------------
-# A linear law whose pressure acts at once: the loop as an idealisation in continuous time, without samples.
+# Linear law in continuous time with a pressure without delay: idealised loop without sampling.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -435,7 +435,7 @@ def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction
 
 
 # ----------------------------------------------------------------------
-# A linear law of samples around slow sliding of a fault with rate-and-state friction, without inertia.
+# Sampled linear law about slow sliding of a fault with rate-and-state friction, without inertia.
 
 StateLaw = Literal["ageing", "slip"]
 _ONE = Fraction(1)
@@ -459,7 +459,7 @@ class SlidingModel:
     state_slope : Fraction
         c_z [-]: of ageing in place of 1 − e^{−z} over z; of the slip law in place of e^y.
     strength : Fraction
-        What a change of y takes, N·a and damping [Pa].
+        Stress per change of y: N·a and damping [Pa].
     weakening : Fraction
         N·b [Pa].
     direct, evolution : Fraction
@@ -506,8 +506,8 @@ def sliding_loop(
     [-] in x′ = V(cy + f) and, of ageing, in z′ = −ρ(cy + c_z·z + f), ``state`` h [-] in z′ = … − ρh, the ``drift``
     dp*/dt [Pa/s], and ``reference``, by how much of V the reference is faster [-], in x′ = … − V·it.
     Outputs: ``slip_error`` x [m], ``log_rate`` y, ``log_state`` z, ``ageing`` c_y·y + c_z·z, ``strength`` a·y + b·z,
-    ``push`` q [Pa], ``asked`` [Pa], what arrived at the valve less what p* needs, and with a layer ``left_out`` [Pa].
-    Those of y and q come without what e and what the layer leaves out add to them at once (`at_once`).
+    ``push`` q [Pa], ``asked`` [Pa], pressure at the valve less that for p*, and with a layer ``left_out`` [Pa].
+    The outputs of y and q exclude the direct feedthrough of e and of the truncation error (`at_once`).
 
     Raises
     ------

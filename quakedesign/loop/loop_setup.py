@@ -155,7 +155,7 @@ class LoopSetup:
         None,
     )
     measured: str = MEASURED[0]
-    delay: Fraction = quantity("s", "From the measurement to the pressure at the valve.")
+    delay: Fraction = quantity("s", "Delay from the measurement to the pressure at the valve.")
     lag: Fraction = quantity(
         "s",
         "Time constant between the valve and the fault, or the well where there is a diffusion path; a designed "
@@ -173,29 +173,29 @@ class LoopSetup:
     rate_noise: Fraction = quantity("m/s", "Bound of the measurement error of the slip rate at any time.")
     initial_slip: Fraction = quantity(
         "m",
-        "Bound of the initial slip, of either sign, such as '0.01 mm'; the law starts as from rest.",
+        "Bound of the initial slip, of either sign, such as '0.01 mm'; the law starts as if at rest.",
     )
     initial_slip_rate: Fraction = quantity(
         "m/s",
-        "The same of the slip rate, such as '0.1 mm/s'. Negative slip rates are those of the plant without stick.",
+        "Bound of the initial slip rate, such as '0.1 mm/s'; a negative one exists on the plant without stick only.",
     )
     jitter: Fraction = quantity(
         "s",
-        "Largest time by which a measurement, and its pressure, is early or late, such as '2 ms'.",
+        "Largest time by which a measurement and its pressure are early or late, such as '2 ms'.",
     )
-    delay_jitter: Fraction = quantity("s", "The same of the delay alone.")
+    delay_jitter: Fraction = quantity("s", "Largest time by which the pressure is early or late besides.")
     averaging_time: Fraction = quantity(
         "s",
-        "The law measures means of slip and slip rate over this time, up to each sample; the delay starts at its end.",
+        "The law measures means of slip and slip rate over this time before each sample; the delay starts there.",
     )
     longest_step: Fraction = quantity(
         "s",
-        "Aperiodic sampling: each sample comes T_s to this after the one before; the law does not know when.",
+        "Aperiodic sampling: longest interval between samples, T_s the shortest; the law does not know the intervals.",
     )
     saturation: Fraction | None = quantity(
         "Pa",
-        "Largest pressure of the pump, such as '20 MPa', and largest withdrawal unless that is given. A proof shows "
-        "that these limits are never reached.",
+        "Largest pressure of the pump, such as '20 MPa'; largest withdrawal too, unless --withdrawal is given. A proof "
+        "shows that these limits are never reached.",
         None,
     )
     withdrawal: Fraction | None = quantity(

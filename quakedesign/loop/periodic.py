@@ -8,7 +8,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 
 # ----------------------------------------------------------------------
-# A loop that flows and jumps with one period, in rationals.
+# Periodic loop of flows and jumps, in rationals.
 
 Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
@@ -26,7 +26,7 @@ class Segment:
     duration : Fraction
         [s], positive.
     ends, past_ends : tuple of Fraction
-        Where bounds cut the flow into pieces, for outputs and for what is past: shares of the duration from 0 to 1.
+        Ends of the pieces of the flow in bounds, of outputs and of past responses: shares of the duration, 0 to 1.
     """
 
     jump: Matrix
@@ -62,7 +62,7 @@ class Fading:
     floor: Fraction
 
     def weight(self, time: Fraction) -> Fraction:
-        """Bound of |w|/W a time θ [s] after the jump: e^x is more than the first terms of its sum."""
+        """Bound of |w|/W a time θ [s] after the jump, as e^x exceeds the first terms of its series."""
         x = self.rate * time
         return self.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24) + self.floor
 
@@ -71,8 +71,7 @@ class Fading:
 class Pulse:
     """An input b·w that acts only near the jump of a segment, before or after it: |w| ≤ W.
 
-    ∫|w| over the time before the jump, over `before`, and that over the time after it, over `after`, are at most W in
-    all.
+    With I₋ and I₊ the integrals of |w| before and after the jump, I₋/`before` + I₊/`after` ≤ W.
 
     Attributes
     ----------
@@ -81,9 +80,9 @@ class Pulse:
     first : int
         Number of the segment, from 0.
     early, late : Fraction
-        From so long before the jump until so long after it [s], within the segments that meet there.
+        Durations before and after the jump [s], within the segments that meet there.
     before, after : Fraction
-        [s].
+        Scales of the two integrals [s].
     """
 
     entry: Row
@@ -98,7 +97,7 @@ class Pulse:
 class PeriodicLoop:
     """x' = Ax + Σ b_i·w_i between jumps; segments repeat periodically for all t ≥ 0, the first at t = 0.
 
-    Without any segment there are no jumps: the flow never jumps.
+    Without segments the loop is a continuous flow.
 
     Attributes
     ----------
@@ -113,13 +112,13 @@ class PeriodicLoop:
     sampled : dict of str to tuple of Fraction
         j_i by the name of an input that adds j_i·w_i to the state once a period, with the jump of the first segment.
     fading : dict of str to Fading
-        Inputs of which only what a jump leaves is known.
+        Inputs that decay after a jump.
     pulses : dict of str to Pulse
-        Inputs that are there near a jump alone.
+        Inputs that act only near a jump.
     at_once : dict of (str, str) to Fraction
-        What an input of size 1 adds to an output at the same instant, besides, at most; by (output, input).
+        Bound of the direct feedthrough from an input of size 1 to an output, by (output, input).
     start : tuple of tuple of Fraction
-        Columns s_i of the box from which it starts: x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, before the first jump; none for 0.
+        Columns s_i of the box of initial states: x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, before the first jump; empty for 0.
     """
 
     states: tuple[str, ...]
@@ -144,7 +143,7 @@ class PeriodicLoop:
 
 
 # ----------------------------------------------------------------------
-# How far the instants of a loop of samples are off its schedule.
+# Timing errors of the samples and pressures of a loop.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,11 +153,11 @@ class Instants:
     Attributes
     ----------
     measured : Fraction
-        By how much a measurement is early or late, at most [s]; the first one is at its instant.
+        Largest timing error of a measurement [s]; the first one is exact.
     arrived : Fraction
-        By how much the valve's pressure begins to change early or late, at most [s].
+        Largest timing error of the begin of a change of the pressure at the valve [s].
     ramp : Fraction
-        Time in which it is what was asked for, at most [s]; until then it changes no slower than |change|/ramp.
+        Longest duration of a change of the pressure at the valve [s]; its rate is at least |change|/ramp.
     """
 
     measured: Fraction = Fraction(0)

@@ -1,6 +1,6 @@
 """Ranges and inputs of the error loop from the data of a fault, by rational inequalities.
 
-About p*(t), the pressure that would hold the fault at rest at the reference r(t), the error e = x − (r, r′) follows
+About p*(t), the pressure of equilibrium at rest at the reference r(t), the error e = x − (r, r′) satisfies
 
     e1′ = e2,   e2′ = s·e1 − w·e2 + β·b·(p − p*) + φ − w·r′ − r″.
 
@@ -64,9 +64,9 @@ class FaultPlant:
     amplitude : Fraction
         Bound of the disturbance φ(t) [m/s²].
     change : Fraction or None
-        Bound of |φ′| [m/s³], for a disturbance that starts at 0 and has one; None: φ is any measurable function.
+        Bound of |φ′| [m/s³] of a disturbance that starts at 0 (class rate); None: φ is any measurable function.
     growths : (Fraction, Fraction)
-        φ1 [1/s²] and φ2 [1/s]: what the disturbance adds per slip and per slip rate.
+        φ1 [1/s²] and φ2 [1/s]: slopes of the disturbance in slip and slip rate.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Summary of a comparison: the answer in a sentence, one table, and what else matters, for terminal and report."""
+"""Summary of a comparison for terminal and report: main result in a sentence, one table, and notes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ Number = Bound | float | None
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """What is proved and what was seen of one controller."""
+    """Proved bounds, worst case found and simulated values of one controller."""
 
     name: str
     outcome: str
@@ -40,12 +40,12 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What is said first of a comparison."""
+    """First part of the text of a comparison."""
 
-    answer: str  # What is guaranteed, against the natural earthquake
+    answer: str  # Guarantee, relative to the natural earthquake
     rows: tuple[Row, ...]
-    conditions: str  # Sentence of the guarantee of the answer, or why there is none
-    notes: tuple[str, ...]  # What limits the answer
+    conditions: str  # Sentence of this guarantee, or the reason why there is none
+    notes: tuple[str, ...]  # Limitations of the answer
 
 
 def summary(comparison: "Compared") -> Summary:
@@ -130,7 +130,7 @@ def _row(entry: "Entry") -> Row:
 def worst_slip_rate(
     worst: WorstFound | WorstSliding | WorstStickSlip, found: Guarantee | SlidingGuarantee | StickSlipGuarantee | None
 ) -> float:
-    """Slip rate [m/s] of the worst case found; of its error where no more is followed."""
+    """Slip rate [m/s] of the worst case found; its error if only that is computed."""
     if isinstance(worst, WorstSliding):
         assert isinstance(found, SlidingGuarantee)
         return float(found.task.rate) * exp(worst.log_rate)
@@ -169,7 +169,7 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
 
 
 def _with_stick(answer: object) -> Iterator[str]:
-    """Worst case found where friction holds the fault at rest, and why there is no proof there."""
+    """Worst case found on the stick–slip plant, and the reason why there is no proof on it."""
     seen, why = getattr(answer, "worst_with_stick", None), getattr(answer, "not_at_rest", "")
     if seen is not None:
         yield (
@@ -265,14 +265,14 @@ def _table(rows: Sequence[Row]) -> list[str]:
 
 
 def _scale(groups: Sequence[Sequence[Number]]) -> int:
-    """Power of ten that suits what is proved, or else what was seen under control."""
+    """Power of ten of the proved bounds, or else of the simulated values under control."""
     proved = [float(group[0]) for group in groups if group[0] is not None]
     seen = [float(group[2]) for group in groups[1:] if group[2] is not None]
     return power_of(max(proved, default=max(seen, default=0.0)))
 
 
 def _cells(group: Sequence[Number], power: int, unit: str) -> str:
-    """Three cells; a number that stands alone and is too wide has a unit of its own."""
+    """Three cells; a single number that is too wide has its own unit."""
     known = [value for value in group if value is not None]
     if len(known) == 1 and len(_cell(known[0], power)) >= _NUMBERS[-1]:
         return f"{quantity(float(known[0]), unit):>{sum(_NUMBERS)}}"
@@ -280,13 +280,13 @@ def _cells(group: Sequence[Number], power: int, unit: str) -> str:
 
 
 def _fitted(value: Number, power: int, width: int) -> str:
-    """Three digits, or as many as leave a blank before the number."""
+    """Number in three digits, or in as many as leave a blank before it."""
     shown = (_cell(value, power, digits) for digits in (3, 2, 1))
     return next((cell for cell in shown if len(cell) < width), "–" if value is None else f"{_scaled(value, power):.0e}")
 
 
 def _scaled(value: Bound | float, power: int) -> Bound | float:
-    """Over a power of ten; a bound stays one."""
+    """Number divided by a power of ten; a bound remains a bound."""
     if isinstance(value, Bound):
         return type(value)(value / Fraction(10) ** power)
     return float(value / 10.0**power)

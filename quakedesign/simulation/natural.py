@@ -18,14 +18,14 @@ from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, OutcomeCriterion
 from quakedesign.symbolic import derive
 
 # ----------------------------------------------------------------------
-# What happens without control.
+# Natural earthquake.
 
-NUDGE = 1e-9  # of the largest change of friction: far above rounding, far below what the peak depends on
+NUDGE = 1e-9  # relative to the largest change of friction: far above rounding, without effect on the peak
 FOLDINGS = 90
 PERIODS = 100
-ENDING = 30, 10  # e-foldings and natural periods, of a fault that grows much faster than it swings
-FINENESS = 2e-3  # a step passes a kink of friction with an error of its square
-STILL = 1e3  # times the slip rate that the nudge alone gives: less is no growth
+ENDING = 30, 10  # e-foldings and natural periods, for a growth rate far above the natural frequency
+FINENESS = 2e-3  # steps across a kink of friction have an error of second order
+STILL = 1e3  # factor above the slip rate due to the nudge alone; a smaller peak is no instability
 
 _PEAKS: dict[Fault, float | None] = {}
 _MOST_PEAKS = 64
@@ -39,11 +39,11 @@ def natural_earthquake(
     compiled: bool | None = None,
     plant: str | None = None,
 ) -> Trajectory:
-    """Let an uncontrolled fault go, under a constant pressure and, if it is unstable, a tiny constant acceleration.
+    """Simulate an uncontrolled fault under a constant pressure and, if it is unstable, a tiny constant acceleration.
 
-    A fault whose friction heals begins as it is released. The acceleration is a share of 1e-9 of the largest change of
-    friction, and the step so short, that the peak of the
-    slip rate depends on neither of them in its first six digits.
+    A fault with healing starts at its release. The acceleration is 1e-9 of the largest change of friction. It and the
+    step are so small that they do not change the first six digits of
+    the peak slip rate.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def natural_earthquake(
     ParameterError
         For a pressure that is not below the effective normal stress.
     SimulationError
-        When the fault is unstable and yet does not move.
+        When the fault is unstable but does not move.
     """
     fault.require_memoryless("the natural earthquake")
     if not abs(pressure) < fault.effective_normal_stress:
@@ -93,7 +93,7 @@ def natural_earthquake(
 
 
 def _with_peak(earthquake: Trajectory, fault: Fault, growth: float) -> Trajectory:
-    """Event of an unstable fault that is the measure of others, if it moves more than by the nudge alone."""
+    """Reference event of an unstable fault, if it moves more than by the nudge alone."""
     peak = earthquake.metrics.peak_slip_rate  # none where the run diverges
     if peak is not None and peak <= STILL * _nudge(fault) / growth:
         raise SimulationError(
@@ -104,7 +104,7 @@ def _with_peak(earthquake: Trajectory, fault: Fault, growth: float) -> Trajector
 
 
 def _released(fault: Fault) -> Fault:
-    """A fault that has lost what healing held it by: no nudge would release it."""
+    """The fault without its healing, from which the nudge could not release it."""
     law: Any = fault.friction
     return replace(fault, friction=replace(law, healing=0.0)) if law.rest_excess else fault
 
@@ -118,7 +118,7 @@ def natural_peak(fault: Fault) -> float | None:
 
 
 def _alone(fault: Fault) -> Fault:
-    """Fault without what its natural earthquake does not depend on."""
+    """Fault reduced to the properties on which its natural earthquake depends."""
     return fault.with_disturbance(Disturbance()).with_box("paper")
 
 
@@ -129,7 +129,7 @@ def _nudge(fault: Fault) -> float:
 
 
 def _duration(fault: Fault, growth: float) -> float:
-    """Time [s] in which an instability has grown from nothing and ended."""
+    """Time [s] in which an instability grows from the nudge and ends."""
     period = 2 * pi / fault.natural_frequency
     if growth <= 0:
         return PERIODS * period
@@ -140,7 +140,7 @@ def _duration(fault: Fault, growth: float) -> float:
 # Uncontrolled runs of unstable faults that end before the earthquake begins.
 
 BEGUN_SHARE = 0.01
-"""Of the natural peak: a slip rate beyond it is no mere growth from rest any more."""
+"""Share of the natural peak: slip rates above it are no longer exponential growth from rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,7 +158,7 @@ class Waiting:
 
 
 def waiting(run: Trajectory, fault: Fault) -> Waiting | None:
-    """What a run without control waits for; None where the event has begun, or there is none to come."""
+    """Event that has not begun in a run without control; None if it has begun, or if none will."""
     natural, reached = run.criterion.natural_peak, run.outcome.share_of_natural
     if run.provenance["controller"] != "none" or natural is None or reached is None or reached >= BEGUN_SHARE:
         return None

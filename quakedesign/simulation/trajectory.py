@@ -22,13 +22,13 @@ from quakedesign.simulation.closed_loop import EnergyBudget
 from quakedesign.simulation.recorder import Metrics
 
 # ----------------------------------------------------------------------
-# What every run can be handed on as: xarray, pandas, NetCDF.
+# Export of every run: xarray, pandas, NetCDF.
 
 CONVENTIONS = "CF-1.11"
 
 
 def signal(title: str, unit: str) -> Any:
-    """Field that is a signal, with its long name and SI unit; one that is None is none."""
+    """Field that is a signal, with its long name and SI unit; None means that the run does not have the signal."""
     return field(repr=False, metadata={"title": title, "unit": unit})
 
 
@@ -57,7 +57,7 @@ class Recording(ABC):
         """Return an xarray Dataset over ``time``, with the attributes of the CF conventions.
 
         The time [s] is that since the start of the run. It is not marked as CF's axis T, which is for dates: its unit
-        would have to name a day that a simulation does not have. Nothing is missing, so there are no fill values.
+        would have to name a reference date, which a simulation does not have. No value is missing: no fill values.
         """
         import xarray as xr
 
@@ -79,12 +79,12 @@ class Recording(ABC):
         Parameters
         ----------
         dt : float
-            [s]. No shorter than the mean distance of the instants that are kept, between which nothing is known.
+            Interval [s], at least the mean interval of the stored instants.
 
         Raises
         ------
         ParameterError
-            For a shorter one, or one longer than the run.
+            For a shorter interval, or one longer than the run.
         """
         duration, kept = float(self.time[-1] - self.time[0]), max(len(self.time) - 1, 1)
         if not 0 < duration / kept * (1 - 1e-9) <= dt <= duration:
@@ -117,7 +117,7 @@ class Recording(ABC):
 
 
 # ----------------------------------------------------------------------
-# What a simulation of a spring-slider with state returns.
+# Result of a simulation of a spring-slider with friction state.
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
@@ -128,7 +128,7 @@ class StateTrajectory(Recording):
     ----------
     name : str
     time : ndarray
-        [s], shape (n,); the same one twice where the pressure steps, before and after.
+        [s], shape (n,); at a step of the pressure an instant occurs twice, before and after.
     load_point, slip, stretch : ndarray
         Displacement of the load point, slip, and stretch of the spring [m], shape (n,).
     slip_rate : ndarray
@@ -141,8 +141,8 @@ class StateTrajectory(Recording):
         State of friction, shape (number of variables, n), named `state_names`, in `state_units`.
     state_names, state_units : tuple of str
     imbalance : ndarray
-        Driving less resisting stress, as a share of the normal stress [-], shape (n,): what accelerates the mass.
-        Without mass it must vanish, and what is left of it is an error of the integration.
+        Driving minus resisting stress over normal stress [-], shape (n,), which accelerates the mass.
+        Without mass it must vanish, and its value is an integration error.
     onsets : ndarray
         Times [s] at which the slip rate rises through `onset_rate`.
     onset_rate : float
@@ -180,7 +180,7 @@ class StateTrajectory(Recording):
     def event_slips(self) -> "np.ndarray":
         """Slip [m] of every event that has ended: from its onset until the slip rate is back at `onset_rate`.
 
-        Between the instants of `time` by straight lines. `Fault.moment_of` makes it a seismic moment.
+        Linear interpolation between the instants of `time`. `Fault.moment_of` gives the seismic moment.
         """
         at = self._at_arrest(self.slip)
         return np.asarray(at - np.interp(self.onsets[: len(at)], self.time, self.slip))
@@ -191,7 +191,7 @@ class StateTrajectory(Recording):
         return self._at_arrest(self.time)
 
     def _at_arrest(self, values: "np.ndarray") -> "np.ndarray":
-        """Values where the slip rate falls through `onset_rate` after every onset, by straight lines."""
+        """Values where the slip rate falls through `onset_rate` after every onset, by linear interpolation."""
         below = self.slip_rate <= self.onset_rate
         falls = np.flatnonzero(~below[:-1] & below[1:]).tolist()
         ends = [next((i for i in falls if self.time[i + 1] > onset), None) for onset in self.onsets]
@@ -212,30 +212,30 @@ class StateTrajectory(Recording):
 
 
 # ----------------------------------------------------------------------
-# What a run comes to: tracked, slow slip, earthquake, diverged or opened.
+# Outcome of a run: tracked, slow slip, earthquake, diverged or opened.
 
 KINDS = ("tracked", "slow slip", "earthquake", "diverged", "opened")
 HARMLESS = ("tracked", "slow slip")
 EARTHQUAKE_SHARE = 0.1
-"""Of the natural peak: a run that goes faster than its reference by this share or more is an earthquake."""
+"""Share of the natural peak: a run that exceeds the reference rate by it or more is an earthquake."""
 TRACKED_SHARE = 0.01
-"""Of the natural peak: a tracked run never goes faster than its reference by more."""
+"""Share of the natural peak: a tracked run never exceeds the reference rate by more."""
 SLIP_BAND = 0.02
-"""Of the target slip: a tracked run stays this close to its reference, the usual band for settling."""
+"""Share of the target slip: largest slip error of a tracked run, the usual settling band."""
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What one run comes to, as `OutcomeCriterion` decides.
+    """Outcome of one run, decided by `OutcomeCriterion`.
 
     Attributes
     ----------
     kind : str
         One of `KINDS`.
     peak_slip_rate : float or None
-        Largest |x2| of the whole run [m/s], or until the numbers of its law overflow; None where those of the plant do.
+        Largest |x2| of the run [m/s], up to an overflow of the law; None after an overflow of the plant.
     share_of_natural : float or None
-        The same over the peak of the natural earthquake [-]; None also for a fault that has none.
+        Its ratio to the peak of the natural earthquake [-]; None also for a fault without a natural earthquake.
     """
 
     kind: str
@@ -254,7 +254,7 @@ class Outcome:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class OutcomeCriterion:
-    """What the outcome of a run is decided by.
+    """Criterion of the outcome of a run.
 
     In this order, a run is
 
@@ -263,10 +263,10 @@ class OutcomeCriterion:
       errors count), and its slip rate never exceeds the largest of the reference by more than 1 % of the natural peak
       (over the whole run);
     - an ``earthquake``, if its slip rate exceeds that of the reference by 10 % of the natural peak or more at any time;
-    - ``slow slip`` otherwise, or ``diverged`` if the numbers of its law overflow, after which nothing is known.
+    - ``slow slip`` otherwise, or ``diverged`` if the numbers of its law overflow, since the rest of the run is unknown.
 
-    A stable fault has no natural earthquake. What it is compared with instead is the speed at which its own spring and
-    mass would swing through the whole target slip, ω_n·d_max; friction with a state always with its `dynamic_rate`.
+    A stable fault has no natural earthquake. Its natural peak is replaced by ω_n·d_max, the peak slip rate of a
+    harmonic oscillation with the target slip as amplitude; with a friction state always by `dynamic_rate`.
 
     Attributes
     ----------
@@ -279,7 +279,7 @@ class OutcomeCriterion:
     target_slip : float
         d_max [m].
     dynamic_rate : float, optional
-        aσ'A/(η + √(km)) [m/s] of friction with a state, whose natural peak takes a cycle to know.
+        aσ'A/(η + √(km)) [m/s] of friction with a state, whose natural peak needs the simulation of a cycle.
     """
 
     natural_peak: float | None
@@ -309,11 +309,11 @@ class OutcomeCriterion:
         peak_slip_rate : float or None
             [m/s]; None where the motion of the plant overflows.
         max_slip_error : float or None
-            [m]; where none counts, because the run is too short, the slip rate alone decides.
+            [m]; None for a run that ends before errors are evaluated: then the slip rate alone decides.
         events : mapping of str to float
             Time of first occurrence [s].
         followed : bool
-            Whether there was a controller, and so a reference to follow.
+            Whether there was a controller, and therefore a reference.
         """
         if peak_slip_rate is None:
             return Outcome(kind="diverged", peak_slip_rate=None, share_of_natural=None)
@@ -394,7 +394,7 @@ def _prefix(largest: float) -> tuple[float, str]:
 
 
 # ----------------------------------------------------------------------
-# What a simulation returns.
+# Result of a simulation.
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
@@ -413,7 +413,7 @@ class Trajectory(Recording):
     friction : ndarray
         Friction coefficient [-], shape (n,).
     shear_stress : ndarray
-        What friction sets against the load, μ(σ' − p) where the fault slips forward [Pa], shape (n,).
+        Shear stress of friction [Pa], μ(σ' − p) in forward slip, shape (n,).
     moment_per_slip : float
         G·A [N], the seismic moment of one metre of slip.
     integrals : ndarray
@@ -427,7 +427,7 @@ class Trajectory(Recording):
         (friction holds the fault at rest after the start), ``load_reversed`` (the load at rest exceeds friction
         backward, which the stick–slip plant leaves out).
     criterion : OutcomeCriterion
-        What `outcome` is decided by.
+        Criterion of `outcome`.
     provenance : mapping
         Method, step, scheme, backend and versions; the fault as a TOML file (``scenario``).
     """
@@ -453,7 +453,7 @@ class Trajectory(Recording):
 
     @property
     def outcome(self) -> Outcome:
-        """What the run comes to: tracked, slow slip, earthquake, diverged or opened."""
+        """Outcome of the run: tracked, slow slip, earthquake, diverged or opened."""
         figures, followed = self.metrics, self.reference is not None
         return self.criterion.outcome(figures.peak_slip_rate, figures.max_slip_error, self.events, followed=followed)
 
@@ -511,12 +511,12 @@ class Trajectory(Recording):
 
     @property
     def heading(self) -> str:
-        """Name, and how much of the run is drawn: what happened in between is in its metrics alone."""
+        """Name, and number of instants that are drawn; metrics are of all steps."""
         kept = len(self.time) - 1
         return self.name + (f"\n{kept} of {self.metrics.steps} steps drawn" if kept < self.metrics.steps else "")
 
     def panels(self) -> list[Panel]:
-        """Slip, slip rate and pressure, and errors where something is followed."""
+        """Slip, slip rate and pressure, and errors of a run with a reference."""
         found: list[Panel] = [
             ("slip", "m", self.slip, ("reference", self.reference)),
             ("slip rate", "m/s", self.slip_rate, ("reference", self.reference_rate)),
@@ -537,7 +537,7 @@ class Trajectory(Recording):
 
 
 # ----------------------------------------------------------------------
-# What a simulation with an actuator returns.
+# Result of a simulation with an actuator.
 
 Signal = tuple["np.ndarray", str, str]
 
@@ -560,7 +560,7 @@ class SampledTrajectory(Trajectory):
         return super().signals() | dict(self.actuation)
 
     def panels(self) -> list[Panel]:
-        """The pressure at the well in the panel of that in the fault, and what the actuator tells beside."""
+        """Pressures at the well and in the fault in one panel, and the other signals of the actuator."""
         found, further = super().panels(), dict(self.actuation)
         if "well_pressure" in further:
             found[2] = (*found[2][:3], ("at the well", further.pop("well_pressure")[0]))

@@ -41,7 +41,7 @@ from quakedesign.synthesis import Design, assess, designable, left_out
 from quakedesign.synthesis import design as synthesise
 
 # ----------------------------------------------------------------------
-# All controllers of one fault side by side, in closed loop.
+# Comparison of all controllers of one fault in closed loop.
 
 Tell = Callable[[str, float], None]
 Run = Trajectory | StateRun
@@ -64,19 +64,19 @@ class Entry:
     run : Trajectory or None
         None when there is no controller to run.
     largest_step : float or None
-        Largest T_s [s] for which the run would stay inside the premise on |h'|; None when not asked or not found, and
-        for schemes that hold p.
+        Largest T_s [s] for which the run would satisfy the premise on |h'|; None if not computed or not found, and
+        for sampled schemes.
     growth_per_step : float or None
-        For a linear law: growth of the fastest mode per step of the run [-]; below 1 is stable. None for schemes that
-        hold p, of which `held` speaks.
+        For a linear law: growth of the fastest mode per step of the run [-]; below 1 is stable. None for sampled
+        schemes, see `held`.
     variants : tuple of Variant
-        For a designed sliding mode: what is certified of the same gains with every named feed-forward.
+        For a designed sliding mode: certified properties of the same gains with every named feed-forward.
     held : HeldLoop or None
-        For a linear law: what is decided when p is held over T_s, see `Design.held_loop`.
+        For a linear law: stability with zero-order hold over T_s, see `Design.held_loop`.
     peaks : mapping of str to ContinuousPeaks
         For a designed linear law that is proved: peaks in continuous time by class; no class without any.
     answer : LoopAnswer, SlidingAnswer, StickSlipAnswer or None
-        For a designed law: what is guaranteed of it with p held over T_s, see `Design.guarantee`, and the worst found.
+        For a designed law: guarantee with zero-order hold over T_s, see `Design.guarantee`, and worst case found.
     """
 
     label: str
@@ -92,7 +92,7 @@ class Entry:
 
     @property
     def guarantee(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee | None:
-        """Of the loop with p held over T_s."""
+        """Guarantee of the loop with zero-order hold over T_s."""
         return self.answer.found if self.answer else None
 
     @property
@@ -133,7 +133,7 @@ class Compared:
     Attributes
     ----------
     uncontrolled : Trajectory or StateRun
-        The natural earthquake; of friction with a state the cycle of them.
+        The natural earthquake; with friction state the seismic cycle.
     """
 
     fault: Fault
@@ -142,13 +142,13 @@ class Compared:
 
     @property
     def left_out(self) -> dict[str, str]:
-        """Why laws that are designed otherwise are not for this fault, or what stands around it, by name."""
+        """Reasons why other laws do not apply to this fault or loop setup, by name."""
         behind = self.path and not self.fault.friction.state_names
         return behind_path(self.fault) if behind else left_out(self.fault)
 
     @property
     def path(self) -> dict[str, Fraction]:
-        """Delay, lag and diffusion [s] behind which the designs are to act; those that there are."""
+        """Delay, lag and diffusion time [s] of the designs that are not 0."""
         return {name: time for entry in self.entries for name, time in entry.design.setup.path.items()}
 
     def of(self, origin: str) -> tuple[Entry, ...]:
@@ -197,7 +197,7 @@ def require_plant(fault: Fault, plant: str | None) -> None:
 
 
 def behind_path(fault: Fault) -> dict[str, str]:
-    """Why laws of the package that are designed for a pressure that acts at once are not for one behind a path."""
+    """Reasons why laws designed for a pressure without delay do not apply behind a delay, lag or diffusion path."""
     why = (
         "sliding modes and published gains are for a pressure that acts at once and are not compared behind a delay, a "
         "lag or rock; guarantee says what is proved of a sliding mode behind them"
@@ -216,7 +216,7 @@ def _answer(fault: Fault, design: Design) -> LoopAnswer | SlidingAnswer | StickS
 
 
 def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, whole: bool) -> Compared:
-    """Of friction with a state: its cycle, and its designs as they run."""
+    """Comparison for friction with a state: seismic cycle, and designs with their runs."""
     natural = natural_run(fault)
     entries = []
     for designed in designs:
@@ -297,10 +297,10 @@ def _with_rate(entry: Entry, law: Controller, limit: float, run: Trajectory, tel
 
 
 # ----------------------------------------------------------------------
-# The pressure that a task needs at equilibrium, and whether a run had it.
+# Equilibrium pressure of a task, and whether a run reached it.
 
 _MARGIN = 0.01
-"""Of the range that is needed: what is closer to zero, or to the range, makes no difference."""
+"""Tolerance relative to the equilibrium range: smaller differences from zero, or from the range, are ignored."""
 
 
 def needed_pressure(fault: Fault, slip: float | None = None) -> Enclosure | None:
@@ -319,14 +319,14 @@ def needed_pressure(fault: Fault, slip: float | None = None) -> Enclosure | None
 
 
 def ways(needed: Enclosure) -> tuple[str, ...]:
-    """What a range of pressures takes: ``withdrawal`` below zero, ``injection`` above."""
+    """Fluid operations of a range of pressures: ``withdrawal`` below zero, ``injection`` above."""
     margin = _margin(needed)
     taken = {"withdrawal": needed.low < -margin, "injection": needed.high > margin}
     return tuple(way for way, needs in taken.items() if needs)
 
 
 def need_sentence(needed: Enclosure) -> str:
-    """Range of the pressure that a task needs, and what it takes."""
+    """Range of the equilibrium pressure of a task, and its fluid operations."""
     taken = f"the task needs {' and '.join(ways(needed))} of fluid" if ways(needed) else "the task needs no fluid"
     ends = f"{needed.low.quantity('Pa')} to {needed.high.quantity('Pa')}"
     return f"pressure at equilibrium along the reference {ends} (p < 0 is withdrawal): {taken}"
@@ -339,7 +339,7 @@ def pressure_extremes(run: "Trajectory") -> tuple[float, float] | None:
 
 
 def shortfall(run: "Trajectory", fault: Fault) -> str | None:
-    """Pressure that the reference of a run needs at equilibrium and the run never had; None for a run that tracked."""
+    """Sentence on an equilibrium pressure that a run never reached; None for a run that tracked."""
     extremes = pressure_extremes(run)
     if run.reference is None or extremes is None or run.outcome.kind == "tracked":
         return None

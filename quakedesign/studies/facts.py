@@ -19,7 +19,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault, fault_toml
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, mean_rate, sliding_step
-from quakedesign.guarantees.exact.impossibility import longest_reaction
+from quakedesign.guarantees.exact.limit_theorems import longest_reaction
 from quakedesign.guarantees.search.lqg import sliding_model, sliding_poles
 from quakedesign.laws import Controller, Signals
 from quakedesign.plant import uncertain_plant

@@ -20,7 +20,7 @@ from quakedesign.guarantees import (
     longest_delay,
     longest_step,
 )
-from quakedesign.guarantees.exact.impossibility import (
+from quakedesign.guarantees.exact.limit_theorems import (
     Noise,
     SlidingPush,
     farthest_well,

@@ -11,7 +11,7 @@ from quakedesign.exact import exact_text, rational
 from quakedesign.fault import BlockChain, Fault, with_accepted_fit
 from quakedesign.fault.units import exact_value
 from quakedesign.guarantees import CLASSES, OBJECTIVES, Guarantee, LoopAnswer, NoGuarantee, StickSlipGuarantee
-from quakedesign.guarantees.exact.impossibility import hopeless, too_slow
+from quakedesign.guarantees.exact.limit_theorems import hopeless, too_slow
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
 from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding

@@ -44,7 +44,7 @@ from quakedesign.lyapunov.search.search import find_certificate
 from quakedesign.plant import FaultPlant, uncertain_plant
 
 # ----------------------------------------------------------------------
-# What is asked of every family of laws, and what is answered of a law that belongs to none.
+# Interface of the families of laws, and its implementation for a law of no family.
 
 Designed = TypeVar("Designed")
 MEMORYLESS = "user-defined laws are designed for friction of slip and slip rate alone"
@@ -60,7 +60,7 @@ class SlowSlidingDesign:
     diffusion : Fraction or None
         L²/D [s]; None for a well near the fault.
     stress : Fraction or None
-        [Pa]; None for the largest that the design stands.
+        [Pa]; None for about the largest with a guarantee.
     spread : Fraction
         [-].
     """
@@ -78,7 +78,7 @@ class GainProblem(Generic[Designed]):
     ----------
     fault : Fault
     answer : callable
-        What is made of all that is found.
+        Builds the `Design` from the results.
     objective : str
     continuous : bool
     feedforward : FeedForward
@@ -86,11 +86,11 @@ class GainProblem(Generic[Designed]):
     sliding : SlowSlidingDesign
         Of friction with a state.
     disturbance_class : str
-        ``amplitude`` or ``rate``, of the disturbances that a guarantee is about.
+        Class of the disturbances of a guarantee, ``amplitude`` or ``rate``.
     plant : str or None
         ``printed`` for a guarantee on the plant without stick alone.
     tell : callable
-        Called with what a long search is doing, and the fraction done [-].
+        Called with the present task of a long search, and the completed fraction [-].
     """
 
     fault: Fault
@@ -141,7 +141,7 @@ class GainProblem(Generic[Designed]):
     ) -> Designed:
         """Gains with their results; premises of the sampled loop come first.
 
-        The verdict is that on the certificate unless given; of a law of samples it is that on what runs.
+        The default verdict is that on the certificate; for a sampled law it is that on the sampled loop.
         """
         own, domain = method_of(type(controller)).premises(self.fault, controller, certificate)
         verdict = decided_once(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
@@ -235,7 +235,7 @@ class DesignMethod(Generic[L]):
         raise UnsupportedError(f"no way to design {law.title} is known. Give its class a classmethod design(problem).")
 
     def assess(self, problem: GainProblem[Designed], controller: L) -> Designed:
-        """Judge given gains: by a quadratic V where the closed loop is linear about any constant reference."""
+        """Verdict on given gains, by a quadratic V if the closed loop is linear about any constant reference."""
         if not linear_about_a_reference(controller):
             return problem.judged(controller, details={"reason": f"no way to prove {controller.title} is known"})
         loop = sector_loop(controller, sectors(problem.fault))
@@ -244,7 +244,7 @@ class DesignMethod(Generic[L]):
     def premises(
         self, fault: Fault, controller: L, certificate: Certificate | None
     ) -> tuple[tuple[Premise, ...], Domain | None]:
-        """Premises of the certificate, and the domain that it certifies."""
+        """Premises and certified domain of the certificate."""
         known = linear_about_a_reference(controller)
         return tuple(linear_premises(fault, controller, certificate)) if known else (), None
 
@@ -261,7 +261,7 @@ class DesignMethod(Generic[L]):
         return NoGuarantee(reason=f"no bound of peaks of {controller.title} is known here", small_gain=None)
 
     def compensation(self, controller: L, found: Guarantee | StickSlipGuarantee | NoGuarantee) -> Compensation | None:
-        """A sliding mode of samples with its guarantee; None for another law."""
+        """Sampled sliding mode with its guarantee; None for other laws."""
         return None
 
     def base_law(self, task: FaultPlant, law: type[L], gains: tuple[str, ...]) -> SlidingMode | None:
@@ -277,17 +277,17 @@ class DesignMethod(Generic[L]):
         return ()
 
     def sampled(self, fault: Fault, task: FaultPlant, law: type[L], step: Fraction, wanted: Wanted) -> LoopAnswer:
-        """Guarantee of given gains, or of a design, as they run once every T_s [s]."""
+        """Guarantee of given gains, or of a design, with sampling every T_s [s]."""
         reason = f"no analysis of {law.title} under a held pressure is known here"
         return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
 
     def given(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> LoopAnswer:
-        """Guarantee of a controller as it is, in a loop setup.
+        """Guarantee of a given controller in a loop setup.
 
         Raises
         ------
         UnsupportedError
-            For one that is not a sampled linear law.
+            For a controller that is not a sampled linear law.
         """
         raise UnsupportedError(
             "guarantee takes a sampled linear law as it is, and others by name with gains. Received "
@@ -321,7 +321,7 @@ def left_out(fault: Fault) -> dict[str, str]:
 
 
 # ----------------------------------------------------------------------
-# Linear laws that run once per sample.
+# Sampled linear laws.
 
 
 class Samples(DesignMethod[SampledController]):
@@ -331,20 +331,20 @@ class Samples(DesignMethod[SampledController]):
     family: ClassVar[type] = SampledController
 
     def assess(self, problem: GainProblem[Designed], controller: SampledController) -> Designed:
-        """By the guarantee."""
+        """Verdict of the guarantee."""
         found = self.guarantee(problem.fault, problem.task, controller, problem.setup)
         return problem.judged(controller.behind(**problem.setup.path), runs=found)
 
     def premises(
         self, fault: Fault, controller: SampledController, certificate: Certificate | None
     ) -> tuple[tuple[Premise, ...], Domain | None]:
-        """None: those of the guarantee stand with it."""
+        """None: the premises are part of the guarantee."""
         return (), None
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> Guarantee | NoGuarantee:
-        """At its own T_s, with its own delay, lag and diffusion path where the loop setup has none."""
+        """Guarantee at the law's T_s, with its delay, lag and diffusion path where the loop setup gives none."""
         law, step = controller.law, controller.step
         if setup.step is not None and setup.step != step:
             own, asked = apart(step, setup.step)
@@ -373,7 +373,7 @@ class Samples(DesignMethod[SampledController]):
         return replace(found, reason=f"{found.reason}: of a period it has an eigenvalue of size {largest:.4g}")
 
     def given(self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup) -> LoopAnswer:
-        """With the worst case found beside it, of a law of the errors alone."""
+        """Guarantee with the worst case found, for a law of the errors alone."""
         found = self.guarantee(fault, task, controller, setup)
         worst = worst_found(found) if found.proved and not controller.law.of_reference else None
         return LoopAnswer(fault=fault, found=found, worst=worst, notes=controller.notes)

@@ -22,7 +22,7 @@ from quakedesign.guarantees import (
     design_held,
     sampled_design,
 )
-from quakedesign.guarantees.exact.impossibility import hopeless
+from quakedesign.guarantees.exact.limit_theorems import hopeless
 from quakedesign.guarantees.guarantee_result import GAINS, answer_sliding
 from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law

@@ -1,4 +1,4 @@
-"""Friction laws, one a file, found by looking into this folder."""
+"""Friction laws: one module each, discovered in this folder."""
 
 from functools import cache
 
@@ -11,27 +11,27 @@ __all__ = ["FrictionLaw", "friction_law", "friction_laws"]
 
 @cache
 def friction_laws() -> dict[str, type[FrictionLaw]]:
-    """Every friction law of the package, by name; a module of this folder that defines none is an error.
+    """Every friction law of the package, by name; a module of this folder without a law is an error.
 
-    A law that cannot be built (an abstract class, for others to derive from) counts for its module but is not listed.
+    An abstract class, from which other laws derive, counts as the law of its module but is not listed.
     """
     return discovered(__name__, FrictionLaw, shared=("base", "weakening"))
 
 
 @checked
 def friction_law(name: str, *, in_file: bool = False, allow_code: bool = False) -> type[FrictionLaw]:
-    """Friction law of a given name, or of the user's own as ``module:Class``.
+    """Friction law of a given name, or a user-defined one as ``module:Class``.
 
     Parameters
     ----------
     in_file : bool
-        The name stands in a file: it may be one of the package only, unless code is allowed.
+        Whether the name is from a file, which may name laws of the package only, unless code is allowed.
     allow_code : bool
-        Whether it is.
+        Whether a file may name user-defined code.
 
     Raises
     ------
     UnknownNameError
-        When there is none.
+        For an unknown name.
     """
     return named(name, friction_laws(), FrictionLaw, "friction law", in_file=in_file, code=allow_code)

@@ -1,4 +1,4 @@
-"""What every friction law offers."""
+"""Base class of friction laws."""
 
 import math
 from abc import ABC, abstractmethod
@@ -16,8 +16,8 @@ class FrictionLaw(ABC):
     """One friction coefficient μ(slip, slip rate, state …), written once with the parameters as attributes.
 
     A subclass is a frozen dataclass. Each quantity carries ``metadata`` with ``unit`` (as pint reads it) and
-    ``symbol`` (LaTeX); a field without a symbol is an option, not a quantity. The same method serves numbers, exact
-    rationals and symbols, because `symbolic` and `exact` return copies of the law that hold those instead of floats.
+    ``symbol`` (LaTeX); a field without a symbol is an option, not a quantity. The same method is used for numbers,
+    exact rationals and symbols: `symbolic` and `exact` return copies of the law with these instead of floats.
 
     A law without state defines `coefficient`, `extended` and the bounds. A law with state also names its variables
     in `state_names` (with `state_units`), and defines `state_rates`, `steady_state`, `operating_rate` and
@@ -48,7 +48,7 @@ class FrictionLaw(ABC):
         return (0,) * len(self.state_names)
 
     def steady_state(self, rate: "sp.Expr") -> "tuple[sp.Expr, ...]":
-        """State at which sliding at a constant rate [m/s] leaves it; none for a law without state."""
+        """Steady state of sliding at a constant rate [m/s]; none for a law without state."""
         return ()
 
     def steady_coefficient(self, rate: "sp.Expr") -> "sp.Expr":
@@ -57,12 +57,12 @@ class FrictionLaw(ABC):
 
     @property
     def rest_excess(self) -> float:
-        """Friction at rest less that in slip [-]: `healing` of laws that have it."""
+        """Friction at rest minus friction in slip [-]: `healing` of laws that have it."""
         return float(getattr(self, "healing", 0.0))
 
     @property
     def operating_rate(self) -> float:
-        """Slip rate [m/s] of the equilibrium that is studied unless another is asked for: rest."""
+        """Slip rate [m/s] of the default equilibrium; 0 for laws without state."""
         return 0
 
     @property
@@ -78,7 +78,7 @@ class FrictionLaw(ABC):
     @property
     @abstractmethod
     def slip_slope(self) -> float:
-        """Largest chord slope |Δμ/Δslip| [1/m]; with state, along a motion that carries the state with it."""
+        """Largest chord slope |Δμ/Δslip| [1/m]; with state, along a motion in which the state evolves too."""
 
     @property
     @abstractmethod

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# A law as it runs around a fault: what a guarantee is about besides the fault.
+# A sampled law with its loop setup, the subject of a guarantee besides the fault.
 
 
 class Around(TypedDict, total=False):
@@ -57,25 +57,25 @@ class Held:
     diffusion : Fraction
         L²/D of the layer between well and fault [s]; 0 for none.
     slip_noise, rate_noise : Fraction
-        Bounds of what measured slip and slip rate are off [m], [m/s], whatever the course.
+        Bounds of the measurement errors of slip [m] and slip rate [m/s], any functions of time.
     initial_slip, initial_slip_rate : Fraction
-        Bounds of both at the start, where the reference has none, of either sign [m], [m/s].
+        Bounds of the absolute initial slip [m] and slip rate [m/s]; those of the reference are 0.
     jitter, delay_jitter : Fraction
-        By how much a measurement is early or late at most, its pressure with it [s], and the pressure besides.
+        Largest timing error of a measurement and its pressure [s], and an additional one of the pressure alone [s].
     averaging : Fraction
-        Each measurement but the first is a mean over a time around its own, at most half of this away [s].
+        Averaging time [s]: each measurement but the first is a mean over times within half of this of its instant.
     pump : Pump, optional
         Limits at the valve, which the loop must never reach.
     ramp : Fraction
-        Time in which the pump goes from one pressure to the next, at most [s].
+        Largest time of a change of the pressure by the pump [s].
     longest_step : Fraction
-        Where samples follow no clock: each comes `step` to this after the last [s]; 0 where they do.
+        Aperiodic sampling: longest interval between samples [s], `step` the shortest; 0 for periodic sampling.
 
     Raises
     ------
     ParameterError
-        For a negative bound, noise of a slip rate that the law does not measure, or samples that follow no clock with
-        anything but noise around the law.
+        For a negative bound, noise of a slip rate that the law does not measure, or aperiodic sampling with a loop
+        setup of more than noise.
     """
 
     law: LinearLaw
@@ -126,7 +126,7 @@ class Held:
             self._require_no_clock()
 
     def _require_no_clock(self) -> None:
-        """Refuse intervals that are no range, and what asks for a schedule or a start at rest."""
+        """Reject an empty range of intervals, and a setup that needs periodic sampling or an initial state of rest."""
         if self.longest_step <= self.step:
             raise ParameterError(
                 "the longest step must exceed the step, which is the shortest sampling interval. Received "
@@ -235,9 +235,9 @@ class Held:
 
 
 # ----------------------------------------------------------------------
-# The inputs of a nominal loop, and what bounds each: acceleration, drift, root, noise, start, a layer's rest.
+# Inputs of a nominal loop and their bounds: acceleration, drift, root, noise, start, truncation error of a layer.
 #
-# Why each is bounded so stands in `quakedesign.guarantees.exact.small_gain`.
+# The bounds are derived in `quakedesign.guarantees.exact.small_gain`.
 
 Gains = Mapping[tuple[str, str], tuple[Any, ...]]
 NOISELESS: Mapping[str, Fraction] = MappingProxyType({})
@@ -263,7 +263,7 @@ class Channel:
     shares: Mapping[str, Fraction]
 
     def rounded(self) -> "Channel":
-        """The same in floats, which are multiplied twenty times as fast: for estimates."""
+        """The same in floats, for estimates: products of floats are twenty times as fast."""
         shares: Mapping[str, Any] = {output: float(share) for output, share in self.shares.items()}
         own: Any = float(self.own)
         return Channel(name=self.name, own=own, shares=shares)
@@ -276,9 +276,9 @@ class GainSpread:
     Attributes
     ----------
     half : Fraction
-        By itself.
+        Largest deviation at the present time.
     aged : Fraction
-        Of that of a time σ ago, over e^{ασ}.
+        Largest deviation at a time σ ago, divided by e^{ασ}.
     """
 
     half: Fraction
@@ -316,7 +316,7 @@ def channels_of(
 
 
 def _told(task: FaultPlant, noise: Mapping[str, Fraction], jitter: Fraction) -> Iterator[Channel]:
-    """What the measured errors are more than the true ones at their instants: noise, and what moves until then."""
+    """Measured minus true errors at the nominal instants: noise, and the motion during the timing error."""
     forces = _task_inputs(task)[0]
     slopes = [max(map(abs, ends)) for ends in (task.slip_chord, task.rate_chord, task.beta)]
     moves = {
@@ -331,7 +331,7 @@ def _told(task: FaultPlant, noise: Mapping[str, Fraction], jitter: Fraction) -> 
 
 
 def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
-    """Inputs of a law that uses the reference itself (`continuous_loop`, `held_loop`), a start, what is late."""
+    """Inputs of reference (`continuous_loop`, `held_loop`), initial state and late pressures, as far as they exist."""
     for name in ("reference", "reference_rate"):
         if name in names:
             yield Channel(name=name, own=task.reference_rates[0], shares={})
@@ -346,7 +346,7 @@ def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
 
 
 def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
-    """Inputs of a loop through a layer: what its modes leave out acts as v does, by itself where it fades."""
+    """Inputs of a loop with a layer: its truncation error acts as v does; after a step it is a fading input."""
     fades = ("left_out", "left_out") in gains
     for channel in channels:
         share = {"left_out": channel.shares["push"]} if "push" in channel.shares else {}

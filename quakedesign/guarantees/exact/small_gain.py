@@ -24,7 +24,7 @@ from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
-# The robust small-gain theorem for a loop that runs: bounds for all t, in exact arithmetic.
+# Robust small-gain theorem for the sampled loop: bounds for all t ≥ 0, in exact arithmetic.
 #
 # **Theorem.** Let a loop be linear with inputs w_1 … w_n, first at 0, and g_yi,j gains as those of `norms`: |y(τ)| ≤
 # Σ_i g_yi,j·W_i(t) for τ ≤ t in part j of the period, W_i(t) the essential supremum of |w_i| on [0, t] (for a sampled
@@ -55,13 +55,12 @@ from quakedesign.plant.ranges import FaultPlant
 # the shift of p* is 0 too. Below, the loop of every β_i starts alike; since t = 0 counts, what bounds e1 and e2 for
 # ever is at least their bound at first, so that E and R exceed that as well.
 #
-# **Noise.** A law that is told e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples has two sampled inputs
-# more, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c; nothing else is said of their courses.
-# Readings in
-# steps of q are off by at most q/2.
+# **Noise.** Let a law measure e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples. Then the loop has two
+# more sampled inputs, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c. They are any sequences in these
+# bounds. Readings in steps of q have errors of at most q/2.
 #
-# **Implicit root.** A law that uses the end w of an implicit step is linear but for the sampled input ``root``, w_k +
-# γe1/T_s at the samples, γ the middle of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤ R
+# **Implicit root.** A law with the solution w of an implicit step is linear except for the sampled input ``root``, w_k
+# + γe1/T_s at the samples, γ the middle of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤ R
 # (`sector`). E and R are the claims themselves. Let the claims follow from these bounds of the inputs. If e was within
 # them at the samples before kT_s, then the inputs up to kT_s, which these samples alone decide, obey the bounds, so e
 # is within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do.
@@ -117,13 +116,13 @@ _WORDS = {
     **{("rate_noise", output): "jitter of the measurement" for output in OUTPUTS},
     ("slip_noise", "slip_rate_error"): "jitter of the measurement",
 }
-_LEFT_OUT = "what the modes of the layer leave out"
+_LEFT_OUT = "truncation error of the modes of the layer"
 _HALVINGS = 96
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """Bounds for every course of the uncertain quantities and all t ≥ 0.
+    """Bounds for every trajectory of the uncertain quantities and all t ≥ 0.
 
     Attributes
     ----------
@@ -134,9 +133,9 @@ class Bounds:
     push : Fraction
         b·|p − p*| [m/s²].
     asked : Fraction, optional
-        The same at the valve [m/s²]; None where that is the fault's.
+        The same at the valve [m/s²]; None where both pressures are equal.
     stepped : Fraction, optional
-        b times the change of the pressure that is asked for from sample to sample [m/s²]; None where it does not count.
+        b times the change of the commanded pressure between samples [m/s²]; None where it is not needed.
     small_gain : Fraction
         Spectral radius of M [-] from above, below 1.
     """
@@ -151,18 +150,18 @@ class Bounds:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class NoGuarantee:
-    """Reason why a loop has no guarantee.
+    """Result without a guarantee, with its reason.
 
     Attributes
     ----------
     reason : str
-        With the quantity that fails.
+        Names the quantity that fails.
     small_gain : UpperBound or None
         At least 1; None where something else fails, such as the stability of the nominal loop.
     needs : Fraction, optional
-        Change of the pressure from sample to sample that a pump would have to make [Pa].
+        Change of the pressure between samples that the pump would have to make [Pa].
     pressed : bool
-        Whether it is the pressure alone that fails: more than a pump can hold, or enough to open the fault.
+        Whether only the pressure fails: it exceeds a pump limit, or opens the fault.
     """
 
     proved: ClassVar[Literal[False]] = False
@@ -196,7 +195,7 @@ def certified_bounds(
     Raises
     ------
     ParameterError
-        When the nominal loop is not found to be stable.
+        When the nominal loop is not proved to be stable.
     """
     gains = norms(loop) if loop.segments else flow_norms(loop)
     return best_bounds(task, gains, root, loop.period, noise, jitter=jitter)
@@ -231,7 +230,7 @@ def bounds_from(
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
 ) -> Bounds | NoGuarantee:
-    """Bounds of the theorem from the gains of the nominal loop; of floats, what floats make of them."""
+    """Bounds of the theorem from the gains of the nominal loop; for gains in floats an estimate in floats."""
     channels = (*channels_of(task, root, step, noise, spread, jitter), *beside(task, {name for _, name in gains}))
     if ("push", "awaited") in gains:
         channels = tuple(through_layer(channels, gains))
@@ -329,7 +328,7 @@ def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoGuara
 
 
 # ----------------------------------------------------------------------
-# The input gain of friction that depends on the slip alone: slow, so that a loop meets one value of it at a time.
+# Slowly varying input gain of friction that depends on the slip alone.
 
 MOST_PARTS = 16
 _ONE_OVER_E = Fraction(3679, 10000)  # from above
@@ -342,9 +341,9 @@ class SlowGain:
     Attributes
     ----------
     parts : int
-        Into how many equal parts the range of the gain is cut, each with a nominal loop of its own, at most 16.
+        Number of equal parts of the range of the gain, at most 16; each has its own nominal loop.
     growth : Fraction
-        α [1/s]: what is past counts e^{ασ} times, σ ago.
+        α [1/s]: weight e^{ασ} of the response a time σ ago.
 
     Raises
     ------
@@ -392,26 +391,26 @@ class SlowGain:
 
 
 def slow_gains(loops: Iterable[PeriodicLoop], growth: Fraction) -> Gains:
-    """Gains of the nominal loops of all parts, those of one after those of the other, with those of ``aged``.
+    """Gains of the nominal loops of all parts, concatenated, with those of ``aged``.
 
     Raises
     ------
     ParameterError
-        When one of the loops, or of those that grow, is not found to be stable.
+        When one of the loops, with or without the growth, is not proved to be stable.
     """
     of_parts = [norms(loop) | norms(grown(loop, growth)) for loop in loops]
     return {key: tuple(chain.from_iterable(gains[key] for gains in of_parts)) for key in of_parts[0]}
 
 
 def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:
-    """The loop whose responses to the acceleration are e^{ασ} as large."""
+    """Loop whose responses to the acceleration are multiplied by e^{ασ}."""
     flow = tuple(tuple(v + growth * (i == j) for j, v in enumerate(row)) for i, row in enumerate(loop.flow))
     entry = {"aged": loop.inputs["acceleration"]}
     return replace(loop, flow=flow, inputs=entry, sampled={}, fading={}, pulses={}, at_once={}, start=())
 
 
 # ----------------------------------------------------------------------
-# Whether the root of an implicit step lies between two lines for all errors of a size, in ball arithmetic.
+# Sector bounds of the solution of an implicit step for bounded errors, in ball arithmetic.
 #
 # **Statement.** w solves 0 ∈ w − e2 + q(e1 + T_s·w, w). For |e1| ≤ E and |e2| ≤ R: −γ1·u − ε ≤ w ≤ −γ0·u + ε where u
 # =

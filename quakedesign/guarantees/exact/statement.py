@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# What is claimed of a loop, and whether it follows from bounds.
+# Claims about a loop, and their verdict from bounds.
 
 _DIGITS = 4
 _ENDS = ("least_pressure", "largest_pressure", "least_asked", "largest_asked")
-MARGIN = Fraction(1001, 1000)  # so that another way to bound the same integrals proves the same claim
+MARGIN = Fraction(1001, 1000)  # so that another implementation with slightly larger bounds proves the same claim
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +50,7 @@ class Claims:
     Attributes
     ----------
     slip_error : UpperBound
-        Slip less reference, absolute value [m].
+        Slip minus reference, absolute value [m].
     slip_rate_error : UpperBound
         [m/s].
     peak_slip_rate : UpperBound
@@ -60,9 +60,9 @@ class Claims:
     largest_pressure : UpperBound
         [Pa].
     least_asked, largest_asked : LowerBound and UpperBound, optional
-        The same of the pressure at the valve [Pa]; None where that is the fault's.
+        Range of the pressure at the valve [Pa]; None where it equals that in the fault.
     largest_step : UpperBound, optional
-        Change of the pressure that is asked for from sample to sample [Pa]; None where it does not count.
+        Change of the commanded pressure between samples [Pa]; None where it is not needed.
     """
 
     slip_error: UpperBound
@@ -93,7 +93,7 @@ class Claims:
 
     @property
     def pressures(self) -> tuple[tuple[LowerBound, UpperBound], ...]:
-        """In the fault, and at the valve where that is another one [Pa]."""
+        """Range of the pressure in the fault and, if it differs, at the valve [Pa]."""
         fault = self.least_pressure, self.largest_pressure
         if self.least_asked is None or self.largest_asked is None:
             return (fault,)
@@ -113,7 +113,7 @@ class Claims:
         }
 
     def rounded(self) -> "Claims":
-        """The same, a little weaker and with few digits."""
+        """Slightly weaker claims with few digits."""
         step = self.largest_step
         ends: list[Any] = [end for low, high in self.pressures for end in _wider(low, high)]
         return Claims(
@@ -130,7 +130,7 @@ class Claims:
         return Verdict.PROVED if self.covers(tightest) and not tightest.opens(task) else Verdict.UNDECIDED
 
     def opens(self, task: FaultPlant) -> str:
-        """Why the fault may open, where the plant is another one; empty where the pressure stays below σ′."""
+        """Reason why the fault may open, after which the plant does not apply; empty if the pressure is below σ′."""
         if self.largest_pressure < task.normal_stress:
             return ""
         return (
@@ -164,7 +164,7 @@ def _wider(low: LowerBound, high: UpperBound) -> tuple[LowerBound, UpperBound]:
 
 
 def above(value: Fraction) -> Fraction:
-    """At least a rational, with four digits."""
+    """Rational of four digits, not below a given one."""
     if not value:
         return value
     scale = Fraction(10) ** (floor(log10(abs(value))) - _DIGITS + 1)
@@ -172,17 +172,17 @@ def above(value: Fraction) -> Fraction:
 
 
 # ----------------------------------------------------------------------
-# A guarantee: a fault, the loop that runs, and what its outputs never exceed.
+# Guarantee of a sampled loop: fault, loop, and bounds of its outputs.
 
 _NOISE_WORDS = {
     "slip_noise": "with any noise of at most {:.6g} m in the measured slip",
     "rate_noise": "with any noise of at most {:.6g} m/s in the measured slip rate",
 }
-_RESTS = Fraction(1, 100)  # of the largest rate of the reference: below that a fault counts as at rest
-_TURNS, _LEAPS = 32, 16  # of claims that follow from themselves: by small steps first, then by leaps
+_RESTS = Fraction(1, 100)  # slip rate over the largest reference rate below which a fault counts as at rest
+_TURNS, _LEAPS = 32, 16  # fixed-point iterations of claims: with small steps first, then with large ones
 _LEAP = Fraction(6, 5)
-_RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # times of a pump that are tried, and what each has more than the last needed
-_FIRST = Fraction(1, 64)  # of a step, the first of them
+_RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # number of ramp times tried, and factor above the last required one
+_FIRST = Fraction(1, 64)  # first ramp time over T_s
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,11 +195,11 @@ class Guarantee:
     held : Held
     claims : Claims
     slow_gain : SlowGain, optional
-        How the proof uses that the input gain is slow; None for one that lets it jump.
+        Slowly varying input gain of the proof; None for an arbitrary input gain.
     reach : InvariantPolytope, optional
-        Of aperiodic sampling, the set that the loop never leaves; None for others.
+        Invariant set for aperiodic sampling; None for periodic sampling.
     covers, lasts, plant : str
-        For what it holds, for how long, and the plant of `simulate` that it is about.
+        Conditions, time range, and the plant of `simulate` to which it applies.
     """
 
     proved: ClassVar[Literal[True]] = True
@@ -239,9 +239,9 @@ class Guarantee:
     def rest_limit(self) -> RestLimit | None:
         """Limit at rest that the valve pressure never reaches; None without a valve claim or `applied`.
 
-        What the law asks for acts a delay later, while the reference moves on. A fault that moves by less than its
-        measurement tells, or by a hundredth of the reference's largest rate, rests. Pressures that are
-        claimed never to be passed are not, either, unless the fault slips faster than is claimed.
+        The commanded pressure acts after the delay, during which the reference moves. A fault counts as at rest if it
+        moves by less than the measurement error, or slower than 1/100 of the largest reference rate. The limit also
+        includes the claimed range of pressure, unless the fault slips faster than is claimed.
         """
         held, (low, high), (*fault, (least, largest)) = self.held, self.task.rest_pressure, self.claims.pressures
         if not held.law.applied or (not fault and (held.lag or held.diffusion)):
@@ -296,7 +296,7 @@ class Guarantee:
         return self.claims.verdict(self.task, bounds)
 
     def sentence(self) -> str:
-        """What is guaranteed, for people."""
+        """Statement of the guarantee as text."""
         held = self.held
         when = f"with zero-order hold over {_seconds(held.step)}"
         if held.longest_step:
@@ -316,9 +316,9 @@ class Guarantee:
 
 
 def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from rest") -> str:
-    """What is claimed of a task, for people; `when` says how the pressure follows the law.
+    """Statement of the claims about a task as text; `when` describes the loop setup.
 
-    Bounds of what is claimed are rounded up, those of the disturbances and starts for which it is claimed down.
+    Claimed bounds are rounded outward; bounds of disturbances and initial errors are rounded down.
     """
     stress = LowerBound(task.amplitude / task.area_per_mass[1])
     kind = f"for every disturbance of at most {LowerBound(task.amplitude):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
@@ -339,9 +339,9 @@ def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from 
 def guarantee(
     task: FaultPlant, held: Held, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
 ) -> Guarantee | NoGuarantee:
-    """Tightest rounded claims about a loop, or why there are none; of a pump of some rate, with a ramp that will do.
+    """Tightest rounded claims about a loop, or why there are none; for a rate limit, with a sufficient ramp time.
 
-    Samples that follow no clock need a reach, and have no slow gain.
+    Aperiodic sampling needs `reach`, and excludes `slow_gain`.
 
     Raises
     ------
@@ -379,7 +379,7 @@ def _of_claims(
     slow_gain: SlowGain | None = None,
     reach: InvariantPolytope | None = None,
 ) -> Guarantee | NoGuarantee:
-    """What is claimed, or what speaks against it."""
+    """Claims, or the reason why there are none."""
     if not _root_within(task, held, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
         return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
@@ -401,7 +401,7 @@ def _rounded(task: FaultPlant, bounds: Bounds) -> Claims:
 
 
 def _slow_claims(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
-    """Claims on whose slip error the gain's spread rests that they follow from."""
+    """Claims that follow from the deviation of the input gain under the claimed slip error (fixed point)."""
     gains, slip_error = _slow_gains(task, held, slow_gain), Fraction(0)
     if isinstance(gains, NoGuarantee):
         return gains
@@ -437,14 +437,14 @@ def _slow_bounds(
 
 
 def _root_within(task: FaultPlant, held: Held, claims: Claims) -> bool:
-    """Whether an implicit root, if there is one, is as said wherever the claims hold."""
+    """Whether the sector of an implicit step, if there is one, is valid within the claims."""
     root = held.law.root
     errors = held.told(task, (claims.slip_error, claims.slip_rate_error))
     return root is None or small_gain.holds(root, held.step, *errors)
 
 
 def _beyond_the_pump(held: Held, claims: Claims) -> str:
-    """Why the pump cannot do what is claimed; empty where it can."""
+    """Reason why the claims exceed a pump limit; empty if they do not."""
     if held.pump is None:
         return ""
     return held.pump.exceeded(*claims.pressures[-1]) or held.pump.too_slow(claims.largest_step, held.ramp)
@@ -471,7 +471,7 @@ def _unstable(held: Held) -> NoGuarantee:
 
 
 def _off_schedule(measured: Fraction, arrived: Fraction) -> str:
-    """Said of jitter; nothing where there is none."""
+    """Part of the statement on jitter; empty without jitter."""
     each = f", each measurement within {LowerBound(measured):.6g} s of its instant" if measured else ""
     return each + (f", each pressure within {LowerBound(arrived):.6g} s of when it is due" if arrived else "")
 
@@ -487,7 +487,7 @@ def _seconds(value: Fraction) -> str:
 
 
 # ----------------------------------------------------------------------
-# Peaks of the idealised loop whose pressure acts at once: the theorem of the loop that runs, in continuous time.
+# Peaks of the idealised loop with a pressure without delay: the same theorem in continuous time.
 
 WHEN = "for a pressure that acts at once (continuous time)"
 PREMISES = (
@@ -530,12 +530,12 @@ class ContinuousPeaks:
         return self.claims.verdict(self.task, bounds) if isinstance(bounds, Bounds) else Verdict.UNDECIDED
 
     def to_dict(self) -> dict[str, Any]:
-        """Exact claims as texts, SI, and what they rest on."""
+        """Exact claims as texts, SI, and their assumptions."""
         kind = "amplitude" if self.task.change is None else "rate"
         return {"disturbance_class": kind, **self.claims.to_dict(), "premises": list(PREMISES)}
 
     def sentence(self) -> str:
-        """What is proved, for people."""
+        """Statement of the proved bounds as text."""
         return sentence_of(self.task, self.claims, WHEN)
 
 
@@ -557,7 +557,7 @@ def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousPeaks | 
 
 
 def _loop(task: FaultPlant, law: ContinuousLaw) -> PeriodicLoop:
-    """Nominal error loop, of a law that fits the reference."""
+    """Nominal error loop; rejects a law that needs a smoother reference."""
     loop = continuous_loop(law, task.model, task.authority)
     if any(law.of_reference):
         task.require_smooth_reference()
@@ -574,7 +574,7 @@ def _continuous_bounds(task: FaultPlant, law: ContinuousLaw) -> Bounds | NoGuara
 
 
 # ----------------------------------------------------------------------
-# Whether a guarantee is about a task: what it is proved for covers what is asked.
+# Whether a guarantee covers a task.
 
 _SAME = {
     "density": "kg/m^3",
@@ -591,8 +591,8 @@ _SPREADS = ("stiffness", "damping", "authority")
 def differences(proved: FaultPlant, asked: FaultPlant) -> list[str]:
     """Differences of a task that a proof does not cover, with both values, SI; empty if none.
 
-    Constants of the fault and its reference must be the same; friction, ranges and disturbance lie within those of the
-    proof. The name is none of it.
+    Constants of the fault and its reference must be the same; friction, ranges and disturbance must lie within those
+    of the proof. The name is not compared.
     """
     return [*_other(proved, asked), *_wider_than_needed(proved, asked), *_rougher(proved.friction, asked.friction)]
 
@@ -638,7 +638,7 @@ def _rougher(proved: Friction, asked: Friction) -> list[str]:
 
 
 # ----------------------------------------------------------------------
-# A guarantee of slow sliding: a fault, its box of constants in cells, the loop that runs, and its bounds.
+# Guarantee of slow sliding: fault, its box of constants in cells, loop, and bounds.
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -650,7 +650,7 @@ class SlidingGuarantee:
     task : SlidingPlant
     held : Held
     cuts : Cuts
-        How the box of constants falls into cells.
+        Subdivision of the box of constants into cells.
     claims : SlidingClaims
     """
 
@@ -685,7 +685,7 @@ class SlidingGuarantee:
         return cells(self.task, self.cuts)
 
     def check(self) -> Verdict:
-        """PROVED if the claims follow from themselves on every cell, in ball arithmetic; else UNDECIDED."""
+        """PROVED if the claims are self-consistent (fixed point) on every cell, in ball arithmetic; else UNDECIDED."""
         for cell in self.cells:
             bounds = cell_bounds(cell, self.held, self.claims)
             if isinstance(bounds, NoGuarantee) or not follows(bounds, self.claims):
@@ -704,11 +704,11 @@ class SlidingGuarantee:
 
     @property
     def valve_pressures(self) -> tuple[LowerBound, UpperBound]:
-        """Least and largest pressure at the valve, what is planned included [Pa]."""
+        """Least and largest pressure at the valve, with the planned pressure [Pa]."""
         return self._within(self.claims.asked)
 
     def _within(self, size: UpperBound) -> tuple[LowerBound, UpperBound]:
-        """Ends of p* while the reference goes its distance, and a size [Pa] beyond."""
+        """Range of p* along the reference, widened by a size [Pa] on both sides."""
         return LowerBound(-size), UpperBound(self.task.pressure_per_slip * self.task.distance + size)
 
     def to_dict(self) -> dict[str, Any]:
@@ -726,7 +726,7 @@ class SlidingGuarantee:
         }
 
     def sentence(self) -> str:
-        """What is guaranteed, for people; bounds rounded up, those of what it is guaranteed for down."""
+        """Statement of the guarantee as text; bounds rounded outward, bounds of its conditions down."""
         task, held, claims = self.task, self.held, self.claims
         ratio = UpperBound(exponential(claims.log_rate))
         (low, high), (least, largest) = self.pressures, self.valve_pressures
@@ -753,13 +753,13 @@ def _path(held: Held) -> str:
 
 
 def _along(task: SlidingPlant) -> str:
-    """The references, where there is more than one."""
+    """Part of the statement on the references, if there is more than one."""
     slow, fast = UpperBound(1 - task.swing), LowerBound(1 + task.swing)
     return f"every reference whose rate stays between {slow:.6g} V and {fast:.6g} V, " if task.swing else ""
 
 
 def _friction(task: SlidingPlant) -> list[str]:
-    """What a reader would not expect, who expects ageing."""
+    """Parts of the statement on regularised friction and on the slip law."""
     said = ["friction regularised"] if task.regularised else []
     return said + (["state by the slip law"] if task.state_law == "slip" else [])
 
@@ -775,7 +775,7 @@ def _box(task: SlidingPlant) -> str:
 
 
 def _inside(low: Fraction, high: Fraction) -> str:
-    """Ends of a range on its inner side, with as many digits as it takes."""
+    """Ends of a range, rounded inward, with as many digits as necessary."""
     for digits in range(6, 16):
         ends = f"{UpperBound(low):.{digits}g}", f"{LowerBound(high):.{digits}g}"
         if Fraction(ends[0]) < Fraction(ends[1]):

@@ -27,24 +27,24 @@ from quakedesign.plant.ranges import FaultPlant
 from quakedesign.plant.sliding_plant import SlidingPlant
 
 # ----------------------------------------------------------------------
-# The worst that a search finds on the loop of a guarantee: what is seen, beside what is proved.
+# Falsification of the loop of a guarantee: worst case found, a lower bound of the errors.
 
 _PIECES = 6
 _SWEEPS = 8
-_MANY, _FEW = 512, 2  # courses that switch after random times, and their sweeps: where the fault sticks, sweeps stall
-_COURSES, _LEAST_COURSES = 24, 8  # for each of the two outputs; fewer where they are longer
-_CLIMBING, _CLIMBS = 48, 8  # courses that climb from the best of those, and how often
-_CHANGED = 0.15, 0.4, 1.0  # shares of the pieces whose inputs are those of the adjoint, in turn
+_MANY, _FEW = 512, 2  # trajectories with random switching times, and their sweeps, which stall at rest
+_COURSES, _LEAST_COURSES = 24, 8  # for each of the two outputs; fewer of long ones
+_CLIMBING, _CLIMBS = 48, 8  # trajectories improved from the best of those, and number of improvements
+_CHANGED = 0.15, 0.4, 1.0  # shares of the pieces whose inputs are replaced by those of the adjoint, in turn
 _BLOCK = 8  # pieces that change together, at most
-_RESTING, _ROUNDS = 96, 9  # courses that rest before a push, and how often they change; of 128 periods
-_FIRST_PUSH, _LONGEST_PUSH = 20, 7  # periods within which a push ahead of the reference begins, and that it lasts
+_RESTING, _ROUNDS = 96, 9  # trajectories at rest before a push, and number of their changes; of 128 periods
+_FIRST_PUSH, _LONGEST_PUSH = 20, 7  # latest begin and longest duration of a push ahead of the reference, in periods
 _NEAR = np.array([[2], [2], [_PIECES]])  # pieces by which start, length and end of the rest change from round to round
 _MOST_RESTED = 128  # periods
-_SOON = 1, 2, 4, 8, 16  # periods after which errors are looked at as well where a loop does not start at rest
-_SLOW = 0.05  # a reference that is nearly at rest, of its largest rate
-_LEVELS = 400  # of a disturbance of bounded rate above 0
+_SOON = 1, 2, 4, 8, 16  # periods after which errors are also evaluated for a loop with initial errors
+_SLOW = 0.05  # rate of a slow reference over its largest rate
+_LEVELS = 400  # grid levels above 0 of a disturbance of bounded rate
 _SEED = 7
-_NEARLY = Fraction(31, 32)  # of the time between two events, so that they never meet
+_NEARLY = Fraction(31, 32)  # largest shift over the time between two events, so that they never coincide
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +58,7 @@ class WorstFound:
     slip_rate_error : float
         [m/s].
     least_pressure, largest_pressure : float or None
-        At the valve [Pa]; None where they are not followed: without stick, or a limit at rest.
+        At the valve [Pa]; computed only on the stick–slip plant with a law that has a limit at rest, else None.
     """
 
     slip_error: float
@@ -68,13 +68,13 @@ class WorstFound:
 
     @property
     def pressures(self) -> tuple[float, float] | None:
-        """Least and largest [Pa], if they are followed."""
+        """Least and largest pressure [Pa], if computed."""
         least, largest = self.least_pressure, self.largest_pressure
         return None if least is None or largest is None else (least, largest)
 
 
 def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> WorstFound:
-    """Adversarial courses of disturbance, friction slope, damping and input gain, all at their ends.
+    """Adversarial trajectories: disturbance, friction slope, damping and input gain at the ends of their ranges.
 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64 to 512
     periods long, as the loop forgets; in continuous time a period is that of the fastest pole, 1/|λ|. A disturbance of
@@ -93,7 +93,7 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
 
 
 def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
-    """Largest slip error [m] and slip-rate error [m/s]; the least and largest pressure [Pa] if they are followed."""
+    """Largest slip error [m] and slip-rate error [m/s]; least and largest pressure [Pa] if computed."""
     searches = [_CourseSearch(claim, sticks, 2 * _COURSES)]
     searches[0].follow(searches[0].random(), _SWEEPS)
     if sticks:
@@ -115,7 +115,7 @@ def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
 
 
 def _resting(claim: Guarantee, like: "_CourseSearch") -> "_CourseSearch":
-    """Courses of the slip-rate error along the fastest reference, longer by the rest of a fault ahead of it."""
+    """Trajectories of the slip-rate error along the fastest reference, longer by a rest ahead of the reference."""
     way = claim.task.reference_rates[0] * claim.held.step
     periods = like.periods + int(np.ceil(min(float(claim.claims.slip_error / way), _MOST_RESTED)))
     courses = max(_RESTING * 2 * PERIODS // (periods * len(like.parts)), _LEAST_COURSES)
@@ -157,10 +157,10 @@ _ON_TIME: dict[str, Any] = dict.fromkeys(("jitter", "delay_jitter", "averaging",
 
 
 def _on_time(held: Held) -> tuple[Held, Fraction, Fraction]:
-    """The loop without jitter whose events are moved, by how much its samples are, and its pressures before its time.
+    """Loop without jitter whose events are shifted, largest shift of its samples, and largest lead of its pressures.
 
-    Where pressures arrive with a sample they are moved with that. Events keep their order. A first sample that has to
-    be at its instant is as early as the earliest.
+    Pressures that arrive with a sample are shifted with it. Events keep their order. A first sample that must be
+    at its instant is as early as the earliest.
     """
     off, late, delay = held.jitter, held.jitter + held.delay_jitter, held.delay
     if any(held.start) or held.law.first:
@@ -218,7 +218,7 @@ class _Limit:
     def of(
         cls, claim: Guarantee, held: Held, size: int, back: np.ndarray, numbers: np.ndarray | None = None
     ) -> "_Limit | None":
-        """That of a guarantee along references of some rates [m/s], in a loop; None where it has none."""
+        """Limit at rest of a guarantee along references of given rates [m/s]; None if it has none."""
         limit, law, authority = claim.rest_limit, claim.held.law, float(claim.task.authority)
         if limit is None:
             return None
@@ -258,7 +258,7 @@ class _Limit:
         return np.asarray(state + np.outer((applied - asked) * sampled, self.told))
 
     def follow(self, before: np.ndarray, after: np.ndarray) -> None:
-        """p* drifts, and with it what all pressures are less it."""
+        """Subtract the drift of p* from all pressures, which are relative to it."""
         drifted = after[:, self.place] - before[:, self.place]
         self.highest = self.highest + drifted
         self.rest = np.clip(self.rest - drifted, *self.ends)
@@ -274,7 +274,7 @@ def _of_asked(task: FaultPlant, held: Held) -> list[float]:
 
 
 class _CourseSearch:
-    """Many courses at once; `largest` holds |e1| and |e2|."""
+    """Many trajectories in one array; `largest` is |e1| and |e2|."""
 
     def __init__(
         self,
@@ -340,7 +340,7 @@ class _CourseSearch:
         return last
 
     def best(self, count: int) -> np.ndarray:
-        """Numbers of the best courses of the last sweep, a quarter of each kind."""
+        """Indices of the best trajectories of the last sweep, a quarter of each kind."""
         reached = self.marks.max(axis=0)
         kinds = [np.flatnonzero(self.kinds == kind) for kind in range(4)]
         return np.concatenate([kind[np.argsort(-reached[kind])[: count // 4]] for kind in kinds])
@@ -348,8 +348,8 @@ class _CourseSearch:
     def ascend(self, costates: np.ndarray) -> None:
         """Climb: of each course the inputs of some pieces become those of its adjoint, and stay so where it goes on.
 
-        Where the fault sticks, the maximum principle for all pieces at once stalls. The adjoint is that of the largest
-        error, whenever it is reached.
+        While the fault is at rest, the maximum principle for all pieces at once makes no progress. The adjoint is that
+        of the largest error, at the time at which it occurs.
         """
         random = np.random.default_rng(_SEED)
         chosen, held, jumped = self._forward(costates, None)
@@ -482,14 +482,14 @@ class _CourseSearch:
         return np.asarray(after + noise @ self.heard + self._beside_the_line(state[:, :2] + noise))
 
     def _beside_the_line(self, told: np.ndarray) -> np.ndarray | float:
-        """What the true end of an implicit step adds to that of the nominal loop."""
+        """Difference between the solution of the implicit step and its linear approximation in the nominal loop."""
         if self.root is None:
             return 0.0
         line = float(self.root.middle) / self.step * told[:, 0]
         return np.outer(root_of(self.root.pull, self.step, told[:, 0], told[:, 1]) + line, self.sudden)
 
     def _held(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
-        """Keep every state where it can be; mask of what is held there."""
+        """Project every state onto the admissible slip rates; mask of states at rest."""
         mask = np.zeros(state.shape, dtype=bool)
         if self.back is not None:
             mask[:, 1] = stuck = state[:, 1] < -self.back
@@ -615,7 +615,7 @@ def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, event: _Event, *, no
 
 
 def _periods_to_forget(parts: list[_EventPieces], size: int) -> int:
-    """How many periods a loop of so many states remembers at the vertex that forgets last, within limits."""
+    """Periods until the state has decayed at the slowest vertex, for a number of states, within limits."""
     maps = np.eye(parts[0].jump.shape[0])[None]
     for part in parts:
         jump = np.eye(len(part.jump)) if part.of.late else part.jump
@@ -630,7 +630,7 @@ def _widened(jump: Any, size: int) -> np.ndarray:
 
 
 # ----------------------------------------------------------------------
-# The worst that a search finds on the loop of a guarantee of slow sliding: what is seen, beside what is proved.
+# Falsification of a guarantee of slow sliding: worst case found, a lower bound of the errors.
 
 _SLIDING_PIECES, _FINE_PIECES = 4, 16  # of a part of the period
 _SLOPES = (1.0, 1.15)  # of e^y − 1 over y, in the linear loop that a course is found for

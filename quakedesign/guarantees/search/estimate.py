@@ -21,17 +21,17 @@ from quakedesign.loop import PeriodicLoop
 from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
-# The bounds of a guarantee in floats, for searches: proposes, decides nothing.
+# Floating-point estimates of the bounds of a guarantee, for searches; no decision depends on them.
 
 _PIECES = 4
 _MOST_PERIODS = 4096
-_FORGOTTEN = 1e-4  # share of the past that is left out
-_ALIKE = 0.99  # decays of modes that are not told apart
+_FORGOTTEN = 1e-4  # relative size of the neglected tail of the response
+_ALIKE = 0.99  # ratio of decays above which two modes are not separated
 _SOON = 1024  # periods
-_ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # of the range of a slow input gain, with whose loops it is judged
-_SPREAD = Fraction(1, 16)  # of the range by which it is off theirs
-_PARTS = SlowGain(parts=8, growth=Fraction(1))  # as in proofs; what is past is left out
-_TURNS, _LEAP = 10, 1.4  # of a slip error that follows from itself, and how far it goes at least after a few
+_ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # places in the range of a slow input gain of the nominal loops
+_SPREAD = Fraction(1, 16)  # deviation of the gain from theirs, relative to its range
+_PARTS = SlowGain(parts=8, growth=Fraction(1))  # as in proofs; the input ``aged`` is neglected
+_TURNS, _LEAP = 10, 1.4  # iterations of the slip error to its fixed point, and least factor of a late one
 _FEW = 2
 
 
@@ -44,7 +44,7 @@ class BoundsEstimate:
 
 
 def estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
-    """Bounds of the theorem with sums in place of upper sums; None where the nominal loop is unstable or very slow."""
+    """Bounds of the theorem with trapezoidal sums instead of upper bounds; None for an unstable or very slow loop."""
     gains = gains_of(held.loop(task))
     if gains is None:
         return None
@@ -53,7 +53,7 @@ def estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
 
 
 def slowly_estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
-    """The same where the input gain is slow: of nominal loops at the ends and in the middle of its range."""
+    """The same for a slow input gain, with nominal loops at the ends and in the middle of its range."""
     low, high = task.beta
     found = []
     for share in _ENDS:
@@ -68,11 +68,11 @@ def slowly_estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
 
 
 def closeness(task: FaultPlant, held: Held) -> tuple[float, Bounds | None]:
-    """Below 1 where a proof is to be expected: the small gain [-], and the bounds; elsewhere 1 more, of errors of 0.
+    """Small gain [-] with the bounds if a proof is expected, below 1; else 1 + the small gain for errors of 0.
 
-    Where friction depends on the slip alone the input gain is slow, and the slip error that moves it has to follow from
-    itself; loops of the first and the last part of its range tell. Infinite where a nominal loop is unstable or very
-    slow.
+    For friction that depends on the slip alone the input gain is slow, and its deviation depends on the bound of the
+    slip error, which is found by fixed-point iteration for the nominal loops of the first and the last part of the
+    range. Infinite for an unstable or very slow nominal loop.
     """
     if task.friction.rate_slope:
         found = estimated(task, held)
@@ -147,10 +147,10 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
 
 @dataclass(frozen=True, slots=True)
 class _Slowest:
-    """Decay of the slowest mode over a period and of all others, and the directions to which and by which it is moved.
+    """Decay over a period of the slowest mode and of all others, with left and right eigenvector of the slowest.
 
-    Of a pair of modes that turn, or two that are alike, nothing is told apart: all count as others, as
-    they do where all is soon forgotten anyway.
+    A complex pair, or two modes with nearly equal decay, are not separated: all modes count as others, as they do
+    where all modes decay within a few periods.
     """
 
     decay: float
@@ -173,13 +173,13 @@ class _Slowest:
         return cls(decay, others, vectors[:, first].real, seen)
 
     def left(self, columns: np.ndarray, periods: int) -> np.ndarray:
-        """What it leaves, in all, of the columns of a period after so many."""
+        """Sum over all later periods of the responses to the columns, after a number of periods."""
         size = np.abs(self.seen @ columns).sum() * self.decay**periods / (1 - self.decay)
         return np.asarray(self.along * size)
 
 
 def _entries(loop: PeriodicLoop) -> Iterator[tuple[str, np.ndarray, int | None]]:
-    """Every input, and the segment with whose jump it enters if that is so; what fades counts as sudden."""
+    """Every input, and the segment whose jump it enters with, if any; a fading input counts as one at the jump."""
     for name, row in loop.inputs.items():
         yield name, np.array(row, float), None
     for name, row in loop.sampled.items():
@@ -190,7 +190,7 @@ def _entries(loop: PeriodicLoop) -> Iterator[tuple[str, np.ndarray, int | None]]
 
 
 def _pulses(loop: PeriodicLoop, flows: list[_Flow]) -> Iterator[tuple[str, list[np.ndarray]]]:
-    """Every input that is there near a jump alone, with the half sum and the half difference of both sides of that."""
+    """Every input that acts near a jump only, with half the sum and half the difference of both sides."""
     for name, pulse in loop.pulses.items():
         entry = np.array(pulse.entry, float)
         before, after = flows[pulse.first].jump @ entry * float(pulse.before), entry * float(pulse.after)
@@ -246,7 +246,7 @@ class _Sums:
 
     @property
     def columns(self) -> np.ndarray:
-        """For the sums of everything later."""
+        """Factor for the sums of all later periods."""
         weights = np.array([0.5, *[1.0] * (_PIECES - 1), 0.5])
         return self.response[:, -1:] if self.sudden else self.response * weights * self.piece
 
@@ -267,12 +267,12 @@ def _response(entry: np.ndarray, flow: _Flow) -> np.ndarray:
 
 
 # ----------------------------------------------------------------------
-# Eigenvalues of sampled laws and loops, in floats: how they move by themselves.
+# Eigenvalues of sampled laws and loops, in floats.
 
 PERIODS = 64
-"""Of a course of an adversary, at least."""
+"""Least number of periods of an adversarial trajectory."""
 _MOST_POLE_PERIODS = 512
-_FORGOTTEN_POLE = 100  # a course is over when what was at first is down to the hundredth part
+_FORGOTTEN_POLE = 100  # a trajectory ends when the initial state has decayed by this factor
 
 
 def own_poles(law: LinearLaw) -> np.ndarray:
@@ -291,13 +291,13 @@ def moved(flow: np.ndarray, inputs: np.ndarray, length: float) -> tuple[np.ndarr
 
 
 def periods_to_forget(radius: float) -> int:
-    """How many periods a loop remembers that leaves a share of what was: until a hundredth is left, within limits."""
+    """Periods until the state of a loop with a decay factor per period has decayed to 1/100, within limits."""
     pace = -np.log(np.clip(radius, 1e-9, 1 - 1e-9))
     return int(np.clip(np.ceil(np.log(_FORGOTTEN_POLE) / pace), PERIODS, _MOST_POLE_PERIODS))
 
 
 def spectral_radius(loop: PeriodicLoop) -> float:
-    """Largest size of an eigenvalue of a period."""
+    """Spectral radius of the map over a period."""
     flow, period = np.array(loop.flow, dtype=float), np.eye(len(loop.flow))
     for part in loop.segments:
         period = expm(flow * float(part.duration)) @ np.array(part.jump, dtype=float) @ period

@@ -50,16 +50,16 @@ from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
-# Guarantees that use how slowly the input gain changes, where friction depends on the slip alone.
+# Guarantees with a slowly varying input gain, for friction that depends on the slip alone.
 
 _PARTS = 8
-_SHARE = 0.5  # of the slowest decay, for what is past to grow by
+_SHARE = 0.5  # growth α as a share of the slowest decay rate
 
 
 def best_guarantee(task: FaultPlant, held: Held) -> Guarantee | NoGuarantee:
-    """Guarantee with an input gain that is slow, where the friction's is and it helps, else with any.
+    """Guarantee with a slowly varying input gain if friction has one and it helps, else with an arbitrary gain.
 
-    Where samples follow no clock that is one with a set that the loop never leaves.
+    With aperiodic sampling, a guarantee by an invariant set.
     """
     if held.longest_step:
         return unclocked_guarantee(task, held)
@@ -76,7 +76,7 @@ def tightened(found: Guarantee) -> Guarantee: ...
 @overload
 def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee: ...
 def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee:
-    """A guarantee with a slow input gain in place of one with any, where there is one."""
+    """Guarantee with a slowly varying input gain in place of one with an arbitrary gain, if one is found."""
     if not found.proved or found.slow_gain is not None or found.reach is not None:
         return found
     better = best_guarantee(found.task, found.held)
@@ -93,32 +93,32 @@ def slow_gain(task: FaultPlant, held: Held) -> SlowGain | None:
 
 
 def _decay(loop: PeriodicLoop) -> float:
-    """Of the slowest mode [1/s]."""
+    """Decay rate of the slowest mode [1/s]."""
     return -log(max(spectral_radius(loop), 1e-12)) / float(loop.period)
 
 
 # ----------------------------------------------------------------------
-# A law with a disturbance estimate for the loop as it runs, chosen by what can be guaranteed.
+# Design of a sampled law with a disturbance estimate by its guaranteed bounds.
 
 OBJECTIVES = ("tracking", "peak")
 _EVALUATIONS = 150
-_FEW = 45  # evaluations near a law that has a guarantee at another time
-_SURE = 0.9  # closeness that is near enough
-_NARROW = 1.25  # room of those: more of it costs what is proved of the slip error too
-_FEWER = 80  # evaluations where samples follow no clock
-_CREEPING = 0.1  # what the slip error over a period counts beside the slip-rate error, so that the loop does not creep
+_FEW = 45  # evaluations near a law that has a guarantee at another T_s or delay
+_SURE = 0.9  # closeness that is sufficient
+_NARROW = 1.25  # `room` with aperiodic sampling: a larger one increases the bound of the slip error too
+_FEWER = 80  # evaluations with aperiodic sampling
+_CREEPING = 0.1  # weight of slip error per period relative to slip-rate error, against slow convergence
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
-_MOST_GROWTH = 50.0  # logarithm; no law of samples answers that, and predictions far beyond it overflow
+_MOST_GROWTH = 50.0  # logarithm; no sampled law stabilises that, and predictions far beyond it overflow
 _FAILED = 1e6
-_HOPELESS = 1.2  # small gain of a whole search after which no other start is tried
-_SETTLES = 0.9  # per period of the family, of what a law does by itself while the fault sticks, but for its integral
-_WIDE = 0.05  # around a small number, at first
-_FAR, _ENOUGH = 3.0, 40  # small gain that a search gives up at after so many evaluations
+_HOPELESS = 1.2  # small gain at the end of a search beyond which no other start is tried
+_SETTLES = 0.9  # largest decay factor per period of the law alone while the fault is at rest, without its integral
+_WIDE = 0.05  # initial range around a small number
+_FAR, _ENOUGH = 3.0, 40  # a search stops at a small gain above the first after this number of evaluations
 
 
 @dataclass(frozen=True, slots=True)
 class Closest:
-    """Of a family of laws for one loop that which comes nearest to a guarantee.
+    """The law of a family that comes nearest to a guarantee of one loop.
 
     Attributes
     ----------
@@ -147,9 +147,9 @@ def closest(
     measured: str = MEASURED[0],
     **around: Unpack[Around],
 ) -> Closest | NoGuarantee:
-    """The law that comes nearest to a guarantee, or one that is well within it; why there is no law at all.
+    """The law that comes nearest to a guarantee, or one well within it; `NoGuarantee` if there is no law at all.
 
-    The search begins near the numbers of another law, if there is one, else where good laws of the family were seen.
+    The search begins near the numbers of another law if given, else near numbers of good laws of the family.
     """
     if around.get("delay", 0) > MOST_DELAY * step:
         return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
@@ -170,7 +170,7 @@ def nearby(
 ) -> Guarantee | NoGuarantee:
     """Design for the smallest certified slip-rate error, sought near the numbers of a law for another T_s or delay.
 
-    Near the longest of these a law is proved with a slow input gain alone, of which `design_held` knows too late.
+    Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_held` uses it at its end only.
     """
     laws = _Laws.of(task, step, measured, around)
     if isinstance(laws, NoGuarantee):
@@ -204,8 +204,8 @@ def design_held(
         T_s [s].
     objective : str
     room : float, optional
-        What ``tracking`` may spend of the smallest certified slip-rate error [-]; 1.6 unless given, of an observer,
-        whose smallest is larger, 1.4, by no clock 1.25.
+        Largest slip-rate error of ``tracking``, relative to the smallest certified one [-]. Default 1.6; with an
+        observer, whose smallest error is larger, 1.4; with aperiodic sampling 1.25.
     measured : str
         One of `MEASURED`; the differentiator is the implicit one of order 2, from rest.
     **around : Fraction
@@ -251,7 +251,7 @@ def design_held(
 
 
 def _with_noise(without: Guarantee, noise: Mapping[str, Fraction]) -> Guarantee | NoGuarantee:
-    """What a law that is proved without noise comes to with it: no small gain depends on noise."""
+    """Guarantee with noise of a law that is proved without noise: the small gain does not depend on noise."""
     held = replace(without.held, **noise)  # type: ignore[arg-type]
     found = best_guarantee(without.task, held)
     if found.proved:
@@ -265,7 +265,7 @@ def _with_noise(without: Guarantee, noise: Mapping[str, Fraction]) -> Guarantee 
 
 @dataclass(frozen=True)
 class _Laws:
-    """Laws among which a search chooses for one loop, and what is seen of each."""
+    """Candidate laws of a search for one loop, with their estimates."""
 
     task: FaultPlant
     family: LawFamily
@@ -274,7 +274,7 @@ class _Laws:
 
     @classmethod
     def of(cls, task: FaultPlant, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
-        """Laws for a T_s [s] and what is around them, or why there are none."""
+        """Laws for a T_s [s] and a loop setup, or the reason why there are none."""
         require_surroundings(around)
         require_step(step)
         if (none := unpredictable(task, step)) is not None:
@@ -292,7 +292,7 @@ class _Laws:
         return replace(self.template, law=self.family.law(x))
 
     def seen(self, x: np.ndarray) -> BoundsEstimate | None:
-        """What is estimated of a law; None where there is none of these numbers."""
+        """Estimate of the law with these numbers; None if they give no law."""
         judged = slowly_estimated if self.template.diffusion and not self.task.friction.rate_slope else estimated
         judged = unclocked_estimate if self.template.longest_step else judged
         try:
@@ -301,7 +301,7 @@ class _Laws:
             return None
 
     def closest(self, start: Sequence[float] | np.ndarray, evaluations: int) -> tuple[float, np.ndarray]:
-        """Smallest closeness to a guarantee near a start, and where."""
+        """Smallest closeness to a guarantee near a start, with its numbers."""
 
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _FAILED * min(self.close(x)[0], 9.0)) / _FAILED
@@ -311,7 +311,7 @@ class _Laws:
         )
 
     def least_peak_near(self, start: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Where the cost of a peak is smallest near a law that may be proved with a slow input gain alone."""
+        """Numbers with the smallest peak cost near a law that only a slowly varying input gain may prove."""
 
         def cost(x: np.ndarray) -> float:
             found, bounds = self.close(x)
@@ -361,7 +361,7 @@ class _Laws:
         return search_near(("pressure", *self.question), cost, start, **self._effort)
 
     def least_drift(self, start: Sequence[float] | np.ndarray, limit: float) -> tuple[float, np.ndarray]:
-        """Smallest cost of a drift near a start, and where, within a limit of the slip-rate error [m/s]."""
+        """Smallest drift cost near a start, with its numbers, under a limit of the slip-rate error [m/s]."""
 
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _drift_cost(self.seen(x), limit))
@@ -375,7 +375,7 @@ class _Laws:
 
     @property
     def _effort(self) -> dict[str, Any]:
-        """Evaluations of a search, where one takes a twentieth of a second."""
+        """Number of evaluations of a search, of 0.05 s each."""
         return {"evaluations": _FEWER} if self.template.longest_step else {}
 
     def quiet(self, x: np.ndarray, cost: float) -> float:
@@ -388,7 +388,7 @@ class _Laws:
 
 
 def _hopeless(cost: float) -> bool:
-    """Whether a whole search ends at a small gain from which nothing was seen to lead to a guarantee."""
+    """Whether the small gain at the end of a search is so large that experience shows no way to a guarantee."""
     return _HOPELESS * _FAILED < cost < 9 * _FAILED
 
 
@@ -473,11 +473,11 @@ def _drift_cost(found: BoundsEstimate | None, limit: float) -> float:
 
 Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
 _ATTEMPTS = 12
-_NEAR = Fraction(1, 16)  # share of the longest time by which the end of the reach is left open
+_NEAR = Fraction(1, 16)  # relative width of the final bracket of the longest time
 _CLOSE = Fraction(1, 16)  # the same where designs are continued
-_LOOSE = Fraction(1, 10)  # the same of delays and what else may be 0, each of which takes longer
+_LOOSE = Fraction(1, 10)  # the same for delays and other quantities that may be 0, whose designs take longer
 _BACK = Fraction(39, 40)  # of a time whose law is not proved after all
-_EDGE, _AIM = 0.92, 0.985  # small gain that is at the end of the reach, and that which a time is sought for
+_EDGE, _AIM = 0.92, 0.985  # small gain accepted as the end of the range, and target of the search for a time
 _POWER = 1.3  # of a time with which the small gain was seen to grow
 _LEAST = 0.01  # small gain that is counted with
 _LONGEST_TIMES_FAR = 2.0  # small gain from which a time is halved
@@ -674,7 +674,7 @@ def nearest_setup(
 
 
 def _slack(step: Fraction, around: Around) -> Fraction:
-    """By how much the longest interval from sample to sample is longer than T_s [s]."""
+    """Longest sampling interval less T_s [s]."""
     return max(around.get("longest_step", step) - step, Fraction(0))
 
 
@@ -865,7 +865,7 @@ def _next(good: Fraction | None, bad: Fraction | None, most: Fraction | None) ->
 
 
 # ----------------------------------------------------------------------
-# How fast a fault can slip at most under a given e-LQR whose pressure acts at once, as the theorem proves it.
+# Proved peaks of slip and slip rate under a given e-LQR in continuous time, with a pressure without delay.
 
 CLASSES = ("amplitude", "rate")
 

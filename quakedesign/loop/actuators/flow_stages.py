@@ -88,7 +88,7 @@ class Diffusion(FlowStage):
     diffusivity : float
         D [m²/s], positive.
     storage : float or None
-        S [m³/Pa], positive: fluid that the whole layer takes up per pressure, its volume times its specific storage.
+        S [m³/Pa], positive: fluid volume stored in the whole layer per pressure, its volume times its specific storage.
         Without it pressures are the same, but volume and flow rate are not known.
     cells : int
         N, 1 … 200.
@@ -100,15 +100,15 @@ class Diffusion(FlowStage):
         Option(
             name="diffusion",
             unit="s",
-            help="L^2/D of the rock between well and fault, such as '100 s'; the smaller, the more substeps it needs.",
+            help="L^2/D of the diffusion path between well and fault, such as '100 s'; the smaller, the more substeps.",
         ),
         Option(
             name="storage",
             unit="m^3/Pa",
-            help="Fluid that this rock takes up per pressure, such as '1e-4 m^3/Pa'; gives injected volume and flow "
-            "rate.",
+            help="Fluid volume stored in the diffusion path per pressure, such as '1e-4 m^3/Pa'; gives injected volume "
+            "and flow rate.",
         ),
-        Option(name="cells", unit="", help="Of the model of this rock.", default=16),
+        Option(name="cells", unit="", help="Number of cells of the diffusion path.", default=16),
     )
 
     length: float

@@ -39,14 +39,14 @@ class Delay(SampledStage):
         Option(
             name="delay",
             unit="s",
-            help="Time that the computation takes, such as '2 ms'.",
+            help="Delay of the computation, such as '2 ms'.",
             default=0.0,
         ),
         Option(
             name="jitter",
             unit="",
-            help="Most further steps that a delay takes, drawn anew at every sample: 1 for 1 or 2 ms at --delay '1 ms' "
-            "and steps of 1 ms.",
+            help="Largest random addition to the delay, in steps, drawn at every sample: with --delay '1 ms', steps of "
+            "1 ms and 1 the delay is 1 or 2 ms.",
         ),
     )
 

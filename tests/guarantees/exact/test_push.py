@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.impossibility import (
+from quakedesign.guarantees.exact.limit_theorems import (
     SlidingPush,
     longest_diffusion,
     longest_reaction,

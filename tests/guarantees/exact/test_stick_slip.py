@@ -14,7 +14,7 @@ from scipy.spatial import HalfspaceIntersection
 
 import quakedesign as qd
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
-from quakedesign.guarantees.exact.impossibility import smallest_stick_slip_rate
+from quakedesign.guarantees.exact.limit_theorems import smallest_stick_slip_rate
 from quakedesign.laws.sampled_controller import integral_symbols, law_expressions, r, r_rate
 from quakedesign.laws.stick_slip_controller import StickSlipController
 from quakedesign.laws.stick_slip_law import StickSlipLaw

@@ -17,7 +17,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Guarantee, Held, guarantee
-from quakedesign.guarantees.exact.impossibility import (
+from quakedesign.guarantees.exact.limit_theorems import (
     farthest_well,
     longest_diffusion,
     longest_reaction,

@@ -1,7 +1,7 @@
 """Performance limits of every controller: two theorems evaluated in ball arithmetic.
 
 Theorem 1 bounds the smallest peak error at a given sampling period. Theorem 2 gives the longest reaction
-and diffusion times, and the smallest withdrawal, with which a controller may hold the fault. The first
+and diffusion times, and the smallest withdrawal, with which a controller may stabilise the fault. The first
 chapter treats the linearised rate-and-state fault in slow sliding, the second a fault with slip or
 slip-rate dependent friction.
 """
@@ -22,7 +22,7 @@ from quakedesign.loop import SlidingModel
 from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
-# What no controller can do with a fault in slow sliding, of its linearisation: two theorems, in ball arithmetic.
+# Performance limits of every controller for the linearised fault in slow sliding: two theorems, in ball arithmetic.
 #
 # The plant is the nominal one about sliding at V, linearised at the pressure 0, without inertia (`SlidingModel` with
 # c = c_z = 1): slip error x, y = ln(v/V), z = ln(θ/θ_ss), pressure error q = p − p*, any measurable shear stress |d|
@@ -31,7 +31,8 @@ from quakedesign.plant.ranges import FaultPlant
 #
 #     x′ = Vy,   z′ = −ρ(y + z),   Sy = −Kx − Wz + μq + d.
 #
-# Controllers are any: linear or not, with memory, knowing plant, errors and stress exactly up to the sample.
+# The controller is arbitrary: linear or not, with memory, with exact knowledge of plant, errors and stress up to the
+# sample.
 #
 # **Theorem 1 (surprise).** If pressures are decided at samples T apart, no controller keeps |y| below D·h(t) for any 0
 # ≤ t < T, h the response of y to a unit step of d with q = 0: h(0) = 1/S. *Proof.* Take d = D for all t, and the course
@@ -103,25 +104,24 @@ class SlidingPush:
 
 
 # ----------------------------------------------------------------------
-# What no controller can do with a fault: three theorems, evaluated in ball arithmetic.
+# Performance limits of every controller for a fault: three theorems, evaluated in ball arithmetic.
 #
-# A claim about all frictions and parameters of the box fails if it fails for one of them, so each theorem picks the
-# plant that hurts most among a few. κ = k̂ − φ1 and w = η̂ − φ2 stand for the plant, φ is any measurable function of
-# time with |φ| ≤ H, the pressure p is whatever a controller likes: linear or not, with memory, knowing plant, slip,
-# slip rate and disturbance exactly up to the sample; or, with noise in theorem 1, knowing the plant and being told, at
+# A claim about all frictions and parameters of the box fails if it fails for one of them, so each theorem takes the
+# worst of a few plants. κ = k̂ − φ1 and w = η̂ − φ2 stand for the plant, φ is any measurable function of
+# time with |φ| ≤ H, the pressure p is from any controller: linear or not, with memory, knowing plant, slip,
+# slip rate and disturbance exactly up to the sample; or, with noise in theorem 1, knowing the plant and measuring, at
 # all times up to the sample, slip and slip rate within n and n′ of the true ones, either of which may be missing (n =
 # ∞). X and P below are the largest slip-rate error and the largest withdrawal.
 #
 # **Theorem 1 (surprise).** Let the pressure be decided at samples T apart, act θ later and stay for T. On the plant
 # continued to negative slip rates no controller keeps the slip error within E and the slip-rate error below X for
-# ever if
+# all t if
 #
 #     X ≤ 2H·h(T + θ + τ),   h: impulse response of h″ = σh − wh′ from acceleration to slip,
 #
-# where noise hides for τ that a push has turned: H·h₊(t) ≤ n′ and H·∫₀ᵗ h₊ ≤ n for 0 ≤ t ≤ τ, h₊ as h with σ₊; τ = 0
-# without noise. Once the reference r rests, friction that is affine there, μ(r + e1) = μr − m·e1 for |e1| ≤ E, gives
-# with
-# q = p − p*
+# where noise hides for a time τ that the disturbance has changed sign: H·h₊(t) ≤ n′ and H·∫₀ᵗ h₊ ≤ n for 0 ≤ t ≤ τ, h₊
+# as h with σ₊; τ = 0 without noise. Once the reference r rests, friction that is affine there, μ(r + e1) = μr − m·e1
+# for |e1| ≤ E, gives with q = p − p*
 #
 #     e1′ = e2,   e2′ = s·e1 − w·e2 + N̂(μr − m·e1)q + φ,   s = N̂m(σ′ − p*) − κ,
 #     σ = s − m(2X/T + sE + |w|X)/(μr − mE),   σ₊ = s + m(2X/T + sE + |w|X + H)/(μr − mE),
@@ -134,36 +134,36 @@ class SlidingPush:
 # since κT² ≤ 1 < π²), each T adds at least a fixed part of δ to e1, and e1 leaves E. So for every δ some change of p,
 # at t + θ + T with t a sample, has e2 < δ, as late as one likes. Turn φ to −H at t − τ. As long as p is the same in
 # both, the difference d of both courses has d2′ = σ(t)d1 − w·d2 + 2H with σ ≤ σ(t) ≤ σ₊, so that d1 and d2 are at least
-# 0 and at most what σ₊ makes of them: up to t at most 2n and 2n′. So let what is told be n and n′ too low in the first
-# course, always, and higher by d in the turned one: it is within n and n′ there too, and up to t what is told is the
-# same, which decides what p does until t + θ + T. By then d2 ≥ 2H·h(τ + θ + T) ≥ X, and the turned course has e2 < δ −
+# 0 and at most what σ₊ makes of them: up to t at most 2n and 2n′. So let the measurements be n and n′ too low in the
+# first course, always, and higher by d in the turned one: they are within n and n′ there too, and up to t they are the
+# same in both, which determines p until t + θ + T. By then d2 ≥ 2H·h(τ + θ + T) ≥ X, and the turned course has e2 < δ −
 # X, for every δ > 0. ∎ A controller that holds for T also holds for T/n, and one that acts θ late could act earlier, so
 # T and θ may be shortened, and τ as well.
 #
-# **Theorem 2 (withdrawal).** Let a fault rest at p = 0 when a push φ = H begins, and the pressure at the well be 0
-# until T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse response is
-# not negative: delay, diffusion 1/cosh √(sL²/D). Friction that falls from μ* by m per slip gives s = N̂mσ′ − κ and, for
-# s > 0, the unstable pole λ, λ² + wλ = s. If
+# **Theorem 2 (withdrawal).** Let a fault rest at p = 0 when a disturbance φ = H begins. Let the pressure at the well
+# be 0 until a time T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse
+# response is not negative: delay, diffusion 1/cosh √(sL²/D). Friction that falls from μ* by m per slip gives s = N̂mσ′ −
+# κ and, for s > 0, the unstable pole λ, λ² + wλ = s. If
 #
 #     H·e^{λT} > N̂μ*·P·G(λ),
 #
-# then slip passes E = (μ* − μ_res)/m, where friction has lost all that it can, whatever the controller does, even if it
-# knows φ and the plant from the onset on; also where friction sticks instead of reversing. *Proof.* For 0 ≤ x1 ≤ E: x2′
+# then slip exceeds E = (μ* − μ_res)/m, where friction has its residual value, under every controller, even if it
+# knows φ and the plant from the onset on; also on the stick–slip plant. *Proof.* For 0 ≤ x1 ≤ E: x2′
 # ≥ s·x1 − w·x2 + N̂(μ* − m·x1)p_f + H, an equality unless the fault sticks, and the third term is at least c·min(p_f,
 # 0), c = N̂μ*, and min(p_f, 0) at least the path's answer to u = min(p, 0). With z = (λ + w)x1 + x2, z′ = λz + … so
 # that z ≥ ζ, ζ = z0 + what u up to now will still do; ζ′ = λζ + cG(λ)u + H, ζ(0) = 0. Until T ζ grows to H(e^{λT} −
 # 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 at all later t: ζ grows exponentially. x1′ = z − (λ + w)x1 with z ≥ ζ > 0
 # keeps x1 positive, so the premise x1 ≥ 0 lasts, and takes x1 beyond E. ∎
 #
-# **Theorem 3 (a fault that sticks).** Let a fault rest at slip 0 and p = 0, held by friction, and never slip backward.
-# Let the pressure be decided at samples T apart and stay for T. No controller that moves it at all keeps its slip rate
+# **Theorem 3 (stick–slip plant).** Let a fault rest at slip 0 and p = 0, held by friction, and never slip backward.
+# Let the pressure be decided at samples T apart and stay for T. No controller that moves the fault keeps its slip rate
 # below 2H·h(T), h as in theorem 1 with σ = −κ, κT² ≤ 1, for every φ, with friction that does not change.
 # *Proof.* Let φ = −H always. While the fault rests, the force on it changes with the pressure alone, so that it first
 # moves in a period of some pressure p with N̂μ*p ≥ H. Turn φ to H as that pressure begins to act. Until then both are
 # the same course, so p is the same, and it stays for T. The fault starts from rest with the force N̂μ*p + H ≥ 2H, and
 # y = x2 has y′ = N̂μ*p + H − κx1 − wy, whose solution is that many times h and positive up to T. ∎
-# So what is left of theorem 1 needs no negative slip rate: a reference that goes on makes the controller move it. At a
-# rest of the reference nothing is left: friction holds the fault under any pressure that is low enough.
+# So theorem 3 replaces theorem 1 without negative slip rates: a moving reference requires that the controller moves the
+# fault. While the reference rests there is no such limit: at low enough pressure friction holds the fault at rest.
 
 _SHARE = Fraction(1, 20)  # E of theorem 1: of the slip over which friction falls, and of the target
 _BISECTIONS = 14

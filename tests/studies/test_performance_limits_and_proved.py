@@ -11,7 +11,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Disturbance
 from quakedesign.guarantees import Claims, Guarantee, Held, NoGuarantee
-from quakedesign.guarantees.exact.impossibility import longest_reaction
+from quakedesign.guarantees.exact.limit_theorems import longest_reaction
 from quakedesign.guarantees.search.linear_design import Longest
 from quakedesign.laws import summed_integrals
 from quakedesign.plant import uncertain_plant
