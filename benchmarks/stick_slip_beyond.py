@@ -11,6 +11,11 @@ the convex hull of the reached states: a polytope of the theorem needs about as 
 A delay of one period adds the pressure that is under way to the state. A lag adds the pressure in the fault. With a
 slip rate that is measured within M the law reads max(measured − M, 0), so that it reads 0 at rest. Samples T to 2T
 apart are those of a law that takes T for the interval.
+
+Rock between well and fault has eight modes, which make 12 states. *One mode*: the slowest and the well's pressure are
+states, and the others an input, bounded by the largest step of the well so far; 5 states. *Held at rest*: while the law
+expects rest, the well holds what it takes for the pressure of release, raised by 0.2H a period while the fault is
+behind. The hull is that of slip error, slip rate, level, slowest mode and well alone, of at most 600 states.
 """
 
 import sys
@@ -39,6 +44,10 @@ class Loop:
     slip: float = 0.5
     back: float = 0.3
     gain: float = 1.3
+    path: float = 0.0  # L²/D [s] of the rock between well and fault
+    reduced: bool = False  # of the path one mode alone, the others as bounded inputs
+    rounds: int = ROUNDS
+    ramp: float = 0.0  # share of H that the held pressure gains in a period at rest
 
 
 class Fault:
@@ -53,7 +62,91 @@ class Fault:
         self.slopes = [float(v) for v in task.slip_slopes(task.stress)]
         self.fastest = float(task.reference_rates[0])
         self.decay = np.exp(-self.damping * self.step)
+        self.step_seen = 0.0  # largest step of the well
         self.held = (1 - self.decay) / self.damping
+
+
+def slide(fault, loop, y, pressed, random):
+    """Slip rate, slip and rise of p* after a period, and its length; `pressed` is U in the fault at a time of it."""
+    count = len(y)
+    beta = random.choice([1.0, fault.beta], count)
+    slope, other = random.choice(fault.slopes, (2, count))
+    turn, sign = random.uniform(0, 1, count), random.choice([-1.0, 1.0], count)
+    turn = np.where(random.random(count) < 0.3, 1.0, turn)
+    length = fault.step * (random.choice([1.0, loop.longest], count) if loop.longest > 1 else np.ones(count))
+    h, moved, now, lost = length / SUBSTEPS, np.zeros(count), y.copy(), np.zeros(count)
+    for i in range(SUBSTEPS):
+        early = (i + 0.5) / SUBSTEPS < turn
+        push = np.where(early, sign, -sign) * fault.amplitude
+        force = push - fault.authority * beta * pressed((i + 1) * h) + lost - fault.damping * now
+        rests = (now <= 0) & (force <= 0)
+        end = now + h * force
+        stops = end < 0
+        way = np.where(stops, np.where(force < 0, now**2 / (2 * np.maximum(-force, 1e-300)), 0), h * (now + end) / 2)
+        way = np.where(rests, 0, way)
+        now = np.where(rests | stops, 0, end)
+        moved, lost = moved + way, lost + np.where(early, slope, other) * way
+    return now, moved, lost / (fault.authority * beta), length
+
+
+def through_rock(fault, loop, states, random):
+    """As `period`, behind a diffusion path; columns e1, y, d and then U, which stands for p* less a pressure.
+
+    It is that of the slowest mode less d, of the well less the slowest mode, and of faster modes less the slowest.
+
+    The law knows the slowest mode alone. It expects the slip rate of half the path's time and a period later, under the
+    pressure of now, and moves the pressure so that this slip rate becomes the target.
+    """
+    count = len(states)
+    e1, y, d, slow, held = states[:, :5].T
+    slow = slow + d
+    held, faster = held + slow, states[:, 5:] + slow[:, None]
+    rates, shares = modes(loop.path)
+    slip, ahead, behind, effect = e1, y, held - slow, 0.0  # what the fault lacks of the well's pressure, over c0
+    r_rate = fault.fastest * random.choice([0.0, 1.0], count)
+    per_rate = 1 / (loop.gain * fault.held * fault.authority)
+    fades = np.exp(-rates[0] * fault.step)
+    mean = shares[0] * (1 - fades) / (rates[0] * fault.step)  # of what is lacking, in a period
+    many, left = round(loop.path / 2 / fault.step), 1.0
+    for i in range(many + 1):
+        before, ahead = ahead, fault.decay * ahead + (d - held + mean * behind) / per_rate
+        effect = fault.decay * effect + (1 - mean * left) / per_rate
+        behind, left = behind * fades, left * fades
+        if i < many:
+            ahead = np.maximum(ahead, 0)
+            slip = slip + fault.step * ((before + ahead) / 2 - r_rate)
+    target = r_rate - loop.back / fault.step * slip
+    asked = held + (ahead - target) / effect
+    if loop.ramp:  # at rest and expected to rest: the well holds what releases the fault, and more if it is behind
+        more = loop.ramp * fault.amplitude / fault.authority
+        rest = (y <= 0) & (np.maximum(ahead, 0) <= 0)
+        asked = np.where(rest, np.where(slip < 0, np.minimum(held, d) - more, d), asked)
+    predicted = np.maximum(fault.decay * y + (d - asked + mean * (asked - slow)) / per_rate, 0)
+    lacks = asked[:, None] - np.column_stack([slow, faster])
+    fault.step_seen = max(fault.step_seen, float(np.abs(asked - held).max()))
+    sign, turn = random.choice([-1.0, 1.0], count), fault.step * random.uniform(0, 1, count)
+
+    def pressed(time):
+        kept = sum(c * np.exp(-k * time) * v for c, k, v in zip(shares, rates, lacks.T, strict=False))
+        if not loop.reduced:
+            return asked - kept
+        most = fault.step_seen * abs(shares[1]) * np.exp(-rates[1] * time) / (1 - np.exp(-rates[1] * fault.step))
+        return asked - kept + np.where(time < turn, sign, -sign) * most
+
+    now, moved, lifted, _ = slide(fault, loop, y, pressed, random)
+    innovation = moved - fault.step * (y + predicted) / 2
+    innovation = np.where(now <= 0, np.maximum(innovation, -fault.step * predicted / 2), innovation)
+    level = d + per_rate * (loop.level * (now - predicted) + loop.slip / fault.step * innovation) - lifted
+    after = asked[:, None] - lacks * np.exp(-rates[: lacks.shape[1]] * fault.step)
+    slow = after[:, 0]
+    first = [e1 + moved - fault.step * r_rate, now, level, slow - lifted - level, asked - slow]
+    return np.column_stack([*first, after[:, 1:] - slow[:, None]])
+
+
+def modes(path):
+    """Rates and shares of the modes of a layer."""
+    odd = 2 * np.arange(8) + 1
+    return (odd * np.pi / 2) ** 2 / path, 4 / np.pi * (-1.0) ** np.arange(8) / odd
 
 
 def period(fault, loop, states, random):
@@ -76,44 +169,32 @@ def period(fault, loop, states, random):
     asked = per_rate * (fault.decay * ahead - target) + d  # U of the pressure that is asked for
     acting = under_way if loop.late else asked
     predicted = ahead if loop.late else np.maximum(target, 0)
-    beta = random.choice([1.0, fault.beta], count)
-    slope, other = random.choice(fault.slopes, (2, count))
-    turn, sign = random.uniform(0, 1, count), random.choice([-1.0, 1.0], count)
-    turn = np.where(random.random(count) < 0.3, 1.0, turn)
-    length = fault.step * (random.choice([1.0, loop.longest], count) if loop.longest > 1 else 1.0)
-    h, moved, now, pressed = length / SUBSTEPS, np.zeros(count), y.copy(), 0 * y + (under_way if loop.lag else acting)
-    lost, fades = np.zeros(count), np.exp(-h / loop.lag) if loop.lag else 0.0
-    for i in range(SUBSTEPS):
-        early = (i + 0.5) / SUBSTEPS < turn
-        pressed = asked + (pressed - asked) * fades if loop.lag else pressed
-        push = np.where(early, sign, -sign) * fault.amplitude
-        force = push - fault.authority * beta * pressed + lost - fault.damping * now
-        rests = (now <= 0) & (force <= 0)
-        end = now + h * force
-        stops = end < 0
-        way = np.where(stops, np.where(force < 0, now**2 / (2 * np.maximum(-force, 1e-300)), 0), h * (now + end) / 2)
-        way = np.where(rests, 0, way)
-        now = np.where(rests | stops, 0, end)
-        moved, lost = moved + way, lost + np.where(early, slope, other) * way
+
+    def pressed(time):
+        return asked + (under_way - asked) * np.exp(-time / loop.lag) if loop.lag else acting
+
+    now, moved, lifted, length = slide(fault, loop, y, pressed, random)
     innovation = moved - fault.step * (seen + predicted) / 2
     innovation = np.where(now <= loop.creep, np.maximum(innovation, -fault.step * predicted / 2), innovation)
-    lifted = lost / (fault.authority * beta)  # p* of the slip at the end less that at the start
     read = np.maximum(now - loop.creep * random.choice([0.0, 1.0], count), 0)
     level = d + per_rate * loop.level * (read - predicted) + per_rate * loop.slip / fault.step * innovation - lifted
     columns = [e1 + moved - length * r_rate, now, level]
     if states.shape[1] > 3:
-        columns.append((asked if loop.late else pressed) - lifted)
+        columns.append(pressed(length) - lifted)
     return np.column_stack(columns)
 
 
 def reached(fault, loop, seed=0):
     """Extents of the reached states, whether they have settled, and the facets of their hull."""
     random = np.random.default_rng(seed)
-    size = 4 if loop.late or loop.lag else 3
+    size, after = 4 if loop.late or loop.lag else 3, period
+    if loop.path:
+        size, after = 5 if loop.reduced else 12, through_rock
     directions = random.normal(size=(DIRECTIONS, size))
+    directions[:, 5:] *= 0.2  # the faster modes of a path are nearly one
     states, before, settled = np.zeros((1, size)), None, False
-    for _ in range(ROUNDS):
-        more = [period(fault, loop, np.repeat(states, 12, axis=0), random) for _ in range(4)]
+    for _ in range(loop.rounds):
+        more = [after(fault, loop, np.repeat(states, 12, axis=0), random) for _ in range(4)]
         states = np.vstack([states, *more])
         scale = np.abs(states).max(axis=0) + 1e-300
         states = states[np.unique((directions @ (states / scale).T).argmax(axis=1))]
@@ -122,7 +203,7 @@ def reached(fault, loop, seed=0):
         before = extent
         if not np.isfinite(extent).all() or extent[1] > 1:
             return extent, False, None
-    return before, settled, len(ConvexHull(states / scale, qhull_options="QJ").equations)
+    return before, settled, len(ConvexHull((states / scale)[:, :5], qhull_options="QJ").equations)
 
 
 def rows():
@@ -139,6 +220,14 @@ def rows():
     yield Loop("samples T to 1.2T apart", longest=1.2)
     yield Loop("samples T to 2T apart", longest=2.0)
     yield Loop("samples T to 2T apart, slower estimate", longest=2.0, level=0.2, slip=0.2, back=0.1, gain=1.425)
+    for path in (0.3, 1.0, 2.0):
+        rock = Loop(f"rock of {path:g} s, all modes", path=path, rounds=100)
+        yield rock
+        yield replace(rock, name=f"rock of {path:g} s, one mode", reduced=True, rounds=300)
+        yield replace(rock, name=f"rock of {path:g} s, held at rest", ramp=0.2, rounds=300)
+    slower = replace(rock, level=0.2, slip=0.2, back=0.1, gain=1.425)
+    yield replace(slower, name="rock of 2 s, all modes, slower estimate")
+    yield replace(slower, name="rock of 2 s, one mode, slower estimate", reduced=True, rounds=300)
 
 
 def row(loop):
