@@ -7,7 +7,7 @@ from math import exp
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from quakedesign.exact import Bound, UpperBound
+from quakedesign.exact import Bound, LowerBound, UpperBound
 from quakedesign.guarantees import Guarantee, SlidingGuarantee, StickSlipGuarantee
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
@@ -73,9 +73,12 @@ def _answer(comparison: "Compared", best: "Entry | None") -> str:
         share = f" ({ratio:.2g} % of the natural earthquake's {quantity(peak, 'm/s')})"
     first = f"On the plant without stick, with the {best.label}," if _without_stick(best) else f"With the {best.label}"
     sticks = ", whether the fault slides or sticks" if isinstance(found, StickSlipGuarantee) else ""
+    slow = ""
+    if isinstance(found, SlidingGuarantee):
+        slow = f" {found.lasts} and shear stress is disturbed by at most {LowerBound(found.task.stress).quantity('Pa')}"
     return (
         f"{name}: {best.design.other_step_first or 'guaranteed'}. {first} the slip rate never exceeds "
-        f"{found.peak_slip_rate.quantity('m/s')}{share}{sticks}, and the slip stays within "
+        f"{found.peak_slip_rate.quantity('m/s')}{share}{sticks}{slow}, and the slip stays within "
         f"{found.claims.slip_error.quantity('m')} of the reference"
     )
 

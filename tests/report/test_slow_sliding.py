@@ -99,7 +99,8 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     assert len(lines) <= 40
     assert max(map(len, lines)) <= 80
     said = " ".join(told.getvalue().split())
-    assert said.startswith("crustal-patch: guaranteed. With the e-LQR (designed) the slip rate never exceeds 1.2 µm/s,")
+    proved = "With the e-LQR (designed) the slip rate never exceeds 1.2 µm/s while the reference goes"
+    assert said.startswith(f"crustal-patch: guaranteed. {proved}")
     assert "the slip stays within 83.3 µm of the reference" in said
     (row,) = (line.split() for line in lines if line.startswith("e-LQR  "))
     claims, worst = comparison.entries[0].guarantee.claims, comparison.entries[0].answer.worst
