@@ -94,7 +94,11 @@ def test_only_proofs_for_every_fault_are_code_zero(prove, answers, code, json_to
     elif not json_too:
         lines = ["refused: a step is needed" if one is REFUSED else "line of claim" for one in answers]
         names = [f'"{name}": ' for name in faults] if len(faults) > 1 else [""]
-        assert out.splitlines() == [name + line for name, line in zip(names, lines, strict=True)]
+        said, box = [name + line for name, line in zip(names, lines, strict=True)], out.splitlines()[len(lines) :]
+        assert out.splitlines()[: len(lines)] == said
+        assert [line[:29] for line in box] == ["box paper: every friction from"[:29]] * (
+            len(answers) == 1 and code == 0
+        )
     else:
         told = json.loads(out)
         assert 0 <= told.pop("seconds") < 60
@@ -152,7 +156,10 @@ def test_a_certificate_is_written_where_there_is_a_proof(prove, tmp_path):
     assert (code, json.loads(out)["certificate"], (tmp_path / "a.json").read_text()) == (0, "a.json", "claim")
     assert prove([proof(True)], "real-fault", "--out", "a.json")[0] == 2
     code, out, _ = prove([proof(True, "other")], "real-fault", "--out", "a.json", "--force")
-    assert (code, out, (tmp_path / "a.json").read_text()) == (0, "line of other\nwritten: a.json\n", "other")
+    first, box, last = out.splitlines()
+    assert (code, first, last) == (0, "line of other", "written: a.json")
+    assert box.startswith("box paper: every friction from")
+    assert (tmp_path / "a.json").read_text() == "other"
 
 
 def test_certificates_of_several_faults_lie_in_a_folder_that_no_other_command_writes(prove, tmp_path, monkeypatch):

@@ -139,7 +139,9 @@ def test_friction_with_a_state_beside_friction_without_one_is_refused(tmp_path):
 
 
 def test_what_takes_one_block_refuses_the_file_and_says_what_takes_it():
-    with pytest.raises(ScenarioError, match="Use the commands fault, design, guarantee, compare, simulate or limits"):
+    with pytest.raises(
+        ScenarioError, match="Use the commands fault, design, guarantee, compare, simulate, export or limits"
+    ):
         qd.load_fault(PATH)
     with pytest.raises(ScenarioError, match="no \\[\\[block\\]\\]"):
         parse_fault(TEXT, "text")

@@ -60,7 +60,10 @@ KINDS = {
     ),
     "stick_slip": (
         stick_slip,
-        {"numbers", *(f"guarantee.{name}" for name in ("reading", "task", "matrices", "polytope", "stick_slip"))},
+        {
+            "numbers",
+            *(f"guarantee.{name}" for name in ("reading", "task", "matrices", "root", "polytope", "stick_slip")),
+        },
     ),
     "uncertain_plant": (
         uncertain_plant,

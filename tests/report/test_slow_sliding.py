@@ -153,7 +153,8 @@ def test_the_report_is_the_one_of_all_faults(folder):
     assert "guaranteed as it runs" in page
     assert "Uncertainty box" not in page
     assert not re.search(r"for ever\b", page[: page.index("Glossary")])
-    assert first.index("for every shear stress disturbance of at most") < first.index("while the reference goes")
+    assert first.index("while the reference goes") < first.index("shear stress is disturbed by at most")
+    assert first.index("for every shear stress disturbance of at most") < first.rindex("while the reference goes")
     assert "a well near the fault" in page
     assert "continued to negative slip rates" not in page
 
