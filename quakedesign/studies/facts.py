@@ -416,14 +416,14 @@ def _rock(fault: Fault) -> list[str]:
 
 
 def box_sentence(fault: Fault) -> str:
-    """Friction without a state and parameters for which a guarantee holds."""
-    (low, high), law = fault.friction.bounds, fault.friction
-    slopes = [f"{law.slip_slope:.4g} per m of slip"] * (law.slip_slope > 0)
-    slopes += [f"{law.rate_slope:.4g} per m/s"] * (law.rate_slope > 0)
-    widths = {
-        name: getattr(fault.box, name) for name in ("stiffness", "damping", "authority") if getattr(fault.box, name)
-    }
-    off = [f"{name.replace('authority', 'area per mass')} within {float(100 * v):g} %" for name, v in widths.items()]
+    """Friction without a state and parameters for which a guarantee holds; numbers rounded inward."""
+    law = fault.friction
+    low, high = UpperBound(rational(law.bounds[0])), LowerBound(rational(law.bounds[1]))
+    slopes = [f"{LowerBound(rational(law.slip_slope)):.4g} per m of slip"] * (law.slip_slope > 0)
+    slopes += [f"{LowerBound(rational(law.rate_slope)):.4g} per m/s"] * (law.rate_slope > 0)
+    parts = {"stiffness": "stiffness", "damping": "damping", "authority": "area per mass"}
+    widths = {part: LowerBound(100 * getattr(fault.box, name)) for name, part in parts.items()}
+    off = [f"{part} within {width:.4g} %" for part, width in widths.items() if width]
     friction = f"every friction from {low:.4g} to {high:.4g} that changes by at most {', '.join(slopes)}"
     exact = "stiffness, damping and area per mass are exact"
     return f"box {fault.box.name}: {friction}; {', '.join(off) or exact}"

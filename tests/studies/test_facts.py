@@ -1,11 +1,12 @@
 """What is said of a fault: friction as it was read, its box in numbers, and units that look wrong."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import pytest
 from thinned import few
 
-from quakedesign.fault import load_fault
+from quakedesign.fault import UncertaintyBox, load_fault
 from quakedesign.studies.facts import box_sentence, fault_sentences
 
 REAL, PATCH = load_fault("real-fault"), load_fault("crustal-patch")
@@ -18,10 +19,15 @@ def test_friction_is_told_as_it_was_read_with_its_box_in_numbers():
         "shear waves 3464 m/s, effective normal stress 50 MPa, friction exponential-slip-weakening: residual 0.2353, "
         "drop 0.1, critical_slip 0.2763 m"
     )
-    friction = "every friction from 0.2353 to 0.3353 that changes by at most 0.3619 per m of slip"
+    friction = "every friction from 0.2353 to 0.3353 that changes by at most 0.3618 per m of slip"
     assert told[2] == f"box paper: {friction}; stiffness, damping and area per mass are exact"
     wide = box_sentence(REAL.with_box("ten-percent"))
     assert wide == f"box ten-percent: {friction}; stiffness within 10 %, damping within 10 %, area per mass within 10 %"
+    third = UncertaintyBox(name="third", stiffness=Fraction(1, 3))
+    law = replace(REAL.friction, residual=0.235361, drop=0.100033)
+    inside = box_sentence(replace(REAL, friction=law, box=third))
+    assert "from 0.2354 to 0.3353 that" in inside  # 0.235361 to 0.335394
+    assert "stiffness within 33.33 %" in inside
     assert not any("box" in line for line in fault_sentences(PATCH))
 
 
