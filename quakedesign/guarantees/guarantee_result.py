@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import exp
-from typing import Any, ClassVar, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -394,7 +394,7 @@ class SlidingAnswer(LoopResult):
     found: SlidingGuarantee | NoGuarantee
     task: SlidingPlant
     held: Held | None
-    compensation: ClassVar[None] = None
+    compensation: None = None
 
     @cached_property
     def worst(self) -> WorstSliding | None:

@@ -1,4 +1,4 @@
-"""What every result of `quakedesign.guarantee` about a fault offers, whatever friction and plant it is about."""
+"""Interface of all results of `quakedesign.guarantee` about a fault."""
 
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -16,6 +16,7 @@ class LoopResult:
     __slots__ = ()
     found: Any
     worst: Any
+    compensation: Any
 
     @property
     def proved(self) -> bool:
@@ -76,7 +77,7 @@ class LoopResult:
         CertificateError
             Without a guarantee.
         """
-        found, sliding = self._proof(), getattr(self, "compensation", None)
+        found, sliding = self._proof(), self.compensation
         return found.controller if sliding is None else sliding.limited
 
     def save(self, path: str | Path) -> None:

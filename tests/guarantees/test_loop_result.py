@@ -1,12 +1,15 @@
 """Results of `guarantee` offer the same names, whatever friction and plant they are about."""
 
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 import quakedesign as qd
 from quakedesign.errors import CertificateError
-from quakedesign.guarantees import NoGuarantee
+from quakedesign.exact import LowerBound, UpperBound
+from quakedesign.guarantees import Guarantee, NoGuarantee
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
 from quakedesign.guarantees.guarantee_result import LoopAnswer, SlidingAnswer
 from quakedesign.guarantees.search.adversary import WorstSliding
@@ -50,6 +53,19 @@ def test_each_kind_of_result_has_the_bounds_of_its_claims_in_si():
     assert stick_slip.worst_case["slip_error"] == 3e-6
     assert printed.worst_case["slip_error"] == written["worst_found"]["slip_error"] > 0
     assert "least_pressure" not in printed.worst_case or printed.worst_case["least_pressure"] < 0
+
+
+def test_the_pressures_are_those_in_the_fault_and_not_at_the_valve():
+    """Behind a lag the commanded pressure may go farther than that in the fault."""
+    one = qd.load_guarantee(PROOFS / "guarantee_lab-fault.json")
+    assert isinstance(one, Guarantee)
+    asked = {"least_asked": LowerBound(Fraction(-(10**9))), "largest_asked": UpperBound(Fraction(10**9))}
+    found = LoopAnswer(fault=FAULT, found=replace(one, claims=replace(one.claims, **asked))).bounds
+    assert (found["least_pressure"], found["largest_pressure"]) == (
+        one.claims.least_pressure,
+        one.claims.largest_pressure,
+    )
+    assert asked.items() <= found.items()
 
 
 def test_check_of_a_result_is_that_of_its_certificate(monkeypatch):
