@@ -111,6 +111,10 @@ def test_only_proofs_for_every_fault_are_code_zero(prove, answers, code, json_to
             assert told == {"guarantees": named, "class": "amplitude"}
 
 
+def test_friction_with_a_state_has_no_box(prove):
+    assert prove([proof(True)], "crustal-patch")[1].splitlines() == ["line of claim"]
+
+
 def test_what_is_asked_is_what_was_typed(prove):
     more = "--gains 1 2 3 4 --objective peak --scheme explicit --stress 3 --spread 0.1 --class rate --delay 1/50"
     prove([proof(True)], "real-fault", "--step", "92 ms", "--measured", "slip", *more.split())

@@ -90,6 +90,16 @@ def test_a_run_that_is_not_what_is_proved_says_so(file, capsys, more, outside):
         assert f"proved: {CLAIM.sentence()}" in out
 
 
+def test_the_pressure_of_a_run_is_compared_with_that_in_the_fault(file, capsys, monkeypatch):
+    compared = []
+    monkeypatch.setattr("quakedesign.report.sentences.exceeded_line", lambda *seen: compared.append(seen) or "TOO FAR")
+    options = ("--duration", "3 s", "--plant", "printed")
+    assert "TOO FAR" not in told(capsys, "simulate", "real-fault", "--certificate", file, *options)[1]
+    said = told(capsys, "simulate", "real-fault", "--certificate", file, *options, "--initial-slip", "1 um")[1]
+    assert "which differs in initial_slip; TOO FAR; the proof says" in " ".join(said.split())
+    assert {(least, largest) for _, least, largest in compared} == {CLAIM.claims.pressures[-1]}
+
+
 @pytest.mark.slow
 def test_a_start_for_which_a_law_is_proved_is_in_what_is_proved(capsys, tmp_path):
     held = replace(HELD, initial_slip=F(1, 10**5))

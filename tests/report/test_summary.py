@@ -223,6 +223,7 @@ def test_without_a_guarantee_each_reason_is_given(monkeypatch):
         "A (designed): none: the reason of A (designed)",
         "B (designed): none: the reason of B (designed)",
     ]
+    assert not any(note.startswith("box ") for note in said.notes)
 
 
 def test_a_design_without_a_guarantee_beside_one_that_has_it_is_named(monkeypatch):

@@ -355,8 +355,19 @@ def test_simulate_runs_what_a_design_found_in_its_own_way():
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"controller": None, "step": 20.0}, "uncontrolled .* Received step. Omit"),
-        ({"controller": None, "tide": Tide(amplitude=1.0)}, "uncontrolled .* Received tide. Omit"),
+        *(
+            ({"controller": None, name: value}, rf"uncontrolled .* Received {name}\. Omit")
+            for name, value in {
+                "step": 20.0,
+                "scheme": "explicit",
+                "settled_from": 1.0,
+                "variation": SlidingVariation(),
+                "actuator": Actuator(stages=()),
+                "measurement": Transducer(),
+                "tide": Tide(amplitude=1.0),
+                "rtol": 1e-8,
+            }.items()
+        ),
         ({"substeps": 2}, "Received substeps"),
         ({"initial_slip": 1e-3}, "Received initial_slip "),
         ({"initial_slip_rate": 1e-3}, "Received initial_slip_rate"),

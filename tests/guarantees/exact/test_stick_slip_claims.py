@@ -431,6 +431,8 @@ def test_check_says_of_a_fault_that_heals_whether_that_is_covered(monkeypatch, t
     assert "must be covered beside its disturbance, up to 3.11e-05. Received 3.2e-05" in said(half, 3.2e-5)[0]
     assert "up to 0. Received 1e-06" in said(real, 1e-6)[0]
     assert "not those of" in said(half, 0.0)[0]  # without healing its data are others
+    twice = real.with_disturbance(replace(real.disturbance, amplitude=real.disturbance.amplitude * 2))
+    assert "not those of" in said(twice, 1e-6)[0]  # its disturbance alone exceeds that of the claims
 
 
 def test_a_run_of_its_file_knows_what_is_proved_and_on_which_plant(proof, monkeypatch):
