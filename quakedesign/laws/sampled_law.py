@@ -529,7 +529,7 @@ class RestLimit:
     loop whose pressure stays within P of p*, with dp*/dr at most `per_slip`, never reaches a limit with a width of 2P,
     so that the limit does not affect a guarantee. While friction holds the fault, measurements do not respond to the
     pressure, and an integral ahead of the reference would lower the pressure without end. The limit then saturates the
-    pressure, with anti-windup of the law. It ends when the fault moves, whatever moves it. The proved range of pressure
+    pressure, with anti-windup of the law. It ends when the fault moves, for any cause. The proved range of pressure
     limits the pressure too, at rest and after it, unless the fault moves faster than is proved.
 
     Attributes

@@ -91,7 +91,7 @@ class ControllerStep:
 
     @property
     def limited(self) -> bool:
-        """Whether it is told which pressure was applied."""
+        """Whether the applied pressure is an argument."""
         return bool(self.function.n_in() == 3)
 
     @property

@@ -17,7 +17,7 @@ from quakedesign.simulation.integrators import Flow, StoppedError, adaptive_inte
 # ----------------------------------------------------------------------
 # CVODES and IDAS of CasADi as a solver of SciPy's `solve_ivp`, whose steps are nearly straight lines.
 #
-# A solver that answers only where it is asked passes over an earthquake between two questions. Here intervals are taken
+# A solver that is evaluated only at given times misses an earthquake between two of them. Here intervals are taken
 # so short that in the middle of each of their pieces, the steps, the value is nearly the mean of its ends. Slopes are
 # not used: those of a stiff problem are lost in rounding.
 

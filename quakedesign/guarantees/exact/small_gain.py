@@ -47,13 +47,14 @@ from quakedesign.plant.ranges import FaultPlant
 # rate as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0. A disturbance of
 # this class is one of the class amplitude too, so the smaller of both bounds holds for every output.
 #
-# **Start.** Where the loop starts at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of rest, |y(τ)| ≤ h_y,j + Σ_i g_yi,j·W_i(t)
-# by superposition, with h_y,j ≥ |y| of the free response in part j, from every such start (`free_response`). So a start
-# is one input more, ``start``, with F = 1, no c and the gains h, whose row of M is zero: the spectral radius stays. The
-# s_i are bounds of e1(0) and e2(0), of both signs, and what the law makes at first of what it is told then; nothing
-# else moves before the first sample: p is 0, and so is p* at r = 0, as r(0) = r′(0) = 0. In the class rate φ(0) = 0, so
-# the shift of p* is 0 too. Below, the loop of every β_i starts alike; since t = 0 counts, what bounds e1 and e2 for
-# ever is at least their bound at first, so that E and R exceed that as well.
+# **Initial state.** Where the loop starts at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of rest, |y(τ)| ≤ h_y,j + Σ_i
+# g_yi,j·W_i(t) by superposition, with h_y,j ≥ |y| of the free response in part j, from every such initial state
+# (`free_response`). So the initial state is one more input, ``start``, with F = 1, no c and the gains h, whose row of M
+# is zero: the spectral radius does not change. The s_i are bounds of e1(0) and e2(0), of both signs, and of the law's
+# response to its first measurement. Nothing else changes before the first sample: p is 0, and so is p* at r = 0, as
+# r(0) = r′(0) = 0. In the class rate φ(0) = 0, so the shift of p* is 0 too. Below, the loop of every β_i has the same
+# initial state. As t = 0 counts, the bounds of e1 and e2 for all t are at least those of the initial state, so that E
+# and R exceed these as well.
 #
 # **Noise.** Let a law measure e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples. Then the loop has two
 # more sampled inputs, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c. They are any sequences in these
@@ -67,25 +68,26 @@ from quakedesign.plant.ranges import FaultPlant
 # With noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places of E and R, and ε gains
 # δγN1/T_s. ∎
 #
-# **Jitter.** Let sample k be measured within J of kT_s, the first at 0, and let the valve's pressure leave p_{k−1}
-# within A of when p_k is due and go to p_k without turning back, over a time of at most Θ, with |p_k − p_{k−1}|/Θ at
-# least until it is there. Keep the nominal loop on schedule. What it is told is then e(kT_s) and what e moves until it
-# is measured: |n1| ≤ J(|e2| + r′), r′ where it is compared with the reference at kT_s, and |n2| ≤ J(|e2′| + |r″|),
-# |e2′| ≤ max|s||e1| + max|w||e2| + max β|v| + |φ − w·r′ − r″|: both are c and F of the inputs of noise. The valve's
-# pressure is j more than on schedule, b·|j| ≤ |u_k|, u_k = b(p_k − p_{k−1}), the output ``stepped``, and only from A
-# before to A + Θ after p_k is due: p_k where it is early, p_{k−1} where it is late. The input ``late`` is b·j, which
-# acts as the valve's pressure does, F = 0 and c = 1 for u_k. Let f be the share of the step that is made when p_k is
-# due. The areas of b|j| before and after that are E and L times |u_k|: where it begins late, E = 0 and L ≤ A + Θ/2;
-# where it begins early, E ≤ f·A and L ≤ (1 − f)²·Θ/2. So E/A + L/(A + Θ/2) ≤ 1 always, and ``late`` is a `Pulse`. v =
-# b(p − p*) is what the nominal loop has of it at the same time or, of the pressure before or after, A + Θ away at most,
-# when p* was d times that time another: the output ``push`` (behind a lag ``asked``) has that more.
+# **Jitter.** Let sample k be measured within J of kT_s, the first at 0. Let the valve's pressure leave p_{k−1} within A
+# of the time at which p_k is due and go to p_k monotonically, within at most Θ and at a rate of at least |p_k −
+# p_{k−1}|/Θ. Let the nominal loop have no timing error. The measured error is then e(kT_s) plus the change of e until
+# the measurement: |n1| ≤ J(|e2| + r′), r′ where the slip is compared with the reference at kT_s, and |n2| ≤ J(|e2′| +
+# |r″|), |e2′| ≤ max|s||e1| + max|w||e2| + max β|v| + |φ − w·r′ − r″|: both are c and F of the inputs of noise. Let j be
+# the valve's pressure less that of the nominal loop. Then b·|j| ≤ |u_k|, u_k = b(p_k − p_{k−1}), the output
+# ``stepped``, and j is not zero only from A before to A + Θ after p_k is due: the valve has p_k early, or p_{k−1} late.
+# The input ``late`` is b·j, which acts as the valve's pressure does, with F = 0 and c = 1 for u_k. Let f be the share
+# of the step that is made when p_k is due. The areas of b|j| before and after that time are E and L times |u_k|: where
+# the step begins late, E = 0 and L ≤ A + Θ/2; where it begins early, E ≤ f·A and L ≤ (1 − f)²·Θ/2. So E/A + L/(A + Θ/2)
+# ≤ 1 always, and ``late`` is a `Pulse`. v = b(p − p*) is that of the nominal loop, with the pressure of the same time
+# or of at most A + Θ before or after, during which p* changes by at most d times that time: the output ``push`` (behind
+# a lag ``asked``) is larger by that.
 #
-# Some of these bounds are by outputs a little later, up to t + T_s for an input at t. But beyond t let the nominal loop
-# go on with no inputs but those that bring what has been measured or has come before t to its instant: they obey the
-# same bounds, and beyond t + T_s there is none. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is not more. A root is one
-# of what was measured: of e at a time up to which the bounds hold, so that E and R have no more on top than noise, J·r′
-# and J·|r″|, and ε gains δγ(N1 + J·r′)/T_s. What is told may as well be a mean of e, with any weights, over times
-# within J of kT_s: it is as near e(kT_s), and within the bounds if e is. ∎
+# An input at t may thus be bounded by outputs up to t + T_s. To see that the theorem still holds, fix t and let the
+# nominal loop continue after t with those inputs alone that shift what was measured, or had arrived, before t to its
+# nominal instant. They obey the same bounds, and after t + T_s there is none. So W(t + T_s) ≤ F + M·W(t + T_s), and
+# W(t) is not larger. An implicit root is that of a measured error, of e at a time up to which the bounds hold: E and R
+# grow by the noise, J·r′ and J·|r″| alone, and ε by δγ(N1 + J·r′)/T_s. A measurement may as well be a mean of e, with
+# any weights, over times within J of kT_s: it is as near to e(kT_s), and within the bounds if e is. ∎
 #
 # **Slow input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤ κ(2E + r′σ),
 # σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Cut the range of β into parts with middles β_i and half widths δ. Fix t, let
@@ -95,13 +97,14 @@ from quakedesign.plant.ranges import FaultPlant
 # are e^{ασ} times as large. All gains are the largest over the parts. E is the claim on the slip error, which has to
 # exceed the bound that follows: e1 is continuous and below E at first, so it never reaches E. ∎
 #
-# **Layer between well and fault.** Its pressure is that of its modes, v, and what they leave out, R, |R| ≤ sup|y| with
-# the output y = ``left_out`` (`quakedesign.loop.layer`). Of β(v + R) the loop has β0·v and what is known of β0·R, with
-# x2 = e2 − β0Y in place of e2 (`quakedesign.loop.layer`). So (β − β0)R comes into x2′ beside a, with the c of v for y:
-# where the well's pressure moves, within a; where it steps, R fades after every step and is an input of its own. What
-# is past of a slow gain takes R as it takes v, with the same c. Two inputs more, F = 0 and c = 1 for y, are
-# ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, what the law is told of it, as of noise, at the samples: e2 is
-# measured, not x2. A bound of e2 is one of x2 and one of β0Y: the gain of ``awaited`` and what that adds at once. ∎
+# **Layer between well and fault.** The pressure in the fault is that of the modes, v, plus their truncation error R,
+# |R| ≤ sup|y| with the output y = ``left_out`` (`quakedesign.loop.layer`). Of β(v + R) the loop has β0·v and, with x2 =
+# e2 − β0Y in place of e2 (`quakedesign.loop.layer`), the known part of β0·R. So (β − β0)R enters x2′ beside a, with the
+# c of v for y. While the well's pressure changes continuously it is part of a; where the pressure steps, R fades after
+# every step and is an input of its own. In a slow gain, past values of R are treated as those of v, with the same c.
+# There are two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, its
+# effect on the measurement at the samples, which acts as noise does: e2 is measured, not x2. The bound of e2 is that of
+# x2 plus that of β0Y: the gain of ``awaited`` and its direct feedthrough. ∎
 
 _ZERO = Fraction(0)
 OUTPUTS = ("slip_error", "slip_rate_error", "push")

@@ -69,7 +69,7 @@ class StickSlipGuarantee:
         Raises
         ------
         UnsupportedError
-            For a sliding mode, which is a controller of its own with a scheme.
+            For a sliding mode, whose gains the certificate does not state.
         """
         if self.held.law.pull:
             raise UnsupportedError(

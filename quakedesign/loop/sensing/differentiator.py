@@ -373,8 +373,8 @@ def _next(entries: Iterator[Any], count: int) -> list[Any]:
 # z_0 = x1 the reading before, and z_i = ∇ⁱx1/Tⁱ. Then b = y_1 + T(y_2 + … + T(z_0 − x + T·z_1 + …)) is −T^nf·∇^(nd+1)x,
 # and where |∇^(nd+1)x| ≤ λ̃_0·λ_d·T^(nd+1) the step gives s⁺ = 0. So w stays 0, z_0⁺ = x and, from z_i⁺ = z_i +
 # T·z_(i+1)⁺, z_(i+1)⁺ = ∇^(i+1)x/T^(i+1). At rest at slip 0 all of y is 0. By induction the differentiator is this
-# filter for all t, whatever n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`), and a law
-# that it tells is a law of the slip alone, whose guarantee counts all of its errors.
+# filter for all t and any n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`), and a law
+# with its estimates is a law of the slip alone, whose guarantee counts all of its errors.
 #
 # With |x1″| ≤ A and readings within ε, |∇^(nd+1)x| ≤ c·A·T² + 2^(nd+1)·ε: x1‴, which does not exist where the pressure
 # is held, need not be bounded. ∇²x1 is the integral of x1″ with a triangle over two periods, so that c is the area of
