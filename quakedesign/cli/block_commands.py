@@ -77,12 +77,14 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
         )
     box = chain.fault.box
     springs = ", springs between the blocks as they are" if any((box.stiffness, box.damping, box.authority)) else ""
+    along = chain.diffusivity
+    pressure = "" if along is None else f", pressures diffuse along the fault, {along:g} m²/s"
     excess = UpperBound(max(rational(block.friction.rest_excess) for block in chain.blocks))
     healed = f"not covered: friction at rest up to {excess:.3g} above friction in slip (healing of the fault file)"
     return [
         *([healed] if excess else []),
-        f"plant: {chain.name}, {blocks}, {wells}, any constants of box {box.name}{springs}, without stick (friction "
-        "continues to negative slip rates)",
+        f"plant: {chain.name}, {blocks}, {wells}, any constants of box {box.name}{springs}{pressure}, without "
+        "stick (friction continues to negative slip rates)",
         meant,
     ]
 

@@ -1,7 +1,9 @@
 """Faults of several blocks in a row with springs between neighbours, and wells along them; their files.
 
-A fault file with ``[[block]]`` tables. Wells share their pressure as steady diffusion along the fault does: linear
-between two wells, constant beyond the last ones, at the middle of each block.
+A fault file with ``[[block]]`` tables. Without a diffusivity the pressure along the fault is steady: linear between two
+wells, constant beyond the last ones, taken at the middle of each block. With a diffusivity D the pressure diffuses
+between the middles x_i of blocks of lengths L_i and the wells, which are the neighbouring points: q_i' =
+D/L_i·Σ(q_j − q_i)/|x_j − x_i| (finite volumes, without flow at the ends), and is that of the well where x_i is one.
 """
 
 from collections.abc import Mapping
@@ -58,11 +60,14 @@ class BlockChain:
         2 to 20 blocks, whose lengths add up to that of the fault.
     wells : tuple of float
         Positions along the fault [m], in increasing order.
+    diffusivity : float, optional
+        Of the pressure along the fault [m²/s]; None for steady pressures.
     """
 
     fault: Fault
     blocks: tuple[FaultBlock, ...]
     wells: tuple[float, ...]
+    diffusivity: float | None = None
 
     def __post_init__(self) -> None:
         blocks, wells = len(self.blocks), len(self.wells)
@@ -85,6 +90,13 @@ class BlockChain:
                 f"positions of wells must increase, from 0 to {most} m. Received {', '.join(received)} m. Sort the "
                 "wells, and place each on the fault where no other is."
             )
+        if self.diffusivity is not None:
+            require_positive(diffusivity=self.diffusivity)
+            if self.ages:
+                raise ParameterError(
+                    "diffusivity along the fault needs friction without a state. Received "
+                    f"{self.blocks[0].friction.name}. Omit diffusivity, for steady pressures along the fault."
+                )
         for place, block in enumerate(self.blocks, 1):
             if bool(block.friction.state_names) != self.ages:
                 raise ParameterError(
@@ -121,6 +133,43 @@ class BlockChain:
                 row[after - 1], row[after] = 1 - part, part
             rows.append(tuple(row))
         return tuple(rows)
+
+    @cached_property
+    def flow(self) -> tuple[tuple[Fraction, ...], ...]:
+        """Rows of q' [1/s] over the pressures q of blocks without a well in their middle, then those of the wells.
+
+        Empty without a diffusivity.
+        """
+        wells, slow = [rational(v) for v in self.wells], self._slow
+        diffusivity = rational(self.diffusivity or 0)
+        points = sorted({*self.middles, *wells})
+        rows = []
+        for i in slow:
+            x, row = self.middles[i], [Fraction(0)] * (len(slow) + len(wells))
+            place = points.index(x)
+            for other in points[max(place - 1, 0) : place] + points[place + 1 : place + 2]:
+                rate = diffusivity / (self.lengths[i] * abs(other - x))
+                column = len(slow) + wells.index(other) if other in wells else slow.index(self.middles.index(other))
+                row[column] += rate
+                row[slow.index(i)] -= rate
+            rows.append(tuple(row))
+        return tuple(rows)
+
+    @cached_property
+    def pressures(self) -> tuple[tuple[Fraction, ...], ...]:
+        """Pressure of each block (rows) by the pressures of `flow` (columns) [-]; `shares` without a diffusivity."""
+        if self.diffusivity is None:
+            return self.shares
+        wells, slow = [rational(v) for v in self.wells], self._slow
+        places = [slow.index(i) if i in slow else len(slow) + wells.index(x) for i, x in enumerate(self.middles)]
+        size = len(slow) + len(wells)
+        return tuple(tuple(Fraction(j == place) for j in range(size)) for place in places)
+
+    @property
+    def _slow(self) -> list[int]:
+        """Blocks whose pressure diffuses."""
+        wells = {rational(v) for v in self.wells}
+        return [] if self.diffusivity is None else [i for i, x in enumerate(self.middles) if x not in wells]
 
     @cached_property
     def springs(self) -> tuple[tuple[int, int, Fraction], ...]:
@@ -169,6 +218,8 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
     if not {"block", "well"} & set(raw):
         return None
     problems = Problems()
+    along = Table({key: raw.pop(key) for key in ("diffusivity",) if key in raw}, problems)
+    read = along.quantities({"diffusivity": "m^2/s"}, optional=True)
     tables = {key: _tables(raw.pop(key, []), key, problems) for key in ("block", "well")}
     fault = fault_of_tables(Table(raw, problems), problems, allow_code)
     blocks = [_block(table, fault, allow_code) for table in tables["block"]]
@@ -179,7 +230,7 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
     problems.refuse(str(source))
     fault = fault.with_box(box) if box else fault
     with problems.collected():
-        return BlockChain(fault=fault, blocks=tuple(blocks), wells=tuple(wells))
+        return BlockChain(fault=fault, blocks=tuple(blocks), wells=tuple(wells), **read)
     problems.refuse(str(source))
     return None
 

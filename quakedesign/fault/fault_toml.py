@@ -748,6 +748,11 @@ def fault_schema() -> dict[str, Any]:
         ("well", {"position": place}, "position", "tables [[well]], from one end of the row"),
     ):
         properties[key] = {"type": "array", "description": text, "items": _table(items, (needed,))}
+    properties["diffusivity"] = {
+        "type": "string",
+        "description": "of the pressure along a fault of several blocks [m²/s]; steady pressure unless given",
+        "examples": ["1e6 m^2/s"],
+    }
     required = ("name", *(key for key in PLANT if key not in OPTIONAL), "friction")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -61,7 +61,8 @@ def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupl
             )
         N, m = len(fault.blocks), len(fault.wells)
         tasks = [uncertain_plant(one) for one in fault.faults]
-        return _parts(tasks, fault.springs, fault.shares, f"{fault.name}, {N} blocks, {counted(m, 'well')}")
+        name = f"{fault.name}, {N} blocks, {counted(m, 'well')}"
+        return _parts(tasks, fault.springs, fault.shares, name, fault.flow, fault.pressures)
     require_known(wells, ("each", "one"), "wells")
     if blocks is None or not 2 <= blocks <= MOST // 2:
         raise ParameterError(f"blocks must be 2 to {MOST // 2}. Received {blocks}.")
@@ -76,10 +77,17 @@ def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupl
     return _parts([task] * blocks, springs, shares, f"{blocks} blocks of {task.name}, {held}")
 
 
-def _parts(tasks: Sequence[FaultPlant], springs: Iterable[Spring], shares: Sequence[Row], name: str) -> dict[str, Any]:
-    """Fields of a plant of blocks and wells."""
-    N, m, zero = len(tasks), len(shares[0]), Fraction(0)
-    size, springs = 2 * N, list(springs)
+def _parts(
+    tasks: Sequence[FaultPlant],
+    springs: Iterable[Spring],
+    shares: Sequence[Row],
+    name: str,
+    flow: Matrix = (),
+    pressures: Matrix = (),
+) -> dict[str, Any]:
+    """Fields of a plant of blocks and wells, with pressures that diffuse between them as further states."""
+    N, m, more, zero = len(tasks), len(shares[0]), len(flow), Fraction(0)
+    size, springs, pressures = 2 * N + more, list(springs), pressures or tuple(shares)
     inverse, weights, lost = _inverse(shares) if m == N else None, None, False
     if inverse is None:
         weights = _averages(tasks, shares)
@@ -100,7 +108,7 @@ def _parts(tasks: Sequence[FaultPlant], springs: Iterable[Spring], shares: Seque
         sectors[f"slope of block {place}"] = dict(entry=rate[i], row=unit(size, i), slopes=slopes[i], within=within)
         if half:
             sectors[f"damping of block {place}"] = dict(entry=rate[i], row=rate[i], slopes=(-half, half))
-        acts = (*[zero] * size, *(task.authority * v for v in shares[i]))
+        acts = (*[zero] * (2 * N), *(task.authority * v for v in pressures[i]))
         sectors[f"input gain of block {place}"] = dict(entry=rate[i], row=acts, slopes=(zero, task.beta[1] - 1))
         force = max(map(abs, dampings[i])) * first + task.reference_rates[1] + task.amplitude
         disturbances[f"force on block {place}"] = (rate[i], force)
@@ -112,15 +120,23 @@ def _parts(tasks: Sequence[FaultPlant], springs: Iterable[Spring], shares: Seque
     else:  # pressures of the wells that hold block i against a pressure of 1
         held = [tuple(row[i] for row in inverse) for i in range(N)]
         moving = [max(map(abs, s)) * first / task.authority for s, task in zip(slopes, tasks, strict=True)]
+    forces = [tuple(task.authority * v for v in row) for task, row in zip(tasks, pressures, strict=True)]
+    pulls = [[*row[: 2 * N], *force[:more]] for row, force in zip(pulls, forces, strict=True)]
+    seen = weights or ([unit(N, i) for i in range(N)] if more else None)
+    steady = [row for row, read in zip(shares, pressures, strict=True) if any(read[:more])]
+    shifts = [[*[zero] * (2 * N), *(_dot(row, one) for row in steady)] if more else None for one in held]
     order = ("slope", "damping", "input")
     return {
-        "A": [*rate, *pulls],
-        "B": [(zero,) * m] * N
-        + [tuple(task.authority * v for v in row) for task, row in zip(tasks, shares, strict=True)],
-        "C": weights and [*((*row, *[zero] * N) for row in weights), *((*[zero] * N, *row) for row in weights)],
+        "A": [*rate, *pulls, *((*[zero] * (2 * N), *row[:more]) for row in flow)],
+        "B": [(zero,) * m] * N + [row[more:] for row in (*forces, *flow)],
+        "C": seen
+        and [*((*row, *[zero] * (N + more)) for row in seen), *((*[zero] * N, *row, *[zero] * more) for row in seen)],
         "sectors": dict(sorted(sectors.items(), key=lambda item: order.index(item[0].split()[0]))),
         "disturbances": disturbances,
-        "loads": {f"pressure {i + 1}": (one, None, v) for i, (one, v) in enumerate(zip(held, moving, strict=True))},
+        "loads": {
+            f"pressure {i + 1}": (one, shift, v)
+            for i, (one, shift, v) in enumerate(zip(held, shifts, moving, strict=True))
+        },
         "outputs": {
             **{f"slip error {i + 1}": unit(size, i) for i in range(N)},
             **{f"slip-rate error {i + 1}": rate[i] for i in range(N)},

@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import sympy as sp
+from scipy.linalg import expm
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
@@ -114,9 +115,11 @@ class _Period:
         chain, fault, law = self.chain, self.chain.fault, self.law
         N = len(chain.blocks)
         parts = [ca.SX.sym(name, size) for name, size in self.sizes]
-        x, v, z, _, count, worst, rate, peak, rest, room = parts
+        x, v, z, q, _, count, worst, rate, peak, rest, room = parts
         step, h = float(law.step), float(law.step) / self.substeps
-        shares = np.array(chain.shares, dtype=float)
+        pressures, flow = np.array(chain.pressures, dtype=float), np.array(chain.flow, dtype=float)
+        slow, columns = len(flow), pressures.shape[1]
+        through = expm(np.vstack([flow, np.zeros((columns - slow, columns))]) * h) if slow else np.eye(columns)
         pulls = np.zeros((N, N))
         for i, j, K in chain.springs:
             pulls[i, j] += float(K)
@@ -132,11 +135,12 @@ class _Period:
 
         began = count * step
         p, z = decided(chain, law, count, x, v, z)
-        acting = ca.mtimes(shares, p)
         static = friction(ca.SX.zeros(N), ca.SX.zeros(N))
         for k in range(self.substeps):
             time = began + k * h
             pushed = kicked.constant + kicked.amplitude * ca.sin(kicked.frequency * time + phases)
+            after = ca.mtimes(through[:slow], ca.vertcat(q, p))  # p is held
+            acting, q = ca.mtimes(pressures, ca.vertcat((q + after) / 2, p)), after
             strength = fault.authority * friction(x, v) * (stress - acting)
             drive = fault.authority * static * stress - fault.specific_stiffness * x + ca.mtimes(pulls, x)
             drive += pushed + kicked.slip_growth * x + (kicked.rate_growth - fault.specific_damping) * v
@@ -146,15 +150,24 @@ class _Period:
             worst, rate = ca.fmax(worst, ca.fabs(x - r)), ca.fmax(rate, ca.fabs(v - moved))
             peak, rest = ca.fmax(peak, v), rest + (v <= 0) / self.substeps
             room = ca.fmin(room, ca.vertcat(ca.mmin(drive + strength), ca.mmin(stress - acting)))
-        after = [x, v, z, p, count + 1, worst, rate, peak, rest, room]
-        return ca.Function("period", [ca.vertcat(*parts)], [ca.vertcat(*after)])
+        last = [x, v, z, q, p, count + 1, worst, rate, peak, rest, room]
+        return ca.Function("period", [ca.vertcat(*parts)], [ca.vertcat(*last)])
 
     @property
     def sizes(self) -> tuple[tuple[str, int], ...]:
         """What is carried from period to period."""
         N, m, q = len(self.chain.blocks), len(self.chain.wells), len(self.law.update)
         of_blocks = tuple((name, N) for name in ("worst", "rate", "peak", "rest"))
-        return (("x", N), ("v", N), ("z", q), ("p", m), ("count", 1), *of_blocks, ("room", 2))
+        return (
+            ("x", N),
+            ("v", N),
+            ("z", q),
+            ("q", len(self.chain.flow)),
+            ("p", m),
+            ("count", 1),
+            *of_blocks,
+            ("room", 2),
+        )
 
 
 def whole_periods(chain: BlockChain, step: Fraction, duration: float | None) -> int:

@@ -4,6 +4,8 @@
 unstable pole p of this linear plant: z = ℓ·(x, x′) obeys z′ = pz + ℓ·(φ + βbS(P − P*)). With constant φ of size H whose
 signs are those of ℓ, z grows from 0, as long as friction weakens so, unless Σ_j|ℓ·βb_j||P_j − P*_j| reaches HΣ|ℓ_i|: a
 controller of any kind needs pressures that far from balance, with the largest β. A mode that no well reaches grows.
+Pressures q that diffuse, q′ = Fq + G(P − P*) from q = 0, are those of S(p) = (pI − F)⁻¹G in place of S: unless the
+integral of e^{−pt}ℓ·(φ + βbq) is 0, z grows, and that of e^{−pt}q is S(p) times that of e^{−pt}(P − P*).
 """
 
 from collections.abc import Callable, Sequence
@@ -127,7 +129,7 @@ def chain_limits(chain: BlockChain) -> ChainLimits:
     damping = np.diag([-float(task.rate_chord[0]) for task in tasks])
     A = np.block([[np.zeros((N, N)), np.eye(N)], [stiff, damping]])
     authority = np.array([[float(task.authority * task.beta[1])] for task in tasks])
-    B = np.vstack([np.zeros((N, len(chain.wells))), authority * np.array(chain.shares, dtype=float)])
+    within = authority * np.array(chain.shares, dtype=float)
     size = float(tasks[0].amplitude)
     poles, right = np.linalg.eig(A)
     if max(abs(poles[poles.real > 0].imag), default=0) > _SAME * max(abs(poles)):
@@ -150,11 +152,13 @@ def chain_limits(chain: BlockChain) -> ChainLimits:
     modes = []
     for group in groups:  # of one pole: combinations that the wells reach, and those that none does
         rows = np.real(left[group])
+        B = np.vstack([np.zeros_like(within), authority * _transmitted(chain, float(poles[group[0]].real))])
         turned = np.linalg.svd(rows @ B)[0].T
         shapes = np.real(right[:N, group]) @ np.linalg.inv(turned)
         for row, shape in zip(turned @ rows, shapes.T, strict=True):
             reach = np.abs(row @ B).sum()
-            out = reach <= _UNREACHED * np.linalg.norm(row) * np.linalg.norm(B)
+            steady = np.abs(row[N:] @ within).sum()
+            out = not reach or steady <= _UNREACHED * np.linalg.norm(row) * np.linalg.norm(within)
             modes.append(
                 UnstableMode(
                     pole=float(poles[group[0]].real),
@@ -163,6 +167,18 @@ def chain_limits(chain: BlockChain) -> ChainLimits:
                 )
             )
     return ChainLimits(chain=chain, modes=tuple(modes))
+
+
+def _transmitted(chain: BlockChain, pole: float) -> np.ndarray:
+    """Transfer functions from pressures of wells (columns) to those of blocks (rows) at a pole [1/s]."""
+    flow, pressures = np.array(chain.flow, dtype=float), np.array(chain.pressures, dtype=float)
+    if not len(flow):
+        return pressures
+    K = len(flow)
+    found: np.ndarray = pressures[:, K:] + pressures[:, :K] @ np.linalg.solve(
+        pole * np.eye(K) - flow[:, :K], flow[:, K:]
+    )
+    return found
 
 
 def chain_lines(chain: BlockChain) -> list[str]:
@@ -178,7 +194,12 @@ def chain_lines(chain: BlockChain) -> list[str]:
         stress = block.effective_normal_stress
         said.append(f"{place:5}{block.length:12g}{stress:13.4g}  {shares:24}{block.friction.name}")
     springs = ", ".join(f"{float(K):.4g}" for i, j, K in chain.springs if i < j)
-    return [*said, "", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
+    said += ["", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
+    if chain.diffusivity is not None:
+        said.append(
+            f"pressure along the fault diffuses with {chain.diffusivity:g} m^2/s; shares are those at steady state"
+        )
+    return said
 
 
 def chain_dict(chain: BlockChain) -> dict[str, Any]:
@@ -189,7 +210,8 @@ def chain_dict(chain: BlockChain) -> dict[str, Any]:
     ]
     springs = [{"block": i + 1, "pulled_by": j + 1, "stiffness_over_mass": float(K)} for i, j, K in chain.springs]
     shares = [[float(v) for v in row] for row in chain.shares]
-    return {"fault": chain.name, "blocks": blocks, "wells": list(chain.wells), "shares": shares, "springs": springs}
+    along = {"wells": list(chain.wells), "shares": shares, "diffusivity": chain.diffusivity}
+    return {"fault": chain.name, "blocks": blocks, **along, "springs": springs}
 
 
 # ----------------------------------------------------------------------

@@ -62,7 +62,7 @@ def guarantee_plant(
 
 def _shown(plant: UncertainPlant) -> int:
     """Slip errors of blocks, or all states."""
-    return len(plant.A) // 2 if any("block" in name for name in plant.sectors) else len(plant.A)
+    return len(plant.outputs or ()) // 2 if any("block" in name for name in plant.sectors) else len(plant.A)
 
 
 def _law_of(

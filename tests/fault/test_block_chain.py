@@ -4,7 +4,10 @@ from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
 
+import numpy as np
 import pytest
+import sympy as sp
+from scipy.linalg import expm
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError, QuakedesignError, ScenarioError
@@ -31,6 +34,54 @@ def test_pressure_is_linear_between_wells_and_constant_beyond_them():
     assert CHAIN.shares == ((1, 0, 0), (0, F(6, 7), F(1, 7)), (0, 0, 1))
     beyond = replace(CHAIN, wells=(1500.0, 2000.0))
     assert beyond.shares == ((1, 0), (0, 1), (0, 1))
+
+
+def test_diffusing_pressure_settles_at_the_shares():
+    slow = replace(CHAIN, wells=(1000.0, 2000.0, 4900.0), diffusivity=0.1)
+    flow, wells = sp.Matrix(slow.flow)[:, :2], sp.Matrix(slow.flow)[:, 2:]
+    settled = -flow.LUsolve(wells)
+    assert [tuple(map(F, map(str, row))) for row in settled.tolist()] == list(slow.shares[1:])
+    assert slow.pressures == ((0, 0, 1, 0, 0), (1, 0, 0, 0, 0), (0, 1, 0, 0, 0))
+    assert (CHAIN.flow, CHAIN.pressures) == ((), CHAIN.shares)
+
+
+def test_diffusion_is_that_of_a_strip_with_one_end_held_and_one_closed():
+    """1 − Σ 4/((2n+1)π)·sin((2n+1)πx/2l)·exp(−D((2n+1)π/2l)²t); errors fall with the square of the lengths."""
+    errors = []
+    for count in (10, 20):
+        blocks = tuple(replace(CHAIN.blocks[0], length=5000.0 / count) for _ in range(count))
+        chain = replace(CHAIN, blocks=blocks, wells=(2500.0 / count,), diffusivity=0.3)
+        x = np.array([float(v) for v in chain.middles])[1:] - 2500 / count
+        far, time = 5000 - 2500 / count, 0.1 * 5000**2 / 0.3
+        n = (2 * np.arange(200)[:, None] + 1) * np.pi / 2
+        exact = 1 - (2 / n * np.sin(n * x / far) * np.exp(-0.3 * (n / far) ** 2 * time)).sum(axis=0)
+        flow = np.vstack([np.array(chain.flow, dtype=float), np.zeros(count)])
+        errors.append(np.abs(expm(flow * time)[:-1, -1] - exact).max())
+    assert errors[1] < 1e-3
+    assert errors[1] < errors[0] / 3
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        ('diffusivity = "0 m^2/s"', "diffusivity must be positive"),
+        ("diffusivity = 1", "diffusivity"),
+        ('diffusivity = "1 m"', "diffusivity"),
+    ],
+)
+def test_a_diffusivity_is_positive_with_its_unit(written, said, tmp_path):
+    path = tmp_path / "fault.toml"
+    path.write_text(f"{written}\n{TEXT}")
+    with pytest.raises(QuakedesignError, match=said):
+        load_chain(path)
+    path.write_text(f'diffusivity = "2 m^2/s"\n{TEXT}')
+    assert load_chain(path) == replace(CHAIN, diffusivity=2.0)
+
+
+def test_diffusion_along_the_fault_needs_friction_without_a_state():
+    sliding = load_chain(PATH.with_name("three_sliding_blocks.toml"))
+    with pytest.raises(ParameterError, match="diffusivity along the fault needs friction without a state"):
+        replace(sliding, diffusivity=1.0)
 
 
 def test_springs_are_those_of_elastic_strips():

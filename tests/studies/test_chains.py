@@ -69,6 +69,21 @@ def test_modes_of_equal_blocks_are_those_of_a_chain():
     assert [mode.pole for mode in every.modes] == pytest.approx(wanted, rel=1e-9)
 
 
+def test_a_well_that_diffuses_needs_more_pressure_by_its_transfer_function_at_the_pole():
+    """Two alike blocks and a well between their middles, r = D/(L·L/2): r/(p + r) of its pressure at a pole p."""
+    chain = alike((2500.0, 2500.0), (2500.0,))
+    steady, slow = chain_limits(chain), chain_limits(replace(chain, diffusivity=1e5))
+    rate, (one,) = 1e5 / (2500 * 1250), [mode for mode in steady.modes if mode.reached]
+    (other,) = [mode for mode in slow.modes if mode.reached]
+    assert other.pole == pytest.approx(one.pole, rel=1e-12)
+    assert other.pressure == pytest.approx(one.pressure * (one.pole + rate) / rate, rel=1e-9)
+    assert [mode.reached for mode in slow.modes] == [mode.reached for mode in steady.modes]
+    aside = chain_limits(replace(chain, wells=(1250.0,), diffusivity=1e5))
+    through = 1e5 / 2500**2
+    felt = (1 + through / (one.pole + through)) / 2  # by the mean of both blocks
+    assert aside.modes[0].pressure == pytest.approx(one.pressure / felt, rel=1e-9)
+
+
 def test_blocks_that_hardly_pull_each_other_need_a_well_each():
     """Of blocks with one pole each, m wells reach as many combinations as the wells are independent."""
     long = replace(CHAIN.fault, length=5e7, width=5e3)

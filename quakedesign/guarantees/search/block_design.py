@@ -2,14 +2,14 @@
 
 Linear-quadratic feedback of what is measured, with an estimate of the disturbance from the innovation of the slip
 rates: of all blocks where each has a well, else of averages, one for each well. In a decentralised law each well has
-the same for its own slip and slip rate.
+the same for its own slip and slip rate. A law for pressures that diffuse along the fault has a model of these.
 """
 
 from fractions import Fraction
 
 import numpy as np
 from flint import fmpq, fmpq_mat
-from scipy.linalg import expm, solve_discrete_are
+from scipy.linalg import block_diag, expm, solve_discrete_are
 from scipy.optimize import minimize
 
 from quakedesign.errors import ParameterError
@@ -57,7 +57,7 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
             return 1e3
         return found[0] if found[1] is None else float(np.log(found[1][blocks : 2 * blocks].max())) - 100
 
-    blocks = len(part.A) // 2
+    blocks = len(part.outputs) // 2
     simplex = np.vstack([np.zeros(len(_STEPS)), np.diag(_STEPS)])
     most = min(_EVALUATIONS[0], _EVALUATIONS[1] // blocks**3)
     options = {"maxfev": most, "xatol": 1e-2, "fatol": 1e-3, "initial_simplex": simplex}
@@ -95,39 +95,49 @@ def _feedback(A: np.ndarray, G: np.ndarray, x: np.ndarray) -> np.ndarray:
     chain = 2 * np.eye(count) - np.eye(count, k=1) - np.eye(count, k=-1)
     chain[0, 0] = chain[-1, -1] = min(count - 1, 1)
     apart = np.eye(count) + x[4] * chain
-    Q = np.block([[apart, np.zeros((count, count))], [np.zeros((count, count)), x[0] * np.eye(count)]])
+    Q = block_diag(apart, x[0] * np.eye(count), np.zeros([len(A) - 2 * count] * 2))
     P = solve_discrete_are(A, G, Q, x[1] * apart)
     gain: np.ndarray = np.linalg.solve(x[1] * apart + G.T @ P @ G, G.T @ P @ A)
     return gain
 
 
 def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> MatrixLaw:
-    """Feedback of what is measured, in exact numbers: π⁺ = Pe, d⁺ = d + M(e2 − π), p = −g⁻¹(Ke + d⁺).
+    """Feedback of what is measured, in exact numbers: π⁺ = P(e, q), d⁺ = d + M(e2 − π), p = −g⁻¹(K(e, q) + d⁺).
 
-    What is measured are all errors, or averages Ce of them for each well, of which Te are the errors of all blocks.
+    What is measured are all errors e, or averages of them for each well; q is a model of diffusing pressures.
     """
-    blocks, count = len(part.A) // 2, len(part.C) // 2
+    blocks, count = len(part.outputs) // 2, len(part.C) // 2
     A, B = _middle(part)
     weights = np.array(part.C, dtype=float)[:count, :blocks]
-    spread = B[blocks:] @ np.linalg.inv(weights @ B[blocks:]) if count < blocks else np.eye(blocks)
-    own = np.kron(np.eye(2), weights) @ A @ np.kron(np.eye(2), spread)
-    gain = weights @ B[blocks:] * x[3]
+    flow, fed, read = A[2 * blocks :, 2 * blocks :], B[2 * blocks :], A[blocks : 2 * blocks, 2 * blocks :]
+    acting = B[blocks : 2 * blocks] - read @ np.linalg.solve(flow, fed)  # at steady pressure
+    spread = acting @ np.linalg.inv(weights @ acting) if count < blocks else np.eye(blocks)
+    own = np.kron(np.eye(2), weights) @ A[: 2 * blocks, : 2 * blocks] @ np.kron(np.eye(2), spread)
+    gain, read = weights @ acting * x[3], weights @ read * x[3]
     if alone:  # each well knows what it measures itself, and takes the others for a disturbance
         own, gain = own * np.kron(np.ones((2, 2)), np.eye(count)), np.diag(np.diag(gain))
-    phi, reach = _held(own, np.vstack([np.zeros((count, count)), np.eye(count)]), float(step))
+        flow, fed, read = block_diag(*[flow] * count), block_diag(*fed.T[:, :, None]), block_diag(*read[:, None])
+    still, more, size = np.zeros((count, count)), len(flow), 2 * count
+    largest = 1 / np.abs(gain).max()  # Pa, of a pressure that accelerates by 1 m/s²
+    whole = np.block([[own, np.vstack([np.zeros_like(read), read * largest])], [np.zeros((more, size)), flow]])
+    wells = np.linalg.inv(gain) / largest
+    at_once = np.eye(count) + read @ np.linalg.solve(flow, fed) @ wells * largest if more else np.eye(count)
+    phi, reach = _held(whole, np.vstack([still, at_once, fed @ wells]), float(step))
     K = _feedback(phi, reach, x * (1, 1, 1, 1, not alone))
-    feedback = _rounded(K)
-    learned = _rounded(float(x[2]) * np.linalg.inv(reach[count:]))
-    expected = _rounded(phi[count:] - reach[count:] @ np.array(feedback, dtype=float))
-    return _law(step, _rounded(gain), feedback, learned, expected)
+    scale = np.r_[np.ones(size), np.full(more, 1 / largest)]  # of the states, for pressures in Pa
+    feedback = _rounded(K * scale)
+    pushed = _held(own, np.vstack([still, np.eye(count)]), float(step))[1]
+    learned = _rounded(float(x[2]) * np.linalg.inv(pushed[count:]))
+    closed = (phi - reach @ (np.array(feedback, dtype=float) / scale)) * scale / scale[:, None]
+    return _law(step, _rounded(gain), feedback, learned, _rounded(closed[count:]))
 
 
 def _law(
     step: Fraction, gains: Matrix, feedback: tuple[Row, ...], learned: tuple[Row, ...], expected: tuple[Row, ...]
 ) -> MatrixLaw:
-    """States π [m/s] and d [m/s²]; a constant d is balanced by p = −g⁻¹d exactly."""
+    """States π [m/s], diffusing pressures [Pa] and d [m/s²]; a constant d is balanced by p = −g⁻¹d exactly."""
     size, zero = len(feedback), Fraction(0)
-    still = (zero,) * size
+    still, more = (zero,) * size, len(expected) - size
     inverse = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in gains]).inv().tolist()
     asked = [[-Fraction(int(v.p), int(v.q)) for v in row] for row in inverse]
 
@@ -139,20 +149,20 @@ def _law(
             for line in asked
         )
 
-    learned_by = [(*(-v for v in row), *unit(size, i)) for i, row in enumerate(learned)]  # d⁺ of π and d
+    learned_by = [(*(-v for v in row), *[zero] * more, *unit(size, i)) for i, row in enumerate(learned)]
+    by_pressures = [(*still, *row[2 * size :], *still) for row in feedback]
     return MatrixLaw(
         step=step,
         delay=zero,
-        update=(*[(*still, *still)] * size, *learned_by),
-        measured=(*expected, *((*still, *row) for row in learned)),
-        output=acting(learned_by),
-        feedback=acting(
-            [
-                tuple(a + b for a, b in zip(row, (*still, *more), strict=True))
-                for row, more in zip(feedback, learned, strict=True)
-            ]
-        ),
+        update=(*((*still, *row[2 * size :], *still) for row in expected), *learned_by),
+        measured=(*(row[: 2 * size] for row in expected), *((*still, *row) for row in learned)),
+        output=acting([_sum(*rows) for rows in zip(learned_by, by_pressures, strict=True)]),
+        feedback=acting([_sum(row[: 2 * size], (*still, *by)) for row, by in zip(feedback, learned, strict=True)]),
     )
+
+
+def _sum(one: Row, other: Row) -> Row:
+    return tuple(a + b for a, b in zip(one, other, strict=True))
 
 
 def _rounded(values: np.ndarray) -> tuple[Row, ...]:

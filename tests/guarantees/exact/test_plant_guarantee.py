@@ -443,12 +443,14 @@ def friction_run(found, law, blocks, seed):
     A, B, C = (np.array(m, dtype=float) for m in (part.A, part.B, part.C))
     F, G, H, D = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output, law.feedback))
     force, *moved = [float(size) for _, size in part.disturbances[blocks - 1 :]]
-    n = 2 * blocks
+    n, each = len(A), slice(blocks, 2 * blocks)
     x, z, largest, pieces = np.zeros(n), np.zeros(len(F)), np.zeros(n), 4
     period = random.uniform(1, 8)
     low, high = (np.array([float(one.slopes[end]) for one in part.sectors[:blocks]]) for end in (0, 1))
     gain = np.array([float(one.slopes[1]) for one in part.sectors[blocks:]])
     drift = np.array(moved or np.zeros(blocks)) * random.choice([-1, 1], blocks)
+    shifts = [np.array(load.shift[2 * blocks :], dtype=float) * float(load.rate) for load in part.loads]
+    lagging = random.choice([-1, 1], len(shifts)) @ np.array(shifts)  # of pressures that diffuse
     for k in range(300):
         y = C @ x
         u = H @ z + D @ y
@@ -458,12 +460,15 @@ def friction_run(found, law, blocks, seed):
                 np.sin(2 * np.pi * (k + j / pieces) / period + np.arange(blocks) * random.choice([0, np.pi]))
             )
             now = A.copy()
-            now[blocks:, :blocks] += np.diag(np.where(x[:blocks] * sign > 0, high, low))
-            pushed = B[blocks:] @ u * (1 + gain * random.choice([0, 1], blocks)) + force * sign
-            whole = expm(np.block([[now, np.r_[drift, pushed][:, None]], [np.zeros((1, n + 1))]]) * 0.046)
+            now[each, :blocks] += np.diag(np.where(x[:blocks] * sign > 0, high, low))
+            larger = 1 + gain * random.choice([0, 1], blocks)
+            now[each, 2 * blocks :] *= larger[:, None]
+            pushed = B[each] @ u * larger + force * sign
+            flowing = B[2 * blocks :] @ u + lagging
+            whole = expm(np.block([[now, np.r_[drift, pushed, flowing][:, None]], [np.zeros((1, n + 1))]]) * 0.046)
             x = (whole @ [*x, 1])[:n]
             largest = np.maximum(largest, np.abs(x))
-    return largest
+    return largest[: 2 * blocks]
 
 
 @few("wells", ["each", "one"], every=2)
@@ -491,6 +496,27 @@ def test_three_blocks_that_differ_under_fewer_wells_stay_inside(wells, controlle
     claims = np.array([float(v) for v in found.claims.outputs])
     for seed in range(4):
         assert (friction_run(found, found.law, 3, seed) < claims).all()
+    assert checker.check(json.dumps(guarantee_document(found))).verdict == "proved"
+
+
+@pytest.mark.parametrize(
+    ("wells", "controller"),
+    [
+        ((1200.0, 3800.0), "centralised"),
+        pytest.param((1200.0, 3800.0), "decentralised", marks=pytest.mark.slow),
+        pytest.param((1250.0,), "centralised", marks=pytest.mark.slow),
+    ],
+)
+def test_blocks_stay_inside_where_the_pressure_diffuses_along_the_fault(wells, controller, checker):
+    chain = qd.load_chain(Path(__file__).parents[2] / "data" / "three_blocks.toml")
+    blocks = tuple(replace(chain.blocks[0], length=2500.0) for _ in range(2))
+    chain = replace(chain, blocks=blocks, wells=wells, diffusivity=1e6 if len(wells) == 2 else 1e7)
+    found = qd.guarantee(chain, controller)
+    assert len(found.part.A) == 4 + (2 if len(wells) == 2 else 1)
+    claims = np.array([float(v) for v in found.claims.outputs])
+    assert max(claims[2:]) < (3e-4 if len(wells) == 2 else 2e-3)
+    for seed in range(4):
+        assert (friction_run(found, found.law, 2, seed) < claims).all()
     assert checker.check(json.dumps(guarantee_document(found))).verdict == "proved"
 
 
