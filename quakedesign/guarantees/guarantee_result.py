@@ -80,7 +80,9 @@ class LoopAnswer(LoopResult):
         T_s [s] that has no guarantee where `shorter` has one.
     nearest : (str, Guarantee) or None
         For a loop without a guarantee: another quantity of its setup and a design with the value nearest to it that
-        has one, all else as it is; `GAINS` for a design in place of given gains.
+        has one, all else as it is; `GAINS` for a design in place of given gains, `FACTOR` for a law with its pressure
+        times `factor`.
+    factor : Fraction or None
     compensation : Compensation or None
         Gains, scale and settings of a sliding mode that runs in the scheme ``compensated``.
     notes : tuple of str or None
@@ -96,6 +98,7 @@ class LoopAnswer(LoopResult):
     shorter: Guarantee | None = None
     asked_step: Fraction | None = None
     nearest: tuple[str, Guarantee] | None = None
+    factor: Fraction | None = None
     compensation: Compensation | None = None
     notes: tuple[str, ...] | None = None
     not_at_rest: str = ""
@@ -117,7 +120,10 @@ class LoopAnswer(LoopResult):
             if self.shorter is not None:
                 said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             if self.nearest is not None:
-                said.append(f"{_with_nearest(*self.nearest)}: {self.nearest[1].sentence()}")
+                other = _with_nearest(*self.nearest)
+                if self.factor is not None:
+                    other = f"with the pressure of this law times {shortly(self.factor)}"
+                said.append(f"{other}: {self.nearest[1].sentence()}")
             if len(said) == 1 and self.notes is None:
                 said.append("no T_s was found for which a design is proved with this box, disturbance and setup")
             return said
@@ -243,7 +249,7 @@ class LoopAnswer(LoopResult):
                 "reason": self.found.reason,
                 "small_gain": None if gain is None else gain.exact,
                 "shorter": shorter,
-                "nearest": self.nearest and _nearest(*self.nearest),
+                "nearest": self.nearest and _nearest(*self.nearest, self.factor),
                 **({} if self.notes is None else {"notes": list(self.notes)}),
                 **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             }
@@ -271,6 +277,7 @@ class LoopAnswer(LoopResult):
 
 
 GAINS = "gains"
+FACTOR = "pressure_factor"
 _QUANTITIES = {
     "delay_jitter": ("jitter of the delay", "s"),
     "jitter": ("jitter", "s"),
@@ -305,10 +312,12 @@ def _with_nearest(name: str, found: Guarantee) -> str:
     return f"with a pump of at least {UpperBound(pump.rate or 0).quantity('Pa/s')}"
 
 
-def _nearest(name: str, found: Guarantee) -> dict[str, Any]:
+def _nearest(name: str, found: Guarantee, factor: Fraction | None) -> dict[str, Any]:
     """Plain values, SI; exact numbers as texts, of a box and of a pump's pressures several."""
     pump, value = found.held.pump, None
-    if name == AMPLITUDE:
+    if name == FACTOR:
+        value = str(factor)
+    elif name == AMPLITUDE:
         value = str(found.task.amplitude)
     elif name in (BOX, SATURATION):
         several = found.task.spreads if name == BOX else (pump and pump.limits) or ()

@@ -28,6 +28,7 @@ from quakedesign.guarantees import (
     StickSlipGuarantee,
     best_guarantee,
 )
+from quakedesign.guarantees.guarantee_result import FACTOR
 from quakedesign.guarantees.search.adversary import worst_found
 from quakedesign.guarantees.search.estimate import spectral_radius
 from quakedesign.laws import Controller, SampledController, Signals, SlidingMode, control_laws
@@ -376,9 +377,21 @@ class Samples(DesignMethod[SampledController]):
         """Guarantee with the worst case found, for a law of the errors alone."""
         found = self.guarantee(fault, task, controller, setup)
         worst = worst_found(found) if found.proved and not controller.law.of_reference else None
-        return LoopAnswer(fault=fault, found=found, worst=worst, notes=controller.notes)
+        answer = LoopAnswer(fault=fault, found=found, worst=worst, notes=controller.notes)
+        if found.proved or found.pressed or found.reason == _STANDING or setup.longest_step:
+            return answer
+        for factor in _FACTORS:
+            law = controller.law
+            rows = ([factor * v for v in row] for row in (law.output, law.feedback))
+            output, feedback = map(tuple, rows)
+            scaled = replace(controller, law=replace(law, output=output, feedback=feedback))
+            other = self.guarantee(fault, task, scaled, setup)
+            if isinstance(other, Guarantee):
+                return replace(answer, nearest=(FACTOR, other), factor=factor)
+        return answer
 
 
+_FACTORS = tuple(Fraction(v) for v in ("1/2", "2", "1/4", "4"))  # of the pressure of a law without a guarantee
 _STANDING = (
     "the law leaves an error under a constant pressure at rest, as it has no integral action: give it an integral of "
     "the slip error or an estimate of the disturbance"
