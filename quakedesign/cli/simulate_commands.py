@@ -318,12 +318,17 @@ def export(
         step=step,
         scheme=scheme,
         **sensors.told(),
-        remarks=(f"proved: {chosen.claim.sentence()}",) if chosen.claim else (),
+        remarks=(f"proved: {chosen.claim.sentence()}" if chosen.claim else _WITHOUT_CLAIM,),
         fmu=fmu,
         force=force,
     )
     output.show(answer, export_lines(answer))
     return 0
+
+
+_WITHOUT_CLAIM = (
+    "no guarantee is stated here: quakedesign guarantee --out FILE, then export --certificate FILE, gives one"
+)
 
 
 # ----------------------------------------------------------------------

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 WIDTH = 7.16  # two columns of a printed page [in]
 SMALL = 8  # size of letters [pt], still readable in print
-NATURAL, INDUCED = "#000000", "#CC79A7"
+NATURAL, INDUCED, PROVED = "#000000", "#CC79A7", "#000000"
 ORIGINS = {"published": (0, (4, 2)), "designed": "solid"}
 """Line style of every origin, in the order in which they stand side by side."""
 PALE = 0.45

@@ -15,6 +15,7 @@ from quakedesign.report.drawing import (
     INDUCED,
     NATURAL,
     ORIGINS,
+    PROVED,
     SMALL,
     band,
     bar_look,
@@ -238,7 +239,7 @@ def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
     rate.plot(time, speed / first, color="black", linestyle=":", linewidth=1, label="reference")
     if entry.guaranteed is not None:
         never = float(entry.guaranteed.peak_slip_rate) / first
-        rate.axhline(never, color="black", linestyle="--", label="never exceeded, proved")
+        rate.axhline(never, color=PROVED, linestyle=(0, (10, 3)), label="never exceeded, proved")
     rate.set_ylabel("slip rate / V [-]")
     largest, pascal = scaled(float(np.abs(run.pressure).max()) or 1.0, "Pa")
     _filled(pressure, time, run.pressure / largest, shade)
@@ -341,12 +342,12 @@ def _peak(entry: "Entry") -> float:
     return float("inf") if entry.guaranteed is None else float(entry.guaranteed.peak_slip_rate)
 
 
-def _levels(entry: "Entry") -> "Iterator[tuple[float, str, str, str]]":
+def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":
     """Proved bound of the slip rate, worst case found, and performance limit, as far as they are known."""
     if entry.guaranteed is None or entry.answer is None:
         return
     peak = entry.guaranteed.peak_slip_rate
-    yield float(peak), f"proved: at most {peak.quantity('m/s')}", "dashed", colour(entry.design.name)
+    yield float(peak), f"proved: at most {peak.quantity('m/s')}", (0, (10, 3)), PROVED
     if entry.answer.worst is not None:
         worst = worst_slip_rate(entry.answer.worst, entry.guaranteed)
         yield worst, f"worst case found: {quantity(worst, 'm/s')}", "dotted", INDUCED

@@ -8,6 +8,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from quakedesign.exact import Bound, LowerBound, UpperBound
+from quakedesign.fault.fault_toml import beyond_rates, mean_rate
 from quakedesign.guarantees import Guarantee, SlidingGuarantee, StickSlipGuarantee
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
@@ -147,6 +148,8 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
     if isinstance(comparison.uncontrolled, StateRun):
         yield cycle_sentence(comparison.uncontrolled)
     yield from (f"assumed: {said}" for said in fault.assumed)
+    if fault.friction.state_names and (beyond := beyond_rates(fault.friction, mean_rate(fault.reference))):
+        yield beyond
     if best is not None and not fault.friction.state_names:
         yield box_sentence(fault)
     for entry in designed:

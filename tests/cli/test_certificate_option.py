@@ -135,6 +135,14 @@ def test_what_is_exported_says_first_what_it_is_for(file, capsys, tmp_path):
     assert "#define CONTROLLER_STEP 0.15 /* s */" in header
 
 
+def test_what_is_exported_without_a_certificate_says_that_nothing_is_stated(capsys, tmp_path):
+    code, _, _ = told(capsys, "export", "real-fault", "--controller", "elqr", "--out", tmp_path / "c")
+    header = (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")
+    assert code == 0
+    assert header.startswith("/*\n * no guarantee is stated here: quakedesign guarantee --out FILE, then export")
+    assert "proved" not in header
+
+
 @pytest.mark.slow
 def test_a_campaign_runs_it_as_it_is_proved(file, capsys, tmp_path):
     arguments = "--samples", "1", "--rerun", "0", "--workers", "1", "--duration", "3 s", "--out", tmp_path / "samples"

@@ -213,6 +213,9 @@ def test_the_overview_is_of_the_design_with_the_smallest_proved_bound(comparison
     answer = replace(best.answer, found=replace(best.answer.found, claims=claims))
     worse = replace(best, label="worse", answer=answer)
     both = Comparison(fault=comparison.fault, uncontrolled=comparison.uncontrolled, entries=(worse, best))
-    labels = [line.get_label() for line in overview(both).axes[0].lines]
-    assert best.label in labels
-    assert "worse" not in labels
+    lines = {line.get_label(): line for line in overview(both).axes[0].lines}
+    assert best.label in lines
+    assert "worse" not in lines
+    (proved,) = (line for label, line in lines.items() if label.startswith("proved"))
+    looks = [(line.get_color(), line.get_linestyle()) for line in lines.values()]
+    assert looks.count((proved.get_color(), proved.get_linestyle())) == 1  # no other curve looks like it

@@ -240,6 +240,17 @@ def test_what_a_design_and_a_fault_take_for_granted_is_said(monkeypatch):
     assert "A (designed) assumes a well near the fault" in notes
 
 
+def test_friction_that_is_extrapolated_to_the_rate_of_the_task_is_said(monkeypatch):
+    one = compared(monkeypatch, entry("A (designed)", "3e-4", "1e-5"))
+    patch = qd.load_fault("crustal-patch")
+    one.fault.reference = patch.reference  # 1 µm/s
+    one.fault.friction = patch.friction
+    assert not any("extrapolated" in note for note in summary(one).notes)
+    one.fault.friction = replace(patch.friction, fastest_rate=1e-7)
+    (said,) = (note for note in summary(one).notes if "extrapolated" in note)
+    assert said.startswith("V = 1e-06 m/s is above the rates for which friction is known, 1e-20 to 1e-07")
+
+
 def test_two_sliding_modes_with_the_same_bounds_say_why(monkeypatch):
     one, other = (entry(f"{name} (designed)", 3e-4, 1e-5, compensation="c") for name in ("2-CTA", "2-DIA"))
     other.guaranteed.claims = one.guaranteed.claims
