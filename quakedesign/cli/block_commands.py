@@ -96,7 +96,10 @@ def _facts(found: Any, chain: "BlockChain") -> dict[str, Any]:
 
 
 def _lines(found: Any, chain: "BlockChain") -> list[str]:
-    return [*found.lines(), *_scope(found, chain)] if found.proved else [found.sentence()]
+    if found.proved:
+        return [*found.lines(), *_scope(found, chain)]
+    far = f"quakedesign limits {chain.name} gives the pressures that every controller needs with this diffusivity"
+    return [found.sentence(), *([far] if chain.diffusivity else [])]
 
 
 def _require_no_state(chain: "BlockChain", command: str) -> None:

@@ -49,7 +49,9 @@ def guarantee_plant(
     exact, notes = _law_of(around, law, gains, setup, decentralised)
     radius, mode = escaping(around, exact)
     if radius >= 1:
-        shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[: _shown(around)], 9))
+        count = _shown(around)
+        mode = mode / (np.abs(mode[:count]).max() or 1)  # blocks may have pressures [Pa] beside slips [m]
+        shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[:count], 9))
         seen = np.abs(np.array(around.C, dtype=float) @ mode).max() > _UNSEEN
         return NoGuarantee(
             reason=f"a mode escapes{'' if seen else ', which is not measured'}: with every uncertain term at its "

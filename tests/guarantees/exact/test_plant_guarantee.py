@@ -7,6 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from time import process_time
+from typing import Any
 
 import control
 import numpy as np
@@ -20,7 +21,8 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, read_guarantee, save_guarantee
 from quakedesign.guarantees.exact.plant_guarantee import named
-from quakedesign.guarantees.exact.plant_loop import response_bounds
+from quakedesign.guarantees.exact.plant_loop import MatrixLaw, response_bounds
+from quakedesign.plant import uncertain_plant
 
 CHECK = Path(__file__).parents[3] / "proofs" / "check.py"
 REAL = qd.load_fault("real-fault")
@@ -518,6 +520,29 @@ def test_blocks_stay_inside_where_the_pressure_diffuses_along_the_fault(wells, c
     for seed in range(4):
         assert (friction_run(found, found.law, 2, seed) < claims).all()
     assert checker.check(json.dumps(guarantee_document(found))).verdict == "proved"
+
+
+def test_a_mode_that_escapes_wells_at_a_distance_is_named_by_the_slips_of_its_blocks(monkeypatch):
+    chain = qd.load_chain(Path(__file__).parents[2] / "data" / "three_blocks.toml")
+    blocks = tuple(replace(chain.blocks[0], length=2500.0) for _ in range(2))
+    far = replace(chain, blocks=blocks, wells=(1200.0, 3800.0), diffusivity=1.0)
+    zero, kept = Fraction(0), ((Fraction(1), Fraction(0)), (Fraction(0), Fraction(1)))
+    idle: Any = {
+        "update": kept,
+        "measured": tuple((*row, zero, zero) for row in kept),
+    }  # an integral of 1 Pa/m a sample
+    idle |= {"output": tuple(tuple(-v for v in row) for row in kept), "feedback": ((zero,) * 4,) * 2}
+    still = MatrixLaw(step=Fraction("0.184"), delay=zero, **idle)
+    monkeypatch.setattr("quakedesign.synthesis.plant_guarantees.block_law", lambda *_, **__: still)
+    none = qd.guarantee(far)
+    # alike blocks, pole p of x'' + wx' = sx: e^(pT)
+    assert none.reason.startswith(
+        "a mode escapes: with every uncertain term at its steepest the states (1, 1) grow by "
+    )
+    task = uncertain_plant(far.faults[0])
+    s, w = float(task.slip_chord[1]), float(task.rate_chord[0])
+    grown = np.exp((np.sqrt(w**2 + 4 * s) - w) / 2 * 0.184)
+    assert none.reason.endswith(f"grow by {grown:.4g} a sample")
 
 
 @pytest.mark.slow
