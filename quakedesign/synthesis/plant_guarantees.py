@@ -50,7 +50,7 @@ def guarantee_plant(
     radius, mode = escaping(around, exact)
     if radius >= 1:
         count = _shown(around)
-        mode = mode / (np.abs(mode[:count]).max() or 1)  # blocks may have pressures [Pa] beside slips [m]
+        mode = mode / (max(mode[:count], key=abs) or 1)  # blocks may have pressures [Pa] beside slips [m]
         shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[:count], 9))
         seen = np.abs(np.array(around.C, dtype=float) @ mode).max() > _UNSEEN
         return NoGuarantee(
