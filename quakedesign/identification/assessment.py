@@ -121,7 +121,11 @@ def sign_check(
         said = f"a - b is {sign}{trends}"
     else:
         late = ": the trend may begin with the change of rate, as slow evolution does"
-        between = f": from {low:.2g} to {high:.2g}{trends}"
+        between = f": from {difference.low:.2g} to {difference.high:.2g} in the fit that is taken"
+        between += "".join(
+            f", from {other.low:.2g} to {other.high:.2g} {what} (AIC {excess:+.3g})"
+            for what, (other, excess) in others.items()
+        )
         said = f"the sign of a - b is open{unsteady or (late if shift is not None else between)}"
     return Check(name="sign", passed=passed, value=difference.value, limit=0.0, sentence=said)
 
