@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy import ndarray
 
 from quakedesign.identification.experiment import TREND, TREND_IN_TIME
 from quakedesign.identification.fitting import Fit, weighed
@@ -64,7 +65,7 @@ class Assessment:
 
 
 def checks_of(
-    fit: Fit, raw: Record, record: Record, used: "np.ndarray", loading: Loading | None, values: Mapping[str, float]
+    fit: Fit, raw: Record, record: Record, used: ndarray, loading: Loading | None, values: Mapping[str, float]
 ) -> tuple[tuple[Check, ...], float]:
     """Tests of beginning, residuals, peaks and halves of the `used` means of a record; and residuals over noise."""
     time = record.time[used]
@@ -170,7 +171,7 @@ def _beginning(values: Mapping[str, float], loading: Loading) -> Check:
 
 
 def _after_steps(
-    fit: Fit, time: "np.ndarray", begins: "np.ndarray", record: Record, used: "np.ndarray", values: Mapping[str, float]
+    fit: Fit, time: ndarray, begins: ndarray, record: Record, used: ndarray, values: Mapping[str, float]
 ) -> float:
     """Largest root mean square of residuals within some critical slips of a change of rate, over their noise."""
     assert record.load_point is not None
@@ -186,7 +187,7 @@ def _after_steps(
     return worst
 
 
-def _halves(fit: Fit, time: "np.ndarray", last: float, record: Record, used: "np.ndarray") -> Check:
+def _halves(fit: Fit, time: ndarray, last: float, record: Record, used: ndarray) -> Check:
     """Whether the trend is the same before and after the last change of rate, and the noise as large in both halves."""
     assert record.load_point is not None
     path = record.load_point[used]

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy import ndarray
 from scipy.linalg import cho_solve_banded, cholesky, cholesky_banded
 from scipy.linalg.lapack import dtrtri
 from scipy.optimize import minimize
@@ -27,10 +28,10 @@ class CorrelatedNoise:
 
     share: float  # variance of the process that fades
     length: float  # over which it fades, in units of `along`
-    along: "np.ndarray"  # where every sample lies: time [s] or displacement [m]
-    counts: "np.ndarray"  # measurements in every sample
+    along: ndarray  # where every sample lies: time [s] or displacement [m]
+    counts: ndarray  # measurements in every sample
     of_time: bool  # whether `along` is time
-    common: "np.ndarray | None" = None  # columns: what a deviation of each unknown of the load moves in all samples
+    common: ndarray | None = None  # columns: what a deviation of each unknown of the load moves in all samples
 
     def to_dict(self, noise: float) -> dict[str, Any] | None:
         """Size and length with their units, of the white noise [-] of one measurement; None where nothing fades."""
@@ -50,14 +51,14 @@ class CorrelatedNoise:
         return float(np.ptp(self.along)) / (4 * self.length) if self.share else np.inf
 
     @cached_property
-    def covariance(self) -> "np.ndarray":
+    def covariance(self) -> ndarray:
         """Of all samples."""
         apart = np.abs(self.along[:, None] - self.along[None, :]) / self.length
-        whole: np.ndarray = self.share * np.exp(-apart)
+        whole: ndarray = self.share * np.exp(-apart)
         whole[np.diag_indices(len(self.along))] += 1 / self.counts
         return whole if self.common is None else whole + self.common @ self.common.T
 
-    def deletion(self, residuals: "np.ndarray", kept: "np.ndarray") -> "np.ndarray":
+    def deletion(self, residuals: ndarray, kept: ndarray) -> ndarray:
         """Residuals less what the others tell of them, in their deviations then; those that are not kept tell nothing.
 
         The inverse of the covariance has both (Martin 1992, Commun. Stat. Theory Methods 21, 1183).
@@ -68,10 +69,9 @@ class CorrelatedNoise:
         off = residuals - told @ residuals[kept]
         variance = np.diag(self.covariance) - np.sum(told * beside, axis=1)
         off[kept], variance[kept] = (inverse @ residuals[kept]) / np.diag(inverse), 1 / np.diag(inverse)
-        standardised: np.ndarray = off / np.sqrt(variance)
-        return standardised
+        return np.asarray(off / np.sqrt(variance))
 
-    def whitener(self, kept: "np.ndarray") -> "np.ndarray":
+    def whitener(self, kept: ndarray) -> ndarray:
         """Matrix that makes residuals independent with the variance of one measurement, without what is not kept."""
         if kept.tobytes() not in self._whiteners:
             factor = cholesky(self.covariance[np.ix_(kept, kept)], lower=True)
@@ -81,18 +81,13 @@ class CorrelatedNoise:
         return self._whiteners[kept.tobytes()]
 
     @cached_property
-    def _whiteners(self) -> "dict[bytes, np.ndarray]":
+    def _whiteners(self) -> dict[bytes, ndarray]:
         """Those that were made, by the samples that are kept."""
         return {}
 
 
 def restricted_likelihood(
-    residuals: "np.ndarray",
-    slopes: "np.ndarray",
-    counts: "np.ndarray",
-    steps: "np.ndarray",
-    share: float,
-    length: float,
+    residuals: ndarray, slopes: ndarray, counts: ndarray, steps: ndarray, share: float, length: float
 ) -> float:
     """Logarithm of the restricted likelihood of residuals, but for a constant.
 
@@ -125,12 +120,12 @@ def restricted_likelihood(
 
 
 def noise_of(
-    residuals: "np.ndarray",
-    slopes: "np.ndarray",
-    counts: "np.ndarray",
-    time: "np.ndarray",
-    path: "np.ndarray | None",
-    kept: "np.ndarray",
+    residuals: ndarray,
+    slopes: ndarray,
+    counts: ndarray,
+    time: ndarray,
+    path: ndarray | None,
+    kept: ndarray,
     most: int = _MOST_DENSE,
 ) -> CorrelatedNoise | None:
     """Likeliest noise of residuals, by slopes of what was fitted; None where independent samples are as likely.
@@ -149,7 +144,7 @@ def noise_of(
             continue
         way, steps = float(np.ptp(along)), np.abs(np.diff(along[kept]))
 
-        def lost(at: "np.ndarray", steps: "np.ndarray" = steps, way: float = way) -> float:
+        def lost(at: ndarray, steps: ndarray = steps, way: float = way) -> float:
             inside = np.clip(at, (-30, -30), (_LARGEST, np.log(_LONGEST)))
             share, length = np.exp(inside) * [1, way]
             return -restricted_likelihood(*told, steps, share, length) + 10 * float(np.sum(np.abs(at - inside)))

@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy import ndarray
 
 from quakedesign.fault import FrictionLaw
 
@@ -45,38 +46,38 @@ class Experiment(ABC):
     coordinates: tuple[Coordinate, ...]
 
     @abstractmethod
-    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+    def friction(self, fitted: ndarray) -> ndarray:
         """Friction coefficient [-] at every sample; not finite where there is no such experiment."""
 
     @abstractmethod
-    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+    def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives of `friction`, shape (samples, coordinates)."""
 
-    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+    def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
         """What a noise of friction [-] means for what was taken for granted; nothing by default."""
         return ()
 
-    def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
+    def best_law(self, fitted: ndarray) -> FrictionLaw:
         """The law with the values of given coordinates."""
         values = {name: v for name, v in self.outward(fitted).items() if name in self.law.quantities()}
         return holding(self.law, values)
 
-    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "Experiment":
+    def resolved(self, fitted: ndarray, accuracy: float) -> "Experiment":
         """The same experiment, simulated to an accuracy of friction [-] at given coordinates."""
         return self
 
     @property
-    def bounds(self) -> "tuple[np.ndarray, np.ndarray]":
+    def bounds(self) -> tuple[ndarray, ndarray]:
         """Least and largest of what is fitted."""
         ends = [(c.inward(c.low), c.inward(c.high)) for c in self.coordinates]
         low, high = np.array(ends, dtype=float).T
         return low, high
 
-    def inward(self, values: Sequence[float]) -> "np.ndarray":
+    def inward(self, values: Sequence[float]) -> ndarray:
         """What is fitted, of values in their units."""
         return np.array([c.inward(v) for c, v in zip(self.coordinates, values, strict=True)])
 
-    def near(self, values: Mapping[str, float]) -> "np.ndarray":
+    def near(self, values: Mapping[str, float]) -> ndarray:
         """What is fitted, at values of another experiment; where it has none, the middle of where searches start."""
         return np.array(
             [
@@ -85,7 +86,7 @@ class Experiment(ABC):
             ]
         )
 
-    def outward(self, fitted: "np.ndarray") -> dict[str, float]:
+    def outward(self, fitted: ndarray) -> dict[str, float]:
         """Values in their units by name."""
         return {c.name: c.outward(float(q)) for c, q in zip(self.coordinates, fitted, strict=True)}
 
@@ -123,7 +124,7 @@ class Widened(Experiment):
 
     whole: Any
     coordinates: tuple[Coordinate, ...]
-    columns: "np.ndarray"  # of shape (samples, further coordinates)
+    columns: ndarray  # of shape (samples, further coordinates)
     delays: bool = False
 
     @property
@@ -132,35 +133,35 @@ class Widened(Experiment):
         law: FrictionLaw = self.whole.law
         return law
 
-    def own(self, fitted: "np.ndarray") -> "np.ndarray":
+    def own(self, fitted: ndarray) -> ndarray:
         """Coordinates of the experiment without the others."""
         return fitted[: len(self.whole.coordinates)]
 
-    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+    def friction(self, fitted: ndarray) -> ndarray:
         """Friction of the experiment, moved by the further coordinates."""
         own = self.own(fitted)
         with np.errstate(invalid="ignore", over="ignore"):
             moved = self.columns @ fitted[len(own) :] * (-self.whole.growth(own) if self.delays else 1.0)
-            friction: np.ndarray = self.whole.friction(own) + moved
+            friction: ndarray = self.whole.friction(own) + moved
         return friction
 
-    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+    def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives, at delays that are small against what follows the changes."""
         own = self.own(fitted)
         moved = -self.whole.growth(own)[:, None] * self.columns if self.delays else self.columns
         return np.column_stack([self.whole.slopes(own), moved])
 
-    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+    def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
         """Those of the experiment."""
         told: tuple[str, ...] = self.whole.remarks(self.own(fitted), noise)
         return told
 
-    def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
+    def best_law(self, fitted: ndarray) -> FrictionLaw:
         """That of the experiment."""
         law: FrictionLaw = self.whole.best_law(self.own(fitted))
         return law
 
-    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "Widened":
+    def resolved(self, fitted: ndarray, accuracy: float) -> "Widened":
         """With the experiment resolved."""
         finer = self.whole.resolved(self.own(fitted), accuracy)
         return self if finer is self.whole else replace(self, whole=finer)
@@ -169,7 +170,7 @@ class Widened(Experiment):
 DELAY = "delay"
 
 
-def delayed(whole: Any, after: "np.ndarray", most: "np.ndarray") -> Experiment:
+def delayed(whole: Any, after: ndarray, most: ndarray) -> Experiment:
     """An experiment with a delay of each change of rate, of at most so much [s]; as `Widened` has their columns."""
     if not after.shape[1]:
         return whole  # type: ignore[no-any-return]
@@ -177,7 +178,7 @@ def delayed(whole: Any, after: "np.ndarray", most: "np.ndarray") -> Experiment:
     return Widened(whole=whole, coordinates=(*whole.coordinates, *delays), columns=after, delays=True)
 
 
-def trended(whole: Experiment, along: "np.ndarray", size: float, name: str = TREND) -> Widened:
+def trended(whole: Experiment, along: ndarray, size: float, name: str = TREND) -> Widened:
     """An experiment with a trend along displacement [m] or time [s], of at most ten frictions over the whole way."""
     trend = _about_zero(name, "1/m" if name == TREND else "1/s", 10 * size / float(np.ptp(along)))
     return Widened(whole=whole, coordinates=(*whole.coordinates, trend), columns=along[:, None])
@@ -215,11 +216,11 @@ class Difference(Experiment):
         )
         return tuple(changed)
 
-    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+    def friction(self, fitted: ndarray) -> ndarray:
         """Friction of the experiment; there is none where the first would not be positive."""
         return self.whole.friction(self.whole_of(fitted))
 
-    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+    def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives by the chain rule."""
         at = self.whole_of(fitted)
         slopes = self.whole.slopes(at).copy()
@@ -232,11 +233,11 @@ class Difference(Experiment):
         slopes[:, self.first] = per_first
         return slopes
 
-    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "Difference":
+    def resolved(self, fitted: ndarray, accuracy: float) -> "Difference":
         """With the whole resolved."""
         return replace(self, whole=self.whole.resolved(self.whole_of(fitted), accuracy))
 
-    def difference(self, fitted: "np.ndarray") -> "np.ndarray":
+    def difference(self, fitted: ndarray) -> ndarray:
         """Coordinates here, of those of the whole."""
         changed = np.array(fitted, dtype=float)
         changed[self.first] = self.whole.coordinates[self.first].outward(float(fitted[self.first])) - self._others(
@@ -244,7 +245,7 @@ class Difference(Experiment):
         )
         return changed
 
-    def whole_of(self, fitted: "np.ndarray") -> "np.ndarray":
+    def whole_of(self, fitted: ndarray) -> ndarray:
         """Coordinates of the whole, of those here; not a number where the first would not be positive."""
         changed = np.array(fitted, dtype=float)
         first = fitted[self.first] + self._others(fitted)
@@ -253,5 +254,5 @@ class Difference(Experiment):
         changed[self.first] = first
         return changed
 
-    def _others(self, fitted: "np.ndarray") -> float:
+    def _others(self, fitted: ndarray) -> float:
         return sum(self.whole.coordinates[place].outward(float(fitted[place])) for place in self.seconds)

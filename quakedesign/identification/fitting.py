@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy import ndarray
 from scipy import stats
 from scipy.optimize import least_squares
 from scipy.signal import correlate
@@ -44,42 +45,39 @@ class Fit:
     """The best fit of an experiment to measured friction."""
 
     experiment: Experiment
-    fitted: "np.ndarray"  # coordinates as they are fitted
-    measured: "np.ndarray"  # friction [-]
-    counts: "np.ndarray"  # of how many measurements every sample is the mean
-    kept: "np.ndarray"  # samples that count
+    fitted: ndarray  # coordinates as they are fitted
+    measured: ndarray  # friction [-]
+    counts: ndarray  # of how many measurements every sample is the mean
+    kept: ndarray  # samples that count
     agreeing: int  # searches that end in the best fit
     starts: int  # searches
     correlated: CorrelatedNoise | None = None  # noise that samples share with their neighbours
     pieces: float = math.inf  # independent ones of the noise, where samples of several records are whitened
 
     @cached_property
-    def residuals(self) -> "np.ndarray":
+    def residuals(self) -> ndarray:
         """Measured less simulated friction [-] at every sample."""
-        residuals: np.ndarray = self.measured - self.experiment.friction(self.fitted)
-        return residuals
+        return np.asarray(self.measured - self.experiment.friction(self.fitted))
 
     @property
-    def scaled(self) -> "np.ndarray":
+    def scaled(self) -> ndarray:
         """Residuals [-] in deviations of one measurement, less what their neighbours tell of them.
 
         The noise of a mean of n falls with the root of n.
         """
         if self.correlated is not None:
             return self.correlated.deletion(self.residuals, self.kept)
-        scaled: np.ndarray = self.residuals * np.sqrt(self.counts)
-        return scaled
+        return np.asarray(self.residuals * np.sqrt(self.counts))
 
     @cached_property
-    def weights(self) -> "np.ndarray":
+    def weights(self) -> ndarray:
         """Of all residuals, 0 for outliers; a matrix that makes them independent where noise is correlated."""
         if self.correlated is not None:
             return self.correlated.whitener(self.kept)
-        weights: np.ndarray = np.sqrt(self.counts) * self.kept
-        return weights
+        return np.asarray(np.sqrt(self.counts) * self.kept)
 
     @cached_property
-    def whitened(self) -> "np.ndarray":
+    def whitened(self) -> ndarray:
         """Residuals that count, made independent with the variance of one measurement."""
         return weighed(self.weights, self.residuals)
 
@@ -128,12 +126,12 @@ class Fit:
         """`excess` that so many parameters jointly pass by noise alone with a chance (Fisher's F)."""
         return float(count * stats.f.isf(chance, count, self.freedom_of_noise))
 
-    def distance(self, fitted: "np.ndarray") -> float:
+    def distance(self, fitted: ndarray) -> float:
         """`excess` of given coordinates, infinite where there is no such experiment."""
         squares = float(np.sum(weighed(self.weights, self.measured - self.experiment.friction(fitted)) ** 2))
         return self.excess(squares) if np.isfinite(squares) else np.inf
 
-    def along(self, place: int) -> "np.ndarray":
+    def along(self, place: int) -> ndarray:
         """Moves of all coordinates, to first order, with one of them by 1 and the others at their best."""
         slopes, moves = self._slopes, np.zeros(len(self.fitted))
         scale = np.linalg.norm(slopes, axis=0)
@@ -144,11 +142,11 @@ class Fit:
         return moves
 
     @cached_property
-    def _slopes(self) -> "np.ndarray":
+    def _slopes(self) -> ndarray:
         return weighed(self.weights, _finite(self.experiment.slopes(self.fitted)))
 
     @cached_property
-    def deviations(self) -> "np.ndarray":
+    def deviations(self) -> ndarray:
         """Standard deviations of what is fitted, from the slopes; infinite where these say nothing."""
         slopes = self._slopes
         scale = np.linalg.norm(slopes, axis=0)
@@ -159,29 +157,27 @@ class Fit:
         weights = np.where(np.abs(turn) > 1e-9, np.abs(turn), 0)
         with np.errstate(invalid="ignore"):
             spread = np.where(weights > 0, weights * inverse[:, None], 0)
-        deviations: np.ndarray = np.sqrt(np.sum(spread**2, axis=0)) / scale * self.noise * np.sqrt(self.correlation)
-        return deviations
+        return np.asarray(np.sqrt(np.sum(spread**2, axis=0)) / scale * self.noise * np.sqrt(self.correlation))
 
 
-def weighed(weights: "np.ndarray", values: "np.ndarray") -> "np.ndarray":
+def weighed(weights: ndarray, values: ndarray) -> ndarray:
     """Values of all samples, or columns of them, by weights of `Fit`; those without a weight are left out."""
     if weights.ndim == 2:
         kept = np.any(weights != 0, axis=0)
         with np.errstate(invalid="ignore", over="ignore"):
-            product: np.ndarray = weights[:, kept] @ values[kept]
+            product: ndarray = weights[:, kept] @ values[kept]
         return product
     kept = weights > 0
-    scaled: np.ndarray = (values[kept].T * weights[kept]).T
-    return scaled
+    return np.asarray((values[kept].T * weights[kept]).T)
 
 
 def fit(
     experiment: Experiment,
-    measured: "np.ndarray",
+    measured: ndarray,
     *,
     seed: int,
-    counts: "np.ndarray | None" = None,
-    near: "np.ndarray | None" = None,
+    counts: ndarray | None = None,
+    near: ndarray | None = None,
     search: FitSearch | None = None,
 ) -> Fit:
     """Best fit of all starts, without outliers, on an experiment that is simulated accurately enough for the noise.
@@ -217,7 +213,7 @@ def fit(
     counts = np.ones(len(measured)) if counts is None else counts
     roots = np.sqrt(counts)
     experiment, starts = _starts(experiment, measured, roots, seed, how, near)
-    minima: list[tuple[np.ndarray, float]] = []
+    minima: list[tuple[ndarray, float]] = []
     low, high = experiment.bounds
     for start in starts:
         minima.append(minimised(experiment, measured, roots, start, steps=how.coarse))
@@ -238,13 +234,8 @@ def fit(
 
 
 def _starts(
-    experiment: Experiment,
-    measured: "np.ndarray",
-    roots: "np.ndarray",
-    seed: int,
-    how: FitSearch,
-    near: "np.ndarray | None" = None,
-) -> "tuple[Experiment, list[np.ndarray]]":
+    experiment: Experiment, measured: ndarray, roots: ndarray, seed: int, how: FitSearch, near: ndarray | None = None
+) -> tuple[Experiment, list[ndarray]]:
     """The candidates that come nearest, behind the one that is known, and the experiment with steps for the first."""
     draw = np.random.default_rng(seed)
     ends = np.array([[c.inward(end) for end in c.start] for c in experiment.coordinates])
@@ -268,13 +259,13 @@ def _starts(
 
 def minimised(
     experiment: Experiment,
-    measured: "np.ndarray",
-    weights: "np.ndarray",
-    start: "np.ndarray",
+    measured: ndarray,
+    weights: ndarray,
+    start: ndarray,
     *,
-    fixed: "np.ndarray | None" = None,
+    fixed: ndarray | None = None,
     steps: int = 100,
-) -> "tuple[np.ndarray, float]":
+) -> tuple[ndarray, float]:
     """Coordinates with the least sum of squares near a start, and that sum; `fixed` ones stay as they are.
 
     Residuals count by their weights, as `weighed` says.
@@ -283,12 +274,12 @@ def minimised(
     low, high = experiment.bounds
     whole = np.clip(np.array(start, dtype=float), low, high)
 
-    def at(part: "np.ndarray") -> "np.ndarray":
-        full: np.ndarray = whole.copy()
+    def at(part: ndarray) -> ndarray:
+        full: ndarray = whole.copy()
         full[free] = part
         return full
 
-    def residuals(part: "np.ndarray") -> "np.ndarray":
+    def residuals(part: ndarray) -> ndarray:
         return weighed(weights, experiment.friction(at(part)) - measured)
 
     first = residuals(whole[free])
@@ -309,10 +300,9 @@ def minimised(
     return at(solution.x), float(2 * solution.cost * size**2)
 
 
-def _finite(slopes: "np.ndarray") -> "np.ndarray":
+def _finite(slopes: ndarray) -> ndarray:
     """Slopes with nothing where they leave the floats, as those of transients that no sample sees can."""
-    finite: np.ndarray = np.where(np.isfinite(slopes), slopes, 0.0)
-    return finite
+    return np.asarray(np.where(np.isfinite(slopes), slopes, 0.0))
 
 
 def settled(fit: Fit, how: FitSearch) -> Fit:
@@ -334,7 +324,7 @@ def settled(fit: Fit, how: FitSearch) -> Fit:
     return fit
 
 
-def outliers(residuals: "np.ndarray", longest: int) -> "np.ndarray":
+def outliers(residuals: ndarray, longest: int) -> ndarray:
     """Samples so far off that noise alone has one such among all with a chance of 5 %, in runs of at most `longest`.
 
     The size of the noise is that of the median residual. What rises from its neighbours is no accident, and stays.
@@ -381,7 +371,7 @@ _FAR = 0.5  # move of a logarithmic coordinate after which the experiment is res
 class BetterFit(Exception):
     """A profile has come upon coordinates that fit better."""
 
-    def __init__(self, fitted: "np.ndarray") -> None:
+    def __init__(self, fitted: ndarray) -> None:
         super().__init__("a better fit")
         self.fitted = fitted
 
@@ -391,8 +381,8 @@ class ProfilePoint:
     """Coordinates on a profile, and the experiment there with the coordinates that its steps are made for."""
 
     experiment: Experiment
-    resolved_at: "np.ndarray"
-    fitted: "np.ndarray"
+    resolved_at: ndarray
+    fitted: ndarray
     step: float = 0.0  # of the coordinate from the fit
     distance: float = 0.0  # root of the excess
 

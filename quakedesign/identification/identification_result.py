@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy import ndarray
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
@@ -107,7 +108,7 @@ class Identification:
 
     record: Record
     fit: Fit
-    used: "np.ndarray"
+    used: ndarray
     estimates: dict[str, ParameterEstimate]
     difference: ParameterEstimate | None
     law: FrictionLaw

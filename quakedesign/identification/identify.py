@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from numpy import ndarray
 
 from quakedesign.errors import RecordError, UnknownNameError, require_known
 from quakedesign.fault import FrictionLaw, friction_law
@@ -60,7 +61,7 @@ class Setup:
     """An experiment with the samples of the record that it simulates (`used`), and notes on what it assumes."""
 
     experiment: Experiment
-    used: "np.ndarray"
+    used: ndarray
     notes: tuple[str, ...]
 
 
@@ -170,7 +171,7 @@ def _sliding(
     return Setup(experiment=late, used=np.ones(len(record.time), dtype=bool), notes=notes)
 
 
-def _rates(law: type[FrictionLaw], rates: "np.ndarray", first: float) -> dict[str, float]:
+def _rates(law: type[FrictionLaw], rates: ndarray, first: float) -> dict[str, float]:
     """Rates of a law, which are chosen, not fitted: that of the first sliding, and a range around those of the load."""
     fast = max(float(np.max(rates)), first)
     chosen = {
@@ -364,7 +365,7 @@ class _Choice:
     stiffness: float | None
     seed: int
     trend: str = "auto"
-    told: "np.ndarray | None" = None  # when pieces begin by the load point alone [s]
+    told: ndarray | None = None  # when pieces begin by the load point alone [s]
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
         """Profiles about the best fit, and tests of it."""
@@ -520,14 +521,14 @@ class _Choice:
         found = found or CorrelatedNoise(0.0, 1.0, time, best.counts, True)
         return replace(found, common=moved / best.noise)
 
-    def _moved_by_rates(self, fitted: _Fitted) -> "np.ndarray":
+    def _moved_by_rates(self, fitted: _Fitted) -> ndarray:
         """By how much friction moves with one deviation of each rate of the load point, where that is felt.
 
         Rates that are taken from noisy displacements are unknowns with a known spread. As part of the covariance of
         the samples they widen the regions of a and b by as much as they would if they were fitted with that spread.
         """
         best, loading = fitted.best, self.loading
-        columns: list[np.ndarray] = []
+        columns: list[ndarray] = []
         if loading is not None and not loading.pieces.rough and loading.pieces.errors is not None:
             values = best.experiment.outward(best.fitted)
             effects = [values.get(name, 0.0) for name in _EFFECTS_OF]

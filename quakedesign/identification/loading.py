@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy import ndarray
 from scipy.optimize import differential_evolution
 
 from quakedesign.errors import RecordError
@@ -33,35 +34,33 @@ _SLIGHT = 0.01  # of the whole path
 class Pieces:
     """A load point that moves at a constant rate in every piece."""
 
-    begins: "np.ndarray"  # times at which pieces begin [s], the first the first time of the record
-    rates: "np.ndarray"  # [m/s]
+    begins: ndarray  # times at which pieces begin [s], the first the first time of the record
+    rates: ndarray  # [m/s]
     noise: float  # standard deviation of the displacement from the pieces [m]
     given: bool = False  # whether the rates were given
     rough: bool = False  # whether the motion is not made of a few such pieces
-    errors: "np.ndarray | None" = None  # deviations of the logarithms of the rates [-]; None where they are known
+    errors: ndarray | None = None  # deviations of the logarithms of the rates [-]; None where they are known
 
     @property
-    def large_changes(self) -> "np.ndarray":
+    def large_changes(self) -> ndarray:
         """Whether the rate changes by more than a quarter, at the beginning of every piece but the first."""
         slow, fast = np.sort([np.abs(self.rates[1:]), np.abs(self.rates[:-1])], axis=0)
-        large: np.ndarray = fast > _LARGE_CHANGE * slow
-        return large
+        return np.asarray(fast > _LARGE_CHANGE * slow)
 
-    def position(self, time: "np.ndarray") -> "np.ndarray":
+    def position(self, time: ndarray) -> ndarray:
         """Displacement since the first time [m]."""
         corners = np.concatenate([[0.0], np.cumsum(np.diff(self.begins) * self.rates[:-1])])
         piece = np.clip(np.searchsorted(self.begins, time, side="right") - 1, 0, None)
-        position: np.ndarray = corners[piece] + self.rates[piece] * (time - self.begins[piece])
-        return position
+        return np.asarray(corners[piece] + self.rates[piece] * (time - self.begins[piece]))
 
 
-def staircase(time: "np.ndarray", rates: "np.ndarray") -> Pieces:
+def staircase(time: ndarray, rates: ndarray) -> Pieces:
     """Pieces of a column of rates, each commanded from its sample on."""
     new = np.concatenate([[True], np.diff(rates) != 0])
     return Pieces(begins=time[new], rates=rates[new], noise=0.0)
 
 
-def straight_pieces(time: "np.ndarray", position: "np.ndarray", scatter: float, step: float) -> Pieces:
+def straight_pieces(time: ndarray, position: ndarray, scatter: float, step: float) -> Pieces:
     """Pieces with the rates of the data, as few as explain it within its noise (`scatter`) and reading step [m]."""
     if len(time) < _FEWEST or not np.ptp(position) > 0:
         ends = np.array([time[0]]), np.array([(position[-1] - position[0]) / max(time[-1] - time[0], 1e-300)])
@@ -103,14 +102,14 @@ def straight_pieces(time: "np.ndarray", position: "np.ndarray", scatter: float, 
     return replace(found, noise=float(np.std(position - found.position(time))))
 
 
-def given_pieces(time: "np.ndarray", position: "np.ndarray", rates: "np.ndarray") -> Pieces:
+def given_pieces(time: ndarray, position: ndarray, rates: ndarray) -> Pieces:
     """Pieces with known rates, beginning at the times that suit the data best; refused where they do not suit."""
     t, x = _means(time, position, most=400)
 
-    def pieces_at(begins: "np.ndarray") -> Pieces:
+    def pieces_at(begins: ndarray) -> Pieces:
         return Pieces(begins=np.concatenate([t[:1], np.sort(begins)]), rates=rates, noise=0.0, given=True)
 
-    def off(begins: "np.ndarray") -> float:
+    def off(begins: ndarray) -> float:
         return float(np.std(x - pieces_at(begins).position(t)))
 
     count = len(rates) - 1
@@ -152,10 +151,9 @@ class Loading:
         return float(self.pieces.rates[0])
 
     @property
-    def steps(self) -> "np.ndarray":
+    def steps(self) -> ndarray:
         """Times of large changes of rate [s]."""
-        times: np.ndarray = self.pieces.begins[1:][self.pieces.large_changes]
-        return times
+        return np.asarray(self.pieces.begins[1:][self.pieces.large_changes])
 
     @property
     def before(self) -> float:
@@ -171,7 +169,7 @@ class Loading:
         slow, fast = self.pieces.rates[places[0]], self.pieces.rates[places[0] + 1]
         return float(np.log(fast / slow)) if slow > 0 and fast > 0 else None
 
-    def delays(self, record: Record) -> "tuple[np.ndarray, np.ndarray]":
+    def delays(self, record: Record) -> tuple[ndarray, ndarray]:
         """Samples that follow each change of rate whose time noise hides, and by how much it may be off at most [s]."""
         begins, rates = self.pieces.begins, self.pieces.rates
         ends = np.append(begins[1:], np.inf)
@@ -188,7 +186,7 @@ class Loading:
         table = np.array([samples for samples, _ in told]).T.reshape(len(record.time), len(told)).astype(float)
         return table, np.array([most for _, most in told])
 
-    def drive(self, record: Record) -> "tuple[Drive, np.ndarray]":
+    def drive(self, record: Record) -> tuple[Drive, ndarray]:
         """Drive between all samples and changes of rate, and which of these instants are samples."""
         assert record.load_point is not None
         inside = self.pieces.begins[(self.pieces.begins > record.time[0]) & (self.pieces.begins < record.time[-1])]
@@ -276,7 +274,7 @@ def _said(pieces: Pieces) -> str:
     return f"the load point moves at {', then '.join(told)} m/s{', as given' if pieces.given else ''}"
 
 
-def _means(time: "np.ndarray", position: "np.ndarray", most: int = _MOST_POINTS) -> "tuple[np.ndarray, np.ndarray]":
+def _means(time: ndarray, position: ndarray, most: int = _MOST_POINTS) -> tuple[ndarray, ndarray]:
     """Times and positions, or means of as many neighbours each as leave at most so many."""
     each = -(-len(time) // most)
     edges = np.arange(0, len(time), each)
@@ -285,18 +283,18 @@ def _means(time: "np.ndarray", position: "np.ndarray", most: int = _MOST_POINTS)
     return t, x
 
 
-def _design(u: "np.ndarray", knots: "np.ndarray") -> "np.ndarray":
+def _design(u: ndarray, knots: ndarray) -> ndarray:
     return np.column_stack([np.ones_like(u), u, np.maximum(u[:, None] - knots, 0)])
 
 
-def _hinges(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+def _hinges(u: ndarray, y: ndarray, knots: ndarray) -> tuple[ndarray, ndarray]:
     """Rates of all pieces, and the broken line."""
     design = _design(u, knots)
     found, *_ = np.linalg.lstsq(design, y, rcond=None)
     return np.cumsum(found[1:]), design @ found
 
 
-def _refined(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray") -> "np.ndarray":
+def _refined(u: ndarray, y: ndarray, knots: ndarray) -> ndarray:
     """Knots moved to where broken lines fit best (Muggeo 2003, Stat. Med. 22, 3055)."""
     best, least = knots, np.inf
     for _ in range(8 if len(knots) else 0):
@@ -316,7 +314,7 @@ def _refined(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray") -> "np.ndarr
     return best
 
 
-def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float) -> "np.ndarray":
+def _needed(u: ndarray, y: ndarray, knots: ndarray, floor: float) -> ndarray:
     """Knots without those that explain no more than noise, and those at which the rate hardly changes.
 
     Two that less than two points part stand for one: a mean of samples before and after a change lies off both lines.
@@ -340,7 +338,7 @@ def _needed(u: "np.ndarray", y: "np.ndarray", knots: "np.ndarray", floor: float)
     return knots
 
 
-def _rate_errors(u: "np.ndarray", left: "np.ndarray", knots: "np.ndarray") -> "np.ndarray":
+def _rate_errors(u: ndarray, left: ndarray, knots: ndarray) -> ndarray:
     """Standard deviation of the slope of each piece: of a separate line, as the knots are free.
 
     By the long-run variance of what is left, the sum of its covariance over all lags. It is that of the likeliest white
@@ -356,11 +354,10 @@ def _rate_errors(u: "np.ndarray", left: "np.ndarray", knots: "np.ndarray") -> "n
         fading = np.exp(-np.mean(np.diff(u)) / shared.length)
         spread = (1 + shared.share * (1 + fading) / (1 - fading)) / (1 + shared.share)
     noise = np.std(left) * np.sqrt(spread)
-    errors: np.ndarray = noise * np.sqrt(12 / inside) / np.maximum(np.diff(ends), 1e-300)
-    return errors
+    return np.asarray(noise * np.sqrt(12 / inside) / np.maximum(np.diff(ends), 1e-300))
 
 
-def _spread(residuals: "np.ndarray") -> float:
+def _spread(residuals: ndarray) -> float:
     """Samples per independent one of residuals that follow each other like AR(1), by their first correlation."""
     first = float(residuals[1:] @ residuals[:-1] / max(residuals @ residuals, 1e-300))
     first = min(max(first, 0.0), 0.95)

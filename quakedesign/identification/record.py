@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy import ndarray
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import RecordError, UnitError
@@ -90,14 +91,14 @@ class Record:
     """
 
     name: str
-    time: "np.ndarray"
-    friction: "np.ndarray"
-    load_point: "np.ndarray | None"
-    slip: "np.ndarray | None"
-    normal: "np.ndarray"
+    time: ndarray
+    friction: ndarray
+    load_point: ndarray | None
+    slip: ndarray | None
+    normal: ndarray
     normal_unit: str
-    counts: "np.ndarray | None" = None
-    load_rates: "np.ndarray | None" = None
+    counts: ndarray | None = None
+    load_rates: ndarray | None = None
     remarks: tuple[str, ...] = ()
     origin: float = 0.0
 
@@ -166,7 +167,7 @@ def read_windows(
     return found
 
 
-def part(record: Record, inside: "np.ndarray", name: str) -> Record:
+def part(record: Record, inside: ndarray, name: str) -> Record:
     """Samples of a record, with time and load point from the first of them on."""
     values: dict[str, Any] = {n: column[inside] for n, column in vars(record).items() if isinstance(column, np.ndarray)}
     begun = float(values["time"][0]) if np.any(inside) else 0.0
@@ -175,7 +176,7 @@ def part(record: Record, inside: "np.ndarray", name: str) -> Record:
     return replace(record, name=name, origin=record.origin + begun, **values)
 
 
-def _weighted(given: "dict[str, np.ndarray]") -> "tuple[dict[str, np.ndarray], list[str]]":
+def _weighted(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]:
     """Samples that have a weight, with a mean weight of 1, and how many have none."""
     if "weight" not in given:
         return given, []
@@ -190,7 +191,7 @@ def _weighted(given: "dict[str, np.ndarray]") -> "tuple[dict[str, np.ndarray], l
     return given | {"weight": given["weight"] / np.mean(given["weight"])}, [lost] * bool(np.any(weight == 0))
 
 
-def _given(found: Sequence[Column], wanted: str) -> "tuple[dict[str, np.ndarray], list[str]]":
+def _given(found: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], list[str]]:
     """Columns in SI by name, and what their names were taken for."""
     given: dict[str, np.ndarray] = {}
     headings: dict[str, str] = {}
@@ -287,7 +288,7 @@ def _factor(name: str, column: Column) -> float:
         ) from None
 
 
-def _require_time(given: "Mapping[str, np.ndarray]", unknown: Sequence[Column]) -> None:
+def _require_time(given: Mapping[str, ndarray], unknown: Sequence[Column]) -> None:
     if "time" not in given:
         others = f", and {', '.join(shown(c.heading) for c in unknown)}, unknown" if unknown else ""
         example = unknown[0].name if unknown else "1"
@@ -297,7 +298,7 @@ def _require_time(given: "Mapping[str, np.ndarray]", unknown: Sequence[Column]) 
         )
 
 
-def _measured(given: "dict[str, np.ndarray]") -> "tuple[dict[str, np.ndarray], list[str]]":
+def _measured(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]:
     """Rows in which everything was measured, those at the same time as their mean, and what was done.
 
     Raises
@@ -326,7 +327,7 @@ def _measured(given: "dict[str, np.ndarray]") -> "tuple[dict[str, np.ndarray], l
     return {str(name): whole[name].to_numpy() for name in whole}, told
 
 
-def _window(given: "dict[str, np.ndarray]", begin: str | None, end: str | None) -> "dict[str, np.ndarray]":
+def _window(given: dict[str, ndarray], begin: str | None, end: str | None) -> dict[str, ndarray]:
     """Samples between two times or displacements of the load point, as the file counts them."""
     inside = np.ones(len(given["time"]), dtype=bool)
     for name, text in (("from", begin), ("to", end)):
@@ -349,7 +350,7 @@ def _window(given: "dict[str, np.ndarray]", begin: str | None, end: str | None) 
     return {name: column[inside] for name, column in given.items()}
 
 
-def _record(name: str, given: "dict[str, np.ndarray]", normal_stress: float | None, remarks: tuple[str, ...]) -> Record:
+def _record(name: str, given: dict[str, ndarray], normal_stress: float | None, remarks: tuple[str, ...]) -> Record:
     _require_sizes(given)
     friction, normal, unit = _friction(given, normal_stress)
     load_point, rates, turned = _load_point(given)
@@ -373,7 +374,7 @@ _DURATION, _PERIOD, _DISTANCE, _RATE = (1e-6, 1e12), (1e-9, 1e12), (1e-12, 1e6),
 _SIZES = {"m/s": _RATE, "Pa": (1e-6, 1e15), "N": (1e-6, 1e15)}
 
 
-def _require_sizes(given: dict[str, "np.ndarray"]) -> None:
+def _require_sizes(given: dict[str, ndarray]) -> None:
     """Refuse sizes that no experiment has, as of a wrong unit: solvers of the fit fail on them.
 
     Raises
@@ -398,7 +399,7 @@ def _require_sizes(given: dict[str, "np.ndarray"]) -> None:
             )
 
 
-def _friction(given: dict[str, "np.ndarray"], stress: float | None) -> "tuple[np.ndarray, np.ndarray, str]":
+def _friction(given: dict[str, ndarray], stress: float | None) -> tuple[ndarray, ndarray, str]:
     """Friction coefficient, what is normal to it, and the unit of that."""
     given = _without_repetition(given)
     found = [name for name in ("friction", *_SHEAR) if name in given]
@@ -429,7 +430,7 @@ def _friction(given: dict[str, "np.ndarray"], stress: float | None) -> "tuple[np
     return friction, normal, unit
 
 
-def _without_repetition(given: "dict[str, np.ndarray]") -> "dict[str, np.ndarray]":
+def _without_repetition(given: dict[str, ndarray]) -> dict[str, ndarray]:
     """Without a column of friction that is shear over normal stress of the same file."""
     for shear, normal in _SHEAR.items():
         if {"friction", shear, normal} <= given.keys():
@@ -439,7 +440,7 @@ def _without_repetition(given: "dict[str, np.ndarray]") -> "dict[str, np.ndarray
     return given
 
 
-def _require_plausible(friction: "np.ndarray", measured: str, across: str) -> None:
+def _require_plausible(friction: ndarray, measured: str, across: str) -> None:
     """Refuse a friction that no rock has, which costs minutes of a fit, with its likely cause.
 
     Raises
@@ -459,7 +460,7 @@ def _require_plausible(friction: "np.ndarray", measured: str, across: str) -> No
         )
 
 
-def _load_point(given: "dict[str, np.ndarray]") -> "tuple[np.ndarray | None, np.ndarray | None, list[str]]":
+def _load_point(given: dict[str, ndarray]) -> tuple[ndarray | None, ndarray | None, list[str]]:
     """Displacement [m] since the first sample, forward positive; rates [m/s] where they were recorded; what was turned.
 
     A recorded rate is that which was commanded from its sample on, a staircase.
@@ -496,7 +497,7 @@ _BENT = np.array([[1.0, -1.0, -1.0, 1.0], [1.0, -3.0, 3.0, -1.0]]).T  # of quart
 _FLOOR = 1e-4  # of the range of friction: what no machine measures
 
 
-def scatter(time: "np.ndarray", values: "np.ndarray") -> float:
+def scatter(time: ndarray, values: ndarray) -> float:
     """Standard deviation of noise from sample to sample, of the distances from the line between both neighbours.
 
     By their median or their ninetieth percentile, whichever is larger: the median of what is read in steps is small.
@@ -509,7 +510,7 @@ def scatter(time: "np.ndarray", values: "np.ndarray") -> float:
     return float(np.max(np.percentile(sizes, (50, 90)) / (_MEDIAN, _NINETIETH)))
 
 
-def reading_step(values: "np.ndarray") -> float:
+def reading_step(values: ndarray) -> float:
     """Step in which values are read, if the first ones stay now and then, or bend often by it; else next to nothing."""
     levels, first = np.unique(values), np.diff(values[:_FIRST])
     step = float(np.min(np.diff(levels))) if len(levels) > 1 else 0.0
@@ -517,7 +518,7 @@ def reading_step(values: "np.ndarray") -> float:
     return step if read_in_steps else 1e-9 * float(np.ptp(values))
 
 
-def thinned(record: Record, begins: "np.ndarray | None" = None, *, follow: bool = False) -> Record:
+def thinned(record: Record, begins: ndarray | None = None, *, follow: bool = False) -> Record:
     """A record with means in place of samples, and how many samples each stands for; short ones as they are.
 
     After every change of the rate of loading, windows reach over at most half of the time since then, and an eighth of
@@ -544,9 +545,8 @@ def thinned(record: Record, begins: "np.ndarray | None" = None, *, follow: bool 
     weights = np.ones(count, dtype=int) if record.counts is None else record.counts
     counts = np.add.reduceat(weights, edges[:-1])
 
-    def means(values: "np.ndarray") -> "np.ndarray":
-        found: np.ndarray = values[0] + np.add.reduceat(weights * (values - values[0]), edges[:-1]) / counts
-        return found
+    def means(values: ndarray) -> ndarray:
+        return np.asarray(values[0] + np.add.reduceat(weights * (values - values[0]), edges[:-1]) / counts)
 
     return replace(
         record,
@@ -560,7 +560,7 @@ def thinned(record: Record, begins: "np.ndarray | None" = None, *, follow: bool 
     )
 
 
-def _edges(time: "np.ndarray", starts: "np.ndarray") -> "np.ndarray":
+def _edges(time: ndarray, starts: ndarray) -> ndarray:
     """First samples of all windows, and the end."""
     edges = [0]
     for begin, end in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True):
@@ -573,7 +573,7 @@ def _edges(time: "np.ndarray", starts: "np.ndarray") -> "np.ndarray":
     return np.unique(edges)
 
 
-def _spikes(values: "np.ndarray", noise: float) -> "np.ndarray":
+def _spikes(values: ndarray, noise: float) -> ndarray:
     """Samples far from both neighbours, and those after them: an outlier must not be lost in a mean."""
     off = np.zeros(len(values))
     off[1:-1] = np.minimum.reduce([(values[1:-1] - values[:-2]) ** 2, (values[1:-1] - values[2:]) ** 2])
@@ -581,7 +581,7 @@ def _spikes(values: "np.ndarray", noise: float) -> "np.ndarray":
     return np.concatenate([far, far + 1]) if len(far) <= _MOST_SPIKES else np.empty(0, dtype=int)
 
 
-def _halved(record: Record, edges: "np.ndarray", follow: bool) -> "np.ndarray":
+def _halved(record: Record, edges: ndarray, follow: bool) -> ndarray:
     """First samples of all means, and the end: windows halved where a column bends, the most curved first."""
     time = record.time
     columns = []

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy import ndarray
 from scipy.io import loadmat, whosmat
 from scipy.io.matlab import MatReadError
 
@@ -43,7 +44,7 @@ class Column:
     heading: str  # name and unit as they are written
     name: str
     unit: str | None
-    values: "np.ndarray"  # not a number where the file has none
+    values: ndarray  # not a number where the file has none
 
 
 def read_columns(path: str | Path) -> list[Column]:
@@ -204,7 +205,7 @@ def _table(text: str, first: int, sign: str, columns: list[Column], line: str) -
     return table
 
 
-def _values(cells: pd.Series, column: Column, text: str, first: int) -> "np.ndarray":
+def _values(cells: pd.Series, column: Column, text: str, first: int) -> ndarray:
     """Numbers of one column; not a number where nothing was measured.
 
     Raises
@@ -213,7 +214,7 @@ def _values(cells: pd.Series, column: Column, text: str, first: int) -> "np.ndar
         For a text that is no number, with its line.
     """
     if pd.api.types.is_numeric_dtype(cells):
-        values: np.ndarray = cells.to_numpy(dtype=float, copy=True)
+        values: ndarray = cells.to_numpy(dtype=float, copy=True)
         values[~np.isfinite(values)] = np.nan
         return values
     told = cells.astype(str).str.strip()
@@ -221,8 +222,7 @@ def _values(cells: pd.Series, column: Column, text: str, first: int) -> "np.ndar
     if _CELL.fullmatch(told.iloc[0]) and not re.fullmatch(_NUMBER, told.iloc[0]):
         dates = pd.to_datetime(told, format="ISO8601", errors="coerce")
         if dates.notna().all():
-            seconds: np.ndarray = (dates - dates.iloc[0]).dt.total_seconds().to_numpy(dtype=float)
-            return seconds
+            return np.asarray((dates - dates.iloc[0]).dt.total_seconds().to_numpy(dtype=float))
     numbers = pd.to_numeric(told.str.replace(r"(?<=[\d.])[dD](?=[+-]?\d)", "e", regex=True), errors="coerce")
     wrong = (numbers.isna() & (told != "nan")).to_numpy().nonzero()[0]
     if len(wrong):
@@ -231,8 +231,7 @@ def _values(cells: pd.Series, column: Column, text: str, first: int) -> "np.ndar
             f"line {_line_number(text, first, int(wrong[0]))} must hold a number in column {column.name}. Received "
             f"{shown(cell)}.{_remedy(cell)}"
         )
-    found: np.ndarray = numbers.to_numpy(dtype=float)
-    return found
+    return np.asarray(numbers.to_numpy(dtype=float))
 
 
 def _remedy(cell: str) -> str:

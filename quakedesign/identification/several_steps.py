@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy import ndarray
 from scipy import stats
 
 from quakedesign.errors import RecordError
@@ -224,8 +225,8 @@ class _Joint(Experiment):
     """Steps with shared coordinates; samples are made independent, in deviations of the noise of their step."""
 
     parts: tuple[Experiment, ...]
-    places: tuple["np.ndarray", ...]  # of the coordinates of each step among those of all
-    weights: tuple["np.ndarray", ...]
+    places: tuple[ndarray, ...]  # of the coordinates of each step among those of all
+    weights: tuple[ndarray, ...]
     accuracies: tuple[float, ...]
     coordinates: tuple[Coordinate, ...]
 
@@ -234,15 +235,15 @@ class _Joint(Experiment):
         """That of the first step."""
         return self.parts[0].law
 
-    def joined(self, values: Sequence["np.ndarray"]) -> "np.ndarray":
+    def joined(self, values: Sequence[ndarray]) -> ndarray:
         """Values of the samples of each step, weighed."""
         return np.concatenate([weighed(w, v) for w, v in zip(self.weights, values, strict=True)])
 
-    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+    def friction(self, fitted: ndarray) -> ndarray:
         """Friction of all steps, weighed."""
         return self.joined([each.friction(fitted[at]) for each, at in zip(self.parts, self.places, strict=True)])
 
-    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+    def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives of `friction`; those in the coordinates of other steps are 0."""
         rows = []
         for each, weights, at in zip(self.parts, self.weights, self.places, strict=True):
@@ -251,11 +252,11 @@ class _Joint(Experiment):
             rows[-1][:, at] = own
         return np.vstack(rows)
 
-    def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
+    def best_law(self, fitted: ndarray) -> FrictionLaw:
         """That of the first step."""
         return self.parts[0].best_law(fitted[self.places[0]])
 
-    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "_Joint":
+    def resolved(self, fitted: ndarray, accuracy: float) -> "_Joint":
         """With each step resolved for its own noise."""
         told = zip(self.parts, self.places, self.accuracies, strict=True)
         return replace(self, parts=tuple(each.resolved(fitted[at], fine) for each, at, fine in told))

@@ -11,6 +11,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy import ndarray
 from scipy.linalg import solve_banded
 
 from quakedesign.fault import FrictionLaw
@@ -78,14 +79,14 @@ START_RATE = "start_rate"
 class Drive:
     """What an experiment is driven with, between neighbouring samples."""
 
-    lengths: "np.ndarray"  # [s]
-    rates: "np.ndarray"  # of the load point [m/s]
-    growth: "np.ndarray"  # d(log σ')/dt [1/s]
-    compliance: "np.ndarray"  # 1/σ' half-way [1/Pa, 1/N, or 1]
+    lengths: ndarray  # [s]
+    rates: ndarray  # of the load point [m/s]
+    growth: ndarray  # d(log σ')/dt [1/s]
+    compliance: ndarray  # 1/σ' half-way [1/Pa, 1/N, or 1]
     first_rate: float  # at which it slides steadily before the first sample [m/s]
 
     @cached_property
-    def inputs(self) -> "np.ndarray":
+    def inputs(self) -> ndarray:
         """Rates, growth and compliance, one column a sample."""
         return np.array([self.rates, self.growth, self.compliance])
 
@@ -100,15 +101,14 @@ class SlidingExperiment(Experiment):
     stiffness: float | None  # where it is given, in units of the normal load per m
     normal_unit: str  # Pa, N or nothing
     steps: tuple[tuple[float, ...], ...]  # lengths [s] of those between neighbouring instants
-    measured: "np.ndarray"  # instants that are samples; the others are changes of rate between them
+    measured: ndarray  # instants that are samples; the others are changes of rate between them
 
-    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+    def friction(self, fitted: ndarray) -> ndarray:
         """Friction coefficient [-] at every sample, sliding steadily at the first."""
         states = self._states(fitted)[:, self._sampled]
-        friction: np.ndarray = self._build["friction"](states, np.asarray(fitted)[:, None])[0]
-        return friction
+        return np.asarray(self._build["friction"](states, np.asarray(fitted)[:, None])[0])
 
-    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+    def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives from the variational equations of the steps themselves: exact for what `friction` computes.
 
         Those of one step are found for all at once; a banded linear system joins them.
@@ -123,24 +123,22 @@ class SlidingExperiment(Experiment):
         moved = np.vstack([self._build["start_slopes"](q[:, 0]).full(), each[size:].T.reshape(-1, count)])
         moved = solve_banded((2 * size - 1, 0), bands, moved, check_finite=False).reshape(-1, size, count)
         read = self._build["friction_slopes"](states[:, self._sampled], q)
-        slopes: np.ndarray = read[size:].T + np.einsum("it,tij->tj", read[:size], moved[self._sampled])
-        return slopes
+        return np.asarray(read[size:].T + np.einsum("it,tij->tj", read[:size], moved[self._sampled]))
 
-    def rates(self, fitted: "np.ndarray") -> "np.ndarray":
+    def rates(self, fitted: ndarray) -> ndarray:
         """Slip rate [m/s] at every sample."""
         with np.errstate(over="ignore"):
-            rates: np.ndarray = np.exp(self._states(fitted)[0, self._sampled])
+            rates: ndarray = np.exp(self._states(fitted)[0, self._sampled])
         return rates
 
-    def growth(self, fitted: "np.ndarray") -> "np.ndarray":
+    def growth(self, fitted: ndarray) -> ndarray:
         """Slope of friction in time [1/s] at every sample, as the spring gives it behind a change of rate."""
         ends, place = np.flatnonzero(self.measured), [c.name for c in self.coordinates]
         after = np.minimum(ends, len(self.drive.rates) - 1)
         stiffness = self.stiffness if self.stiffness is not None else float(np.exp(fitted[place.index(STIFFNESS)]))
-        pulled: np.ndarray = stiffness * self.drive.compliance[after] * (self.drive.rates[after] - self.rates(fitted))
-        return pulled
+        return np.asarray(stiffness * self.drive.compliance[after] * (self.drive.rates[after] - self.rates(fitted)))
 
-    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+    def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
         """The mass from which on inertia would have been seen."""
         ends = np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
         rates = np.exp(self._states(fitted)[0, ends])
@@ -150,14 +148,14 @@ class SlidingExperiment(Experiment):
         unit = {"Pa": "kg/m^2", "N": "kg"}[self.normal_unit]
         return (f"without inertia, which reaches the noise for a block of {noise / acceleration:.2g} {unit}",)
 
-    def best_law(self, fitted: "np.ndarray") -> FrictionLaw:
+    def best_law(self, fitted: ndarray) -> FrictionLaw:
         """The law with a working range, where it has one, about twice as wide as the slip rates of the experiment."""
         law, rates = Experiment.best_law(self, fitted), self.rates(fitted)
         ends = {"slowest_rate": float(f"{np.min(rates) / 2:.2g}"), "fastest_rate": float(f"{2 * np.max(rates):.2g}")}
         effect = {"evolution_effect": getattr(law, "evolution_effect", 1.0)}
         return holding(law, {n: end for n, end in (ends | effect).items() if n in law.quantities()})
 
-    def resolved(self, fitted: "np.ndarray", accuracy: float) -> "SlidingExperiment":
+    def resolved(self, fitted: ndarray, accuracy: float) -> "SlidingExperiment":
         """The same experiment in as many steps as an accuracy of friction needs at given coordinates.
 
         By the embedded estimate; the same steps are then taken at other coordinates too, so that friction is smooth in
@@ -167,7 +165,7 @@ class SlidingExperiment(Experiment):
         taken = _steps(self._build["trial"], q, accuracy, self.drive, self._build["start"](q))
         return self if taken is None else replace(self, steps=taken)
 
-    def _states(self, fitted: "np.ndarray") -> "np.ndarray":
+    def _states(self, fitted: ndarray) -> ndarray:
         """Logarithms of rate and states [SI] after every step, the first before all of them."""
         q = np.asarray(fitted)
         if q.tobytes() not in self._latest:
@@ -178,18 +176,17 @@ class SlidingExperiment(Experiment):
         return self._latest[q.tobytes()]
 
     @cached_property
-    def _latest(self) -> "dict[bytes, np.ndarray]":
+    def _latest(self) -> dict[bytes, ndarray]:
         """The states that were asked for last: friction, its growth and its slopes ask in turn."""
         return {}
 
     @cached_property
-    def _sampled(self) -> "np.ndarray":
-        ends: np.ndarray = np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
-        sampled: np.ndarray = ends[self.measured]
-        return sampled
+    def _sampled(self) -> ndarray:
+        ends: ndarray = np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
+        return np.asarray(ends[self.measured])
 
     @cached_property
-    def _inputs(self) -> "np.ndarray":
+    def _inputs(self) -> ndarray:
         between = np.repeat(self.drive.inputs, [len(lengths) for lengths in self.steps], axis=1)
         return np.vstack([np.concatenate(self.steps), between])
 
@@ -204,7 +201,7 @@ class SlidingExperiment(Experiment):
 
 
 def _steps(
-    trial: Any, fitted: "np.ndarray", accuracy: float, drive: Drive, start: Any
+    trial: Any, fitted: ndarray, accuracy: float, drive: Drive, start: Any
 ) -> tuple[tuple[float, ...], ...] | None:
     """Lengths of the steps between all samples that one simulation chooses; None where too many, or too short ones."""
     y, length, found, left = start, float("inf"), [], _MOST_STEPS * len(drive.lengths)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from numpy import ndarray
 from scipy.optimize.elementwise import find_root
 
 from quakedesign.fault import FrictionLaw
@@ -27,18 +28,17 @@ class Curve:
     law: FrictionLaw
     names: tuple[str, ...]
 
-    def friction(self, slip: "np.ndarray", fitted: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+    def friction(self, slip: ndarray, fitted: ndarray) -> tuple[ndarray, ndarray]:
         """Friction [-] and its slope in slip [1/m]."""
         friction, per_slip = self._rows(self._expressions[:2], slip, fitted)
         return friction, per_slip
 
-    def slopes(self, slip: "np.ndarray", fitted: "np.ndarray") -> "np.ndarray":
+    def slopes(self, slip: ndarray, fitted: ndarray) -> ndarray:
         """Derivatives in the logarithms, shape (slips, names)."""
         rows = self._rows(self._expressions[2:], slip, fitted)
-        slopes: np.ndarray = np.array(rows).T * np.exp(fitted[: len(self.names)])
-        return slopes
+        return np.asarray(np.array(rows).T * np.exp(fitted[: len(self.names)]))
 
-    def _rows(self, expressions: Any, slip: "np.ndarray", fitted: "np.ndarray") -> "list[np.ndarray]":
+    def _rows(self, expressions: Any, slip: ndarray, fitted: ndarray) -> list[ndarray]:
         values = dict(zip(self._symbols, np.exp(fitted[: len(self.names)]), strict=True))
         return [row + np.zeros_like(slip) for row in to_numpy(expressions, values | {x1: slip})]
 
@@ -64,19 +64,19 @@ class MeasuredSlip(Experiment):
     """Friction of a law at the slip [m] that was measured, not negative; `slip_noise` is its deviation [m]."""
 
     law: FrictionLaw
-    slip: "np.ndarray"
+    slip: ndarray
     slip_noise: float
     coordinates: tuple[Coordinate, ...]
 
-    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+    def friction(self, fitted: ndarray) -> ndarray:
         """Friction coefficient [-] at every slip."""
         return self._curve.friction(self.slip, fitted)[0]
 
-    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+    def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives in the logarithms."""
         return self._curve.slopes(self.slip, fitted)
 
-    def remarks(self, fitted: "np.ndarray", noise: float) -> tuple[str, ...]:
+    def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
         """Whether the noise of the slip, which the fit leaves out, is felt in friction."""
         felt = float(np.max(np.abs(self._curve.friction(self.slip, fitted)[1]))) * self.slip_noise
         if felt <= _SMALL_SHARE * noise:
@@ -100,18 +100,17 @@ class Drawn(Experiment):
     """
 
     law: FrictionLaw
-    load_point: "np.ndarray"
-    normal: "np.ndarray"
+    load_point: ndarray
+    normal: ndarray
     coordinates: tuple[Coordinate, ...]
     stiffness: float | None
 
-    def friction(self, fitted: "np.ndarray") -> "np.ndarray":
+    def friction(self, fitted: ndarray) -> ndarray:
         """Shear over normal force [-] at every sample."""
         slip, _ = self._slip(fitted)
-        friction: np.ndarray = self._held(fitted) - self._softness(fitted) * slip
-        return friction
+        return np.asarray(self._held(fitted) - self._softness(fitted) * slip)
 
-    def slopes(self, fitted: "np.ndarray") -> "np.ndarray":
+    def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives, those of slip from the balance at the sample where it was reached."""
         slip, since = self._slip(fitted)
         softness = self._softness(fitted)
@@ -121,34 +120,31 @@ class Drawn(Experiment):
         per_slip = self._curve.friction(slip[since], fitted)[1]
         moved = (at_fixed_slip[since] - laws) / (softness[since] + per_slip)[:, None]
         moved[slip == 0] = 0
-        slopes: np.ndarray = at_fixed_slip - softness[:, None] * moved
-        return slopes
+        return np.asarray(at_fixed_slip - softness[:, None] * moved)
 
-    def slip(self, fitted: "np.ndarray") -> "np.ndarray":
+    def slip(self, fitted: ndarray) -> ndarray:
         """Slip [m] at every sample."""
         return self._slip(fitted)[0]
 
-    def _stiffness(self, fitted: "np.ndarray") -> float:
+    def _stiffness(self, fitted: ndarray) -> float:
         return float(np.exp(fitted[-2])) if self.stiffness is None else self.stiffness
 
-    def _softness(self, fitted: "np.ndarray") -> "np.ndarray":
+    def _softness(self, fitted: ndarray) -> ndarray:
         """Fall of shear over normal force per slip [1/m]."""
-        softness: np.ndarray = self._stiffness(fitted) / self.normal
-        return softness
+        return np.asarray(self._stiffness(fitted) / self.normal)
 
-    def _held(self, fitted: "np.ndarray") -> "np.ndarray":
+    def _held(self, fitted: ndarray) -> ndarray:
         """Shear over normal force if nothing slips."""
-        held: np.ndarray = fitted[-1] * self.normal[0] / self.normal + self._softness(fitted) * self.load_point
-        return held
+        return np.asarray(fitted[-1] * self.normal[0] / self.normal + self._softness(fitted) * self.load_point)
 
-    def _held_slopes(self, fitted: "np.ndarray", slip: "np.ndarray") -> "np.ndarray":
+    def _held_slopes(self, fitted: ndarray, slip: ndarray) -> ndarray:
         held_slopes = np.zeros((len(slip), len(fitted)))
         held_slopes[:, -1] = self.normal[0] / self.normal
         if self.stiffness is None:
             held_slopes[:, -2] = self._softness(fitted) * (self.load_point - slip)
         return held_slopes
 
-    def _slip(self, fitted: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+    def _slip(self, fitted: ndarray) -> tuple[ndarray, ndarray]:
         """Slip [m] at every sample, and the sample at which it was reached."""
         held, softness = self._held(fitted), self._softness(fitted)
         strength, weakening = self._curve.friction(np.zeros(1), fitted)
@@ -156,7 +152,7 @@ class Drawn(Experiment):
             return np.full(len(held), np.nan), np.arange(len(held))
         slip, slips = np.zeros(len(held)), held > strength
 
-        def excess(slip: "np.ndarray", held: "np.ndarray", softness: "np.ndarray") -> "np.ndarray":
+        def excess(slip: ndarray, held: ndarray, softness: ndarray) -> ndarray:
             return held - softness * slip - self._curve.friction(slip, fitted)[0]  # type: ignore[no-any-return]
 
         if np.any(slips):

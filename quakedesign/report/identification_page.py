@@ -6,6 +6,7 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
+from numpy import ndarray
 
 from quakedesign.errors import OutputError
 from quakedesign.files import write_whole
@@ -259,14 +260,14 @@ def identification_figure(identification: Identification) -> Any:
     return finish(drawing, title, [], note, legend=axes["friction"])
 
 
-def _steps(rates: "np.ndarray") -> list[int]:
+def _steps(rates: ndarray) -> list[int]:
     """Samples at which the rate of the load point begins to change by more than a quarter."""
     size = np.log(np.maximum(rates, 1e-3 * np.max(rates)))
     changed = np.flatnonzero(np.abs(size[2:] - size[:-2]) > np.log(1.25)) + 1
     return [int(part[0]) for part in np.split(changed, np.flatnonzero(np.diff(changed) > 2) + 1) if len(part)]
 
 
-def _friction(axis: Any, identification: Identification, way: "np.ndarray", part: slice) -> None:
+def _friction(axis: Any, identification: Identification, way: ndarray, part: slice) -> None:
     fit = identification.fit
     simulated = fit.measured - fit.residuals
     axis.plot(way[part], fit.measured[part], ".", color=_MEASURED, markersize=2, label="measured")
