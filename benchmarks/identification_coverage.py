@@ -112,7 +112,7 @@ def begun_at_truth(kind: str, seed: int) -> tuple[Fit, dict[str, float]]:
         now = moved
     for _ in range(2):
         noise = now._noise(_Fitted(kind=law, setup=setup, best=best))
-        best = settled(replace(best, correlated=noise), FitSearch())
+        best = settled(replace(best, correlated=noise))
     if law.state_names:
         template: Any = setup.experiment.law
         truth["reference_coefficient"] += effects_of(truth) * np.log(template.reference_rate / synthetic.MICRON)

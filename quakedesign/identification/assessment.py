@@ -192,9 +192,8 @@ def _halves(fit: Fit, time: ndarray, last: float, record: Record, used: ndarray)
     assert record.load_point is not None
     path = record.load_point[used]
     hinge = np.maximum(path - np.interp(last, time, path), 0)
-    slopes = np.nan_to_num(weighed(fit.weights, fit.experiment.slopes(fit.fitted)), posinf=0, neginf=0)
     extra = weighed(fit.weights, hinge)
-    across = extra - slopes @ np.linalg.lstsq(slopes, extra, rcond=None)[0]
+    across = extra - fit.slopes @ np.linalg.lstsq(fit.slopes, extra, rcond=None)[0]
     size = float(np.linalg.norm(across))
     score = 0.0 if size <= 1e-6 * np.linalg.norm(extra) else float(across @ fit.whitened) / size / fit.noise
     early, late = (float(np.mean(part**2)) for part in np.array_split(fit.whitened, 2))

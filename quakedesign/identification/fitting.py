@@ -6,6 +6,7 @@ The fit uses several initial values, removes outliers, and estimates the noise f
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
@@ -17,27 +18,24 @@ from quakedesign.errors import RecordError
 from quakedesign.identification.correlated_noise import CorrelatedNoise
 from quakedesign.identification.experiment import Experiment
 
-# ----------------------------------------------------------------------
-# Least squares on a simulated experiment: several starts, outliers left out, noise estimated from what remains.
-
 CONFIDENCE = 0.95
 _SHARE_OF_NOISE = 3e-3
 _ALONE = 0.4  # of an outlier, what lies beside it on the same side: more is a peak that is not explained
 _UNFELT = 1e-7  # of the largest slope, below which one is rounding
 _SHARE_OF_EXCESS = 2e-3  # by which a search may still get better when it ends
+_CANDIDATES = 64  # drawn between the ends of every coordinate and simulated once
+_COARSE = 40  # steps of a search before it is compared with the others
+_ROUNDS = 6  # in which outliers are left out and steps are made finer
+_LONGEST_OUTLIER = 2  # samples in a row; more are no accident, and stay
 
 
 @dataclass(frozen=True, kw_only=True)
 class FitSearch:
     """How the best fit is sought: from the best candidates, until two searches end in it and it tells everything."""
 
-    candidates: int = 64  # drawn between the ends of every coordinate and simulated once
     least: int = 4  # searches
     most: int = 16
-    coarse: int = 40  # steps of a search before it is compared with the others
     agreement: float = 1e-3  # share by which sums of squares of searches that agree differ at most
-    rounds: int = 6  # in which outliers are left out and steps are made finer
-    longest_outlier: int = 2  # samples in a row; more are no accident, and stay
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +131,7 @@ class Fit:
 
     def along(self, place: int) -> ndarray:
         """Moves of all coordinates, to first order, with one of them by 1 and the others at their best."""
-        slopes, moves = self._slopes, np.zeros(len(self.fitted))
+        slopes, moves = self.slopes, np.zeros(len(self.fitted))
         scale = np.linalg.norm(slopes, axis=0)
         others = (scale > _UNFELT * np.max(scale)) & (np.arange(len(scale)) != place)
         moves[others] = np.linalg.lstsq(slopes[:, others] / scale[others], -slopes[:, place], rcond=_UNFELT)[0]
@@ -142,20 +140,19 @@ class Fit:
         return moves
 
     @cached_property
-    def _slopes(self) -> ndarray:
+    def slopes(self) -> ndarray:
+        """Derivatives of friction in what is fitted, made independent as `whitened`."""
         return weighed(self.weights, _finite(self.experiment.slopes(self.fitted)))
 
     @cached_property
     def deviations(self) -> ndarray:
         """Standard deviations of what is fitted, from the slopes; infinite where these say nothing."""
-        slopes = self._slopes
-        scale = np.linalg.norm(slopes, axis=0)
+        scale = np.linalg.norm(self.slopes, axis=0)
         scale[scale == 0] = 1
-        values, turn = np.linalg.svd(slopes / scale, full_matrices=False)[1:]
-        with np.errstate(divide="ignore"):
-            inverse = np.where(values > 1e-12 * values[0], 1 / values, np.inf)
+        values, turn = np.linalg.svd(self.slopes / scale, full_matrices=False)[1:]
         weights = np.where(np.abs(turn) > 1e-9, np.abs(turn), 0)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = np.where(values > 1e-12 * values[0], 1 / values, np.inf)
             spread = np.where(weights > 0, weights * inverse[:, None], 0)
         return np.asarray(np.sqrt(np.sum(spread**2, axis=0)) / scale * self.noise * np.sqrt(self.correlation))
 
@@ -165,8 +162,7 @@ def weighed(weights: ndarray, values: ndarray) -> ndarray:
     if weights.ndim == 2:
         kept = np.any(weights != 0, axis=0)
         with np.errstate(invalid="ignore", over="ignore"):
-            product: ndarray = weights[:, kept] @ values[kept]
-        return product
+            return np.asarray(weights[:, kept] @ values[kept])
     kept = weights > 0
     return np.asarray((values[kept].T * weights[kept]).T)
 
@@ -182,22 +178,8 @@ def fit(
 ) -> Fit:
     """Best fit of all starts, without outliers, on an experiment that is simulated accurately enough for the noise.
 
-    Parameters
-    ----------
-    experiment : Experiment
-    measured : ndarray
-        Friction [-].
-    seed : int
-        Of the draw of the starts.
-    counts : ndarray, optional
-        Of how many measurements every sample is the mean; of one by default.
-    near : ndarray, optional
-        Where to start first.
-    search : FitSearch, optional
-
-    Returns
-    -------
-    Fit
+    `measured` friction [-] is a mean of so many measurements (`counts`), or of one; `seed` is that of the draw of the
+    starts, the first of which may be told (`near`).
 
     Raises
     ------
@@ -215,22 +197,16 @@ def fit(
     experiment, starts = _starts(experiment, measured, roots, seed, how, near)
     minima: list[tuple[ndarray, float]] = []
     low, high = experiment.bounds
-    for start in starts:
-        minima.append(minimised(experiment, measured, roots, start, steps=how.coarse))
-        best_q, best = min(minima, key=lambda pair: pair[1])
+    every = np.ones(len(measured), dtype=bool)
+    for number, start in enumerate(starts, start=1):
+        minima.append(minimised(experiment, measured, roots, start, steps=_COARSE))
+        fitted, best = min(minima, key=lambda pair: pair[1])
         agreeing = sum(squares <= best * (1 + how.agreement) for _, squares in minima)
-        fit = Fit(
-            experiment=experiment,
-            fitted=best_q,
-            measured=measured,
-            counts=counts,
-            kept=np.ones(len(measured), dtype=bool),
-            agreeing=agreeing,
-            starts=len(minima),
-        )
-        if len(minima) >= how.least and agreeing > 1 and np.all(fit.deviations < high - low):
+        told: dict[str, Any] = {"measured": measured, "counts": counts, "kept": every}
+        fit = Fit(experiment=experiment, fitted=fitted, agreeing=agreeing, starts=number, **told)
+        if number >= how.least and agreeing > 1 and np.all(fit.deviations < high - low):
             break
-    return settled(fit, how)
+    return settled(fit)
 
 
 def _starts(
@@ -239,7 +215,7 @@ def _starts(
     """The candidates that come nearest, behind the one that is known, and the experiment with steps for the first."""
     draw = np.random.default_rng(seed)
     ends = np.array([[c.inward(end) for end in c.start] for c in experiment.coordinates])
-    candidates = draw.uniform(ends[:, 0], ends[:, 1], (how.candidates, len(ends)))
+    candidates = draw.uniform(ends[:, 0], ends[:, 1], (_CANDIDATES, len(ends)))
     scatter = max(float(np.std(np.diff(measured, 2))) / 6**0.5, 1e-9)
     if near is not None and not how.most:
         return experiment.resolved(near, scatter), [near]
@@ -253,8 +229,8 @@ def _starts(
             "an experiment must be one that a spring can hold without a jump. No set of parameters gives one for this "
             "record. Check the stiffness, or give a record with measured slip."
         )
-    usable = usable if near is None else [near, *usable]
-    return experiment.resolved(usable[0], scatter), usable
+    starts = usable if near is None else [near, *usable]
+    return experiment.resolved(starts[0], scatter), starts
 
 
 def minimised(
@@ -275,19 +251,16 @@ def minimised(
     whole = np.clip(np.array(start, dtype=float), low, high)
 
     def at(part: ndarray) -> ndarray:
-        full: ndarray = whole.copy()
+        full = whole.copy()
         full[free] = part
-        return full
+        return np.asarray(full)
 
-    def residuals(part: ndarray) -> ndarray:
-        return weighed(weights, experiment.friction(at(part)) - measured)
-
-    first = residuals(whole[free])
+    first = weighed(weights, experiment.friction(whole) - measured)
     if not np.all(np.isfinite(first)):
         return whole, np.inf
     size = max(float(np.sqrt(np.mean(first**2))), 1e-300)
     solution = least_squares(
-        lambda part: residuals(part) / size,
+        lambda part: weighed(weights, experiment.friction(at(part)) - measured) / size,
         np.clip(whole[free], np.nextafter(low, high)[free], np.nextafter(high, low)[free]),
         jac=lambda part: weighed(weights, _finite(experiment.slopes(at(part)))[:, free]) / size,
         bounds=(low[free], high[free]),
@@ -305,14 +278,14 @@ def _finite(slopes: ndarray) -> ndarray:
     return np.asarray(np.where(np.isfinite(slopes), slopes, 0.0))
 
 
-def settled(fit: Fit, how: FitSearch) -> Fit:
+def settled(fit: Fit) -> Fit:
     """A fit on a finer simulation and without outliers, until neither changes.
 
     Steps that suit coordinates a deviation away suit these.
     """
     made_for = np.full_like(fit.fitted, np.inf)
-    for _ in range(how.rounds):
-        kept = ~outliers(fit.scaled, how.longest_outlier)
+    for _ in range(_ROUNDS):
+        kept = ~outliers(fit.scaled)
         finer = fit.experiment
         if not np.all(np.abs(fit.fitted - made_for) <= fit.deviations):
             finer, made_for = finer.resolved(fit.fitted, fit.accuracy), fit.fitted
@@ -324,22 +297,20 @@ def settled(fit: Fit, how: FitSearch) -> Fit:
     return fit
 
 
-def outliers(residuals: ndarray, longest: int) -> ndarray:
-    """Samples so far off that noise alone has one such among all with a chance of 5 %, in runs of at most `longest`.
+def outliers(residuals: ndarray) -> ndarray:
+    """Samples so far off that noise alone has one such among all with a chance of 5 %, in runs of at most two.
 
     The size of the noise is that of the median residual. What rises from its neighbours is no accident, and stays.
     """
-    middle = np.median(residuals)
-    size = np.median(np.abs(residuals - middle)) / stats.norm.ppf(0.75)
-    far = np.abs(residuals - middle) > size * stats.norm.isf((1 - CONFIDENCE) / 2 / len(residuals))
+    off = residuals - np.median(residuals)
+    size = np.median(np.abs(off)) / stats.norm.ppf(0.75)
+    far = np.abs(off) > size * stats.norm.isf((1 - CONFIDENCE) / 2 / len(residuals))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], far.astype(int), [0]])))
     outlying = np.zeros(len(residuals), dtype=bool)
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        beside = residuals[[i for i in (begin - 1, end) if 0 <= i < len(residuals)]] - middle
-        alone = np.max(beside * np.sign(residuals[begin] - middle)) < _ALONE * np.min(
-            np.abs(residuals[begin:end] - middle)
-        )
-        outlying[begin:end] = alone and end - begin <= longest
+        beside = off[[i for i in (begin - 1, end) if 0 <= i < len(off)]]
+        alone = np.max(beside * np.sign(off[begin])) < _ALONE * np.min(np.abs(off[begin:end]))
+        outlying[begin:end] = alone and end - begin <= _LONGEST_OUTLIER
     return outlying
 
 
@@ -349,9 +320,10 @@ def advantage(one: Fit, other: Fit) -> tuple[float, float]:
     At the samples that both count, of fits with as many parameters: n·ln of that ratio, with n independent samples.
     """
     both = one.kept & other.kept
-    ours, theirs = (float(np.sum(fit.scaled[both] ** 2)) for fit in (one, other))
     if one.correlated is not None or other.correlated is not None:
         ours, theirs = one.squares, other.squares
+    else:
+        ours, theirs = (float(np.sum(fit.scaled[both] ** 2)) for fit in (one, other))
     independent = float(both.sum()) / min(one.correlation, other.correlation)
     return theirs / ours, independent * float(np.log(theirs / ours))
 
@@ -398,9 +370,7 @@ class Profile:
     def interval(self, threshold: float) -> tuple[float, float]:
         """Where `Fit.excess` passes a threshold on either side, as it is fitted; infinite where the record sets no end.
 
-        Raises
-        ------
-        BetterFit
+        Raises `BetterFit`.
         """
         return self._end(threshold, -1), self._end(threshold, 1)
 

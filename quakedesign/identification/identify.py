@@ -1,7 +1,4 @@
-"""Identification of friction parameters from a record, with confidence regions.
-
-The second chapter selects the experiment from the friction law and the measured columns.
-"""
+"""Identification of friction parameters from a record: the experiment, the fit with what is chosen in it, regions."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -43,9 +40,6 @@ from quakedesign.identification.sliding_experiment import START_RATE, START_STAT
 from quakedesign.identification.two_states import SECOND_EFFECT, with_two_states
 from quakedesign.identification.weakening_experiment import START, Drawn, MeasuredSlip
 
-# ----------------------------------------------------------------------
-# From a record and a law to the experiment that is fitted.
-
 _EFFECTS = {"low": 1e-5, "high": 1.0, "start": (2e-3, 3e-2)}
 _SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}
 _MODERATE = 1e3
@@ -83,26 +77,24 @@ def set_up(
         When the law is of neither kind, or something is missing.
     """
     if law.state_names:
-        return _with_trend(_sliding(record, law, stiffness, loading, START_STATE in nuisance), record, nuisance)
-    template = law(**dict.fromkeys(law.quantities(), 1.0))
-    slip, rate = sp.symbols("slip rate", positive=True)
-    if sp.sympify(template.symbolic().coefficient(slip, rate)).has(rate):
-        raise RecordError(
-            f"a law that is identified must depend on slip or on a state. Received {law.name}, which depends on the "
-            "slip rate alone. Take another."
-        )
-    setup = _measured_slip(record, law) if record.slip is not None else _drawn(record, law, stiffness)
-    return _with_trend(setup, record, nuisance)
-
-
-def _with_trend(setup: Setup, record: Record, nuisance: Collection[str]) -> Setup:
-    """An experiment with a trend in displacement or time, where that is fitted."""
-    path = record.load_point if record.load_point is not None else record.slip
-    size = float(np.max(np.abs(record.friction)))
-    for name, along in ((TREND, path), (TREND_IN_TIME, record.time)):
+        setup = _sliding(record, law, stiffness, loading, START_STATE in nuisance)
+    else:
+        slip, rate = sp.symbols("slip rate", positive=True)
+        if sp.sympify(_template(law).symbolic().coefficient(slip, rate)).has(rate):
+            raise RecordError(
+                f"a law that is identified must depend on slip or on a state. Received {law.name}, which depends on "
+                "the slip rate alone. Take another."
+            )
+        setup = _measured_slip(record, law) if record.slip is not None else _drawn(record, law, stiffness)
+    for name, along in ((TREND, record.path), (TREND_IN_TIME, record.time)):
         if name in nuisance and along is not None and np.ptp(along[setup.used]) > 0:
-            return replace(setup, experiment=trended(setup.experiment, along[setup.used] - along[0], size, name))
+            along = along[setup.used] - along[0]
+            return replace(setup, experiment=trended(setup.experiment, along, record.largest, name))
     return setup
+
+
+def _template(law: type[FrictionLaw]) -> FrictionLaw:
+    return law(**dict.fromkeys(law.quantities(), 1.0))
 
 
 def _coordinate(name: str, law: type[FrictionLaw], record: Record, path: float) -> Coordinate:
@@ -111,7 +103,7 @@ def _coordinate(name: str, law: type[FrictionLaw], record: Record, path: float) 
     if law.state_names and name in ("evolution_effect", SECOND_EFFECT):
         start = (-0.005, 0.025) if name == "evolution_effect" else (-0.01, 0.01)
         return Coordinate(name=name, unit=unit, low=-1.0, high=1.0, start=start, logarithmic=False)
-    size = float(np.max(np.abs(record.friction)))
+    size = record.largest
     ends: dict[str, Any]
     if unit == "m":
         ends = {"low": path * 1e-6, "high": path * 10, "start": (path * 1e-3, path * 0.3)}
@@ -143,17 +135,17 @@ def _sliding(
         )
     drive, measured = loading.drive(record)
     path = float(np.ptp(record.load_point))
-    chosen = _rates(law, drive.rates, first)
+    fast = max(float(np.max(drive.rates)), first)
+    ends = {"slowest_rate": first / _MODERATE, "fastest_rate": fast * _MODERATE}
+    rates = {"reference_rate": float(f"{first:.6g}"), **ends}  # chosen, not fitted
+    chosen = {name: rates[name] for name in law.quantities() if name in rates}
     optional = {field.name for field in fields(law) if field.default is not MISSING}  # type: ignore[arg-type]
     names = [name for name in law.quantities() if name not in chosen and name not in optional]
     coordinates = [_coordinate(name, law, record, path) for name in names]
-    if stiffness is None:
-        coordinates.append(_stiffness(record, path))
-    template = law(**dict.fromkeys(names, 1.0), **chosen)
-    if unsteady:
-        coordinates += _START
+    coordinates += _stiffness(record, path, stiffness)
+    coordinates += _START if unsteady else ()
     experiment = SlidingExperiment(
-        law=template,
+        law=law(**dict.fromkeys(names, 1.0), **chosen),
         drive=drive,
         normal_unit=record.normal_unit,
         coordinates=tuple(coordinates),
@@ -161,33 +153,19 @@ def _sliding(
         steps=tuple((length,) for length in drive.lengths.tolist()),
         measured=measured,
     )
-    begins = (
-        f"in a state off that of steady sliding at {first:.4g} m/s"
-        if unsteady
-        else f"in steady sliding at {first:.4g} m/s"
-    )
+    begins = f"in {'a state off that of ' if unsteady else ''}steady sliding at {first:.4g} m/s"
     notes = (f"the record begins {begins}", *loading.notes)
     late = delayed(experiment, *loading.delays(record))
     return Setup(experiment=late, used=np.ones(len(record.time), dtype=bool), notes=notes)
 
 
-def _rates(law: type[FrictionLaw], rates: ndarray, first: float) -> dict[str, float]:
-    """Rates of a law, which are chosen, not fitted: that of the first sliding, and a range around those of the load."""
-    fast = max(float(np.max(rates)), first)
-    chosen = {
-        "reference_rate": float(f"{first:.6g}"),
-        "slowest_rate": first / _MODERATE,
-        "fastest_rate": fast * _MODERATE,
-    }
-    return {name: chosen[name] for name in law.quantities() if name in chosen}
-
-
-def _stiffness(record: Record, path: float) -> Coordinate:
-    """Stiffness [as the record's], about that at which the whole friction takes between all and 1e-4 of the path."""
+def _stiffness(record: Record, path: float, given: float | None) -> list[Coordinate]:
+    """Unless given, about that at which the whole friction takes between all and 1e-4 of the path."""
+    if given is not None:
+        return []
     whole = float(np.max(record.normal) * np.max(np.abs(record.friction))) / path
-    return Coordinate(
-        name=STIFFNESS, unit=record.stiffness_unit, low=whole * 1e-2, high=whole * 1e6, start=(whole, whole * 1e3)
-    )
+    start, unit = (whole, whole * 1e3), record.stiffness_unit
+    return [Coordinate(name=STIFFNESS, unit=unit, low=whole * 1e-2, high=whole * 1e6, start=start)]
 
 
 def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
@@ -196,20 +174,17 @@ def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
     noise = scatter(record.time, record.slip)
     resting = np.flatnonzero(record.slip <= FAR_OFF * noise)
     used = np.arange(len(record.slip)) > (resting[-1] if len(resting) else -1)
-    if used.sum() < 3 * len(law.quantities()):
+    count, least = int(used.sum()), 3 * len(law.quantities())
+    if count < least:
         raise RecordError(
-            f"slip must have grown from zero in at least {3 * len(law.quantities())} samples. Received "
-            f"{int(used.sum())}. Measure it from where the fault begins to slip, forward positive."
+            f"slip must have grown from zero in at least {least} samples. Received {count}. Measure it from where the "
+            "fault begins to slip, forward positive."
         )
     slip = record.slip[used]
     coordinates = tuple(_coordinate(name, law, record, float(slip.max())) for name in law.quantities())
-    template = law(**dict.fromkeys(law.quantities(), 1.0))
-    note = f"friction as a function of the measured slip, in {int(used.sum())} samples that slip"
-    return Setup(
-        experiment=MeasuredSlip(law=template, slip=slip, slip_noise=noise, coordinates=coordinates),
-        used=used,
-        notes=(note,),
-    )
+    experiment = MeasuredSlip(law=_template(law), slip=slip, slip_noise=noise, coordinates=coordinates)
+    note = f"friction as a function of the measured slip, in {count} samples that slip"
+    return Setup(experiment=experiment, used=used, notes=(note,))
 
 
 def _drawn(record: Record, law: type[FrictionLaw], stiffness: float | None) -> Setup:
@@ -218,15 +193,15 @@ def _drawn(record: Record, law: type[FrictionLaw], stiffness: float | None) -> S
             f"{law.name} needs the column slip, or the motion of the load point. Received neither. Add slip [mm], say."
         )
     path = float(np.ptp(record.load_point))
-    coordinates = [_coordinate(name, law, record, path) for name in law.quantities()]
-    template = law(**dict.fromkeys(law.quantities(), 1.0))
-    if stiffness is None:
-        coordinates.append(_stiffness(record, path))
-    first, size = float(record.friction[0]), float(np.max(np.abs(record.friction)))
+    first, size = float(record.friction[0]), record.largest
     start = (first - 0.02 * size, first + 0.02 * size)
-    coordinates.append(Coordinate(name=START, unit="", low=-size, high=2 * size, start=start, logarithmic=False))
+    coordinates = [
+        *(_coordinate(name, law, record, path) for name in law.quantities()),
+        *_stiffness(record, path, stiffness),
+        Coordinate(name=START, unit="", low=-size, high=2 * size, start=start, logarithmic=False),
+    ]
     experiment = Drawn(
-        law=template,
+        law=_template(law),
         load_point=record.load_point - record.load_point[0],
         normal=record.normal,
         coordinates=tuple(coordinates),
@@ -244,7 +219,7 @@ _LEAST_NEAR = 2  # searches, where the first begins near the fit of a similar la
 _EFFECTS_OF = ("direct_effect", "evolution_effect", SECOND_EFFECT)
 _MOST_BETTER = 10
 _MOST_MOVES = 4  # of the times of changes of rate, which a delay moves to first order
-_TRENDS = {TREND: "with a trend in displacement", TREND_IN_TIME: "with a trend in time"}
+_TRENDS = {"": "without a trend", TREND: "with a trend in displacement", TREND_IN_TIME: "with a trend in time"}
 _ONE_TREND = {"displacement": {TREND}, "time": {TREND_IN_TIME}}
 TREND_CHOICES = "auto", *_ONE_TREND, "none"
 _STAYS = 0.5  # deviations: a delay as small needs no move
@@ -306,13 +281,11 @@ def identify(
         For a law that does not exist.
     """
     require_positive(normal_stress=1.0 if normal_stress is None else normal_stress)
-    if isinstance(record, Record):
-        if normal_stress is not None:
-            raise RecordError("normal_stress is for a file. Received it with a Record. Put it into the record.")
-        found = record
-    else:
-        found = read_record(record, normal_stress=normal_stress)
-    return identified_as(found, kinds_of(law, states), stiffness=stiffness, rates=rates, trend=trend, seed=seed)
+    if not isinstance(record, Record):
+        record = read_record(record, normal_stress=normal_stress)
+    elif normal_stress is not None:
+        raise RecordError("normal_stress is for a file. Received it with a Record. Put it into the record.")
+    return identified_as(record, kinds_of(law, states), stiffness=stiffness, rates=rates, trend=trend, seed=seed)
 
 
 def kinds_of(law: str | None, states: int) -> list[type[FrictionLaw]]:
@@ -368,17 +341,7 @@ class _Choice:
     told: ndarray | None = None  # when pieces begin by the load point alone [s]
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
-        """Profiles about the best fit, and tests of it."""
-        choice, better, rival, others = self.chosen(kinds)
-        found = replace(profiled(better.best, choice.record, better.setup, self.seed), rival=rival)
-        return replace(found, assessment=choice._assessed(found, others))
-
-    def chosen(self, kinds: Sequence[type[FrictionLaw]]) -> "tuple[_Choice, _Fitted, Rival | None, Alternatives]":
-        """The best law, with trend and unsteady beginning where these are likelier.
-
-        After the choice with the times of changes of rate that friction shows, and before the law that it was preferred
-        to, and the fits with other trends.
-        """
+        """Profiles about the best fit of the best law, at the times of changes of rate that friction shows."""
         first = _ONE_TREND.get(self.trend, {TREND} if self.trend == "auto" else set())
         fits: list[_Fitted] = []
         for kind in kinds:
@@ -393,19 +356,20 @@ class _Choice:
         choice = self
         for _ in range(_MOST_MOVES):
             better = choice._extended(min(fits, key=lambda fitted: fitted.best.squares))
-            moved = choice._moved(better)
-            if moved is None:
+            if (moved := choice._moved(better)) is None:
                 break
             choice = moved
             fits = [choice._fitted(each.kind, _nuisance(better), better.best, start=False) for each in fits]
-        return choice._chosen(fits)
+        better, rival, others = choice._chosen(fits)
+        found = replace(profiled(better.best, choice.record, better.setup, self.seed), rival=rival)
+        return replace(found, assessment=choice._assessed(found, others))
 
     def _moved(self, fitted: _Fitted) -> "_Choice | None":
         """The same with changes of rate at the times that friction shows; nothing where they are there already."""
-        names = [c.name for c in fitted.best.experiment.coordinates]
-        places = [place for place, name in enumerate(names) if name.startswith(DELAY)]
+        coordinates = fitted.best.experiment.coordinates
+        places = [place for place, c in enumerate(coordinates) if c.name.startswith(DELAY)]
         delays, errors = fitted.best.fitted[places], fitted.best.deviations[places]
-        errors = np.where(errors < np.array([c.high for c in fitted.best.experiment.coordinates])[places], errors, 0)
+        errors = np.where(errors < np.array([coordinates[place].high for place in places]), errors, 0)
         if self.loading is None or not np.any(np.abs(delays) > _STAYS * errors):
             return None
         pieces, (after, most) = self.loading.pieces, self.loading.delays(self.record)
@@ -418,47 +382,36 @@ class _Choice:
         record, loading = prepared(self.raw, (), pieces)
         return replace(self, record=record, loading=loading, told=told)
 
-    def _chosen(self, fits: "list[_Fitted]") -> "tuple[_Choice, _Fitted, Rival | None, Alternatives]":
-        better = min(fits, key=lambda fitted: fitted.best.squares)
-        noise = self._noise(better)
-        fits = [replace(each, best=_settled(each.best, noise)) for each in fits]
-        fits.sort(key=lambda fitted: fitted.best.squares)
-        better, rival = fits[0], None
+    def _chosen(self, fits: list[_Fitted]) -> tuple[_Fitted, Rival | None, Alternatives]:
+        """The best law, with trend and beginning where these are likelier; the next law, and fits with other trends."""
+        noise, rival = self._noise(min(fits, key=lambda fitted: fitted.best.squares)), None
+        fits = sorted((_with_noise(each, noise) for each in fits), key=lambda fitted: fitted.best.squares)
         if len(fits) > 1:
-            squares, excess = advantage(better.best, fits[1].best)
+            squares, excess = advantage(fits[0].best, fits[1].best)
             rival = Rival(law=fits[1].kind.name, squares=squares, excess=excess)
-        better = self._extended(better)
-        better = replace(better, best=_settled(better.best, self._noise(better)))
-        better = self._without_start(better)
-        better, others = self._trend(better)
-        return self, replace(better, best=_settled(better.best, self._noise(better))), rival, others
+        better = self._extended(fits[0])
+        better, others = self._trend(self._without_start(_with_noise(better, self._noise(better))))
+        return _with_noise(better, self._noise(better)), rival, others
 
-    def _trend(self, fitted: _Fitted) -> "tuple[_Fitted, Alternatives]":
+    def _trend(self, fitted: _Fitted) -> tuple[_Fitted, Alternatives]:
         """The fit with the trend that is taken or without one, and the others.
 
         A trend in time takes the place of one in displacement where its AIC is lower by `DECISIVE`.
         """
         own, rest = next(iter(_nuisance(fitted) & _TRENDS.keys()), ""), _nuisance(fitted) - _TRENDS.keys()
-        names = {"", own} if self.trend in _ONE_TREND else {"", *_TRENDS}
-        found = {
-            name: self._among(fitted, {*rest, name} - {""}) if name != own else (fitted, fitted.best.squares)
-            for name in sorted(names)
-        }
+        names = {"", own} if self.trend in _ONE_TREND else _TRENDS
+        same = fitted, fitted.best.squares
+        found = {name: same if name == own else self._among(fitted, {*rest, name} - {""}) for name in sorted(names)}
         aic = {name: fitted.best.excess(squares) + 2 * bool(name) for name, (_, squares) in found.items()}
-        taken = own
-        if self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE:
-            taken = TREND_IN_TIME
+        late = self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE
+        taken = TREND_IN_TIME if late else own
         if taken and not needed(found[taken][0].best, found[""][1]):
             taken = ""
-        others = {
-            _TRENDS.get(name, "without a trend"): (found[name][0], aic[name] - aic[taken])
-            for name in found
-            if name != taken
-        }
-        better = found[taken][0]
+        better, _ = found.pop(taken)
+        others = {_TRENDS[name]: (other, aic[name] - aic[taken]) for name, (other, _) in found.items()}
         return better if better is fitted else _again(better), others
 
-    def _assessed(self, found: Identification, others: "Alternatives") -> Assessment:
+    def _assessed(self, found: Identification, others: Alternatives) -> Assessment:
         """Tests of what was taken for granted, and what the record leaves open."""
         values = found.fit.experiment.outward(found.fit.fitted)
         checks, factor = checks_of(found.fit, self.raw, self.record, found.used, self.loading, values)
@@ -471,9 +424,9 @@ class _Choice:
                     doubted[said] = replace(found.difference, low=-math.inf, high=math.inf), excess
         off = unsteady_beginning(found.difference, values, self.loading) if self.loading is not None else ""
         sign = sign_check(found.difference, doubted, shift, off)
-        told = [*found.untold(), *([sign.sentence] if sign is not None and not sign.passed else [])]
-        checks = (*checks, *([sign] if sign is not None else []))
-        return Assessment(checks=checks, factor=factor, open=tuple(told), experiments=tuple(found.experiments(sign)))
+        checks = checks if sign is None else (*checks, sign)
+        told = (*found.untold(), *([sign.sentence] if sign is not None and not sign.passed else []))
+        return Assessment(checks=checks, factor=factor, open=told, experiments=tuple(found.experiments(sign)))
 
     def _late_trend(self, found: Identification) -> float | None:
         """By how much a - b changes if the trend begins with the first change of rate; None if it does not.
@@ -486,7 +439,7 @@ class _Choice:
             return None
         setup = set_up(self.record, type(fit.experiment.law), self.stiffness, loading, {START_STATE})
         after = np.maximum(load - load[0] - loading.before, 0)
-        late: Experiment = trended(setup.experiment, after, float(np.max(np.abs(self.record.friction))))
+        late: Experiment = trended(setup.experiment, after, self.record.largest)
         at = late.near(values)
         for _ in range(2):
             late = late.resolved(at, fit.accuracy)
@@ -502,16 +455,16 @@ class _Choice:
         setup = set_up(self.record, kind, self.stiffness, self.loading, nuisance)
         measured = self.record.friction[setup.used]
         counts = None if self.record.counts is None else self.record.counts[setup.used]
-        search = FitSearch() if near is None else FitSearch(least=_LEAST_NEAR if start else 1, most=16 if start else 0)
-        known = {} if near is None else near.experiment.outward(near.fitted)
-        known = {name: value for name, value in known.items() if start or not name.startswith(DELAY)}
-        at = None if near is None else setup.experiment.near(known)
+        search, at = FitSearch(), None
+        if near is not None:
+            search = FitSearch(least=_LEAST_NEAR) if start else FitSearch(least=1, most=0)
+            known = near.experiment.outward(near.fitted).items()
+            at = setup.experiment.near({name: v for name, v in known if start or not name.startswith(DELAY)})
         best = fit(setup.experiment, measured, seed=self.seed, counts=counts, near=at, search=search)
         return _Fitted(kind=kind, setup=setup, best=best)
 
     def _noise(self, fitted: _Fitted) -> CorrelatedNoise | None:
-        best, used = fitted.best, fitted.setup.used
-        path = self.record.load_point if self.record.load_point is not None else self.record.slip
+        best, used, path = fitted.best, fitted.setup.used, self.record.path
         slopes = np.nan_to_num(best.experiment.slopes(best.fitted), posinf=0, neginf=0)
         where, time = None if path is None else path[used], self.record.time[used]
         moved = self._moved_by_rates(fitted)
@@ -583,7 +536,7 @@ def profiled(
             difference = _difference(best)
             break
         except BetterFit as better:
-            best = settled(replace(best, fitted=better.fitted, agreeing=1), FitSearch())
+            best = settled(replace(best, fitted=better.fitted, agreeing=1))
     else:
         raise RecordError(
             "a record must have one best fit. Received one whose fit gets better wherever it is followed. Give the "
@@ -591,7 +544,9 @@ def profiled(
         )
     pair = [name for name in _EFFECTS_OF if name in estimates]
     if difference is not None and difference.identified and not any(estimates[name].identified for name in pair):
-        estimates |= {name: _open(estimates[name]) for name in pair}
+        # along a valley of equal fits, ends that a search comes upon mean nothing
+        ends: dict[str, Any] = {"low": -math.inf, "high": math.inf, "least": -math.inf, "most": math.inf}
+        estimates |= {name: replace(estimates[name], **ends) for name in pair}
     return Identification(
         record=record,
         fit=best,
@@ -619,13 +574,12 @@ def _nuisance(fitted: _Fitted) -> set[str]:
 
 
 def _again(fitted: _Fitted) -> _Fitted:
-    return replace(fitted, best=settled(fitted.best, FitSearch()))
+    return replace(fitted, best=settled(fitted.best))
 
 
-def _settled(best: Fit, noise: CorrelatedNoise | None) -> Fit:
-    """A fit with another noise."""
-    white = noise is None and best.correlated is None
-    return best if white else settled(replace(best, correlated=noise), FitSearch())
+def _with_noise(fitted: _Fitted, noise: CorrelatedNoise | None) -> _Fitted:
+    white = noise is None and fitted.best.correlated is None
+    return fitted if white else _again(replace(fitted, best=replace(fitted.best, correlated=noise)))
 
 
 def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, ParameterEstimate]:
@@ -661,11 +615,6 @@ def _turned(best: Fit, place: int, first: int, seconds: tuple[int, ...], jointly
         return _estimate(replace(best, experiment=turned, fitted=turned.difference(best.fitted)), place, jointly)
     except BetterFit as better:
         raise BetterFit(turned.whole_of(better.fitted)) from None
-
-
-def _open(told: ParameterEstimate) -> ParameterEstimate:
-    """The same without ends: along a valley of equal fits those that a search comes upon mean nothing."""
-    return replace(told, low=-math.inf, high=math.inf, least=-math.inf, most=math.inf)
 
 
 def _estimate(best: Fit, place: int, jointly: bool = True) -> ParameterEstimate:

@@ -106,6 +106,16 @@ class Record:
         return f"Record({self.name!r}: {self.time.size} samples in {self.time[-1] - self.time[0]:.4g} s)"
 
     @property
+    def largest(self) -> float:
+        """Friction of the largest size [-]."""
+        return float(np.max(np.abs(self.friction)))
+
+    @property
+    def path(self) -> ndarray | None:
+        """Displacement of the load point, or slip where only that was measured [m]."""
+        return self.slip if self.load_point is None else self.load_point
+
+    @property
     def stiffness_unit(self) -> str:
         """Unit of a stiffness that goes with the normal stress or force."""
         return f"{self.normal_unit or '1'}/m"

@@ -12,7 +12,7 @@ from quakedesign.errors import OutputError
 from quakedesign.files import write_whole
 from quakedesign.identification.assessment import CANNOT_TELL, EXPLAINS_NOT
 from quakedesign.identification.experiment import DELAY, TREND, TREND_IN_TIME, Widened
-from quakedesign.identification.fitting import Fit, weighed
+from quakedesign.identification.fitting import Fit
 from quakedesign.identification.identification_result import Identification, ParameterEstimate
 from quakedesign.identification.several_steps import Steps
 from quakedesign.report.drawing import FORMATS, NATURAL, SMALL, figure, figure_bytes, finish
@@ -331,9 +331,9 @@ def _region(axis: Any, identification: Identification, label: str = "", colour: 
     """Region of 95 % of two parameters by the slopes of the fit."""
     fit, pair = identification.fit, _pair(identification.fit)
     places = [[c.name for c in fit.experiment.coordinates].index(name) for name in pair]
-    slopes = weighed(fit.weights, np.nan_to_num(fit.experiment.slopes(fit.fitted), posinf=0, neginf=0))
-    size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
-    spread = (np.linalg.pinv((slopes / size).T @ (slopes / size)) / np.outer(size, size))[np.ix_(places, places)]
+    size = np.maximum(np.linalg.norm(fit.slopes, axis=0), 1e-300)
+    turned = (fit.slopes / size).T @ (fit.slopes / size)
+    spread = (np.linalg.pinv(turned) / np.outer(size, size))[np.ix_(places, places)]
     values, turned = np.linalg.eigh(spread * fit.noise**2 * fit.correlation * fit.threshold(2))
     turn = np.linspace(0, 2 * np.pi, 181)
     around = turned * np.sqrt(np.maximum(values, 0)) @ np.array([np.cos(turn), np.sin(turn)])

@@ -93,7 +93,7 @@ def test_correlated_noise_makes_no_outliers():
     known, everything = CorrelatedNoise(5.0, 8.0, ALONG, COUNTS, True), np.ones(NUMBER, dtype=bool)
     each = [known.deletion(noise(5.0, 8.0, seed), everything) for seed in range(20)]
     assert np.std(each) == pytest.approx(1, rel=0.03)
-    assert sum(outliers(one, 2).sum() for one in each) <= 4
+    assert sum(outliers(one).sum() for one in each) <= 4
 
 
 def test_pieces_of_noise_that_fades_are_satterthwaites_of_its_slow_part():

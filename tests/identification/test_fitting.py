@@ -187,7 +187,7 @@ def test_an_outlier_is_one_that_noise_makes_in_one_record_of_twenty():
     within = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 0.0, 1.0, -1.0, 1.0, -1.0])
     for share, far in ((0.999, False), (1.001, True)):
         for sign in (1, -1):
-            found = outliers(sign * np.append(within, share * limit) + 5.0, 2)
+            found = outliers(sign * np.append(within, share * limit) + 5.0)
             assert found.tolist() == [False] * 10 + [far]
 
 
@@ -196,15 +196,13 @@ def test_more_than_two_in_a_row_are_no_accident(run, left_out):
     for first in (0, 7, 40 - run):
         residuals = np.resize([1.0, -1.0], 40)
         residuals[first : first + run] = 50.0
-        assert outliers(residuals, FitSearch().longest_outlier).nonzero()[0].tolist() == (
-            list(range(first, first + run)) if left_out else []
-        )
+        assert outliers(residuals).nonzero()[0].tolist() == (list(range(first, first + run)) if left_out else [])
 
 
 def test_runs_are_told_apart():
     residuals = np.resize([1.0, -1.0], 40)
     residuals[[3, 10, 11, 12, 20, 21, 30, 31, 32, 33, 38]] = -50.0
-    assert outliers(residuals, 2).nonzero()[0].tolist() == [3, 20, 21, 38]
+    assert outliers(residuals).nonzero()[0].tolist() == [3, 20, 21, 38]
 
 
 @dataclass(frozen=True)
