@@ -79,12 +79,8 @@ class Experiment(ABC):
 
     def near(self, values: Mapping[str, float]) -> ndarray:
         """What is fitted, at values of another experiment; where it has none, the middle of where searches start."""
-        return np.array(
-            [
-                c.inward(values[c.name]) if c.name in values else sum(map(c.inward, c.start)) / 2
-                for c in self.coordinates
-            ]
-        )
+        told = ((c, values.get(c.name)) for c in self.coordinates)
+        return np.array([sum(map(c.inward, c.start)) / 2 if v is None else c.inward(v) for c, v in told])
 
     def outward(self, fitted: ndarray) -> dict[str, float]:
         """Values in their units by name."""
@@ -98,8 +94,7 @@ def fitted_quantities(
 
     Quantities that may be negative, `linear` ones, are fitted as they are.
     """
-    places = {name: i for i, name in enumerate(names)}
-    values = {n: fitted[place] if n in linear else ca.exp(fitted[place]) for n, place in places.items()}
+    values = {n: fitted[place] if n in linear else ca.exp(fitted[place]) for place, n in enumerate(names)}
     return {symbol: values.get(name, getattr(law, name)) for name, symbol in law.symbols().items()}
 
 
@@ -115,56 +110,62 @@ TREND, TREND_IN_TIME = "trend", "trend_in_time"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Widened(Experiment):
+class _Around(Experiment):
+    """An experiment in other coordinates than those of its `whole`."""
+
+    whole: Any
+
+    @property
+    def law(self) -> FrictionLaw:  # type: ignore[override]
+        """That of the whole."""
+        return self.whole.law  # type: ignore[no-any-return]
+
+    @abstractmethod
+    def inside(self, fitted: ndarray) -> ndarray:
+        """Coordinates of the whole."""
+
+    def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
+        """Those of the whole."""
+        return self.whole.remarks(self.inside(fitted), noise)  # type: ignore[no-any-return]
+
+    def best_law(self, fitted: ndarray) -> FrictionLaw:
+        """That of the whole."""
+        return self.whole.best_law(self.inside(fitted))  # type: ignore[no-any-return]
+
+    def resolved(self, fitted: ndarray, accuracy: float) -> Experiment:
+        """With the whole resolved."""
+        finer = self.whole.resolved(self.inside(fitted), accuracy)
+        return self if finer is self.whole else replace(self, whole=finer)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Widened(_Around):
     """An experiment, `whole`, with further coordinates, which come last and move friction in proportion to `columns`.
 
     Trends move it by themselves, for their columns are displacement [m] or time [s]. Delays of changes of rate [s] move
     it against its growth, to first order; their columns say which samples follow each change, up to the next.
     """
 
-    whole: Any
     coordinates: tuple[Coordinate, ...]
     columns: ndarray  # of shape (samples, further coordinates)
     delays: bool = False
 
-    @property
-    def law(self) -> FrictionLaw:  # type: ignore[override]
-        """That of the experiment."""
-        law: FrictionLaw = self.whole.law
-        return law
-
-    def own(self, fitted: ndarray) -> ndarray:
+    def inside(self, fitted: ndarray) -> ndarray:
         """Coordinates of the experiment without the others."""
         return fitted[: len(self.whole.coordinates)]
 
     def friction(self, fitted: ndarray) -> ndarray:
         """Friction of the experiment, moved by the further coordinates."""
-        own = self.own(fitted)
+        own = self.inside(fitted)
         with np.errstate(invalid="ignore", over="ignore"):
             moved = self.columns @ fitted[len(own) :] * (-self.whole.growth(own) if self.delays else 1.0)
-            friction: ndarray = self.whole.friction(own) + moved
-        return friction
+            return np.asarray(self.whole.friction(own) + moved)
 
     def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives, at delays that are small against what follows the changes."""
-        own = self.own(fitted)
+        own = self.inside(fitted)
         moved = -self.whole.growth(own)[:, None] * self.columns if self.delays else self.columns
         return np.column_stack([self.whole.slopes(own), moved])
-
-    def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
-        """Those of the experiment."""
-        told: tuple[str, ...] = self.whole.remarks(self.own(fitted), noise)
-        return told
-
-    def best_law(self, fitted: ndarray) -> FrictionLaw:
-        """That of the experiment."""
-        law: FrictionLaw = self.whole.best_law(self.own(fitted))
-        return law
-
-    def resolved(self, fitted: ndarray, accuracy: float) -> "Widened":
-        """With the experiment resolved."""
-        finer = self.whole.resolved(self.own(fitted), accuracy)
-        return self if finer is self.whole else replace(self, whole=finer)
 
 
 DELAY = "delay"
@@ -189,17 +190,11 @@ def _about_zero(name: str, unit: str, most: float) -> Coordinate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Difference(Experiment):
+class Difference(_Around):
     """An experiment in which a coordinate less others, by their places, stands for the first of them."""
 
-    whole: Experiment
     first: int
     seconds: tuple[int, ...]
-
-    @property
-    def law(self) -> FrictionLaw:  # type: ignore[override]
-        """That of the experiment."""
-        return self.whole.law
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:  # type: ignore[override]
@@ -218,34 +213,26 @@ class Difference(Experiment):
 
     def friction(self, fitted: ndarray) -> ndarray:
         """Friction of the experiment; there is none where the first would not be positive."""
-        return self.whole.friction(self.whole_of(fitted))
+        return self.whole.friction(self.inside(fitted))  # type: ignore[no-any-return]
 
     def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives by the chain rule."""
-        at = self.whole_of(fitted)
-        slopes = self.whole.slopes(at).copy()
-        per_first = slopes[:, self.first].copy()
-        if self.whole.coordinates[self.first].logarithmic:
-            per_first /= np.exp(at[self.first])
+        at = self.inside(fitted)
+        grown = [np.exp(q) if c.logarithmic else 1.0 for q, c in zip(at, self.whole.coordinates, strict=True)]
+        slopes = np.array(self.whole.slopes(at))
+        slopes[:, self.first] /= grown[self.first]
         for second in self.seconds:
-            grown = np.exp(at[second]) if self.whole.coordinates[second].logarithmic else 1.0
-            slopes[:, second] += per_first * grown
-        slopes[:, self.first] = per_first
+            slopes[:, second] += slopes[:, self.first] * grown[second]
         return slopes
-
-    def resolved(self, fitted: ndarray, accuracy: float) -> "Difference":
-        """With the whole resolved."""
-        return replace(self, whole=self.whole.resolved(self.whole_of(fitted), accuracy))
 
     def difference(self, fitted: ndarray) -> ndarray:
         """Coordinates here, of those of the whole."""
         changed = np.array(fitted, dtype=float)
-        changed[self.first] = self.whole.coordinates[self.first].outward(float(fitted[self.first])) - self._others(
-            fitted
-        )
+        first = self.whole.coordinates[self.first].outward(float(fitted[self.first]))
+        changed[self.first] = first - self._others(fitted)
         return changed
 
-    def whole_of(self, fitted: ndarray) -> ndarray:
+    def inside(self, fitted: ndarray) -> ndarray:
         """Coordinates of the whole, of those here; not a number where the first would not be positive."""
         changed = np.array(fitted, dtype=float)
         first = fitted[self.first] + self._others(fitted)
@@ -255,4 +242,4 @@ class Difference(Experiment):
         return changed
 
     def _others(self, fitted: ndarray) -> float:
-        return sum(self.whole.coordinates[place].outward(float(fitted[place])) for place in self.seconds)
+        return float(sum(self.whole.coordinates[place].outward(float(fitted[place])) for place in self.seconds))

@@ -614,7 +614,7 @@ def _turned(best: Fit, place: int, first: int, seconds: tuple[int, ...], jointly
     try:
         return _estimate(replace(best, experiment=turned, fitted=turned.difference(best.fitted)), place, jointly)
     except BetterFit as better:
-        raise BetterFit(turned.whole_of(better.fitted)) from None
+        raise BetterFit(turned.inside(better.fitted)) from None
 
 
 def _estimate(best: Fit, place: int, jointly: bool = True) -> ParameterEstimate:

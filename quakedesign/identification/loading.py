@@ -44,7 +44,7 @@ class Pieces:
     @property
     def large_changes(self) -> ndarray:
         """Whether the rate changes by more than a quarter, at the beginning of every piece but the first."""
-        slow, fast = np.sort([np.abs(self.rates[1:]), np.abs(self.rates[:-1])], axis=0)
+        slow, fast = np.sort(np.abs([self.rates[1:], self.rates[:-1]]), axis=0)
         return np.asarray(fast > _LARGE_CHANGE * slow)
 
     def position(self, time: ndarray) -> ndarray:
@@ -63,15 +63,15 @@ def staircase(time: ndarray, rates: ndarray) -> Pieces:
 def straight_pieces(time: ndarray, position: ndarray, scatter: float, step: float) -> Pieces:
     """Pieces with the rates of the data, as few as explain it within its noise (`scatter`) and reading step [m]."""
     if len(time) < _FEWEST or not np.ptp(position) > 0:
-        ends = np.array([time[0]]), np.array([(position[-1] - position[0]) / max(time[-1] - time[0], 1e-300)])
-        return Pieces(begins=ends[0], rates=ends[1], noise=0.0, rough=bool(np.ptp(position) > 0))
+        rate = (position[-1] - position[0]) / max(time[-1] - time[0], 1e-300)
+        return Pieces(begins=time[:1], rates=np.array([rate]), noise=0.0, rough=bool(np.ptp(position) > 0))
     t, x = _means(time, position)
     size, span = float(np.ptp(x)) or 1.0, float(np.ptp(t))
     u, y = (t - t[0]) / span, (x - x[0]) / size
     candidates = np.unique(u[np.linspace(1, len(u) - 2, min(_CANDIDATES, len(u) - 2)).astype(int)])
     columns = np.maximum(u[:, None] - candidates, 0)
     floor = (max(scatter * np.sqrt(len(t) / len(time)), 0.3 * step / np.sqrt(len(time) / len(t))) / size) ** 2
-    knots, squares = np.empty(0), [float(np.sum((y - _hinges(u, y, np.empty(0))[1]) ** 2))]
+    knots, squares = np.empty(0), [_squares(u, y, np.empty(0))]
     while len(knots) < _MOST_PIECES:
         basis, _ = np.linalg.qr(_design(u, knots))
         across = columns - basis @ (basis.T @ columns)
@@ -82,9 +82,8 @@ def straight_pieces(time: ndarray, position: ndarray, scatter: float, step: floa
         squares.append(float(left @ left))
         noise = max(squares[-1] / len(u) * _spread(left), floor)
         before = squares[max(len(squares) - 1 - _PATIENCE, 0)]
-        if squares[-1] < floor * len(u) or (
-            len(squares) > _PATIENCE and before - squares[-1] < _PATIENCE * _ODDS * np.log(len(u)) * noise
-        ):
+        little = _PATIENCE * _ODDS * np.log(len(u)) * noise
+        if squares[-1] < floor * len(u) or (len(squares) > _PATIENCE and before - squares[-1] < little):
             break
     knots = _needed(u, y, knots, floor)
     rates, line = _hinges(u, y, knots)
@@ -106,34 +105,22 @@ def given_pieces(time: ndarray, position: ndarray, rates: ndarray) -> Pieces:
     """Pieces with known rates, beginning at the times that suit the data best; refused where they do not suit."""
     t, x = _means(time, position, most=400)
 
-    def pieces_at(begins: ndarray) -> Pieces:
-        return Pieces(begins=np.concatenate([t[:1], np.sort(begins)]), rates=rates, noise=0.0, given=True)
-
     def off(begins: ndarray) -> float:
-        return float(np.std(x - pieces_at(begins).position(t)))
+        begins = np.concatenate([t[:1], np.sort(begins)])
+        return float(np.std(x - Pieces(begins=begins, rates=rates, noise=0.0).position(t)))
 
-    count = len(rates) - 1
-    bounds = [(t[0], t[-1])] * count
-    begins = differential_evolution(off, bounds, rng=0, tol=1e-10, maxiter=400).x if count else np.empty(0)
-    pieces = replace(pieces_at(begins), noise=off(begins))
-    pieces = replace(pieces, begins=np.concatenate([time[:1], pieces.begins[1:]]))
-    if pieces.noise > 0.03 * np.ptp(x):
-        moved = np.array(
-            [
-                np.polyfit(part_t, part_x, 1)[0]
-                for part_t, part_x in zip(np.array_split(t, 8), np.array_split(x, 8), strict=True)
-            ]
-        )
+    bounds = [(t[0], t[-1])] * (len(rates) - 1)
+    begins = differential_evolution(off, bounds, rng=0, tol=1e-10, maxiter=400).x if bounds else np.empty(0)
+    noise, begins = off(begins), np.concatenate([time[:1], np.sort(begins)])
+    if noise > 0.03 * np.ptp(x):
+        parts = zip(np.array_split(t, 8), np.array_split(x, 8), strict=True)
+        moved = [np.polyfit(*part, 1)[0] for part in parts]
         told, found = (", ".join(f"{rate:.3g}" for rate in each) for each in (rates, moved))
         raise RecordError(
             f"--rates must be those of the load point. Received {told} m/s; in eighths of the record it moves at "
             f"{found} m/s. Correct the rates, or cut out the part with --from and --to."
         )
-    return pieces
-
-
-# ----------------------------------------------------------------------
-# Load point and normal load together: the drive of a simulated experiment.
+    return Pieces(begins=begins, rates=rates, noise=noise, given=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,10 +150,9 @@ class Loading:
     @property
     def first_step(self) -> float | None:
         """Logarithm of the ratio of rates at the first of them; None without one, or with a hold."""
-        places = np.flatnonzero(self.pieces.large_changes)
-        if not len(places):
+        if not len(places := np.flatnonzero(self.pieces.large_changes)):
             return None
-        slow, fast = self.pieces.rates[places[0]], self.pieces.rates[places[0] + 1]
+        slow, fast = self.pieces.rates[places[0] : places[0] + 2]
         return float(np.log(fast / slow)) if slow > 0 and fast > 0 else None
 
     def delays(self, record: Record) -> tuple[ndarray, ndarray]:
@@ -176,10 +162,8 @@ class Loading:
         off = self.pieces.noise / np.maximum(np.abs(np.diff(rates)), 1e-300)
         count = len(record.time) if record.counts is None else float(np.sum(record.counts))
         period = (record.time[-1] - record.time[0]) / count
-        known = self.pieces.rough or off.size == 0
-        hidden = [
-            i for i in range(len(off)) if not known and self.pieces.large_changes[i] and off[i] > _TIMELY * period
-        ]
+        late = self.pieces.large_changes & (off > _TIMELY * period)
+        hidden = [] if self.pieces.rough else np.flatnonzero(late).tolist()
         hidden = sorted(sorted(hidden, key=lambda i: -abs(rates[i + 1] - rates[i]))[:_MOST_DELAYS])
         after = [(record.time >= begins[i + 1]) & (record.time < ends[i + 1]) for i in hidden]
         told = [(samples, 3 * off[i] + period) for samples, i in zip(after, hidden, strict=True) if samples.any()]
@@ -211,23 +195,15 @@ class Loading:
     def smoothed(self, record: Record) -> Record:
         """A record whose load point and normal load are those of the pieces, where these stand for them."""
         load = record.load_point if self.pieces.rough else self.pieces.position(record.time)
-        normal = record.normal
-        if self.level is not None:
-            normal = np.full_like(normal, self.level)
-        if self.level is not None and self.normal is not None:
-            normal = normal + self.normal.position(record.time)
-        return replace(record, load_point=load, normal=normal)
+        normal = record.normal if self.level is None else np.full_like(record.normal, self.level)
+        moved = 0.0 if self.normal is None else self.normal.position(record.time)
+        return replace(record, load_point=load, normal=normal + moved)
 
 
 def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None = None) -> tuple[Record, Loading | None]:
     """A record as means of its samples, with load point and normal load as they drive it; and how these move.
 
-    `rates` of the load point [m/s], or the pieces, may be known.
-
-    Raises
-    ------
-    RecordError
-        For rates that are not those of the load point.
+    `rates` of the load point [m/s], or the pieces, may be known. Raises `RecordError` where it does not move at these.
     """
     time, load = record.time, record.load_point
     if load is None:
@@ -244,26 +220,18 @@ def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None =
         pieces = staircase(time, record.load_rates)
     else:
         pieces = straight_pieces(time, load, scatter(time, load), reading_step(load))
-    notes = [_said(pieces)]
-    allowed = (
-        FAR_OFF
-        * scatter(time, record.friction)
-        / abs(float(np.median(record.friction)))
-        * float(np.median(record.normal))
-    )
-    normal: Pieces | None = None
-    level: float | None = float(np.mean(record.normal))
-    assert level is not None
-    if np.percentile(np.abs(record.normal - level), 99) > max(allowed, 1e-9 * level):
+    relative = FAR_OFF * scatter(time, record.friction) / abs(float(np.median(record.friction)))
+    allowed, mean = relative * float(np.median(record.normal)), float(np.mean(record.normal))
+    loading = Loading(pieces=pieces, normal=None, level=mean, notes=(_said(pieces),))
+    if np.percentile(np.abs(record.normal - mean), 99) > max(allowed, 1e-9 * mean):
         size = scatter(time, record.normal)
         normal = straight_pieces(time, record.normal, max(size, allowed / FAR_OFF), reading_step(record.normal))
         level = float(np.mean(record.normal - normal.position(time)))
-        rough = normal.noise > max(allowed, 2 * size)
-        normal, level = (None, None) if rough else (normal, level)
-        notes.append(
-            "the normal load is followed sample by sample" if rough else "the normal load changes in straight pieces"
-        )
-    loading = Loading(pieces=pieces, normal=normal, level=level, notes=tuple(notes))
+        if normal.noise > max(allowed, 2 * size):
+            told = replace(loading, level=None), "the normal load is followed sample by sample"
+        else:
+            told = replace(loading, normal=normal, level=level), "the normal load changes in straight pieces"
+        loading = replace(told[0], notes=(*loading.notes, told[1]))
     return loading.smoothed(thinned(record, pieces.begins, follow=pieces.rough)), loading
 
 
@@ -294,12 +262,16 @@ def _hinges(u: ndarray, y: ndarray, knots: ndarray) -> tuple[ndarray, ndarray]:
     return np.cumsum(found[1:]), design @ found
 
 
+def _squares(u: ndarray, y: ndarray, knots: ndarray) -> float:
+    """Of what the broken line leaves."""
+    return float(np.sum((y - _hinges(u, y, knots)[1]) ** 2))
+
+
 def _refined(u: ndarray, y: ndarray, knots: ndarray) -> ndarray:
     """Knots moved to where broken lines fit best (Muggeo 2003, Stat. Med. 22, 3055)."""
     best, least = knots, np.inf
     for _ in range(8 if len(knots) else 0):
-        _, line = _hinges(u, y, knots)
-        squares = float(np.sum((y - line) ** 2))
+        squares = _squares(u, y, knots)
         if squares < least:
             best, gained, least = knots, least - squares, squares
             if gained < 1e-6 * least:
@@ -323,12 +295,11 @@ def _needed(u: ndarray, y: ndarray, knots: ndarray, floor: float) -> ndarray:
     noise = max(float(left @ left) / len(u) * _spread(left), floor)
     allowed = _ODDS * np.log(len(u)) * noise
     while len(knots):
-        rates, line = _hinges(u, y, knots)
-        squares = float(np.sum((y - line) ** 2))
+        rates, _ = _hinges(u, y, knots)
         changes = np.abs(np.diff(rates)) / np.maximum(np.maximum(np.abs(rates[1:]), np.abs(rates[:-1])), 1e-300)
         fewer = [_refined(u, y, np.delete(knots, i)) for i in range(len(knots))]
-        losses = np.array([float(np.sum((y - _hinges(u, y, others)[1]) ** 2)) for others in fewer])
-        losses, near = np.maximum(losses - squares, 0), np.diff(knots) < 2 / len(u)
+        losses = np.array([_squares(u, y, others) for others in fewer]) - _squares(u, y, knots)
+        losses, near = np.maximum(losses, 0), np.diff(knots) < 2 / len(u)
         doubled = np.append(near, False) | np.insert(near, 0, False)
         losses = np.where(changes < _LEAST_CHANGE, -1.0, np.where(doubled, -1 / (1 + losses), losses))
         least = int(np.argmin(losses))

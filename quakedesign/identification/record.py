@@ -1,11 +1,8 @@
-"""Laboratory records: what columns mean in SI, noise estimate, straight parts, and thinning.
-
-Thinning replaces neighbouring samples by their mean where signals vary slowly.
-"""
+"""Laboratory records: what columns mean in SI, their noise, and means of neighbouring samples in place of many."""
 
 import heapq
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,9 +16,6 @@ from quakedesign.errors import RecordError, UnitError
 from quakedesign.fault.units import si_value
 from quakedesign.identification.record_file import Column, heading, read_columns
 from quakedesign.text import nearest_name, shown
-
-# ----------------------------------------------------------------------
-# Records of laboratory experiments: columns with units, read at the boundary into SI.
 
 COLUMNS = {
     "time": "s",
@@ -57,7 +51,7 @@ _UNITS |= {"MPA": "MPa", "Mpa": "MPa", "mpa": "MPa", "KPa": "kPa", "kpa": "kPa",
 _COUNTS = {"bit", "bits", "volt", "volts", "V", "mV", "counts"}
 _SHEAR = {"shear_stress": "normal_stress", "shear_force": "normal_force"}
 _SAME = 0.01  # of friction, by which two columns of it may differ
-_PLAUSIBLE = 0.01, 3.0  # median friction [-]
+_PLAUSIBLE = 0.01, 3.0  # median friction [-]: another costs minutes of a fit
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -173,7 +167,23 @@ def read_windows(
     found = []
     for window in windows:
         inside, left = _weighted(_window(given, *window))
-        found.append(_record(Path(path).stem, inside, normal_stress, (*remarks, *told, *left)))
+        _require_sizes(inside)
+        friction, normal, unit = _friction(inside, normal_stress)
+        load_point, rates, turned = _load_point(inside)
+        record = Record(
+            name=Path(path).stem,
+            time=inside["time"] - inside["time"][0],
+            friction=friction,
+            load_point=load_point,
+            slip=inside.get("slip"),
+            normal=normal,
+            normal_unit=unit,
+            load_rates=rates,
+            counts=inside.get("weight"),
+            remarks=(*remarks, *told, *left, *turned),
+            origin=float(inside["time"][0]),
+        )
+        found.append(record)
     return found
 
 
@@ -212,16 +222,14 @@ def _given(found: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], li
         name = name if name or column.unit else _meant(column.name.rpartition("_")[0])
         if not name:
             unknown.append(column)
-            continue
-        if name in given:
+        elif name in given:
             raise RecordError(
                 f"a column must be there once. Received {name} twice: {headings[name]} and {column.heading}. Say which "
                 f"by --columns '{name}={column.heading}', or remove one."
             )
-        given[name] = column.values * _factor(name, column)
-        headings[name] = column.heading
-    numbered = all(column.heading.isdigit() for column in found)
-    if not given and numbered:
+        else:
+            given[name], headings[name] = column.values * _factor(name, column), column.heading
+    if not given and all(column.heading.isdigit() for column in found):
         raise RecordError(
             f"a record must begin with a line of headings. Received {len(found)} columns of numbers alone. Write names "
             "and units above, or give them: --columns 'time=1 [s], load_point_displacement=2 [um], shear_stress=3 "
@@ -231,9 +239,15 @@ def _given(found: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], li
         near = nearest_name(column.name.lower().replace(" ", "_"), COLUMNS)
         if near and near.split()[-1].strip("?") not in given:
             raise RecordError(f"a column must be one of {', '.join(COLUMNS)}. Received {shown(column.name)}.{near}")
-    _require_time(given, unknown)
+    left = ", ".join(shown(column.heading) for column in unknown)
+    if "time" not in given:
+        others, example = (f", and {left}, unknown", unknown[0].name) if unknown else ("", "1")
+        raise RecordError(
+            f"a record must have the column time. Received {', '.join(given) or 'none'}{others}. Add time [s], or name "
+            f"it: --columns 'time={example} [s]'."
+        )
     remarks = [f"{headings[n]} is read as {n}" for n in given if _squeezed(heading(headings[n]).name) != _squeezed(n)]
-    return given, [*remarks, *([f"not read: {', '.join(shown(c.heading) for c in unknown)}"] if unknown else [])]
+    return given, [*remarks, *([f"not read: {left}"] if unknown else [])]
 
 
 def _squeezed(name: str) -> str:
@@ -298,24 +312,8 @@ def _factor(name: str, column: Column) -> float:
         ) from None
 
 
-def _require_time(given: Mapping[str, ndarray], unknown: Sequence[Column]) -> None:
-    if "time" not in given:
-        others = f", and {', '.join(shown(c.heading) for c in unknown)}, unknown" if unknown else ""
-        example = unknown[0].name if unknown else "1"
-        raise RecordError(
-            f"a record must have the column time. Received {', '.join(given) or 'none'}{others}. Add time [s], or name "
-            f"it: --columns 'time={example} [s]'."
-        )
-
-
 def _measured(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]:
-    """Rows in which everything was measured, those at the same time as their mean, and what was done.
-
-    Raises
-    ------
-    RecordError
-        When time goes back, or nothing is left.
-    """
+    """Rows in which everything was measured, those at the same time as their mean, and what was done."""
     table, told = pd.DataFrame(given), []
     whole = table.dropna()
     if lost := len(table) - len(whole):
@@ -360,48 +358,24 @@ def _window(given: dict[str, ndarray], begin: str | None, end: str | None) -> di
     return {name: column[inside] for name, column in given.items()}
 
 
-def _record(name: str, given: dict[str, ndarray], normal_stress: float | None, remarks: tuple[str, ...]) -> Record:
-    _require_sizes(given)
-    friction, normal, unit = _friction(given, normal_stress)
-    load_point, rates, turned = _load_point(given)
-    time = given["time"]
-    return Record(
-        name=name,
-        time=time - time[0],
-        friction=friction,
-        load_point=load_point,
-        slip=given.get("slip"),
-        normal=normal,
-        normal_unit=unit,
-        load_rates=rates,
-        counts=given.get("weight"),
-        remarks=(*remarks, *turned),
-        origin=float(time[0]),
-    )
-
-
-_DURATION, _PERIOD, _DISTANCE, _RATE = (1e-6, 1e12), (1e-9, 1e12), (1e-12, 1e6), (1e-15, 1e4)
-_SIZES = {"m/s": _RATE, "Pa": (1e-6, 1e15), "N": (1e-6, 1e15)}
+_SIZES = {"m": (1e-12, 1e6), "m/s": (1e-15, 1e4), "Pa": (1e-6, 1e15), "N": (1e-6, 1e15)}
+_DURATION, _PERIOD = (1e-6, 1e12), (1e-9, 1e12)
 
 
 def _require_sizes(given: dict[str, ndarray]) -> None:
-    """Refuse sizes that no experiment has, as of a wrong unit: solvers of the fit fail on them.
-
-    Raises
-    ------
-    RecordError
-    """
+    """Refuse sizes that no experiment has, as of a wrong unit: solvers of the fit fail on them."""
     time = given["time"]
     if len(time) < 2:
         return
     lasting = float(np.ptp(time))
     sizes = [("the duration", lasting, _DURATION, "s"), ("a sampling period", np.min(np.diff(time)), _PERIOD, "s")]
     for name, column in given.items():
-        if COLUMNS[name] == "m":
-            sizes.append((f"the range of {name}", np.ptp(column), _DISTANCE, "m"))
-            sizes.append((f"the mean rate of {name}", np.ptp(column) / lasting, _RATE, "m/s"))
-        elif COLUMNS[name] in _SIZES:
-            sizes.append((f"the largest {name}", np.max(np.abs(column)), _SIZES[COLUMNS[name]], COLUMNS[name]))
+        unit = COLUMNS[name]
+        if unit == "m":
+            sizes.append((f"the range of {name}", np.ptp(column), _SIZES["m"], "m"))
+            sizes.append((f"the mean rate of {name}", np.ptp(column) / lasting, _SIZES["m/s"], "m/s"))
+        elif unit in _SIZES:
+            sizes.append((f"the largest {name}", np.max(np.abs(column)), _SIZES[unit], unit))
     for what, size, (least, largest), unit in sizes:
         if size and not least <= size <= largest:
             raise RecordError(
@@ -411,8 +385,12 @@ def _require_sizes(given: dict[str, ndarray]) -> None:
 
 def _friction(given: dict[str, ndarray], stress: float | None) -> tuple[ndarray, ndarray, str]:
     """Friction coefficient, what is normal to it, and the unit of that."""
-    given = _without_repetition(given)
     found = [name for name in ("friction", *_SHEAR) if name in given]
+    for shear, across in _SHEAR.items():
+        if {"friction", shear, across} <= given.keys():
+            off = np.median(np.abs(given["friction"] * given[across] - given[shear]))
+            if off <= _SAME * np.median(np.abs(given[shear])):  # the same twice
+                found = [name for name in found if name != "friction"]
     if len(found) != 1:
         raise RecordError(
             "a record must have exactly one column friction, shear_stress or shear_force. Received "
@@ -436,38 +414,17 @@ def _friction(given: dict[str, ndarray], stress: float | None) -> tuple[ndarray,
     if np.any(normal <= 0):
         raise RecordError(f"{across} must be positive. Received {np.min(normal):.6g} {unit}. Compression is positive.")
     friction = given[measured] / (1 if measured == "friction" else normal)
-    _require_plausible(friction, measured, across)
-    return friction, normal, unit
-
-
-def _without_repetition(given: dict[str, ndarray]) -> dict[str, ndarray]:
-    """Without a column of friction that is shear over normal stress of the same file."""
-    for shear, normal in _SHEAR.items():
-        if {"friction", shear, normal} <= given.keys():
-            off = np.median(np.abs(given["friction"] * given[normal] - given[shear]))
-            if off <= _SAME * np.median(np.abs(given[shear])):
-                return {name: column for name, column in given.items() if name != "friction"}
-    return given
-
-
-def _require_plausible(friction: ndarray, measured: str, across: str) -> None:
-    """Refuse a friction that no rock has, which costs minutes of a fit, with its likely cause.
-
-    Raises
-    ------
-    RecordError
-    """
-    middle = float(np.median(friction))
-    least, largest = _PLAUSIBLE
-    if middle <= 0:
+    if (middle := float(np.median(friction))) <= 0:
         raise RecordError(
             f"{measured} must be positive. Received a median of {middle:.3g} of friction. Change its sign."
         )
+    least, largest = _PLAUSIBLE
     if not least <= middle <= largest:
         by = "column" if measured == "friction" else f"units of {measured} and {across}, of --normal-stress too"
         raise RecordError(
             f"friction must have a median from {least:g} to {largest:g}. Received {middle:.3g}. Check the {by}."
         )
+    return friction, normal, unit
 
 
 def _load_point(given: dict[str, ndarray]) -> tuple[ndarray | None, ndarray | None, list[str]]:
@@ -475,17 +432,16 @@ def _load_point(given: dict[str, ndarray]) -> tuple[ndarray | None, ndarray | No
 
     A recorded rate is that which was commanded from its sample on, a staircase.
     """
-    name = next((name for name in ("load_point_displacement", "load_point_rate") if name in given), None)
-    if name is None:
-        return None, None, []
-    column, displaced = given[name], name == "load_point_displacement"
-    backward = float(column[-1] - column[0] if displaced else np.sum(column)) < 0
-    column = -column if backward else column
-    turned = [f"{name} falls: its sign is changed"] * backward
-    if displaced:
-        return column - column[0], None, turned
-    moved = np.concatenate([[0.0], np.cumsum(np.diff(given["time"]) * column[:-1])])
-    return moved, column, turned
+    for name in ("load_point_displacement", "load_point_rate"):
+        if name in given:
+            column, displaced = given[name], name == "load_point_displacement"
+            backward = float(column[-1] - column[0] if displaced else np.sum(column)) < 0
+            column = -column if backward else column
+            moved = column - column[0]
+            if not displaced:
+                moved = np.concatenate([[0.0], np.cumsum(np.diff(given["time"]) * column[:-1])])
+            return moved, None if displaced else column, [f"{name} falls: its sign is changed"] * backward
+    return None, None, []
 
 
 # ----------------------------------------------------------------------
@@ -531,43 +487,29 @@ def reading_step(values: ndarray) -> float:
 def thinned(record: Record, begins: ndarray | None = None, *, follow: bool = False) -> Record:
     """A record with means in place of samples, and how many samples each stands for; short ones as they are.
 
+    `begins` are times at which the rate of loading changes [s]; `follow` says whether it changes in between as well.
+
     After every change of the rate of loading, windows reach over at most half of the time since then, and an eighth of
     the piece. A window over which friction, slip or normal load bends by more than its noise explains is halved, the
     most curved first, until there are `MOST_MEANS`; eight means are then taken in every window, so that a bend which
     its noise hides moves a mean by a twentieth of its own noise. Steps and what follows them keep their samples.
-
-    Parameters
-    ----------
-    record : Record
-    begins : ndarray, optional
-        Times at which the rate of loading changes [s].
-    follow : bool
-        Whether the load point bends in between as well.
     """
     count = len(record.time)
     if count <= MOST_PLAIN:
         return record
     starts = np.unique(np.searchsorted(record.time, [record.time[0], *([] if begins is None else begins)]))
     windows = _edges(record.time, np.append(starts[starts < count], count))
-    edges = _halved(
-        record, np.union1d(windows, _spikes(record.friction, scatter(record.time, record.friction))), follow
-    )
+    spikes = _spikes(record.friction, scatter(record.time, record.friction))
+    edges = _halved(record, np.union1d(windows, spikes), follow)
     weights = np.ones(count, dtype=int) if record.counts is None else record.counts
     counts = np.add.reduceat(weights, edges[:-1])
 
-    def means(values: ndarray) -> ndarray:
-        return np.asarray(values[0] + np.add.reduceat(weights * (values - values[0]), edges[:-1]) / counts)
-
-    return replace(
-        record,
-        time=means(record.time),
-        friction=means(record.friction),
-        normal=means(record.normal),
-        load_rates=None,
-        counts=counts,
-        load_point=None if record.load_point is None else means(record.load_point),
-        slip=None if record.slip is None else means(record.slip),
-    )
+    means: dict[str, Any] = {
+        name: values[0] + np.add.reduceat(weights * (values - values[0]), edges[:-1]) / counts
+        for name in ("time", "friction", "normal", "load_point", "slip")
+        if (values := getattr(record, name)) is not None
+    }
+    return replace(record, load_rates=None, counts=counts, **means)
 
 
 def _edges(time: ndarray, starts: ndarray) -> ndarray:
@@ -585,9 +527,8 @@ def _edges(time: ndarray, starts: ndarray) -> ndarray:
 
 def _spikes(values: ndarray, noise: float) -> ndarray:
     """Samples far from both neighbours, and those after them: an outlier must not be lost in a mean."""
-    off = np.zeros(len(values))
-    off[1:-1] = np.minimum.reduce([(values[1:-1] - values[:-2]) ** 2, (values[1:-1] - values[2:]) ** 2])
-    far = np.flatnonzero(off > (_SPIKE * noise) ** 2)
+    steps = np.diff(values) ** 2
+    far = 1 + np.flatnonzero(np.minimum(steps[:-1], steps[1:]) > (_SPIKE * noise) ** 2)
     return np.concatenate([far, far + 1]) if len(far) <= _MOST_SPIKES else np.empty(0, dtype=int)
 
 
@@ -606,9 +547,8 @@ def _halved(record: Record, edges: ndarray, follow: bool) -> ndarray:
         if end - begin < 2:
             return 0.0
         if end - begin < 4:
-            return max(
-                (float(np.max(np.abs(np.diff(sums[begin : end + 1], 2)))) / 2**0.5 for sums in columns), default=0.0
-            )
+            changes = [np.max(np.abs(np.diff(sums[begin : end + 1], 2))) for sums in columns]
+            return float(max(changes, default=0.0)) / 2**0.5
         cuts = np.linspace(begin, end, 5).astype(int)
         each = (end - begin) / 4
         quarters = np.array([np.diff(sums[cuts]) / np.diff(cuts) for sums in columns])

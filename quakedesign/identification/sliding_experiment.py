@@ -1,6 +1,8 @@
 """Simulated velocity-step and hold experiments with rate-and-state friction.
 
-A spring loads a block without inertia; the load point follows the record. The stiff equations are
+A spring loads a block. Its far end follows the recorded load point, from sample to sample at a constant rate. Inertia
+is left out: the spring balances friction, k(x − slip) = σ'μ, and the time derivative of that gives the slip rate (the
+plant of `quakedesign.symbolic.rate_and_state_plant`, without damping, on a record's time). The stiff equations are
 integrated by an L-stable Rosenbrock step of order 3, with exact derivatives.
 """
 
@@ -20,29 +22,15 @@ from quakedesign.symbolic.casadi_printer import to_casadi, vectorised
 from quakedesign.symbolic.plant import x1
 from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
 
-# ----------------------------------------------------------------------
-# A linearly implicit step for stiff equations, as an expression that can be differentiated exactly.
-
 ORDER = 3
-SOURCE = "RODAS3 of Sandu, Verwer, Blom, Spee, Carmichael and Potra (1997), Atmos. Environ. 31(20), 3459"
 _DIAGONAL = 0.5
 
 
 def step(field: Callable[[Any], Any], y: Any, length: Any) -> tuple[Any, Any]:
     """State after one L-stable step of order 3, and the estimate of its error (that of an embedded order 2).
 
-    Parameters
-    ----------
-    field : callable
-        dy/dt of y, both CasADi SX columns; time must not enter.
-    y : casadi.SX
-        State before.
-    length : casadi.SX
-        Of the step [s]; nothing changes when it is 0.
-
-    Returns
-    -------
-    tuple of casadi.SX
+    `field` gives dy/dt of y, both CasADi SX columns; time must not enter. Nothing changes in a step of length 0 [s].
+    RODAS3 of Sandu, Verwer, Blom, Spee, Carmichael and Potra (1997), Atmos. Environ. 31(20), 3459.
     """
     rates = field(y)
     inverse = ca.inv(ca.SX.eye(y.numel()) - _DIAGONAL * length * ca.jacobian(rates, y))
@@ -56,13 +44,6 @@ def step(field: Callable[[Any], Any], y: Any, length: Any) -> tuple[Any, Any]:
     fourth = stage(field(y + 2 * first + third), first - second - 8 * third / 3)
     return y + 2 * first + third + fourth, fourth
 
-
-# ----------------------------------------------------------------------
-# Friction with a state on a block that a spring draws: the experiment behind velocity steps and holds.
-#
-# The far end follows the recorded load point, from sample to sample at a constant rate. Inertia is left out: the spring
-# balances friction, k(x − slip) = σ'μ, and the time derivative of that gives the slip rate (the plant of
-# `quakedesign.symbolic.rate_and_state_plant`, without damping, on a record's time).
 
 _MOST_STEPS = 30  # a sample on average; what needs more runs away, or is far too sparse for its law
 _SAFETY = 0.9
@@ -140,8 +121,7 @@ class SlidingExperiment(Experiment):
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
         """The mass from which on inertia would have been seen."""
-        ends = np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
-        rates = np.exp(self._states(fitted)[0, ends])
+        rates = np.exp(self._states(fitted)[0, self._ends])
         acceleration = float(np.max(np.abs(np.diff(rates) / self.drive.lengths * self.drive.compliance)))
         if not (acceleration > 0 and self.normal_unit):
             return ()
@@ -181,9 +161,13 @@ class SlidingExperiment(Experiment):
         return {}
 
     @cached_property
+    def _ends(self) -> ndarray:
+        """Steps up to every instant."""
+        return np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
+
+    @cached_property
     def _sampled(self) -> ndarray:
-        ends: ndarray = np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
-        return np.asarray(ends[self.measured])
+        return np.asarray(self._ends[self.measured])
 
     @cached_property
     def _inputs(self) -> ndarray:
@@ -227,13 +211,36 @@ def _steps(
 def _built(
     law: FrictionLaw, names: tuple[str, ...], stiffness: float | None, first_rate: float, linear: frozenset[str]
 ) -> dict[str, Any]:
-    """CasADi Functions of a step, its derivatives and what is read, for logarithms of rate, states and coordinates."""
-    model = _Model(law, names, stiffness, linear)
-    count, size = len(names), 1 + len(law.state_names)
-    q, u = ca.SX.sym("q", count), ca.SX.sym("u", 4)
-    y = ca.SX.sym("y", size)
-    after, error = step(lambda at: model.field(at, u, q), y, u[0])
-    start, read = model.start(first_rate, q), model.friction(y, q)
+    """CasADi Functions of a step, its derivatives and what is read, for logarithms of rate, states and coordinates.
+
+    Quantities of the law are exponentials of the coordinates, or numbers.
+    """
+    symbolic, moving = law.symbolic(), (rate, *state_symbols(law.state_names))
+    size = len(law.state_names)
+    q, u, y = ca.SX.sym("q", len(names)), ca.SX.sym("u", 4), ca.SX.sym("y", 1 + size)
+    friction = without_overflow(symbolic.coefficient(x1, *moving))
+    rows = [friction, *(friction.diff(x) for x in moving), *symbolic.state_rates(x1, *moving)]
+
+    def at(expressions: Any, y: Any) -> list[Any]:
+        now = {x: ca.exp(y[i]) for i, x in enumerate(moving)}
+        return to_casadi(expressions, fitted_quantities(law, names, q, linear) | now)
+
+    def field(y: Any) -> Any:
+        """d/dt of the logarithms of rate and states, from d(σ'μ)/dt = k(load rate − rate)."""
+        mu, mu_rate, *others = at(rows, y)
+        load, growth, compliance = u[1], u[2], u[3]
+        spring = stiffness if stiffness is not None else ca.exp(q[names.index(STIFFNESS)])
+        v = ca.exp(y[0])
+        drawn = spring * compliance * (load - v) - growth * mu
+        drawn -= sum(slope * change for slope, change in zip(others[:size], others[size:], strict=True))
+        return ca.vertcat(drawn / (v * mu_rate), *(others[size + i] / ca.exp(y[1 + i]) for i in range(size)))
+
+    # steady sliding, but for a state and a rate that are off by what is fitted
+    values = fitted_quantities(law, names, q, linear) | {rate: ca.SX(first_rate)}
+    steady = ca.log(ca.vertcat(*to_casadi(symbolic.steady_state(rate), values)))
+    older, faster = (q[names.index(n)] if n in names else 0 for n in (START_STATE, START_RATE))
+    start = ca.vertcat(np.log(first_rate) + faster, steady + older)
+    (after, error), (read,) = step(field, y, u[0]), at([friction], y)
     outputs = {
         "step": ([y, u, q], [after]),
         "trial": ([y, u, q], [after, ca.sum2(ca.fabs(ca.jacobian(read, y)) * ca.fabs(error.T))]),
@@ -248,51 +255,3 @@ def _built(
         for name, (into, found) in outputs.items()
     }
     return built | {name: vectorised(built[name]) for name in ("step_slopes", "friction", "friction_slopes")}
-
-
-@dataclass(frozen=True)
-class _Model:
-    """One law in CasADi, its quantities exponentials of the coordinates or numbers."""
-
-    law: FrictionLaw
-    names: tuple[str, ...]
-    stiffness: float | None
-    linear: frozenset[str]
-
-    def friction(self, y: Any, q: Any) -> Any:
-        return self._casadi([self._expressions[0]], y, q)[0]
-
-    def field(self, y: Any, u: Any, q: Any) -> Any:
-        """d/dt of the logarithms of rate and states, from d(σ'μ)/dt = k(load rate − rate)."""
-        friction, *ageing = self._expressions
-        slopes = [friction.diff(x) for x in (rate, *self._states)]
-        (mu, mu_rate), others = (found := self._casadi([friction, *slopes, *ageing], y, q))[:2], found[2:]
-        size = len(self._states)
-        load, growth, compliance = u[1], u[2], u[3]
-        stiffness = self.stiffness if self.stiffness is not None else ca.exp(q[self.names.index(STIFFNESS)])
-        v = ca.exp(y[0])
-        drawn = stiffness * compliance * (load - v) - growth * mu
-        drawn -= sum(slope * change for slope, change in zip(others[:size], others[size:], strict=True))
-        return ca.vertcat(drawn / (v * mu_rate), *(others[size + i] / ca.exp(y[1 + i]) for i in range(size)))
-
-    def start(self, first_rate: float, q: Any) -> Any:
-        """Steady sliding, but for a state and a rate that are off by what is fitted."""
-        steady = self.law.symbolic().steady_state(rate)
-        values = fitted_quantities(self.law, self.names, q, self.linear) | {rate: ca.SX(first_rate)}
-        states = ca.log(ca.vertcat(*to_casadi(steady, values)))
-        older, faster = (q[self.names.index(n)] if n in self.names else 0 for n in (START_STATE, START_RATE))
-        return ca.vertcat(np.log(first_rate) + faster, states + older)
-
-    @property
-    def _states(self) -> tuple[Any, ...]:
-        return state_symbols(self.law.state_names)
-
-    @cached_property
-    def _expressions(self) -> list[Any]:
-        law = self.law.symbolic()
-        friction = without_overflow(law.coefficient(x1, rate, *self._states))
-        return [friction, *law.state_rates(x1, rate, *self._states)]
-
-    def _casadi(self, expressions: Any, y: Any, q: Any) -> list[Any]:
-        moving = {x: ca.exp(y[i]) for i, x in enumerate((rate, *self._states))}
-        return to_casadi(expressions, fitted_quantities(self.law, self.names, q, self.linear) | moving)

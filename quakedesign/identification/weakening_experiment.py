@@ -1,7 +1,4 @@
-"""Simulated experiments with slip-weakening friction, and friction curves over slip.
-
-The block follows the measured slip, or is loaded by a stiff spring.
-"""
+"""Friction that weakens with slip: at a measured slip, or on a block that a stiff spring draws."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,34 +14,35 @@ from quakedesign.identification.experiment import Coordinate, Experiment
 from quakedesign.symbolic.casadi_printer import to_numpy
 from quakedesign.symbolic.plant import x1
 
-# ----------------------------------------------------------------------
-# Friction over slip, with its slopes, of a law that depends on slip alone.
+START = "start_friction"
+_SMALL_SHARE = 0.3  # of the noise of friction, that adds 4 % to it
 
 
-@dataclass(frozen=True)
-class Curve:
-    """Friction of a law over slip, in NumPy, for logarithms of what is fitted: quantities by `names`."""
+@dataclass(frozen=True, kw_only=True)
+class _Weakening(Experiment):
+    """An experiment with a law that depends on slip alone, whose quantities are its first coordinates."""
 
     law: FrictionLaw
-    names: tuple[str, ...]
+    coordinates: tuple[Coordinate, ...]
 
-    def friction(self, slip: ndarray, fitted: ndarray) -> tuple[ndarray, ndarray]:
-        """Friction [-] and its slope in slip [1/m]."""
+    def strength(self, slip: ndarray, fitted: ndarray) -> tuple[ndarray, ndarray]:
+        """Friction of the law [-] and its slope in slip [1/m]."""
         friction, per_slip = self._rows(self._expressions[:2], slip, fitted)
         return friction, per_slip
 
-    def slopes(self, slip: ndarray, fitted: ndarray) -> ndarray:
-        """Derivatives in the logarithms, shape (slips, names)."""
+    def strength_slopes(self, slip: ndarray, fitted: ndarray) -> ndarray:
+        """Derivatives in the logarithms of its quantities, shape (slips, quantities)."""
         rows = self._rows(self._expressions[2:], slip, fitted)
-        return np.asarray(np.array(rows).T * np.exp(fitted[: len(self.names)]))
+        return np.asarray(np.array(rows).T * np.exp(fitted[: len(self._symbols)]))
 
     def _rows(self, expressions: Any, slip: ndarray, fitted: ndarray) -> list[ndarray]:
-        values = dict(zip(self._symbols, np.exp(fitted[: len(self.names)]), strict=True))
+        values = dict(zip(self._symbols, np.exp(fitted[: len(self._symbols)]), strict=True))
         return [row + np.zeros_like(slip) for row in to_numpy(expressions, values | {x1: slip})]
 
     @cached_property
     def _symbols(self) -> list[Any]:
-        return [self.law.symbols()[name] for name in self.names]
+        symbols = self.law.symbols()
+        return [symbols[c.name] for c in self.coordinates if c.name in symbols]
 
     @cached_property
     def _expressions(self) -> list[Any]:
@@ -52,46 +50,33 @@ class Curve:
         return [friction, *(friction.diff(symbol) for symbol in (x1, *self._symbols))]
 
 
-# ----------------------------------------------------------------------
-# Friction that weakens with slip: at a measured slip, or on a block that a stiff spring draws.
-
-START = "start_friction"
-_SMALL_SHARE = 0.3  # of the noise of friction, that adds 4 % to it
-
-
 @dataclass(frozen=True, kw_only=True)
-class MeasuredSlip(Experiment):
+class MeasuredSlip(_Weakening):
     """Friction of a law at the slip [m] that was measured, not negative; `slip_noise` is its deviation [m]."""
 
-    law: FrictionLaw
     slip: ndarray
     slip_noise: float
-    coordinates: tuple[Coordinate, ...]
 
     def friction(self, fitted: ndarray) -> ndarray:
         """Friction coefficient [-] at every slip."""
-        return self._curve.friction(self.slip, fitted)[0]
+        return self.strength(self.slip, fitted)[0]
 
     def slopes(self, fitted: ndarray) -> ndarray:
-        """Derivatives in the logarithms."""
-        return self._curve.slopes(self.slip, fitted)
+        """Derivatives in the logarithms, and in what else is fitted."""
+        return self.strength_slopes(self.slip, fitted)
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
         """Whether the noise of the slip, which the fit leaves out, is felt in friction."""
-        felt = float(np.max(np.abs(self._curve.friction(self.slip, fitted)[1]))) * self.slip_noise
+        felt = float(np.max(np.abs(self.strength(self.slip, fitted)[1]))) * self.slip_noise
         if felt <= _SMALL_SHARE * noise:
             return ()
         return (
             f"the slip is known exactly, although its noise of {self.slip_noise:.2g} m moves friction by {felt:.2g}",
         )
 
-    @cached_property
-    def _curve(self) -> Curve:
-        return Curve(self.law, tuple(c.name for c in self.coordinates))
-
 
 @dataclass(frozen=True, kw_only=True)
-class Drawn(Experiment):
+class Drawn(_Weakening):
     """A block that sticks until its strength is reached and then slips as far as the spring and friction balance.
 
     Slip never falls. A spring so soft that friction falls faster than it makes the block jump, which no balance
@@ -99,61 +84,44 @@ class Drawn(Experiment):
     normal load in Pa, N or 1. Coordinates are those of the law, the stiffness where it is not given, and `START` last.
     """
 
-    law: FrictionLaw
     load_point: ndarray
     normal: ndarray
-    coordinates: tuple[Coordinate, ...]
     stiffness: float | None
 
     def friction(self, fitted: ndarray) -> ndarray:
         """Shear over normal force [-] at every sample."""
-        slip, _ = self._slip(fitted)
-        return np.asarray(self._held(fitted) - self._softness(fitted) * slip)
+        held, softness = self._held(fitted)
+        return np.asarray(held - softness * self.slip(fitted)[0])
 
     def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives, those of slip from the balance at the sample where it was reached."""
-        slip, since = self._slip(fitted)
-        softness = self._softness(fitted)
-        at_fixed_slip = self._held_slopes(fitted, slip)
+        (slip, since), (_, softness) = self.slip(fitted), self._held(fitted)
+        at_fixed_slip = np.zeros((len(slip), len(fitted)))
+        at_fixed_slip[:, -1] = self.normal[0] / self.normal
+        if self.stiffness is None:
+            at_fixed_slip[:, -2] = softness * (self.load_point - slip)
         laws = np.zeros_like(at_fixed_slip)
-        laws[:, : len(self._curve.names)] = self._curve.slopes(slip[since], fitted)
-        per_slip = self._curve.friction(slip[since], fitted)[1]
+        laws[:, : len(self._symbols)] = self.strength_slopes(slip[since], fitted)
+        per_slip = self.strength(slip[since], fitted)[1]
         moved = (at_fixed_slip[since] - laws) / (softness[since] + per_slip)[:, None]
         moved[slip == 0] = 0
         return np.asarray(at_fixed_slip - softness[:, None] * moved)
 
-    def slip(self, fitted: ndarray) -> ndarray:
-        """Slip [m] at every sample."""
-        return self._slip(fitted)[0]
+    def _held(self, fitted: ndarray) -> tuple[ndarray, ndarray]:
+        """Shear over normal force if nothing slips, and its fall per slip [1/m]."""
+        softness = (np.exp(fitted[-2]) if self.stiffness is None else self.stiffness) / self.normal
+        return np.asarray(fitted[-1] * self.normal[0] / self.normal + softness * self.load_point), softness
 
-    def _stiffness(self, fitted: ndarray) -> float:
-        return float(np.exp(fitted[-2])) if self.stiffness is None else self.stiffness
-
-    def _softness(self, fitted: ndarray) -> ndarray:
-        """Fall of shear over normal force per slip [1/m]."""
-        return np.asarray(self._stiffness(fitted) / self.normal)
-
-    def _held(self, fitted: ndarray) -> ndarray:
-        """Shear over normal force if nothing slips."""
-        return np.asarray(fitted[-1] * self.normal[0] / self.normal + self._softness(fitted) * self.load_point)
-
-    def _held_slopes(self, fitted: ndarray, slip: ndarray) -> ndarray:
-        held_slopes = np.zeros((len(slip), len(fitted)))
-        held_slopes[:, -1] = self.normal[0] / self.normal
-        if self.stiffness is None:
-            held_slopes[:, -2] = self._softness(fitted) * (self.load_point - slip)
-        return held_slopes
-
-    def _slip(self, fitted: ndarray) -> tuple[ndarray, ndarray]:
+    def slip(self, fitted: ndarray) -> tuple[ndarray, ndarray]:
         """Slip [m] at every sample, and the sample at which it was reached."""
-        held, softness = self._held(fitted), self._softness(fitted)
-        strength, weakening = self._curve.friction(np.zeros(1), fitted)
+        held, softness = self._held(fitted)
+        strength, weakening = self.strength(np.zeros(1), fitted)
         if np.min(softness + weakening) <= 0:
             return np.full(len(held), np.nan), np.arange(len(held))
         slip, slips = np.zeros(len(held)), held > strength
 
         def excess(slip: ndarray, held: ndarray, softness: ndarray) -> ndarray:
-            return held - softness * slip - self._curve.friction(slip, fitted)[0]  # type: ignore[no-any-return]
+            return held - softness * slip - self.strength(slip, fitted)[0]  # type: ignore[no-any-return]
 
         if np.any(slips):
             told = held[slips], softness[slips]
@@ -161,7 +129,3 @@ class Drawn(Experiment):
         largest = np.maximum.accumulate(slip)
         new = np.where(slip == largest, np.arange(len(held)), 0)
         return largest, np.maximum.accumulate(new)
-
-    @cached_property
-    def _curve(self) -> Curve:
-        return Curve(self.law, tuple(c.name for c in self.coordinates if c.name in self.law.quantities()))

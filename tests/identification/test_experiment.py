@@ -103,7 +103,7 @@ def test_a_block_does_not_slip_back_when_the_load_point_returns():
     )
     friction = drawn.friction(truth)
     assert np.diff(friction)[-2:] == pytest.approx([-0.02, -0.02])
-    assert drawn.slip(truth)[-1] == drawn.slip(truth)[-3]
+    assert drawn.slip(truth)[0][-1] == drawn.slip(truth)[0][-3]
 
 
 @pytest.mark.parametrize("kind", ["velocity steps, ageing", "slide-hold-slide, stiffness fitted"])
