@@ -283,25 +283,22 @@ def identify(
     several = identify_steps(records, law, **how) if len(records) > 1 else None
     identification = fitted(records[0], law, **how) if several is None else several.common
     found = several or identification
-    file, unwritten = (out, "") if out is not None else (None, "")
+    file, told = out, list[str]()
     if out is not None:
         try:
             save_fault(identification, around, out)
+            told.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
+            told += task_remarks(identification, around)
         except RecordError as refused:
-            file, unwritten = None, f"not written: {out}: {refused}"
-    written = [path for path in (figure, file) if path is not None]
+            file = None
+            told.append(f"not written: {out}: {refused}")
     if figure is not None:
         save_figure(found, figure)
-    told = law_remarks(identification, around)
-    told += [f"written: {', '.join(map(str, written))}"] if written else []
-    if file is not None:
-        told.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
-        told += task_remarks(identification, around)
-    told += [unwritten] if unwritten else []
+    written = ", ".join(str(path) for path in (figure, file) if path is not None)
+    told = [*law_remarks(identification, around), *([f"written: {written}"] if written else []), *told]
     told = [line for each in told for line in wrap(each, 80, subsequent_indent="  ", break_long_words=False)]
     told += [f"next: {next_command(identification, file)}"] if file is not None else []
-    places = {"figure": figure, "file": file}
-    facts = found.to_dict() | {name: None if path is None else str(path) for name, path in places.items()}
+    facts = found.to_dict() | {"figure": figure and str(figure), "file": file and str(file)}
     told += [] if verbose else ["tests, noise and assumptions: --verbose"]
     output.show(facts, [*identification_lines(found, verbose=verbose), *told])
     return 0 if identification.explained else 1

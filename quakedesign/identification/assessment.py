@@ -98,35 +98,25 @@ def sign_check(
 ) -> Check | None:
     """Whether a - b has one sign, with the trend that is taken and with others that are about as likely.
 
-    Parameters
-    ----------
-    difference : ParameterEstimate or None
-        a - b of the fit.
-    others : mapping
-        a - b of fits with another trend or none, and by how much their AIC is higher, by what they are.
-    shift : float or None
-        By how much a - b changes if the trend begins with the first change of rate [-]; None where the beginning has
-        it too.
-    unsteady : str
-        Why the beginning tells nothing of steady sliding; nothing where it does.
+    `others` holds a - b of fits with another trend or none, and by how much their AIC is higher, by what they are;
+    `shift` is by how much a - b changes if the trend begins with the first change of rate [-], None where the beginning
+    has it too; `unsteady` says why the beginning tells nothing of steady sliding.
     """
     if difference is None:
         return None
     told = [difference, *(other for other, _ in others.values())]
-    low, high = min(each.low for each in told), max(each.high for each in told)
-    low, high = low + min(shift or 0.0, 0.0), high + max(shift or 0.0, 0.0)
-    trends = "".join(f", also {what} (AIC {excess:+.3g})" for what, (_, excess) in others.items())
+    low = min(each.low for each in told) + min(shift or 0.0, 0.0)
+    high = max(each.high for each in told) + max(shift or 0.0, 0.0)
     passed = bool(low > 0 or high < 0) and not unsteady
     if passed:
+        trends = "".join(f", also {what} (AIC {excess:+.3g})" for what, (_, excess) in others.items())
         sign = "negative: friction weakens with rate" if high < 0 else "positive: friction strengthens with rate"
         said = f"a - b is {sign}{trends}"
     else:
         late = ": the trend may begin with the change of rate, as slow evolution does"
-        between = f": from {difference.low:.2g} to {difference.high:.2g} in the fit that is taken"
-        between += "".join(
-            f", from {other.low:.2g} to {other.high:.2g} {what} (AIC {excess:+.3g})"
-            for what, (other, excess) in others.items()
-        )
+        spans = {f" {what} (AIC {excess:+.3g})": other for what, (other, excess) in others.items()}
+        spans = {" in the fit that is taken" if others else "": difference, **spans}
+        between = ": " + ", ".join(f"from {each.low:.2g} to {each.high:.2g}{what}" for what, each in spans.items())
         said = f"the sign of a - b is open{unsteady or (late if shift is not None else between)}"
     return Check(name="sign", passed=passed, value=difference.value, limit=0.0, sentence=said)
 
@@ -140,8 +130,8 @@ def unsteady_beginning(difference: Any, values: Mapping[str, float], loading: Lo
     moved = abs(values.get("evolution_effect", 0.0) * values.get(START_STATE, 0.0))
     if difference is None or step is None or loading.before >= _FADED * slip or moved <= abs(difference.value * step):
         return ""
-    began = f": the beginning, of {loading.before / slip:.2g} critical slips,"
-    return f"{began} is off steady sliding by {moved:.2g} of friction"
+    before = f"{loading.before / slip:.2g} critical slips"
+    return f": the beginning, of {before}, is off steady sliding by {moved:.2g} of friction"
 
 
 def _within(name: str, value: float, limit: float, sentence: str) -> Check:
@@ -175,16 +165,12 @@ def _after_steps(
 ) -> float:
     """Largest root mean square of residuals within some critical slips of a change of rate, over their noise."""
     assert record.load_point is not None
-    path, slip = record.load_point[used], _PEAK * values.get("critical_slip", 0.0)
-    kept, scores = fit.kept, fit.whitened / fit.noise
-    within = max(slip, 0.01 * float(np.ptp(path)))
-    worst = 0.0
-    for begin in begins.tolist():
-        after = (time >= begin) & (path - np.interp(begin, time, path) <= min(within, 0.2 * float(np.ptp(path))))
-        some = scores[after[kept]]
-        if len(some) >= 5:
-            worst = max(worst, float(np.sqrt(np.mean(some**2))))
-    return worst
+    path, scores = record.load_point[used], fit.whitened / fit.noise
+    way = float(np.ptp(path))
+    within = min(max(_PEAK * values.get("critical_slip", 0.0), 0.01 * way), 0.2 * way)
+    after = [(time >= begin) & (path - np.interp(begin, time, path) <= within) for begin in begins.tolist()]
+    found = [some for each in after if len(some := scores[each[fit.kept]]) >= 5]
+    return max((float(np.sqrt(np.mean(some**2))) for some in found), default=0.0)
 
 
 def _halves(fit: Fit, time: ndarray, last: float, record: Record, used: ndarray) -> Check:

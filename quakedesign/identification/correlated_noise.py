@@ -73,12 +73,11 @@ class CorrelatedNoise:
 
     def whitener(self, kept: ndarray) -> ndarray:
         """Matrix that makes residuals independent with the variance of one measurement, without what is not kept."""
-        if kept.tobytes() not in self._whiteners:
+        if (key := kept.tobytes()) not in self._whiteners:
             factor = cholesky(self.covariance[np.ix_(kept, kept)], lower=True)
-            whole = np.zeros((int(kept.sum()), len(kept)))
-            whole[:, kept] = dtrtri(factor, lower=1)[0]
-            self._whiteners[kept.tobytes()] = whole
-        return self._whiteners[kept.tobytes()]
+            self._whiteners[key] = np.zeros((int(kept.sum()), len(kept)))
+            self._whiteners[key][:, kept] = dtrtri(factor, lower=1)[0]
+        return self._whiteners[key]
 
     @cached_property
     def _whiteners(self) -> dict[bytes, ndarray]:

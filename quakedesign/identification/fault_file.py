@@ -14,6 +14,7 @@ from itertools import product
 from math import ceil, log
 from pathlib import Path
 from shlex import quote
+from typing import Any
 
 from quakedesign.errors import RecordError
 from quakedesign.exact import rational
@@ -37,16 +38,7 @@ def cover(
     """Law that weakens with slip, and box, that cover every law of ranges of residual, drop and critical slip.
 
     The bounds and the slope of the scaled laws are monotone in each of the three, so corners are enough; numbers are
-    rounded to the safe side.
-
-    Parameters
-    ----------
-    law : FrictionLaw
-        Of the family.
-    ranges : mapping
-        Ends by name of quantity.
-    box : UncertaintyBox
-        Of everything else.
+    rounded to the safe side. `law` is one of the family, `box` that of everything else.
     """
     ends = {name: [rational(end) for end in ranges[name]] for name in sorted(_WEAKENING)}
     corners = [dict(zip(ends, corner, strict=True)) for corner in product(*ends.values())]
@@ -96,10 +88,12 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     RecordError
         When the record does not tell every parameter, or tells a friction that no fault file holds.
     """
-    if len(identification.law.state_names) > 1 or getattr(identification.law, "evolution_effect", 1.0) <= 0:
+    told = ""
+    if getattr(identification.law, "evolution_effect", 1.0) <= 0:
         told = "an evolution effect that is not positive. It strengthens with rate: there is nothing to control."
-        if len(identification.law.state_names) > 1:
-            told = "two states. Omit --states for a file."
+    if len(identification.law.state_names) > 1:
+        told = "two states. Omit --states for a file."
+    if told:
         raise RecordError(f"a fault file holds friction with one state whose effect is positive. Received {told}")
     if not identification.determined:
         raise RecordError(
@@ -142,44 +136,25 @@ def other_parts(identification: Identification, fault: Fault) -> str:
 
 
 def task_remarks(identification: Identification, fault: Fault) -> list[str]:
-    """What to look at in the task that a fault file of a record has from a fault: what was assumed, and its rate.
-
-    Parameters
-    ----------
-    identification : Identification
-    fault : Fault
-        That gives everything but friction.
-    """
-    law, task = identification.law, fault.reference
+    """What to look at in the task that a fault file of a record has from a fault: what was assumed, and its rate."""
+    law: Any = identification.law
+    task, moved = fault.reference, _at_rate_of(fault, law)
     assumed = [said for said in fault.assumed if said.startswith(_OF_TASK)]
     told = [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
+    if moved is not law and moved.reference_rate != law.reference_rate:
+        at = [f"{each.reference_coefficient:.5g} at {each.reference_rate:.4g} m/s" for each in (law, moved)]
+        told.append(f"reference_coefficient {at[0]} is {at[1]}, as the file says it")
     beyond = beyond_rates(law, mean_rate(task), source="of the record") if law.state_names else ""
-    return [*told, *_moved(law, _at_rate_of(fault, law)), *filter(None, [beyond])]
+    return [*told, *filter(None, [beyond])]
 
 
 def law_remarks(identification: Identification, fault: Fault) -> list[str]:
-    """Whether a record has another law with state than the fault names, where it was not told which to take.
-
-    Parameters
-    ----------
-    identification : Identification
-    fault : Fault
-    """
+    """Whether a record has another law with state than the fault names, where it was not told which to take."""
     named, found = fault.friction, identification.law
     if identification.rival is None or not named.state_names or named.name == found.name:
         return []
     why = "the record prefers" if named.name == identification.rival.law else "the record was fitted without it, by"
     return [f"{fault.name} names {named.name}, {why} {found.name}; --law {named.name} takes the other"]
-
-
-def _moved(law: FrictionLaw, moved: FrictionLaw) -> list[str]:
-    """One friction at two reference rates, in words."""
-    (old, was), (new, now) = (
-        (getattr(found, "reference_rate", None), getattr(found, "reference_coefficient", 0.0)) for found in (law, moved)
-    )
-    if new == old:
-        return []
-    return [f"reference_coefficient {was:.5g} at {old:.4g} m/s is {now:.5g} at {new:.4g} m/s, as the file says it"]
 
 
 def next_command(identification: Identification, path: str | Path) -> str:
@@ -196,7 +171,7 @@ def next_command(identification: Identification, path: str | Path) -> str:
     return f"quakedesign design {quote(str(path))}{spread}{code}"
 
 
-def _at_rate_of(fault: Fault, law: FrictionLaw) -> FrictionLaw:
+def _at_rate_of(fault: Fault, law: FrictionLaw) -> Any:
     """A law at the reference rate and on the working range of a fault.
 
     The same friction, as μ_0 moves by (a − b)·ln of the ratio of rates.
@@ -217,8 +192,7 @@ def _at_rate_of(fault: Fault, law: FrictionLaw) -> FrictionLaw:
 
 def _step_follows(identification: Identification, fault: Fault) -> bool:
     """Whether T_s is that of the identified friction: the fault has one for friction of another kind, or none."""
-    with_state = bool(identification.law.state_names)
-    return with_state and (step_assumed(fault) or _gains_a_state(identification, fault))
+    return bool(identification.law.state_names) and (step_assumed(fault) or not fault.friction.state_names)
 
 
 def _gains_a_state(identification: Identification, fault: Fault) -> bool:
@@ -233,38 +207,23 @@ def covers(law: FrictionLaw) -> bool:
 def save_fault(identification: Identification, fault: Fault, path: str | Path) -> None:
     """Write `identified_fault` to a TOML file, best fit and ranges as remarks at its head; whole or not at all.
 
-    Parameters
-    ----------
-    identification : Identification
-    fault : Fault
-    path : str or Path
-
-    Raises
-    ------
-    RecordError
-        As `identified_fault`.
-    OutputError
-        When it cannot be written.
+    Raises `RecordError` as that does, and `OutputError` when it cannot be written.
     """
-    whole = identified_fault(identification, fault)
-    remarks = "".join(f"# {line}\n" for line in _remarks(identification, fault))
-    write_whole(Path(path), remarks + fault_toml(whole))
-
-
-def _remarks(identification: Identification, fault: Fault) -> list[str]:
-    said = (
-        "friction and uncertainty below hold every law of the boxes"
-        if covers(identification.law)
-        else "friction below is the best fit: a fault file holds no ranges of this law; "
-        + (_too_wide(identification) or f"design --spread {_spread(identification)} covers a, b and D_c of the box")
-    )
-    return [
-        f"Friction identified from {identification.record.name!r} as {identification.law.name}; "
+    whole, law = identified_fault(identification, fault), identification.law
+    if covers(law):
+        said = "friction and uncertainty below hold every law of the boxes"
+    else:
+        said = "friction below is the best fit: a fault file holds no ranges of this law; "
+        spread = _spread(identification)
+        said += _too_wide(identification) or f"design --spread {spread} covers a, b and D_c of the box"
+    remarks = [
+        f"Friction identified from {identification.record.name!r} as {law.name}; "
         f"from {fault.name}: {other_parts(identification, fault)}.",
         f"Best fit (95 % alone; box of all together); {said}.",
-        *(_remark(estimate) for estimate in identification.estimates.values()),
+        *map(_remark, identification.estimates.values()),
         *(f"{said}." for said in [*task_remarks(identification, fault), *filter(None, [poor_fit(identification)])]),
     ]
+    write_whole(Path(path), "".join(f"# {line}\n" for line in remarks) + fault_toml(whole))
 
 
 def _too_wide(identification: Identification) -> str:

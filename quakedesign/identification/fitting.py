@@ -328,9 +328,6 @@ def advantage(one: Fit, other: Fit) -> tuple[float, float]:
     return theirs / ours, independent * float(np.log(theirs / ours))
 
 
-# ----------------------------------------------------------------------
-# Confidence regions by the profile likelihood: how far one parameter goes when all others give way.
-
 _MOST_TRIALS = 14
 _CLOSE = 0.01  # share of the wanted distance at which an end counts as found
 _LIMIT = 0.98  # share of the way to the limit of a coordinate from which on an end counts as there

@@ -12,12 +12,21 @@ from numpy import ndarray
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import FrictionLaw
-from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT, Assessment, Check
+from quakedesign.identification.assessment import DECISIVE, EXPLAINS, EXPLAINS_NOT, Assessment, Check
 from quakedesign.identification.fitting import CONFIDENCE, Fit, Profile
 from quakedesign.identification.record import Record
 
 _BESIDE = "delay", "start_rate"  # which may stay open: nothing else hangs on them then
-_DECISIVE = 10.0  # of AIC: odds of about 150 to 1
+
+
+_EXPERIMENTS = {
+    "the stiffness of the machine, from loading or unloading: --stiffness": "stiffness",
+    "a step to ten times the rate, with ten samples within a critical slip after it": "direct_effect evolution_effect",
+    "longer sliding after the step, until friction stays": "critical_slip second_slip second_effect",
+    "longer sliding before the step, which fixes the trend, and steps up and down by a factor of 10": "sign",
+    "slip from rest until friction stays": "drop residual",
+}
+"""Experiments that tell what is open: parameters, or the sign of a - b."""
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -76,8 +85,10 @@ class Rival:
     excess: float  # by how much its AIC is higher, twice the fall of the logarithm of the likelihood
 
     def __str__(self) -> str:
-        told = f"{self.law} fits worse: squares {self.squares:.4g} times as large, AIC higher by {self.excess:.3g}"
-        return told if self.excess > _DECISIVE else f"{told}; so little that the record hardly tells the laws apart"
+        little = "" if self.excess > DECISIVE else "; so little that the record hardly tells the laws apart"
+        return (
+            f"{self.law} fits worse: squares {self.squares:.4g} times as large, AIC higher by {self.excess:.3g}{little}"
+        )
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -151,20 +162,8 @@ class Identification:
     def experiments(self, sign: Check | None = None) -> list[str]:
         """Experiments that would tell what this record does not."""
         open_ = {name for name, estimate in self.estimates.items() if not estimate.identified}
-        told = []
-        if "stiffness" in open_:
-            told.append("the stiffness of the machine, from loading or unloading: --stiffness")
-        if open_ & {"direct_effect", "evolution_effect"}:
-            told.append("a step to ten times the rate, with ten samples within a critical slip after it")
-        if open_ & {"critical_slip", "second_slip", "second_effect"}:
-            told.append("longer sliding after the step, until friction stays")
-        if sign is not None and not sign.passed:
-            told.append(
-                "longer sliding before the step, which fixes the trend, and steps up and down by a factor of 10"
-            )
-        if open_ & {"drop", "residual"}:
-            told.append("slip from rest until friction stays")
-        return told
+        open_ |= {"sign"} if sign is not None and not sign.passed else set()
+        return [experiment for experiment, names in _EXPERIMENTS.items() if open_ & set(names.split())]
 
     @property
     def box(self) -> dict[str, tuple[float, float]]:
@@ -174,19 +173,13 @@ class Identification:
     @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
         """Samples left out, largest first."""
-        times, sizes = self.record.time[self.used], self.fit.residuals
-        places = np.flatnonzero(~self.fit.kept)
-        found = [Outlier(time=float(times[i]), size=float(sizes[i])) for i in places]
+        left = ~self.fit.kept
+        sizes, times = self.fit.residuals[left].tolist(), self.record.time[self.used][left].tolist()
+        found = [Outlier(time=time, size=size) for time, size in zip(times, sizes, strict=True)]
         return tuple(sorted(found, key=lambda outlier: -abs(outlier.size)))
 
     def allows(self, values: Mapping[str, float]) -> bool:
-        """Whether the record allows a set of parameters: whether it lies in the joint region at 95 %.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            All that were fitted, in SI units.
-        """
+        """Whether the record allows a set of parameters, in the joint region at 95 %: all that were fitted, in SI."""
         coordinates = self.fit.experiment.coordinates
         if missing := {c.name for c in coordinates} - set(values):
             raise ParameterError(
@@ -198,30 +191,24 @@ class Identification:
     def untold(self) -> list[str]:
         """Sentences about what the record cannot tell; none where it tells everything."""
         open_ = [e for e in self.estimates.values() if not (e.identified or e.name.startswith(_BESIDE))]
-        names = {estimate.name for estimate in open_}
-        told = []
-        if self.difference is not None and self.difference.identified:
-            pair = self.difference.name.split(" - ")
-            if names >= set(pair):
-                told.append(
-                    f"{pair[0]} and {pair[1]} are not identifiable from this record: only "
-                    f"{_between(self.difference)} is"
-                )
-                open_ = [estimate for estimate in open_ if estimate.name not in pair]
+        told, only = [], self.difference
+        pair = only.name.split(" - ") if only is not None and only.identified else []
+        if only is not None and pair and {e.name for e in open_} >= set(pair):
+            ends = f"{only.name} = {only.value:.4g} ({only.low:.4g} to {only.high:.4g})"
+            told.append(f"{pair[0]} and {pair[1]} are not identifiable from this record: only {ends} is")
+            open_ = [estimate for estimate in open_ if estimate.name not in pair]
         return told + [f"{e.name} is not identifiable from this record: {_one_sided(e)}" for e in open_]
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that JSON can hold; SI units."""
-        fit = self.fit
+        fit, difference = self.fit, self.difference
         return {
             "law": self.law.name,
             **self.assessment.to_dict(),
             "identified": self.identified,
             "not_identifiable": self.untold(),
             "parameters": {name: estimate.to_dict() for name, estimate in self.estimates.items()},
-            "difference": None
-            if self.difference is None
-            else {"of": self.difference.name, **self.difference.to_dict()},
+            "difference": None if difference is None else {"of": difference.name, **difference.to_dict()},
             "chosen": {
                 name: {"value": getattr(self.law, name), "unit": field.metadata["unit"]}
                 for name, field in self.law.quantities().items()
@@ -265,11 +252,6 @@ def estimate(profile: Profile, alone: tuple[float, float], jointly: tuple[float,
 
 def _finite(end: float) -> float | None:
     return end if math.isfinite(end) else None
-
-
-def _between(estimate: ParameterEstimate) -> str:
-    unit = f" {estimate.unit}" if estimate.unit else ""
-    return f"{estimate.name} = {estimate.value:.4g}{unit} ({estimate.low:.4g} to {estimate.high:.4g})"
 
 
 def _one_sided(estimate: ParameterEstimate) -> str:

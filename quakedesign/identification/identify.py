@@ -1,7 +1,7 @@
 """Identification of friction parameters from a record: the experiment, the fit with what is chosen in it, regions."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -69,12 +69,7 @@ def set_up(
     """The experiment of a record as `prepared` gives it, by what its law depends on and what was measured.
 
     `nuisance` is what is fitted besides law and stiffness: `TREND` or `TREND_IN_TIME`, `START_STATE` (with
-    `START_RATE`).
-
-    Raises
-    ------
-    RecordError
-        When the law is of neither kind, or something is missing.
+    `START_RATE`). Raises `RecordError` when the law is of neither kind, or something is missing.
     """
     if law.state_names:
         setup = _sliding(record, law, stiffness, loading, START_STATE in nuisance)
@@ -211,9 +206,6 @@ def _drawn(record: Record, law: type[FrictionLaw], stiffness: float | None) -> S
     return Setup(experiment=experiment, used=np.ones(len(record.time), dtype=bool), notes=notes)
 
 
-# ----------------------------------------------------------------------
-# The main call: from a record to friction parameters with their confidence regions.
-
 AGEING, SLIP = "rate-and-state-aging", "rate-and-state-slip"
 _LEAST_NEAR = 2  # searches, where the first begins near the fit of a similar law
 _EFFECTS_OF = ("direct_effect", "evolution_effect", SECOND_EFFECT)
@@ -324,10 +316,6 @@ class _Fitted:
     best: Fit
 
 
-Alternatives = dict[str, tuple[_Fitted, float]]
-"""Fits with other trends and by how much their AIC is higher, by what they are."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Choice:
     """Which law, which nuisance parameters and which noise a record has."""
@@ -382,7 +370,7 @@ class _Choice:
         record, loading = prepared(self.raw, (), pieces)
         return replace(self, record=record, loading=loading, told=told)
 
-    def _chosen(self, fits: list[_Fitted]) -> tuple[_Fitted, Rival | None, Alternatives]:
+    def _chosen(self, fits: list[_Fitted]) -> tuple[_Fitted, Rival | None, dict[str, tuple[_Fitted, float]]]:
         """The best law, with trend and beginning where these are likelier; the next law, and fits with other trends."""
         noise, rival = self._noise(min(fits, key=lambda fitted: fitted.best.squares)), None
         fits = sorted((_with_noise(each, noise) for each in fits), key=lambda fitted: fitted.best.squares)
@@ -393,8 +381,8 @@ class _Choice:
         better, others = self._trend(self._without_start(_with_noise(better, self._noise(better))))
         return _with_noise(better, self._noise(better)), rival, others
 
-    def _trend(self, fitted: _Fitted) -> tuple[_Fitted, Alternatives]:
-        """The fit with the trend that is taken or without one, and the others.
+    def _trend(self, fitted: _Fitted) -> tuple[_Fitted, dict[str, tuple[_Fitted, float]]]:
+        """The fit with the trend that is taken or without one; others, with what their AIC is higher by.
 
         A trend in time takes the place of one in displacement where its AIC is lower by `DECISIVE`.
         """
@@ -411,7 +399,7 @@ class _Choice:
         others = {_TRENDS[name]: (other, aic[name] - aic[taken]) for name, (other, _) in found.items()}
         return better if better is fitted else _again(better), others
 
-    def _assessed(self, found: Identification, others: Alternatives) -> Assessment:
+    def _assessed(self, found: Identification, others: Mapping[str, tuple[_Fitted, float]]) -> Assessment:
         """Tests of what was taken for granted, and what the record leaves open."""
         values = found.fit.experiment.outward(found.fit.fitted)
         checks, factor = checks_of(found.fit, self.raw, self.record, found.used, self.loading, values)
@@ -469,10 +457,8 @@ class _Choice:
         where, time = None if path is None else path[used], self.record.time[used]
         moved = self._moved_by_rates(fitted)
         found = noise_of(best.residuals, np.hstack([slopes, moved]), best.counts, time, where, best.kept)
-        if not moved.size:
-            return found
-        found = found or CorrelatedNoise(0.0, 1.0, time, best.counts, True)
-        return replace(found, common=moved / best.noise)
+        none = CorrelatedNoise(0.0, 1.0, time, best.counts, True)
+        return replace(found or none, common=moved / best.noise) if moved.size else found
 
     def _moved_by_rates(self, fitted: _Fitted) -> ndarray:
         """By how much friction moves with one deviation of each rate of the load point, where that is felt.
@@ -507,8 +493,7 @@ class _Choice:
         if not fitted.kind.state_names:
             return fitted
         wider, _ = self._among(fitted, {*_nuisance(fitted), START_STATE})
-        told = replace(wider, best=replace(wider.best, kept=fitted.best.kept))
-        return _again(wider) if needed(told.best, fitted.best.squares, len(_START)) else fitted
+        return _again(wider) if needed(wider.best, fitted.best.squares, len(_START)) else fitted
 
     def _without_start(self, fitted: _Fitted) -> _Fitted:
         """Without an unsteady beginning, where a region of 95 % holds a steady one."""
@@ -520,10 +505,8 @@ class _Choice:
     def _among(self, fitted: _Fitted, nuisance: Collection[str]) -> tuple[_Fitted, float]:
         """Fit with other nuisance parameters at the same samples with the same noise, and its sum of squares."""
         other, best = self._fitted(fitted.kind, nuisance, fitted.best, start=False), fitted.best
-        weights = best.weights
-        at, squares = minimised(other.best.experiment, best.measured, weights, other.best.fitted)
-        told = replace(best, experiment=other.best.experiment, fitted=at)
-        return replace(other, best=told), squares
+        at, squares = minimised(other.best.experiment, best.measured, best.weights, other.best.fitted)
+        return replace(other, best=replace(best, experiment=other.best.experiment, fitted=at)), squares
 
 
 def profiled(
@@ -588,29 +571,31 @@ def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, Pa
     Where a law has both effects, profiles are followed in coordinates that hold their difference: where a record tells
     only that, the valley of equal fits is straight in them.
     """
-    names = [c.name for c in best.experiment.coordinates]
-    effects = [names.index(name) for name in _EFFECTS_OF if name in names]
-    if len(effects) < 2:
-        return {name: _estimate(best, i) for i, name in enumerate(names) if wanted is None or name in wanted}
-    direct, *others = effects
+    names, effects = [c.name for c in best.experiment.coordinates], _effects(best)
     found = {}
     for i, name in enumerate(names):
         if wanted is None or name in wanted:
-            first, seconds = (others[0], (direct,)) if i == direct else (direct, tuple(others))
-            found[name] = _estimate(best, i) if len(others) > 1 and i == direct else _turned(best, i, first, seconds)
+            direct = effects[:1] == [i]
+            plain = len(effects) < 2 or (direct and len(effects) > 2)
+            found[name] = _estimate(best, i) if plain else _turned(best, i, effects[::-1] if direct else effects)
     return found
+
+
+def _effects(best: Fit) -> list[int]:
+    """Places of the direct effect and all evolution effects."""
+    names = [c.name for c in best.experiment.coordinates]
+    return [names.index(name) for name in _EFFECTS_OF if name in names]
 
 
 def _difference(best: Fit, jointly: bool = True) -> ParameterEstimate | None:
     """Estimate of the difference of the direct effect and all evolution effects."""
-    names = [c.name for c in best.experiment.coordinates]
-    first, *seconds = [names.index(name) for name in _EFFECTS_OF if name in names] or [0]
-    return _turned(best, first, first, tuple(seconds), jointly) if seconds else None
+    effects = _effects(best)
+    return _turned(best, effects[0], effects, jointly) if len(effects) > 1 else None
 
 
-def _turned(best: Fit, place: int, first: int, seconds: tuple[int, ...], jointly: bool = True) -> ParameterEstimate:
+def _turned(best: Fit, place: int, effects: Sequence[int], jointly: bool = True) -> ParameterEstimate:
     """Estimate in coordinates with the difference of some in place of the first of them."""
-    turned = Difference(whole=best.experiment, first=first, seconds=seconds)
+    turned = Difference(whole=best.experiment, first=effects[0], seconds=tuple(effects[1:]))
     try:
         return _estimate(replace(best, experiment=turned, fitted=turned.difference(best.fitted)), place, jointly)
     except BetterFit as better:

@@ -35,6 +35,9 @@ _HEADERS = {16: 1380, 32: 2724}  # bytes of xlook's header of so many channels
 _XLOOK_TEXT = "number of records"
 _ARRAYS = {f"{sign}int{size}" for sign in ("", "u") for size in (8, 16, 32, 64)} | {"double", "single"}
 _MOST_NUMBERS = 16 * MOST_SAMPLES
+_UNIT_WORDS = {"", *"s sec ms min h m mm um µm μm mic micron microns nm cm Pa kPa MPa Mpa GPa N kN MN - 1 Hz".split()}
+_UNIT_WORDS |= {f"{each}/{time}" for each in "m mm um µm mic micron microns nm".split() for time in ("s", "sec")}
+"""What may stand in a line of units."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,13 +51,7 @@ class Column:
 
 
 def read_columns(path: str | Path) -> list[Column]:
-    """Columns of a file, of equal length.
-
-    Raises
-    ------
-    RecordError
-        When it is of no known kind, or a line does not suit its headings.
-    """
+    """Columns of a file, of equal length; `RecordError` when it is of no known kind, or a line unlike its headings."""
     data = read_bytes(path, "record", largest=_LARGEST_FILE, refusal=RecordError)
     if data.startswith(b"MATLAB 5.0"):
         found = _matlab(data, path)
@@ -74,8 +71,7 @@ def heading(text: str) -> Column:
     """Name and unit of a heading, without values: ``Time (s)``, ``tau [MPa]``, ``disp_um``."""
     text = " ".join(text.split())
     name, square, rounded = _HEADING.fullmatch(text).groups()  # type: ignore[union-attr]
-    unit = square if square is not None else rounded
-    return Column(heading=text, name=name, unit=unit, values=np.empty(0))
+    return Column(heading=text, name=name, unit=rounded if square is None else square, values=np.empty(0))
 
 
 # ----------------------------------------------------------------------
@@ -120,8 +116,8 @@ def _numbers(line: str) -> bool:
     if not line.strip() or line.strip()[0] in _COMMENTS:
         return False
     cells = [cell.strip() for cell in _cells(line, _sign(line))]
-    told = [cell for cell in cells if cell.lower() not in _MISSING]
-    return len(told) > 1 and _CELL.fullmatch(told[0]) is not None and sum(map(bool, map(_CELL.fullmatch, told))) > 1
+    told = [_CELL.fullmatch(cell) is not None for cell in cells if cell.lower() not in _MISSING]
+    return sum(told) > 1 and told[0]
 
 
 def _sign(line: str) -> str:
@@ -143,12 +139,10 @@ def _headings(before: list[str], count: int, sign: str) -> list[Column]:
     plain = [line for line in told if line[0] not in _COMMENTS]
     lines = plain or [line.lstrip("".join(_COMMENTS)) for line in told[-1:]]
     split = [_heading_cells(line, sign) for line in lines[-2:]]
-    if split and not plain and len(split[-1]) != count:
-        split = []
-    if not split:
+    if not split or (not plain and len(split[-1]) != count):
         return [Column(heading=str(i), name=str(i), unit=None, values=np.empty(0)) for i in range(1, count + 1)]
     *above, last = split
-    if above and len(above[0]) == len(last) and all(cell.strip(" []().") in _unit_words() for cell in last):
+    if above and len(above[0]) == len(last) and all(cell.strip(" []().") in _UNIT_WORDS for cell in last):
         named = [heading(f"{name} [{unit.strip(' []()')}]") for name, unit in zip(above[0], last, strict=True)]
     else:
         named = [heading(cell) for cell in last]
@@ -206,53 +200,39 @@ def _table(text: str, first: int, sign: str, columns: list[Column], line: str) -
 
 
 def _values(cells: pd.Series, column: Column, text: str, first: int) -> ndarray:
-    """Numbers of one column; not a number where nothing was measured.
-
-    Raises
-    ------
-    RecordError
-        For a text that is no number, with its line.
-    """
+    """Numbers of one column; not a number where nothing was measured. A text that is no number is refused."""
     if pd.api.types.is_numeric_dtype(cells):
         values: ndarray = cells.to_numpy(dtype=float, copy=True)
         values[~np.isfinite(values)] = np.nan
         return values
     told = cells.astype(str).str.strip()
     told = told.where(~told.str.lower().isin(_MISSING), "nan")
-    if _CELL.fullmatch(told.iloc[0]) and not re.fullmatch(_NUMBER, told.iloc[0]):
+    if _is_date(told.iloc[0]):
         dates = pd.to_datetime(told, format="ISO8601", errors="coerce")
         if dates.notna().all():
             return np.asarray((dates - dates.iloc[0]).dt.total_seconds().to_numpy(dtype=float))
     numbers = pd.to_numeric(told.str.replace(r"(?<=[\d.])[dD](?=[+-]?\d)", "e", regex=True), errors="coerce")
     wrong = (numbers.isna() & (told != "nan")).to_numpy().nonzero()[0]
     if len(wrong):
-        cell = told.iloc[int(wrong[0])]
+        cell, lines = told.iloc[int(wrong[0])], enumerate(text.splitlines(), start=1)
+        rows = [i for i, line in lines if i > first and line.strip() and line.strip()[0] != "#"]
         raise RecordError(
-            f"line {_line_number(text, first, int(wrong[0]))} must hold a number in column {column.name}. Received "
-            f"{shown(cell)}.{_remedy(cell)}"
+            f"line {rows[int(wrong[0])]} must hold a number in column {column.name}. Received {shown(cell)}."
+            f"{_remedy(cell)}"
         )
     return np.asarray(numbers.to_numpy(dtype=float))
 
 
+def _is_date(cell: str) -> bool:
+    return _CELL.fullmatch(cell) is not None and not re.fullmatch(_NUMBER, cell)
+
+
 def _remedy(cell: str) -> str:
-    if _CELL.fullmatch(cell) and not re.fullmatch(_NUMBER, cell):
+    if _is_date(cell):
         return " Write seconds, or dates as 2024-03-05 10:00:00.1."
     if re.fullmatch(r"[+-]?\d+,\d+", cell):
         return " Write decimal points, or decimal commas in every number."
     return " Correct it, or leave it empty where nothing was measured."
-
-
-def _line_number(text: str, first: int, row: int) -> int:
-    """Number of the line of a row: blank lines and remarks are none."""
-    told = [i for i, line in enumerate(text.splitlines()) if i >= first and line.strip() and line.strip()[0] != "#"]
-    return told[row] + 1
-
-
-def _unit_words() -> set[str]:
-    """What may stand in a line of units."""
-    words = "s sec ms min h m mm um µm μm mic micron microns nm cm Pa kPa MPa Mpa GPa N kN MN - 1 Hz"
-    rates = {f"{length}/{time}" for length in "m mm um µm mic micron microns nm".split() for time in ("s", "sec")}
-    return {"", *words.split(), *rates}
 
 
 # ----------------------------------------------------------------------
@@ -281,11 +261,9 @@ def _xlook_offset(data: bytes) -> tuple[int, int, str] | None:
         return None
     records, channels = (int.from_bytes(data[i : i + 4], "big") for i in (20, 24))
     for most, size in _HEADERS.items():
-        if 0 < channels <= most and records > 0:
-            if len(data) == size + 4 * records * channels:
-                return size, channels, ">f4"
-            if len(data) == size + 8 * records * channels:
-                return size, channels, "<f8"
+        for width, kind in ((4, ">f4"), (8, "<f8")):
+            if 0 < channels <= most and records > 0 and len(data) == size + width * records * channels:
+                return size, channels, kind
     return None
 
 
@@ -315,9 +293,7 @@ def _matlab(data: bytes, path: str | Path) -> list[Column]:
         held = loadmat(io.BytesIO(data), squeeze_me=True, variable_names=list(kinds))
     except (MatReadError, NotImplementedError, ValueError, TypeError, OSError) as error:
         raise RecordError(f"a MATLAB file must be readable. Received {path}: {error}. Save it with -v7.") from None
-    arrays = {
-        name: value for name, value in held.items() if isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
-    }
+    arrays = {n: value for n, value in held.items() if isinstance(value, np.ndarray) and value.dtype.kind in "iuf"}
     long = max((value.shape[0] for value in arrays.values() if value.ndim), default=0)
     if long < 2:
         raise RecordError(

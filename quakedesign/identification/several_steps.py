@@ -6,6 +6,7 @@ step, and so is its noise: samples count in its deviations.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -59,12 +60,7 @@ def read_steps(
 ) -> list[Record]:
     """Records of the steps of a file: windows ``0 s to 60 s, 60 s to 120 s``, or as `cut` gives them with ``auto``.
 
-    One of the whole file by default. `how` is that of `read_record`.
-
-    Raises
-    ------
-    RecordError
-        As `read_record`, and for windows of another form or beside `begin` and `end`.
+    One of the whole file by default. `how` is that of `read_record`, and so are the errors.
     """
     if steps in ("", "auto"):
         record = read_record(path, begin=begin, end=end, **how)
@@ -75,10 +71,11 @@ def read_steps(
         )
     found: list[Record] = []
     windows = [[end.strip() for end in each.split(" to ")] for each in steps.split(",")]
-    if wrong := [" to ".join(ends) for ends in windows if len(ends) != 2]:
+    named = [" to ".join(ends) for ends in windows]
+    if wrong := [name for name, ends in zip(named, windows, strict=True) if len(ends) != 2]:
         raise RecordError(f"--steps must name windows as 0 s to 60 s, 60 s to 120 s. Received {shown(wrong[0])}.")
     records = read_windows(path, [(begin, end) for begin, end in windows], **how)
-    for window, record in zip([" to ".join(ends) for ends in windows], records, strict=True):
+    for window, record in zip(named, records, strict=True):
         for other in found:
             shared = np.isin((record.origin + record.time).round(9), (other.origin + other.time).round(9))
             if shared.sum() > 1:
@@ -91,13 +88,7 @@ def read_steps(
 
 
 def cut(record: Record) -> list[Record]:
-    """Parts of a record, one a large change of the rate of loading, from midway to midway between these.
-
-    Raises
-    ------
-    RecordError
-        When there are fewer than two such changes.
-    """
+    """Parts of a record, one a large change of the rate of loading, from midway to midway between these."""
     _, loading = prepared(record)
     begins = np.empty(0) if loading is None else loading.steps
     if len(begins) < 2:
@@ -183,17 +174,12 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
     values = np.array([fit.fitted[row] for fit, row in zip(fits, rows, strict=True)])
     sharp = np.array([np.maximum(fit.deviations[row] ** -2.0, 1e-12) for fit, row in zip(fits, rows, strict=True)])
     start = np.array([*(np.sum(sharp * values, axis=0) / np.sum(sharp, axis=0)), *starts])
-    joint = _Joint(
-        parts=tuple(fit.experiment for fit in fits),
-        places=tuple(places),
-        weights=tuple(fit.weights / fit.noise for fit in fits),
-        accuracies=tuple(fit.accuracy for fit in fits),
-        coordinates=tuple(coordinates),
-    )
+    parts = tuple(fit.experiment for fit in fits)
+    joint = _Joint(fits=tuple(fits), parts=parts, places=tuple(places), coordinates=tuple(coordinates))
     measured = joint.joined([fit.measured for fit in fits])
-    ones = np.ones(len(measured))
+    ones, pieces = np.ones(len(measured)), sum(fit.freedom_of_noise for fit in fits)
     best = Fit(experiment=joint, fitted=start, measured=measured, counts=ones, kept=ones > 0, agreeing=1, starts=1)
-    best = replace(best, pieces=sum(fit.freedom_of_noise for fit in fits))
+    best = replace(best, pieces=pieces)
     for _ in range(_ROUNDS):
         finer = best.experiment.resolved(best.fitted, best.accuracy)
         fitted, _ = minimised(finer, measured, ones, best.fitted)
@@ -224,10 +210,9 @@ def _assessed(common: Identification, steps: Sequence[Identification], probabili
 class _Joint(Experiment):
     """Steps with shared coordinates; samples are made independent, in deviations of the noise of their step."""
 
+    fits: tuple[Fit, ...]  # of the steps by themselves, which say how much samples count
     parts: tuple[Experiment, ...]
     places: tuple[ndarray, ...]  # of the coordinates of each step among those of all
-    weights: tuple[ndarray, ...]
-    accuracies: tuple[float, ...]
     coordinates: tuple[Coordinate, ...]
 
     @property
@@ -237,7 +222,11 @@ class _Joint(Experiment):
 
     def joined(self, values: Sequence[ndarray]) -> ndarray:
         """Values of the samples of each step, weighed."""
-        return np.concatenate([weighed(w, v) for w, v in zip(self.weights, values, strict=True)])
+        return np.concatenate([weighed(w, v) for w, v in zip(self._weights, values, strict=True)])
+
+    @cached_property
+    def _weights(self) -> list[ndarray]:
+        return [fit.weights / fit.noise for fit in self.fits]
 
     def friction(self, fitted: ndarray) -> ndarray:
         """Friction of all steps, weighed."""
@@ -246,7 +235,7 @@ class _Joint(Experiment):
     def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives of `friction`; those in the coordinates of other steps are 0."""
         rows = []
-        for each, weights, at in zip(self.parts, self.weights, self.places, strict=True):
+        for each, weights, at in zip(self.parts, self._weights, self.places, strict=True):
             own = weighed(weights, np.nan_to_num(each.slopes(fitted[at]), posinf=0, neginf=0))
             rows.append(np.zeros((len(own), len(self.coordinates))))
             rows[-1][:, at] = own
@@ -258,5 +247,5 @@ class _Joint(Experiment):
 
     def resolved(self, fitted: ndarray, accuracy: float) -> "_Joint":
         """With each step resolved for its own noise."""
-        told = zip(self.parts, self.places, self.accuracies, strict=True)
-        return replace(self, parts=tuple(each.resolved(fitted[at], fine) for each, at, fine in told))
+        told = zip(self.parts, self.places, self.fits, strict=True)
+        return replace(self, parts=tuple(each.resolved(fitted[at], fit.accuracy) for each, at, fit in told))

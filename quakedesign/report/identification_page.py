@@ -19,6 +19,7 @@ from quakedesign.report.drawing import FORMATS, NATURAL, SMALL, figure, figure_b
 from quakedesign.text import PREFIXES, plain, power_of, quantity
 
 _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
+_DASHED = 0, (4, 2)
 _MOST_OUTLIERS = 8
 _MOST_PANELS = 4
 _SHOWN = 12.0  # critical slips after a step
@@ -39,30 +40,23 @@ def identification_lines(found: Identification | Steps, *, verbose: bool = False
         head = common.index(_HEAD) - 1
         said = f"All together: {found.common.assessment.checks[0].sentence}."
         return [*common[:head], "", *table, "", *_wrapped([said]), *common[head:], *(each if verbose else [])]
-    assessment, law = found.assessment, found.law.name
-    reason = f": {assessment.open[0]}" if assessment.verdict == CANNOT_TELL else ""
-    joined = "," if assessment.verdict == CANNOT_TELL else ""
-    answer = f"{found.record.name}: {law}{joined} {assessment}{reason}."
+    assessment, answer = found.assessment, f"{found.record.name}: {found.law.name}"
+    unclear, refused = (assessment.verdict == each for each in (CANNOT_TELL, EXPLAINS_NOT))
+    answer += f", {assessment}: {assessment.open[0]}." if unclear else f" {assessment}."
     sign = next((check for check in assessment.checks if check.name == "sign" and check.passed), None)
-    if sign is not None and assessment.verdict != EXPLAINS_NOT and found.difference is not None:
-        does = "weakens" if found.difference.value < 0 else "strengthens"
-        answer += f" Friction {does} with rate: a - b = {_number(found.difference)}."
-    more = [f"open too: {each}" for each in assessment.open[1:4] if reason]
-    more += [f"would tell: {each}" for each in assessment.experiments if assessment.verdict == CANNOT_TELL]
-    more += [f"- {each}" for each in found.untold() if assessment.verdict == EXPLAINS_NOT]
-    more += [f"try: {'; '.join(found.to_try())}"] * (assessment.verdict == EXPLAINS_NOT)
+    if sign is not None and not refused and found.difference is not None:
+        does, (value, ends, _) = "weakens" if found.difference.value < 0 else "strengthens", _cells(found.difference)
+        answer += f" Friction {does} with rate: a - b = {value} ({ends})."
+    more = [f"open too: {each}" for each in assessment.open[1:4] if unclear]
+    more += [f"would tell: {each}" for each in assessment.experiments if unclear]
+    more += [*(f"- {each}" for each in found.untold()), f"try: {'; '.join(found.to_try())}"] if refused else []
     failed = [check.sentence for check in assessment.checks if not check.passed]
     more += [f"not passed: {sentence}" for sentence in failed if sentence not in assessment.open]
     shown = [each for each in found.estimates.values() if verbose or not each.name.startswith(DELAY)]
     shown += [found.difference] if found.difference else []
-    more += [*_warnings(found), *_outliers(found), *_read(found, verbose)]
-    return [
-        *_wrapped([answer, ""]),
-        _HEAD,
-        *map(_row, shown),
-        "",
-        *_wrapped([*more, *(_more(found) if verbose else [])]),
-    ]
+    told = [each for each in found.record.remarks if verbose or " is read as " not in each]
+    more += [*_warnings(found), *([f"read: {'; '.join(told)}"] if told else []), *(_more(found) if verbose else [])]
+    return [*_wrapped([answer, ""]), _HEAD, *map(_row, shown), "", *_wrapped(more)]
 
 
 _HEAD = f"{'parameter':22}{'value':>13}{'95 % interval':>27}  unit"
@@ -86,21 +80,17 @@ def _step_row(number: int, step: Identification) -> str:
 def _more(found: Identification) -> list[str]:
     """Tests that passed, noise and searches, what was assumed."""
     fit, rate = found.fit, getattr(found.law, "reference_rate", None)
+    means, all_ = len(fit.counts), round(float(np.sum(fit.counts)))
+    samples = f"{int(fit.kept.sum())} samples" if all_ == means else f"one of {all_} samples, taken as {means} means"
     return [
         *(f"passed: {check.sentence}" for check in found.assessment.checks if check.passed),
-        f"noise {fit.noise:.3g} of friction in {_samples(found)}; of {fit.starts} searches from different starts "
+        f"noise {fit.noise:.3g} of friction in {samples}; of {fit.starts} searches from different starts "
         f"(seed {found.seed}) {fit.agreeing} end in this fit"
         f"{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
         *([str(found.rival)] if found.rival else []),
         *([] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]),
         f"assumed: {'; '.join(found.notes)}",
     ]
-
-
-def _read(found: Identification, verbose: bool) -> list[str]:
-    """What was decided when the record was read; what was left out at least."""
-    told = [each for each in found.record.remarks if verbose or " is read as " not in each]
-    return [f"read: {'; '.join(told)}"] if told else []
 
 
 def _wrapped(told: list[str]) -> list[str]:
@@ -128,12 +118,8 @@ def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
     return value, f"{low} … {high}", f"{PREFIXES[power]}{estimate.unit}"
 
 
-def _number(estimate: ParameterEstimate) -> str:
-    value, ends, _ = _cells(estimate)
-    return f"{value} ({ends})"
-
-
 def _warnings(identification: Identification) -> list[str]:
+    """What looks wrong, noise that is not white, and outliers."""
     told, critical = [], identification.estimates.get("critical_slip")
     if critical is not None and identification.law.state_names and not _SHORT <= critical.value <= _LONG:
         short, size = critical.value < _SHORT, critical.value
@@ -146,43 +132,27 @@ def _warnings(identification: Identification) -> list[str]:
         size = identification.fit.noise * correlated.share**0.5
         length = f"{correlated.length:.2g} {'s' if correlated.of_time else 'm'}"
         told.append(f"noise that neighbours share: {size:.2g} of friction, fading over {length}; regions include it")
+    outliers = identification.outliers
+    if outliers:
+        largest = ", ".join(f"{o.size:+.3g} at {o.time:.6g} s" for o in outliers[:_MOST_OUTLIERS])
+        more = f", and {len(outliers) - _MOST_OUTLIERS} smaller" if len(outliers) > _MOST_OUTLIERS else ""
+        told.append(f"outliers left out: {largest}{more}")
     return told
-
-
-def _samples(identification: Identification) -> str:
-    fit = identification.fit
-    kept, all_ = int(fit.kept.sum()), round(float(np.sum(fit.counts)))
-    return f"{kept} samples" if all_ == len(fit.counts) else f"one of {all_} samples, taken as {len(fit.counts)} means"
-
-
-def _outliers(identification: Identification) -> list[str]:
-    if not identification.outliers:
-        return []
-    told = ", ".join(f"{o.size:+.3g} at {o.time:.6g} s" for o in identification.outliers[:_MOST_OUTLIERS])
-    more = len(identification.outliers) - _MOST_OUTLIERS
-    return [f"outliers left out: {told}{f', and {more} smaller' if more > 0 else ''}"]
 
 
 def steps_figure(found: Steps) -> Any:
     """A panel a step with its own fit and the common one, and the regions of a and b of all."""
     joint: Any = found.common.fit.experiment
-    at = found.common.fit.fitted
-    count = len(found.steps)
-    names = [f"step {i}" for i in range(count)] + [""] * (count % 2)
+    at, count = found.common.fit.fitted, len(found.steps)
+    names = [f"step {i}" for i in range(count)] + ["."] * (count % 2)
     rows = [names[i : i + 2] for i in range(0, len(names), 2)] + [["region", "region"]]
-    drawing, axes = figure(0, 1.7 * len(rows) + 1.2, mosaic=[[n or "." for n in row] for row in rows])
+    drawing, axes = figure(0, 1.7 * len(rows) + 1.2, mosaic=rows)
     for i, step in enumerate(found.steps):
         axis, path = axes[f"step {i}"], step.record.load_point
         way = step.record.time[step.used] if path is None else path[step.used] * 1e6
         _friction(axis, step, way, slice(None))
-        axis.plot(
-            way,
-            joint.parts[i].friction(at[joint.places[i]]),
-            color=_OUTLIER,
-            linewidth=1.0,
-            label="common fit",
-            linestyle=(0, (5, 2)),
-        )
+        shared, dashed = joint.parts[i].friction(at[joint.places[i]]), (0, (5, 2))
+        axis.plot(way, shared, color=_OUTLIER, linewidth=1.0, label="common fit", linestyle=dashed)
         axis.set_title(f"{i + 1}: {step.record.name}", fontsize=SMALL)
         axis.set_xlabel("time [s]" if path is None else "displacement of the load point [µm]", fontsize=SMALL)
         _region(axes["region"], step, f"{i + 1}", f"C{i}")
@@ -195,10 +165,9 @@ def steps_figure(found: Steps) -> Any:
 def identification_figure(identification: Identification) -> Any:
     """Friction with fit and trend, rate of the load point, every step, residuals, their correlation, a joint region."""
     record, used, fit = identification.record, identification.used, identification.fit
-    along = record.load_point if record.load_point is not None else record.slip
-    way = record.time[used] if along is None else along[used] * 1e6
-    label = "time [s]" if along is None else "displacement of the load point [µm]"
-    label = label if record.load_point is not None or along is None else "slip [µm]"
+    way = record.time[used] if record.path is None else record.path[used] * 1e6
+    slipped = "time [s]" if record.slip is None else "slip [µm]"
+    label = slipped if record.load_point is None else "displacement of the load point [µm]"
     rates = None if record.load_point is None else np.gradient(record.load_point[used], record.time[used])
     steps = [] if rates is None else _steps(rates)[:_MOST_PANELS]
     names = ["friction", *(["rate"] if rates is not None else []), "residual"]
@@ -227,8 +196,8 @@ def identification_figure(identification: Identification) -> Any:
             axes["rate"].set_ylim(0, 1.2e6 * np.max(rates))
     below = axes["residual"]
     below.plot(way[fit.kept], fit.residuals[fit.kept], ".", color=_MEASURED, markersize=2)
-    for level in (-2 * fit.noise, 0.0, 2 * fit.noise):
-        below.axhline(level, color=NATURAL, linewidth=0.6, linestyle="solid" if level == 0 else (0, (4, 2)))
+    for level, style in ((-2 * fit.noise, _DASHED), (0.0, "solid"), (2 * fit.noise, _DASHED)):
+        below.axhline(level, color=NATURAL, linewidth=0.6, linestyle=style)
     inside = 8 * fit.noise
     below.plot(way[~fit.kept], np.clip(fit.residuals[~fit.kept], -inside, inside), "x", color=_OUTLIER, markersize=5)
     below.set_ylabel("residual [-]", fontsize=SMALL)
@@ -248,12 +217,12 @@ def identification_figure(identification: Identification) -> Any:
     for box, line in zip(boxes, (axes["region"].axvline, axes["region"].axhline), strict=True):
         for end in box:
             if math.isfinite(end):
-                line(end, color=NATURAL, linewidth=0.6, linestyle=(0, (4, 2)))
-    for each in profiles:
-        _profile(axes[f"profile {each.name}"], each, fit)
-        axes[f"profile {each.name}"].tick_params(labelleft=each is profiles[0])
-    if profiles:
-        axes[f"profile {profiles[0].name}"].set_ylabel("distance [deviations]", fontsize=SMALL)
+                line(end, color=NATURAL, linewidth=0.6, linestyle=_DASHED)
+    for i, each in enumerate(profiles):
+        axis = axes[f"profile {each.name}"]
+        _profile(axis, each, fit)
+        axis.tick_params(labelleft=i == 0)
+        axis.set_ylabel("" if i else "distance [deviations]", fontsize=SMALL)
     note = f"dashed: twice the noise, {fit.noise:.3g}; crosses beyond eight times it stand at its edge; profiles: "
     note += "dashed at 95 % of one parameter, dotted of all at once"
     title = f"{record.name}: {identification.law.name} {identification.assessment}"
@@ -275,7 +244,7 @@ def _friction(axis: Any, identification: Identification, way: ndarray, part: sli
     if isinstance(fit.experiment, Widened) and fit.experiment.coordinates[-1].name in (TREND, TREND_IN_TIME):
         along = fit.experiment.columns[:, 0]
         line = simulated[0] + fit.fitted[-1] * (along - along[0])
-        axis.plot(way[part], line[part], color=NATURAL, linewidth=0.8, linestyle=(0, (4, 2)), label="trend")
+        axis.plot(way[part], line[part], color=NATURAL, linewidth=0.8, linestyle=_DASHED, label="trend")
     left = np.flatnonzero(~fit.kept[part]) + (part.start or 0)
     if len(left):
         axis.plot(way[left], fit.measured[left], "x", color=_OUTLIER, markersize=5, label="left out")
@@ -292,7 +261,7 @@ def _correlation(axis: Any, fit: Fit) -> None:
         each = np.correlate(off, off, "full")[len(off) - 1 :][: _LAGS + 1]
         axis.plot(each / max(each[0], 1e-300), ".-", color=colour, markersize=3, label=label)
     for level in (-2.0, 2.0):
-        axis.axhline(level / len(fit.whitened) ** 0.5, color=NATURAL, linewidth=0.6, linestyle=(0, (4, 2)))
+        axis.axhline(level / len(fit.whitened) ** 0.5, color=NATURAL, linewidth=0.6, linestyle=_DASHED)
     axis.set_xlabel("lag [samples]", fontsize=SMALL)
     axis.set_ylabel("autocorrelation [-]", fontsize=SMALL)
     axis.legend(fontsize=SMALL - 1, frameon=False)
@@ -312,7 +281,7 @@ def _profile(axis: Any, estimate: ParameterEstimate, fit: Fit) -> None:
     power = power_of(estimate.value) if estimate.unit in _PREFIXED else -3 * small
     value, distance = np.array([point for point in estimate.profile if point[1] <= 1.5 * jointly]).T
     axis.plot(value / 10.0**power, distance, ".-", color=_FITTED, linewidth=1.0, markersize=3)
-    for level, style in ((alone, (0, (4, 2))), (jointly, (0, (1, 2)))):
+    for level, style in ((alone, _DASHED), (jointly, (0, (1, 2)))):
         axis.axhline(level, color=NATURAL, linewidth=0.6, linestyle=style)
     axis.set_ylim(0, 1.3 * jointly)
     axis.locator_params(axis="x", nbins=3)
