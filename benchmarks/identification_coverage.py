@@ -27,7 +27,7 @@ import numpy as np
 
 from quakedesign.fault import FrictionLaw, friction_law
 from quakedesign.identification.experiment import TREND, TREND_IN_TIME
-from quakedesign.identification.fitting import Fit, FitSearch, fit, minimised, settled
+from quakedesign.identification.fitting import Fit, fit, minimised, settled
 from quakedesign.identification.identification_result import Identification
 from quakedesign.identification.identify import _Choice, _Fitted, identified_as, set_up
 from quakedesign.identification.loading import prepared
@@ -104,7 +104,8 @@ def begun_at_truth(kind: str, seed: int) -> tuple[Fit, dict[str, float]]:
             seed=seed,
             counts=None if record.counts is None else record.counts[setup.used],
             near=near,
-            search=FitSearch(least=1, most=0),
+            least=1,
+            most=0,
         )
         moved = now._moved(_Fitted(kind=law, setup=setup, best=best)) if moves else None
         if moved is None:

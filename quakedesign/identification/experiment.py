@@ -73,10 +73,6 @@ class Experiment(ABC):
         low, high = np.array(ends, dtype=float).T
         return low, high
 
-    def inward(self, values: Sequence[float]) -> ndarray:
-        """What is fitted, of values in their units."""
-        return np.array([c.inward(v) for c, v in zip(self.coordinates, values, strict=True)])
-
     def near(self, values: Mapping[str, float]) -> ndarray:
         """What is fitted, at values of another experiment; where it has none, the middle of where searches start."""
         told = ((c, values.get(c.name)) for c in self.coordinates)

@@ -23,7 +23,7 @@ from quakedesign.fault.fault_toml import beyond_rates, fault_toml, mean_rate, sl
 from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.files import write_whole
 from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT
-from quakedesign.identification.identification_result import Identification, ParameterEstimate
+from quakedesign.identification.identification_result import Identification
 
 _DIGITS = 6
 _WIDEST_SPREAD = Fraction(1, 5)  # of a, b and D_c, independent of each other, for which guarantees are found
@@ -220,7 +220,10 @@ def save_fault(identification: Identification, fault: Fault, path: str | Path) -
         f"Friction identified from {identification.record.name!r} as {law.name}; "
         f"from {fault.name}: {other_parts(identification, fault)}.",
         f"Best fit (95 % alone; box of all together); {said}.",
-        *map(_remark, identification.estimates.values()),
+        *(
+            f"  {e.name} = {e.value:.6g} ({e.low:.6g} to {e.high:.6g}; {e.least:.6g} to {e.most:.6g}) {e.unit}".rstrip()
+            for e in identification.estimates.values()
+        ),
         *(f"{said}." for said in [*task_remarks(identification, fault), *filter(None, [poor_fit(identification)])]),
     ]
     write_whole(Path(path), "".join(f"# {line}\n" for line in remarks) + fault_toml(whole))
@@ -248,8 +251,3 @@ def _shares(identification: Identification) -> dict[str, Fraction]:
     """By how much of its best value each of a, b and D_c leaves it in the box."""
     found = [identification.estimates[name] for name in _RATE_AND_STATE]
     return {e.name: max(abs(rational(end) / rational(e.value) - 1) for end in (e.least, e.most)) for e in found}
-
-
-def _remark(estimate: ParameterEstimate) -> str:
-    ends = f"{estimate.low:.6g} to {estimate.high:.6g}; {estimate.least:.6g} to {estimate.most:.6g}"
-    return f"  {estimate.name} = {estimate.value:.6g} ({ends}) {estimate.unit}".rstrip()

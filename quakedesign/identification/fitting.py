@@ -25,17 +25,9 @@ _UNFELT = 1e-7  # of the largest slope, below which one is rounding
 _SHARE_OF_EXCESS = 2e-3  # by which a search may still get better when it ends
 _CANDIDATES = 64  # drawn between the ends of every coordinate and simulated once
 _COARSE = 40  # steps of a search before it is compared with the others
+_AGREEMENT = 1e-3  # share by which sums of squares of searches that agree differ at most
 _ROUNDS = 6  # in which outliers are left out and steps are made finer
 _LONGEST_OUTLIER = 2  # samples in a row; more are no accident, and stay
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitSearch:
-    """How the best fit is sought: from the best candidates, until two searches end in it and it tells everything."""
-
-    least: int = 4  # searches
-    most: int = 16
-    agreement: float = 1e-3  # share by which sums of squares of searches that agree differ at most
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,19 +166,16 @@ def fit(
     seed: int,
     counts: ndarray | None = None,
     near: ndarray | None = None,
-    search: FitSearch | None = None,
+    least: int = 4,
+    most: int = 16,
 ) -> Fit:
     """Best fit of all starts, without outliers, on an experiment that is simulated accurately enough for the noise.
 
     `measured` friction [-] is a mean of so many measurements (`counts`), or of one; `seed` is that of the draw of the
-    starts, the first of which may be told (`near`).
-
-    Raises
-    ------
-    RecordError
-        When no start can be simulated, or there are too few samples.
+    starts, the first of which may be told (`near`): `most` of the best candidates, until two of at `least` so many
+    searches end in the best fit and it tells everything. Raises `RecordError` when none can be simulated, or there
+    are too few samples.
     """
-    how = search or FitSearch()
     if len(measured) < 3 * len(experiment.coordinates):
         raise RecordError(
             f"a record must have at least {3 * len(experiment.coordinates)} samples for what is fitted. "
@@ -194,35 +183,35 @@ def fit(
         )
     counts = np.ones(len(measured)) if counts is None else counts
     roots = np.sqrt(counts)
-    experiment, starts = _starts(experiment, measured, roots, seed, how, near)
+    experiment, starts = _starts(experiment, measured, roots, seed, most, near)
     minima: list[tuple[ndarray, float]] = []
     low, high = experiment.bounds
     every = np.ones(len(measured), dtype=bool)
     for number, start in enumerate(starts, start=1):
         minima.append(minimised(experiment, measured, roots, start, steps=_COARSE))
         fitted, best = min(minima, key=lambda pair: pair[1])
-        agreeing = sum(squares <= best * (1 + how.agreement) for _, squares in minima)
+        agreeing = sum(squares <= best * (1 + _AGREEMENT) for _, squares in minima)
         told: dict[str, Any] = {"measured": measured, "counts": counts, "kept": every}
         fit = Fit(experiment=experiment, fitted=fitted, agreeing=agreeing, starts=number, **told)
-        if number >= how.least and agreeing > 1 and np.all(fit.deviations < high - low):
+        if number >= least and agreeing > 1 and np.all(fit.deviations < high - low):
             break
     return settled(fit)
 
 
 def _starts(
-    experiment: Experiment, measured: ndarray, roots: ndarray, seed: int, how: FitSearch, near: ndarray | None = None
+    experiment: Experiment, measured: ndarray, roots: ndarray, seed: int, most: int, near: ndarray | None = None
 ) -> tuple[Experiment, list[ndarray]]:
     """The candidates that come nearest, behind the one that is known, and the experiment with steps for the first."""
     draw = np.random.default_rng(seed)
     ends = np.array([[c.inward(end) for end in c.start] for c in experiment.coordinates])
     candidates = draw.uniform(ends[:, 0], ends[:, 1], (_CANDIDATES, len(ends)))
     scatter = max(float(np.std(np.diff(measured, 2))) / 6**0.5, 1e-9)
-    if near is not None and not how.most:
+    if near is not None and not most:
         return experiment.resolved(near, scatter), [near]
     experiment = experiment.resolved(ends.mean(axis=1), scatter)
     costs = np.array([np.sum(roots * np.abs(measured - experiment.friction(q))) for q in candidates])
     costs[~np.isfinite(costs)] = np.inf
-    order = np.argsort(costs, kind="stable")[: how.most]
+    order = np.argsort(costs, kind="stable")[:most]
     usable = [candidates[i] for i in order if np.isfinite(costs[i])]
     if not usable:
         raise RecordError(

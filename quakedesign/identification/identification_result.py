@@ -185,8 +185,7 @@ class Identification:
             raise ParameterError(
                 f"values must hold all that was fitted. Received none of {', '.join(sorted(missing))}."
             )
-        fitted = self.fit.experiment.inward([values[c.name] for c in coordinates])
-        return self.fit.distance(fitted) <= self.fit.threshold(len(coordinates))
+        return self.fit.distance(self.fit.experiment.near(values)) <= self.fit.threshold(len(coordinates))
 
     def untold(self) -> list[str]:
         """Sentences about what the record cannot tell; none where it tells everything."""
@@ -194,7 +193,7 @@ class Identification:
         told, only = [], self.difference
         pair = only.name.split(" - ") if only is not None and only.identified else []
         if only is not None and pair and {e.name for e in open_} >= set(pair):
-            ends = f"{only.name} = {only.value:.4g} ({only.low:.4g} to {only.high:.4g})"
+            ends = f"{only.name} = {_with_unit(only, only.value)} ({only.low:.4g} to {only.high:.4g})"
             told.append(f"{pair[0]} and {pair[1]} are not identifiable from this record: only {ends} is")
             open_ = [estimate for estimate in open_ if estimate.name not in pair]
         return told + [f"{e.name} is not identifiable from this record: {_one_sided(e)}" for e in open_]
@@ -254,10 +253,13 @@ def _finite(end: float) -> float | None:
     return end if math.isfinite(end) else None
 
 
+def _with_unit(estimate: ParameterEstimate, value: float) -> str:
+    return f"{value:.4g} {estimate.unit}".rstrip()
+
+
 def _one_sided(estimate: ParameterEstimate) -> str:
-    unit = f" {estimate.unit}" if estimate.unit else ""
     if math.isfinite(estimate.high):
-        return f"at most {estimate.high:.4g}{unit}, without a lower end"
+        return f"at most {_with_unit(estimate, estimate.high)}, without a lower end"
     if math.isfinite(estimate.low):
-        return f"at least {estimate.low:.4g}{unit}, without an upper end"
+        return f"at least {_with_unit(estimate, estimate.low)}, without an upper end"
     return "any value fits as well"

@@ -32,7 +32,7 @@ from quakedesign.identification.experiment import (
     delayed,
     trended,
 )
-from quakedesign.identification.fitting import BetterFit, Fit, FitSearch, Profile, advantage, fit, minimised, settled
+from quakedesign.identification.fitting import BetterFit, Fit, Profile, advantage, fit, minimised, settled
 from quakedesign.identification.identification_result import Identification, ParameterEstimate, Rival, estimate
 from quakedesign.identification.loading import Loading, prepared
 from quakedesign.identification.record import FAR_OFF, Record, read_record, scatter
@@ -40,7 +40,7 @@ from quakedesign.identification.sliding_experiment import START_RATE, START_STAT
 from quakedesign.identification.two_states import SECOND_EFFECT, with_two_states
 from quakedesign.identification.weakening_experiment import START, Drawn, MeasuredSlip
 
-_EFFECTS = {"low": 1e-5, "high": 1.0, "start": (2e-3, 3e-2)}
+_EFFECTS = 1e-5, 1.0, (2e-3, 3e-2)
 _SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}
 _MODERATE = 1e3
 _NUISANCE = {TREND, TREND_IN_TIME, START_STATE}
@@ -98,20 +98,16 @@ def _coordinate(name: str, law: type[FrictionLaw], record: Record, path: float) 
     if law.state_names and name in ("evolution_effect", SECOND_EFFECT):
         start = (-0.005, 0.025) if name == "evolution_effect" else (-0.01, 0.01)
         return Coordinate(name=name, unit=unit, low=-1.0, high=1.0, start=start, logarithmic=False)
-    size = record.largest
-    ends: dict[str, Any]
+    size, (low, high, start) = record.largest, _EFFECTS
     if unit == "m":
-        ends = {"low": path * 1e-6, "high": path * 10, "start": (path * 1e-3, path * 0.3)}
+        low, high, start = path * 1e-6, path * 10, (path * 1e-3, path * 0.3)
     elif name in _SHARES:
         spread = size if name == "residual" else float(np.ptp(record.friction[record.friction > size / 3]))
-        low, high = _SHARES[name]
-        ends = {"low": size * 1e-4, "high": size * 10, "start": (spread * low, spread * high)}
+        low, high, start = size * 1e-4, size * 10, (spread * _SHARES[name][0], spread * _SHARES[name][1])
     elif name == "reference_coefficient":
         level = float(np.median(record.friction[: max(len(record.friction) // 20, 1)]))
-        ends = {"low": size * 1e-2, "high": size * 10, "start": (level * 0.999, level * 1.001)}
-    else:
-        ends = _EFFECTS
-    return Coordinate(name=name, unit=unit, **ends)
+        low, high, start = size * 1e-2, size * 10, (level * 0.999, level * 1.001)
+    return Coordinate(name=name, unit=unit, low=low, high=high, start=start)
 
 
 def _sliding(
@@ -443,12 +439,12 @@ class _Choice:
         setup = set_up(self.record, kind, self.stiffness, self.loading, nuisance)
         measured = self.record.friction[setup.used]
         counts = None if self.record.counts is None else self.record.counts[setup.used]
-        search, at = FitSearch(), None
+        how, at = {}, None
         if near is not None:
-            search = FitSearch(least=_LEAST_NEAR) if start else FitSearch(least=1, most=0)
+            how = {"least": _LEAST_NEAR} if start else {"least": 1, "most": 0}
             known = near.experiment.outward(near.fitted).items()
             at = setup.experiment.near({name: v for name, v in known if start or not name.startswith(DELAY)})
-        best = fit(setup.experiment, measured, seed=self.seed, counts=counts, near=at, search=search)
+        best = fit(setup.experiment, measured, seed=self.seed, counts=counts, near=at, **how)
         return _Fitted(kind=kind, setup=setup, best=best)
 
     def _noise(self, fitted: _Fitted) -> CorrelatedNoise | None:

@@ -192,13 +192,6 @@ class Loading:
         )
         return drive, np.isin(instants, record.time)
 
-    def smoothed(self, record: Record) -> Record:
-        """A record whose load point and normal load are those of the pieces, where these stand for them."""
-        load = record.load_point if self.pieces.rough else self.pieces.position(record.time)
-        normal = record.normal if self.level is None else np.full_like(record.normal, self.level)
-        moved = 0.0 if self.normal is None else self.normal.position(record.time)
-        return replace(record, load_point=load, normal=normal + moved)
-
 
 def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None = None) -> tuple[Record, Loading | None]:
     """A record as means of its samples, with load point and normal load as they drive it; and how these move.
@@ -226,13 +219,17 @@ def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None =
     if np.percentile(np.abs(record.normal - mean), 99) > max(allowed, 1e-9 * mean):
         size = scatter(time, record.normal)
         normal = straight_pieces(time, record.normal, max(size, allowed / FAR_OFF), reading_step(record.normal))
-        level = float(np.mean(record.normal - normal.position(time)))
         if normal.noise > max(allowed, 2 * size):
             told = replace(loading, level=None), "the normal load is followed sample by sample"
         else:
+            level = float(np.mean(record.normal - normal.position(time)))
             told = replace(loading, normal=normal, level=level), "the normal load changes in straight pieces"
         loading = replace(told[0], notes=(*loading.notes, told[1]))
-    return loading.smoothed(thinned(record, pieces.begins, follow=pieces.rough)), loading
+    means = thinned(record, pieces.begins, follow=pieces.rough)
+    load = means.load_point if pieces.rough else pieces.position(means.time)
+    known = means.normal if loading.level is None else np.full_like(means.normal, loading.level)
+    moved = 0.0 if loading.normal is None else loading.normal.position(means.time)
+    return replace(means, load_point=load, normal=known + moved), loading
 
 
 def _said(pieces: Pieces) -> str:

@@ -444,9 +444,6 @@ def _load_point(given: dict[str, ndarray]) -> tuple[ndarray | None, ndarray | No
     return None, None, []
 
 
-# ----------------------------------------------------------------------
-# Noise of what was measured, and long records as means of neighbouring samples.
-
 FAR_OFF = 4.0  # deviations of a displacement that no noise explains
 _FIRST = 20  # samples
 _BENDS = 2  # among the first samples, which a change of rate alone may have
@@ -499,8 +496,11 @@ def thinned(record: Record, begins: ndarray | None = None, *, follow: bool = Fal
         return record
     starts = np.unique(np.searchsorted(record.time, [record.time[0], *([] if begins is None else begins)]))
     windows = _edges(record.time, np.append(starts[starts < count], count))
-    spikes = _spikes(record.friction, scatter(record.time, record.friction))
-    edges = _halved(record, np.union1d(windows, spikes), follow)
+    # an outlier, far from both neighbours, must not be lost in a mean
+    changes, noise = np.diff(record.friction) ** 2, scatter(record.time, record.friction)
+    far = 1 + np.flatnonzero(np.minimum(changes[:-1], changes[1:]) > (_SPIKE * noise) ** 2)
+    far = far if len(far) <= _MOST_SPIKES else far[:0]
+    edges = _halved(record, np.unique([*windows, *far, *(far + 1)]), follow)
     weights = np.ones(count, dtype=int) if record.counts is None else record.counts
     counts = np.add.reduceat(weights, edges[:-1])
 
@@ -523,13 +523,6 @@ def _edges(time: ndarray, starts: ndarray) -> ndarray:
             at += max(1, int(np.searchsorted(time[at:end], until, side="right")))
         edges.append(end)
     return np.unique(edges)
-
-
-def _spikes(values: ndarray, noise: float) -> ndarray:
-    """Samples far from both neighbours, and those after them: an outlier must not be lost in a mean."""
-    steps = np.diff(values) ** 2
-    far = 1 + np.flatnonzero(np.minimum(steps[:-1], steps[1:]) > (_SPIKE * noise) ** 2)
-    return np.concatenate([far, far + 1]) if len(far) <= _MOST_SPIKES else np.empty(0, dtype=int)
 
 
 def _halved(record: Record, edges: ndarray, follow: bool) -> ndarray:

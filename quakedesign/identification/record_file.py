@@ -74,10 +74,6 @@ def heading(text: str) -> Column:
     return Column(heading=text, name=name, unit=rounded if square is None else square, values=np.empty(0))
 
 
-# ----------------------------------------------------------------------
-# Text: the lines of headings and of units, the sign between columns, and the sign of decimals.
-
-
 def _decoded(data: bytes, path: str | Path) -> str:
     """Text of bytes: UTF-8, UTF-16 by its mark, or Latin-1, in which older instruments write a micro sign."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -233,10 +229,6 @@ def _remedy(cell: str) -> str:
     if re.fullmatch(r"[+-]?\d+,\d+", cell):
         return " Write decimal points, or decimal commas in every number."
     return " Correct it, or leave it empty where nothing was measured."
-
-
-# ----------------------------------------------------------------------
-# xlook's own files, and MATLAB's.
 
 
 def _xlook_text(text: str) -> list[Column]:

@@ -215,11 +215,6 @@ class _Joint(Experiment):
     places: tuple[ndarray, ...]  # of the coordinates of each step among those of all
     coordinates: tuple[Coordinate, ...]
 
-    @property
-    def law(self) -> FrictionLaw:  # type: ignore[override]
-        """That of the first step."""
-        return self.parts[0].law
-
     def joined(self, values: Sequence[ndarray]) -> ndarray:
         """Values of the samples of each step, weighed."""
         return np.concatenate([weighed(w, v) for w, v in zip(self._weights, values, strict=True)])

@@ -50,10 +50,8 @@ _SAFETY = 0.9
 _WILD = 1e3  # error of friction, or none at all, that says nothing of the next length
 _SHORTEST = 1e-8  # of the time between two samples
 STIFFNESS = "stiffness"
-START_STATE = "start_state"
-"""Logarithm of the state at the first sample over that of steady sliding."""
-START_RATE = "start_rate"
-"""Logarithm of the slip rate at the first sample over that of the load point."""
+START_STATE = "start_state"  # logarithm of the state at the first sample over that of steady sliding
+START_RATE = "start_rate"  # logarithm of the slip rate at the first sample over that of the load point
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -122,12 +122,9 @@ def _warnings(identification: Identification) -> list[str]:
     """What looks wrong, noise that is not white, and outliers."""
     told, critical = [], identification.estimates.get("critical_slip")
     if critical is not None and identification.law.state_names and not _SHORT <= critical.value <= _LONG:
-        short, size = critical.value < _SHORT, critical.value
-        told.append(
-            f"D_c of {f'{1e9 * size:.3g} nm' if short else f'{100 * size:.3g} cm'} is far "
-            f"{'shorter' if short else 'longer'} than the some 1 to 100 µm of laboratories: check the unit of the "
-            "displacement"
-        )
+        size = critical.value
+        long = f"{1e9 * size:.3g} nm is far shorter" if size < _SHORT else f"{100 * size:.3g} cm is far longer"
+        told.append(f"D_c of {long} than the some 1 to 100 µm of laboratories: check the unit of the displacement")
     if (correlated := identification.fit.correlated) is not None and correlated.share:
         size = identification.fit.noise * correlated.share**0.5
         length = f"{correlated.length:.2g} {'s' if correlated.of_time else 'm'}"
@@ -176,7 +173,10 @@ def identification_figure(identification: Identification) -> Any:
     if steps:
         rows.append([f"step {i}" for i in range(len(steps)) for _ in range(columns // len(steps))])
     rows.append(["correlation"] * (columns // 2) + ["region"] * (columns // 2))
-    profiles = [each for each in _profiled(identification) if len(each.profile) > 1]
+    drawn = identification.law.quantities().keys() - {"reference_coefficient"}
+    profiles = [each for name, each in identification.estimates.items() if name in drawn][:3]
+    profiles += [identification.difference] if identification.difference else []
+    profiles = [each for each in profiles if len(each.profile) > 1]
     columns = math.lcm(columns, max(len(profiles), 1))
     rows = [[name for name in row for _ in range(columns // len(row))] for row in rows]
     if profiles:
@@ -187,8 +187,8 @@ def identification_figure(identification: Identification) -> Any:
     if rates is not None:
         axes["rate"].plot(way, rates * 1e6, color=_FITTED, linewidth=1.0, drawstyle="steps-mid")
         axes["rate"].set_ylabel("rate [µm/s]", fontsize=SMALL)
-        if steps and np.min(rates) > 0:
-            ends = [1e6 * float(np.min(rates)), 1e6 * float(np.max(rates))]
+        ends = [1e6 * float(np.min(rates)), 1e6 * float(np.max(rates))]
+        if steps and ends[0] > 0:
             axes["rate"].set_yscale("log")
             axes["rate"].set_yticks(ends, [f"{end:.3g}" for end in ends])
             axes["rate"].set_yticks([], minor=True)
@@ -265,13 +265,6 @@ def _correlation(axis: Any, fit: Fit) -> None:
     axis.set_xlabel("lag [samples]", fontsize=SMALL)
     axis.set_ylabel("autocorrelation [-]", fontsize=SMALL)
     axis.legend(fontsize=SMALL - 1, frameon=False)
-
-
-def _profiled(identification: Identification) -> list[ParameterEstimate]:
-    """Parameters whose profiles are drawn: a, b, a - b and D_c, or those of friction that weakens with slip."""
-    names = identification.law.quantities().keys() - {"reference_coefficient"}
-    found = [each for name, each in identification.estimates.items() if name in names]
-    return [*found[:3], *([identification.difference] if identification.difference else [])]
 
 
 def _profile(axis: Any, estimate: ParameterEstimate, fit: Fit) -> None:

@@ -24,7 +24,7 @@ def fitted(made, seed):
 def truth_of(made, best):
     rate = getattr(best.experiment.law, "reference_rate", None)
     values = made.true_at(rate)
-    return best.experiment.inward([values[c.name] for c in best.experiment.coordinates])
+    return best.experiment.near(values)
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ def experiment(made):
     record, loading = prepared(made.noisy(0))
     setup = set_up(record, friction_law(made.law), made.stiffness, loading)
     values = made.true_at(getattr(setup.experiment.law, "reference_rate", None))
-    return setup.experiment, setup.experiment.inward([values[c.name] for c in setup.experiment.coordinates])
+    return setup.experiment, setup.experiment.near(values)
 
 
 def test_the_step_is_of_third_order():
@@ -113,7 +113,7 @@ def test_slopes_by_trend_and_unsteady_beginning_are_those_of_differences(kind):
     law = friction_law(made.law)
     plain, wide = (set_up(record, law, made.stiffness, loading, more).experiment for more in ((), (TREND, START_STATE)))
     values = made.true_at(plain.law.reference_rate)
-    at = wide.inward([(values | {TREND: 30.0, START_STATE: 0.3, START_RATE: 0.2})[c.name] for c in wide.coordinates])
+    at = wide.near(values | {TREND: 30.0, START_STATE: 0.3, START_RATE: 0.2})
     wide = wide.resolved(at, 1e-5)
     slopes = wide.slopes(at)
     for i, coordinate in enumerate(wide.coordinates):
@@ -140,7 +140,7 @@ def test_two_states_are_those_of_an_independent_integrator():
     a, b, d, second, far, mu, k = 0.008, 0.010, 1e-5, -0.004, 6e-5, 0.6, 1e-3 / 1e-6
     told = {"direct_effect": a, "evolution_effect": b, "critical_slip": d, "second_effect": second, "second_slip": far}
     values = told | {"reference_coefficient": mu}
-    at = experiment.inward([values[c.name] for c in experiment.coordinates])
+    at = experiment.near(values)
     found = experiment.resolved(at, 1e-7).friction(at)
     y, exact, begins = np.log([1e-6, d / 1e-6, far / 1e-6]), [], [*loading.pieces.begins, record.time[-1] + 1]
 

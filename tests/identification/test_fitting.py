@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import RecordError
+from quakedesign.identification import fitting
 from quakedesign.identification.experiment import Coordinate, Experiment
 from quakedesign.identification.fitting import (
     Fit,
-    FitSearch,
     Profile,
     _finite,
     _starts,
@@ -87,18 +87,19 @@ def test_three_samples_a_coordinate_are_enough():
 
 
 @pytest.mark.parametrize(("share", "searches"), [(0.75e-3, 2), (1.5e-3, 3)])
-def test_searches_agree_when_their_squares_differ_by_less_than_a_thousandth(share, searches):
+def test_searches_agree_when_their_squares_differ_by_less_than_a_thousandth(share, searches, monkeypatch):
     """The noise leaves 1; the first search ends at -1 with `share` more than that, all others at 1."""
     noise = np.resize([1.0, -1.0], 20) / 20**0.5
     measured = np.concatenate([[0.0, 0.0], noise])
     wells, start = Wells(share**0.5, 22), np.array([-1.0])
-    found = fit(wells, measured, seed=0, near=start, search=FitSearch(least=2))
+    found = fit(wells, measured, seed=0, near=start, least=2)
     assert (found.starts, found.agreeing) == (searches, 2)
     assert found.fitted[0] == pytest.approx(1, abs=1e-4)
     assert fit(wells, measured, seed=0, near=start).starts == 4
-    alone = fit(wells, measured, seed=0, near=start, search=FitSearch(least=1, most=1))
+    alone = fit(wells, measured, seed=0, near=start, least=1, most=1)
     assert alone.starts == 2
-    itself = fit(wells, measured, seed=0, search=FitSearch(least=1, most=1, agreement=0.0))
+    monkeypatch.setattr(fitting, "_AGREEMENT", 0.0)
+    itself = fit(wells, measured, seed=0, least=1, most=1)
     assert (itself.starts, itself.agreeing) == (1, 1)
 
 
@@ -111,8 +112,8 @@ def test_a_mean_of_four_counts_as_four_in_a_fit():
 def test_searches_start_from_the_sixteen_nearest_of_many_between_the_ends():
     """By the sum of absolute residuals, each with the root of its count."""
     experiment, measured, roots = Linear(np.array([[1.0], [-1.0], [0.5]])), np.array([0.7, 0.1, 0.2]), np.arange(1, 4)
-    _, starts = _starts(experiment, measured, roots, 5, FitSearch())
-    _, every = _starts(experiment, measured, roots, 5, FitSearch(most=100))
+    _, starts = _starts(experiment, measured, roots, 5, 16)
+    _, every = _starts(experiment, measured, roots, 5, 100)
     assert (len(starts), len(every)) == (16, 64)
     assert [q[0] for q in starts] == [q[0] for q in every[:16]]
     costs = [abs(0.7 - q) + 2 * abs(0.1 + q) + 3 * abs(0.2 - q / 2) for (q,) in every]
@@ -151,7 +152,7 @@ def test_steps_suit_the_scatter_between_samples_first_and_no_more_than_six_round
     assert [accuracy for _, accuracy in asked[:2]] == pytest.approx([0.01, 0.01], rel=0.05)
     assert asked[-1][1] == pytest.approx(3e-3 * 0.01, rel=0.05)
     asked.clear()
-    _starts(Restless(line(9).matrix, asked), np.arange(9.0), np.ones(9), 0, FitSearch())
+    _starts(Restless(line(9).matrix, asked), np.arange(9.0), np.ones(9), 0, 16)
     assert [accuracy for _, accuracy in asked] == [1e-9, 1e-9]
 
 

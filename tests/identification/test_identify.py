@@ -132,13 +132,13 @@ def test_the_mass_from_which_inertia_counts_and_the_noise_of_slip_are_told():
     made = synthetic.KINDS["velocity steps, ageing"]()
     record, loading = prepared(made.noisy(0))
     experiment = set_up(record, friction_law(made.law), made.stiffness, loading).experiment
-    truth = experiment.inward([made.true_at(experiment.law.reference_rate)[c.name] for c in experiment.coordinates])
+    truth = experiment.near(made.true_at(experiment.law.reference_rate))
     change = np.max(np.abs(np.diff(experiment.rates(truth)))) / 0.2
     (told,) = experiment.remarks(truth, 3e-4)
     assert f"{3e-4 * synthetic.NORMAL / change:.2g} kg/m^2" in told
     slipped = synthetic.weakening()
     measured = set_up(slipped.noisy(0), friction_law(slipped.law), None).experiment
-    at = measured.inward([slipped.truth[c.name] for c in measured.coordinates])
+    at = measured.near(slipped.truth)
     assert measured.remarks(at, 2e-3) == ()
     steepest = 0.17 / 2.5e-3 * np.exp(-measured.slip[0] / 2.5e-3)
     (felt,) = replace(measured, slip_noise=50e-6).remarks(at, 2e-3)
