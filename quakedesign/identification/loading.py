@@ -227,9 +227,9 @@ def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None =
         loading = replace(told[0], notes=(*loading.notes, told[1]))
     means = thinned(record, pieces.begins, follow=pieces.rough)
     load = means.load_point if pieces.rough else pieces.position(means.time)
-    known = means.normal if loading.level is None else np.full_like(means.normal, loading.level)
+    pressed = means.normal if loading.level is None else np.full_like(means.normal, loading.level)
     moved = 0.0 if loading.normal is None else loading.normal.position(means.time)
-    return replace(means, load_point=load, normal=known + moved), loading
+    return replace(means, load_point=load, normal=pressed + moved), loading
 
 
 def _said(pieces: Pieces) -> str:
