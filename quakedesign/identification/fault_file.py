@@ -106,15 +106,9 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         shaken = Disturbance() if _gains_a_state(identification, fault) else fault.disturbance
         step = sliding_step(law, fault.reference)
         fault = replace(fault, friction=law, sampling_time=step, disturbance=shaken)
-    return replace(
-        fault,
-        name=f"{fault.name[:40].rstrip()}-identified",
-        source=f"friction identified from {identification.record.name}; everything else: {fault.source}",
-        friction=law,
-        box=box,
-        assumed=(),
-        poor_fit=poor_fit(identification),
-    )
+    name, poor = f"{fault.name[:40].rstrip()}-identified", poor_fit(identification)
+    source = f"friction identified from {identification.record.name}; everything else: {fault.source}"
+    return replace(fault, name=name, source=source, friction=law, box=box, assumed=(), poor_fit=poor)
 
 
 def poor_fit(identification: Identification) -> str:

@@ -186,17 +186,14 @@ def _drawn(record: Record, law: type[FrictionLaw], stiffness: float | None) -> S
     path = float(np.ptp(record.load_point))
     first, size = float(record.friction[0]), record.largest
     start = (first - 0.02 * size, first + 0.02 * size)
-    coordinates = [
+    coordinates = (
         *(_coordinate(name, law, record, path) for name in law.quantities()),
         *_stiffness(record, path, stiffness),
         Coordinate(name=START, unit="", low=-size, high=2 * size, start=start, logarithmic=False),
-    ]
+    )
+    drawn, normal = record.load_point - record.load_point[0], record.normal
     experiment = Drawn(
-        law=_template(law),
-        load_point=record.load_point - record.load_point[0],
-        normal=record.normal,
-        coordinates=tuple(coordinates),
-        stiffness=stiffness,
+        law=_template(law), load_point=drawn, normal=normal, coordinates=coordinates, stiffness=stiffness
     )
     notes = ("the block sticks at first and has not slipped before", "without inertia")
     return Setup(experiment=experiment, used=np.ones(len(record.time), dtype=bool), notes=notes)
@@ -526,16 +523,9 @@ def profiled(
         # along a valley of equal fits, ends that a search comes upon mean nothing
         ends: dict[str, Any] = {"low": -math.inf, "high": math.inf, "least": -math.inf, "most": math.inf}
         estimates |= {name: replace(estimates[name], **ends) for name in pair}
-    return Identification(
-        record=record,
-        fit=best,
-        used=setup.used,
-        estimates=estimates,
-        difference=difference,
-        law=best.experiment.best_law(best.fitted),
-        notes=(*setup.notes, *best.experiment.remarks(best.fitted, best.noise)),
-        seed=seed,
-    )
+    law, notes = best.experiment.best_law(best.fitted), best.experiment.remarks(best.fitted, best.noise)
+    told: dict[str, Any] = {"record": record, "used": setup.used, "notes": (*setup.notes, *notes), "seed": seed}
+    return Identification(fit=best, law=law, estimates=estimates, difference=difference, **told)
 
 
 def needed(best: Fit, squares: float, fewer: int = 1) -> bool:

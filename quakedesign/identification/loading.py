@@ -183,14 +183,9 @@ class Loading:
             middles = (instants[1:] + instants[:-1]) / 2
             rates = self.pieces.rates[np.searchsorted(self.pieces.begins, middles, side="right") - 1]
         normal = np.log(np.interp(instants, record.time, record.normal))
-        drive = Drive(
-            lengths=lengths,
-            rates=rates,
-            growth=np.diff(normal) / lengths,
-            compliance=np.exp(-(normal[1:] + normal[:-1]) / 2),
-            first_rate=self.first_rate,
-        )
-        return drive, np.isin(instants, record.time)
+        growth, compliance = np.diff(normal) / lengths, np.exp(-(normal[1:] + normal[:-1]) / 2)
+        told = {"lengths": lengths, "rates": rates, "growth": growth, "compliance": compliance}
+        return Drive(first_rate=self.first_rate, **told), np.isin(instants, record.time)
 
 
 def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None = None) -> tuple[Record, Loading | None]:
