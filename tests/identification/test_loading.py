@@ -1,12 +1,21 @@
 """Load points as straight pieces: rates and times of made-up motions come back, in noise that is white or shared."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from quakedesign.errors import RecordError
-from quakedesign.identification.loading import _needed, given_pieces, prepared, staircase, straight_pieces
+from quakedesign.identification.loading import (
+    Loading,
+    Pieces,
+    _needed,
+    given_pieces,
+    prepared,
+    staircase,
+    straight_pieces,
+)
 from quakedesign.identification.record import Record, reading_step, scatter
 
 TIME = np.arange(0.0, 120.0, 0.05)
@@ -174,3 +183,78 @@ def test_a_rest_after_sliding_is_a_hold_without_an_error_and_one_at_the_beginnin
     x = 1e-5 * np.maximum(time - 20, 0) + noise
     pieces = straight_pieces(time, x, scatter(time, x), reading_step(x))
     assert 0 < abs(pieces.rates[0]) < 1e-7
+
+
+def loading(begins, rates, **more):
+    pieces = Pieces(begins=np.array(begins), rates=np.array(rates), **({"noise": 0.0} | more))
+    return Loading(pieces=pieces, normal=None, level=1.0, notes=())
+
+
+def test_a_step_is_a_change_of_rate_by_more_than_a_quarter():
+    made = loading([0.0, 10.0, 20.0, 30.0, 40.0, 50.0], [1.0, 1.25, 1.0, 1.2501, 0.0, -1.0])
+    assert made.pieces.large_changes.tolist() == [False, False, True, True, True]
+    assert made.steps.tolist() == [30.0, 40.0, 50.0]
+    assert made.before == pytest.approx(10 + 12.5 + 10, rel=1e-12)
+    assert made.first_step == pytest.approx(np.log(1.2501), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("rates", "step"),
+    [
+        ([1.0, 1.2], None),
+        ([1.0, 0.0], None),
+        ([0.0, 1.0], None),
+        ([1.0, 10.0, 1.0], np.log(10)),
+        ([10.0, 1.0], -np.log(10)),
+    ],
+)
+def test_a_first_step_has_a_ratio_unless_it_is_a_hold(rates, step):
+    made = loading(10.0 * np.arange(len(rates)), rates)
+    assert made.first_step == (step if step is None else pytest.approx(step, rel=1e-12))
+    assert (made.before > 0) == (rates[0] > 0 and abs(rates[1] - rates[0]) > 0.3)
+
+
+def test_a_time_that_noise_hides_by_a_hundredth_of_a_period_has_a_delay():
+    """The noise over the change of rate is how far the time may be off; three times that and a period are allowed."""
+    record = SimpleNamespace(time=np.arange(0.0, 100.0, 1.0), counts=None)
+    period = 99.0 / 100
+    for share, found in ((0.0099, 0), (0.0101, 1)):
+        noise = share * period * 9.0
+        after, most = loading([0.0, 40.0], [1.0, 10.0], noise=noise).delays(record)
+        assert after.shape == (100, found)
+        assert most.tolist() == [pytest.approx(3 * share * period + period, rel=1e-12)] * found
+    assert np.flatnonzero(after[:, 0]).tolist() == list(range(40, 100))
+    means = SimpleNamespace(time=record.time, counts=np.full(100, 2.0))
+    assert loading([0.0, 40.0], [1.0, 10.0], noise=9.0).delays(means)[1] == pytest.approx([3.0 + period / 2], rel=1e-12)
+    assert loading([0.0, 40.0], [1.0, 10.0], noise=9.0, rough=True).delays(record)[1].size == 0
+    assert loading([0.0, 40.0], [1.0, 1.2], noise=9.0).delays(record)[1].size == 0
+    assert loading([0.0, 99.5], [1.0, 10.0], noise=9.0).delays(record)[1].size == 0
+
+
+def test_only_the_four_largest_changes_of_rate_have_delays_in_their_order():
+    record = SimpleNamespace(time=np.arange(0.0, 70.0, 1.0), counts=None)
+    made = loading(10.0 * np.arange(7), [1.0, 9.0, 1.5, 8.0, 2.0, 4.0, 1.0], noise=1.0)
+    after, _ = made.delays(record)
+    assert [int(np.argmax(column)) for column in after.T] == [10, 20, 30, 40]
+    assert after.sum(axis=0).tolist() == [10.0] * 4
+
+
+@pytest.mark.parametrize(("drift", "followed"), [(3e-4, False), (3e-2, True)])
+def test_a_normal_load_that_noise_of_friction_hides_is_its_mean(drift, followed):
+    time = np.arange(0.0, 60.0, 0.1)
+    friction = 0.6 + 1e-3 * np.random.default_rng(3).standard_normal(len(time))
+    normal = 5e6 * (1 + drift * (time / 60 - 0.5))
+    made = Record(
+        name="made",
+        time=time,
+        friction=friction,
+        load_point=1e-6 * time,
+        slip=None,
+        normal=normal,
+        normal_unit="Pa",
+    )
+    means, found = prepared(made)
+    assert (found.normal is not None) == followed
+    assert len(found.notes) == 1 + followed
+    expected = np.interp(means.time, time, normal) if followed else np.full(len(means.time), 5e6)
+    np.testing.assert_allclose(means.normal, expected, rtol=1e-6)
