@@ -101,6 +101,8 @@ def test_a_peak_of_twice_the_noise_passes_and_four_samples_or_those_left_out_tel
     assert checks(residuals, begins=[300.0], kept=kept)[0]["peak"].value == 0.0
     worst, _ = checks(np.where(np.arange(COUNT) < 250, 1.5, residuals), begins=[100.0, 300.0])
     assert worst["peak"].value == 2.0
+    _, quiet_after = checks(np.where(np.arange(COUNT) < 250, 3.0, 0.0), begins=[300.0])
+    assert quiet_after == pytest.approx((9 * 247 / 398) ** 0.5, rel=1e-12)
 
 
 @pytest.mark.usefixtures("white")
@@ -147,6 +149,8 @@ def test_a_sign_is_that_of_the_whole_interval(ends, said):
     assert check.passed
     assert said in check.sentence
     assert not sign_check(between(*ends), {}, np.sign(ends[0]) * -2e-9).passed
+    assert not sign_check(between(*ends), {"with a trend": (between(-ends[1], -ends[0]), 9.0)}).passed
+    assert not sign_check(between(*ends), {}, None, ": the beginning is off").passed
     assert sign_check(between(*ends), {}, np.sign(ends[0]) * 2e-9).passed
 
 
