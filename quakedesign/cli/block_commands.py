@@ -60,14 +60,11 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
     """What a statement about blocks depends on, and what its words mean."""
     from quakedesign.studies.chains import farthest_balance
 
-    blocks, wells = counted(len(chain.blocks), "block"), counted(len(chain.wells), "well")
     meant = "the load of a pressure is the pressure that balances the blocks on the reference"
     if chain.ages:
         return [
-            f"plant: {chain.name}, {blocks}, {wells}, its constants as they are, from steady sliding; the plan of the "
-            "reference reaches the fault as it is",
             "a log state is ln of the state over D_c/V; |y| is bounded for log states and pulls [MPa]; the load of a "
-            "pressure is the plan; a disturbance is the rate over V that the stress adds",
+            "pressure is the plan",
         ]
     if (far := farthest_balance(chain, found)) is not None:
         meant = (
@@ -75,18 +72,9 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
             "reference; slip errors are relative to the equilibrium of each block under these pressures, which is "
             f"within {far:.3g} m of the reference at every time"
         )
-    box = chain.fault.box
-    springs = ", springs between the blocks as they are" if any((box.stiffness, box.damping, box.authority)) else ""
-    along = chain.diffusivity
-    pressure = "" if along is None else f", pressures diffuse along the fault, {along:g} m²/s"
     excess = UpperBound(max(rational(block.friction.rest_excess) for block in chain.blocks))
     healed = f"not covered: friction at rest up to {excess:.3g} above friction in slip (healing of the fault file)"
-    return [
-        *([healed] if excess else []),
-        f"plant: {chain.name}, {blocks}, {wells}, any constants of box {box.name}{springs}{pressure}, without "
-        "stick (friction continues to negative slip rates)",
-        meant,
-    ]
+    return [*([healed] if excess else []), meant]
 
 
 def _facts(found: Any, chain: "BlockChain") -> dict[str, Any]:

@@ -23,7 +23,7 @@ from functools import cached_property
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.exact import UpperBound, rational, shortly
+from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import BlockChain
 from quakedesign.guarantees.exact.sliding_small_gain import chords, exponential
 from quakedesign.plant import Sector, SlidingPlant, UncertainPlant, slow_sliding_plant
@@ -228,6 +228,8 @@ class SlidingBlocks:
             disturbances[f"stress on block {place}"] = (slips, _outward(*[found.by_pull[1] * found.stress] * 2)[1])
             if task.swing:
                 disturbances[f"reference of block {place}"] = (unit(size, i), ageing * task.swing)
+        more = UpperBound(max(found.stress for found in ranges) - self.stress)
+        name = f"{self.chain.name}, {N} blocks, {counted(m, 'well')}"
         weights = averages(self.chain.shares) if m < N else tuple(unit(N, i) for i in range(N))
         return UncertainPlant(
             A=[(zero,) * size] * (2 * N) + [tuple(-v / self.lag for v in unit(size, 2 * N + k)) for k in range(m)],
@@ -244,7 +246,13 @@ class SlidingBlocks:
             units={f"slip error {i + 1}": "m" for i in range(N)}
             | {f"pull {i + 1}": "MPa" for i in range(N)}
             | {f"pressure {k + 1}": "MPa" for k in range(m)},
-            name=f"{self.chain.name}, {N} blocks, {counted(m, 'well')}",
+            name=name,
+            remarks={
+                "plant": f"of {name}, in slow sliding with constants as they are, from steady sliding, where the plan "
+                "of the reference reaches the fault as it is",
+                "disturbances": f"slip rates over V by {LowerBound(self.stress).quantity('Pa', 4)} of shear stress and "
+                f"up to {more.quantity('Pa')} of inertia and rounding",
+            },
         )
 
 

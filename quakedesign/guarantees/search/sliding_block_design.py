@@ -21,7 +21,7 @@ from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
 from quakedesign.guarantees.exact.sliding_blocks import MPA, BlockClaims, SlidingBlocks
 from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.search.block_design import estimate
+from quakedesign.guarantees.search.block_design import estimate, middle, rounded
 from quakedesign.guarantees.search.plant_search import linear_part, plant_guarantee
 from quakedesign.plant.block_plant import averages
 
@@ -101,8 +101,8 @@ def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, 
     if not low or not covers(low):
         raise _of_another(chain)
     for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if covers(middle) else (low, middle)
+        half = (low + high) / 2
+        low, high = (half, high) if covers(half) else (low, half)
     rate = SlidingBlocks(chain=chain, lag=lag, stress=low).log_rate(claims)
     assert rate is not None  # as the plant is known
     return lag, low, rate
@@ -215,11 +215,8 @@ class _WeightSearch:
     def _law(self, part: Any, x: np.ndarray) -> MatrixLaw | None:
         """Feedback of the estimate, in exact numbers; None where an equation of Riccati has no solution."""
         pressure, slip, drift, noise = np.exp(x)
-        A, m = np.array(part.A, dtype=float), self.count
-        for sector in part.sectors:
-            entry, row = np.array(sector.entry, dtype=float), np.array(sector.row, dtype=float)[: len(A)]
-            A = A + float(sum(sector.slopes)) / 2 * np.outer(entry, row)
-        A, B = self.mean @ A @ self.back, self.mean @ np.array(part.B, dtype=float)
+        (A, B), m = middle(part), self.count
+        A, B = self.mean @ A @ self.back, self.mean @ B
         stressed = self.mean @ np.array([entry for entry, _ in part.disturbances], dtype=float).T
         stressed = stressed * [float(size) for _, size in part.disturbances]
         k, T = len(A), float(self.step)
@@ -243,12 +240,8 @@ class _WeightSearch:
         return MatrixLaw(
             step=self.step,
             delay=Fraction(0),
-            update=_rounded(moved @ rest),
-            measured=_rounded(moved @ L / self.slip),
-            output=_rounded(-K @ rest),
-            feedback=_rounded(-K @ L / self.slip),
+            update=rounded(moved @ rest, _DIGITS),
+            measured=rounded(moved @ L / self.slip, _DIGITS),
+            output=rounded(-K @ rest, _DIGITS),
+            feedback=rounded(-K @ L / self.slip, _DIGITS),
         )
-
-
-def _rounded(values: np.ndarray) -> Any:
-    return tuple(tuple(rational(f"{v:.{_DIGITS}g}") for v in row) for row in values)

@@ -1,6 +1,7 @@
 """Blocks in slow sliding beside their nonlinear equations, and runs of these beside what is proved."""
 
 import json
+import re
 from dataclasses import fields, replace
 from fractions import Fraction as F
 from pathlib import Path
@@ -84,6 +85,12 @@ def test_inertia_is_a_stress_of_less_than_a_pascal_and_grows_with_the_mass():
     assert 10000 < light / by_pull < 10001
     extra = float(heavy.disturbances["stress on block 2"][1]) / by_pull - 10000
     assert extra == pytest.approx(1000 * (light / by_pull - 10000), rel=0.05)
+    told = heavy.remarks["disturbances"]
+    own, more = re.search(r"by ([0-9.]+) kPa of shear stress and up to ([0-9.]+) Pa of", told).groups()
+    by_pull = float(heavy.sectors["rate of block 2 by its pull"].slopes[1]) / 1e6
+    extra = float(heavy.disturbances["stress on block 2"][1]) / by_pull - 10000
+    assert own == "10"
+    assert extra * 0.99 < float(more) < extra * 1.01
 
 
 def test_inertia_counts_the_pull_of_a_neighbour_that_is_faster():
