@@ -305,7 +305,9 @@ def _moving(
     F = _closed(gains, first)
     if F is None:
         return lost
-    moves = [_up(abs(v) + _dot(row, F)) for v, row in zip(still[:N], gain_slip, strict=True)]
+    moves = [
+        Fraction(ceil((abs(v) + _dot(row, F)) * _GRID), _GRID) for v, row in zip(still[:N], gain_slip, strict=True)
+    ]
     pressures = [abs(v) + _dot([abs(g) for g in row[:N]], F) for v, row in zip(still[N:], inverse[N:], strict=True)]
     return replace(lost, moves=moves, pressures=[Fraction(ceil(v)) for v in pressures])
 
@@ -328,15 +330,13 @@ def _middle(ends: Range) -> tuple[Fraction, Fraction]:
     return middle, max(ends[1] - middle, middle - ends[0])
 
 
-def _up(value: Fraction) -> Fraction:
-    return Fraction(ceil(value * _GRID), _GRID)
-
-
 def _dot(row: Iterable[Fraction], values: Iterable[Fraction]) -> Fraction:
     return sum((a * b for a, b in zip(row, values, strict=False) if a and b), Fraction(0))
 
 
-def product(rows: Sequence[Row], columns: Sequence[Sequence[Fraction]], count: int) -> list[list[Fraction]]:
+def product(
+    rows: Sequence[Sequence[Fraction]], columns: Sequence[Sequence[Fraction]], count: int
+) -> list[list[Fraction]]:
     """Product of two matrices, its first columns."""
     return [[_dot(row, (line[j] for line in columns)) for j in range(count)] for row in rows]
 

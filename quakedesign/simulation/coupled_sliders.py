@@ -24,6 +24,7 @@ from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import BlockChain, FrictionLaw, SlidingReference
 from quakedesign.fault.model import magnitude, require_positive
 from quakedesign.plant.block_plant import averages
+from quakedesign.simulation.block_run import MPA
 from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
 from quakedesign.simulation.smooth import Ramp, SmoothProblem
 from quakedesign.simulation.state_plant import TIDE, slip
@@ -32,7 +33,6 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
 
 MOST_EXPANDED = 40  # blocks whose equations are written out; more are matrices
-MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
 _LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
 _LONGEST_RUN = 1e5 * _LONGEST  # s
 _FARTHEST = 1e6  # critical slips that the far end travels: some thousand cycles
@@ -413,6 +413,13 @@ def natural_cycles(
 # Runs under a law of slow sliding.
 
 
+def planned_per_slip(chain: BlockChain) -> float:
+    """Pressure that steady sliding at the first rate of the reference needs, per slip of the reference [Pa/m]."""
+    rate = float(SlidingReference(task=chain.fault.reference).first_rate)
+    steady = float(chain.blocks[0].friction.steady_coefficient(rate))
+    return float(chain.fault.stiffness / chain.fault.area / steady)
+
+
 def simulate_held_blocks(
     chain: BlockChain,
     law: Any,
@@ -461,8 +468,7 @@ def simulate_held_blocks(
         )
     sliders, course = CoupledSliders.of(chain, inertia=inertia, lag=lag), SlidingReference(task=chain.fault.reference)
     (N, m), V = sliders.sizes, float(course.first_rate)
-    steady = float(chain.blocks[0].friction.steady_coefficient(V))
-    per_slip = chain.fault.stiffness / chain.fault.area / steady
+    per_slip = planned_per_slip(chain)
     turn, phases = 2 * math.pi / period, 2 * np.pi * np.arange(N) / N
     y = sliders.start([V] * N, [float(one.steady_state(V)[0]) for one in sliders.laws])
     prestress = sliders.resisting(y)

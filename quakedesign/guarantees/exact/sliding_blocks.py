@@ -248,8 +248,8 @@ class SlidingBlocks:
             | {f"pressure {k + 1}": "MPa" for k in range(m)},
             name=name,
             remarks={
-                "plant": f"of {name}, in slow sliding with constants as they are, from steady sliding, where the plan "
-                "of the reference reaches the fault as it is",
+                "plant": f"of {name}, in slow sliding with constants as they are, from steady sliding, behind a lag of "
+                f"{shortly(self.lag)} s that the plan of the reference does not have",
                 "disturbances": f"slip rates over V by {LowerBound(self.stress).quantity('Pa', 4)} of shear stress and "
                 f"up to {more.quantity('Pa')} of inertia and rounding",
             },

@@ -219,14 +219,21 @@ def nonlinear_run(law, shares, weights, stress, signs, plan=K / MU):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("wells", "stress", "step", "most"),
-    [((2500.0, 7500.0, 12500.0), "10000", "400", 0.08), ((2500.0, 12500.0), "1000", "1600", 0.05)],
-    ids=["three wells", "two wells"],
+    ("wells", "stress", "step", "most", "kind"),
+    [
+        ((2500.0, 7500.0, 12500.0), "10000", "400", 0.08, "centralised"),
+        ((2500.0, 7500.0, 12500.0), "10000", "400", 0.08, "decentralised"),
+        ((2500.0, 12500.0), "1000", "1600", 0.05, "centralised"),
+    ],
+    ids=["three wells", "decentralised", "two wells"],
 )
-def test_nonlinear_blocks_stay_within_what_is_proved_and_both_checkers_decide(wells, stress, step, most, checker):
+def test_nonlinear_blocks_stay_within_what_is_proved_and_both_checkers_decide(wells, stress, step, most, kind, checker):
     chain = replace(CHAIN, wells=wells)
-    found = qd.guarantee(chain, stress=stress, lag="800", step=step)
+    found = qd.guarantee(chain, kind, stress=stress, lag="800", step=step)
     assert found.proved
+    for part in (found.law.update, found.law.measured, found.law.output, found.law.feedback):
+        apart = all(not v or i % 3 == j % 3 for i, row in enumerate(part) for j, v in enumerate(row))
+        assert apart is (kind == "decentralised")
     document = guarantee_document(found)
     assert checker.check(json.dumps(document)).verdict == "proved"
     told = float(found.notes[0].split("|ln(v/V)| <= ")[1].split()[0])
@@ -255,10 +262,10 @@ def run(*arguments):
         (("guarantee", PATH), "give stress, lag and, if you like, step"),
         (("guarantee", PATH, "--stress", "10 kPa"), "positive lag and a positive bound of the shear stress"),
         (("guarantee", PATH, "--stress", "10 kPa", "--lag", "800 s", "--delay", "1 s"), "Received --delay"),
-        (("design", PATH, "--out", "unwritten"), "Use guarantee with --lag and --stress"),
-        (("compare", PATH), "Use guarantee with --lag and --stress"),
-        (("limits", PATH), "Use guarantee with --lag and --stress"),
-        (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--controller", "decentralised"), "one kind of law"),
+        (("design", PATH, "--out", "unwritten"), "give stress, lag and, if you like, step"),
+        (("design", PATH, "--stress", "10 kPa", "--out", "unwritten"), "positive lag and a positive bound"),
+        (("compare", PATH), "give stress, lag and, if you like, step"),
+        (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--controller", "dia"), "centralised, decentralised"),
         (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--box", "ten-percent"), "box paper"),
         (("guarantee", PATH.with_name("three_blocks.toml"), "--lag", "1 s"), "need friction with a state"),
     ],
