@@ -35,6 +35,7 @@ from flint import fmpq, fmpq_mat
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import BlockChain, Fault
+from quakedesign.fault.block_chain import add_springs
 from quakedesign.fault.units import exact_value
 from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.plant.plant_values import MOST, Matrix, Row, unit
@@ -99,8 +100,7 @@ def _parts(
     else:
         slopes, dampings = [task.slip_chord for task in tasks], [task.rate_chord for task in tasks]
     pulls = [[zero] * size for _ in range(N)]
-    for i, j, K in springs:
-        pulls[i][j], pulls[i][i] = pulls[i][j] + K, pulls[i][i] - K
+    add_springs(pulls, springs)
     for i, damping in enumerate(dampings):
         pulls[i][N + i] = -(damping[0] + damping[1]) / 2
     rate = [unit(size, N + i) for i in range(N)]
@@ -164,6 +164,12 @@ def averages(shares: Sequence[Row]) -> Matrix:
     """Weights of the blocks [-] in what each well measures: its shares, so that each row adds up to 1."""
     columns = list(zip(*shares, strict=True))
     return tuple(tuple(v / (sum(column) or 1) for v in column) for column in columns)
+
+
+def measured_by(shares: Sequence[Row]) -> Matrix:
+    """Weights of the blocks [-] in what is measured: each block, or averages where there are fewer wells."""
+    N = len(shares)
+    return averages(shares) if len(shares[0]) < N else tuple(unit(N, i) for i in range(N))
 
 
 def require_independent(shares: Sequence[Row]) -> None:
@@ -236,9 +242,7 @@ def _balancing(
     rows = [[Fraction(0)] * N + list(acting[i]) for i in range(N)] + [[*row, *[Fraction(0)] * m] for row in weights]
     for i, value in enumerate(diagonal):
         rows[i][i] += value
-    for i, j, K in springs:
-        rows[i][j] += K
-        rows[i][i] -= K
+    add_springs(rows, springs)
     return inverse_of(rows)
 
 

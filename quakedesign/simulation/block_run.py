@@ -13,7 +13,8 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import rational
 from quakedesign.fault import BlockChain, SlidingReference
-from quakedesign.plant.block_plant import averages
+from quakedesign.fault.block_chain import add_springs
+from quakedesign.plant.block_plant import measured_by
 from quakedesign.symbolic.casadi_printer import to_casadi
 
 MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
@@ -95,15 +96,13 @@ def decided(chain: BlockChain, law: Any, count: Any, x: Any, v: Any, z: Any) -> 
     z : SX
         States of the law.
     """
-    told, N = len(law.feedback[0]), len(chain.blocks)
-    weights, time = ca.DM(np.array(averages(chain.shares), dtype=float)), count * float(law.step)
+    weights, time = ca.DM(np.array(measured_by(chain.shares), dtype=float)), count * float(law.step)
     if chain.ages:
         r, unit = SlidingReference(task=chain.fault.reference).slip(time), MPA
-        seen = x - r if told == N else weights @ x - r
+        seen = weights @ x - r
     else:
         (r, moved), unit = reference(chain, time), 1
-        errors = ca.vertcat(x - r, v - moved)
-        seen = errors if told == 2 * N else ca.vertcat(weights @ x - r, weights @ v - moved)
+        seen = ca.vertcat(weights @ x - r, weights @ v - moved)
     F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
     p = (ca.mtimes(H, z) if len(F) else 0) + ca.mtimes(D, seen)
     return unit * p, ca.mtimes(F, z) + ca.mtimes(G, seen) if len(F) else z
@@ -129,9 +128,7 @@ class _Period:
         slow, columns = len(flow), pressures.shape[1]
         through = expm(np.vstack([flow, np.zeros((columns - slow, columns))]) * h) if slow else np.eye(columns)
         pulls = np.zeros((N, N))
-        for i, j, K in chain.springs:
-            pulls[i, j] += float(K)
-            pulls[i, i] -= float(K)
+        add_springs(pulls, chain.springs, 1.0)
         stress = np.array([b.effective_normal_stress for b in chain.blocks])
         kicked = fault.disturbance
         phases = 2 * np.pi * np.arange(N) / N

@@ -23,6 +23,7 @@ from scipy.linalg import expm
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import BlockChain
+from quakedesign.fault.block_chain import add_springs
 from quakedesign.fault.model import require_positive
 from quakedesign.guarantees.search.lqg import mean_rate, sliding_model
 from quakedesign.plant import uncertain_plant
@@ -192,9 +193,7 @@ def _steepest(chain: BlockChain) -> tuple[np.ndarray, np.ndarray, np.ndarray, fl
     """A, entries of the disturbances, B, their size [m/s²], and B at a pole, where every block weakens most."""
     tasks, N = [uncertain_plant(fault) for fault in chain.faults], len(chain.blocks)
     stiff = np.diag([float(task.slip_chord[1]) for task in tasks])
-    for i, j, K in chain.springs:
-        stiff[i, j] += float(K)
-        stiff[i, i] -= float(K)
+    add_springs(stiff, chain.springs, 1.0)
     damping = np.diag([-float(task.rate_chord[0]) for task in tasks])
     A = np.block([[np.zeros((N, N)), np.eye(N)], [stiff, damping]])
     poles = np.linalg.eigvals(A)

@@ -23,7 +23,7 @@ from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
 from quakedesign.guarantees.search.block_design import estimate, middle, rounded
 from quakedesign.guarantees.search.plant_search import linear_part, plant_guarantee
-from quakedesign.plant.block_plant import averages
+from quakedesign.plant.block_plant import measured_by
 
 _STARTS = ((100.0, 100.0, 1e-2, 1e-9), (10.0, 100.0, 1e-4, 1e-9), (1000.0, 100.0, 1e-4, 1e-6), (100.0, 1.0, 1e-4, 1e-6))
 """Weight of the pressure, of the slip error, and variances of the pressure error and of the measured slip, scaled."""
@@ -164,7 +164,7 @@ class _WeightSearch:
         task, shares = blocks.tasks[0], np.array(blocks.chain.shares, dtype=float)
         N, m = shares.shape
         self.slip = float(task.ranges["critical_slip"][0])
-        weights = np.array(averages(blocks.chain.shares), dtype=float) if m < N else np.eye(N)
+        weights = np.array(measured_by(blocks.chain.shares), dtype=float)
         spread = shares @ np.linalg.inv(weights @ shares) if m < N else np.eye(N)
         self.mean = np.block([[np.kron(np.eye(2), weights), np.zeros((2 * m, m))], [np.zeros((m, 2 * N)), np.eye(m)]])
         self.back = np.block([[np.kron(np.eye(2), spread), np.zeros((2 * N, m))], [np.zeros((m, 2 * m)), np.eye(m)]])
