@@ -11,6 +11,8 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.cli import main
+from quakedesign.errors import ParameterError
+from quakedesign.fault.friction.weakening import SlipRateWeakening
 from quakedesign.guarantees.search import block_design
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.plant import block_plant, uncertain_plant
@@ -210,3 +212,35 @@ def test_a_search_leaves_the_slip_rates_no_larger_than_its_start(monkeypatch):
     laws = (start, block_design.block_law(plant, F("0.184")))
     before, after = (block_design.estimate(part, law)[1][len(part.A) // 2 : len(part.A)].max() for law in laws)
     assert after <= before
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"blocks": 1}, "blocks must be 2 to 20. Received 1"),
+        ({"blocks": 21}, "blocks must be 2 to 20. Received 21"),
+        ({"blocks": 2, "coupling": 0}, "coupling of blocks must be positive"),
+    ],
+)
+def test_a_fault_is_cut_into_blocks_that_pull_each_other(given, said):
+    with pytest.raises(ParameterError, match=said):
+        qd.UncertainPlant.from_blocks(REAL, **given)
+
+
+@pytest.mark.parametrize("part", ["stiffness", "damping", "authority"])
+def test_fewer_wells_need_known_constants_each(part):
+    unknown = replace(REAL, box=replace(REAL.box, name="own", **{part: F(1, 10)}))
+    with pytest.raises(ParameterError, match="box paper"):
+        qd.UncertainPlant.from_blocks(unknown, 2, wells="one")
+
+
+def test_friction_of_the_slip_rate_is_a_sector_of_its_block():
+    """Its half-width is that of the damping; friction of the slip alone has none."""
+    assert not any("damping" in name for name in qd.UncertainPlant.from_blocks(REAL, 2).sectors)
+    law = SlipRateWeakening(residual=0.25, drop=0.08, critical_rate=1.0)
+    plant = qd.UncertainPlant.from_blocks(replace(REAL, friction=law), 2)
+    low, high = uncertain_plant(replace(REAL, friction=law)).rate_chord
+    for place in (1, 2):
+        assert plant.sectors[f"damping of block {place}"].slopes == (-(high - low) / 2, (high - low) / 2)
+        assert plant.A[1 + place][1 + place] == -(high + low) / 2
+    assert high > low

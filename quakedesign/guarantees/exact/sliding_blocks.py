@@ -180,7 +180,7 @@ class SlidingBlocks:
             if Y > _LARGEST:
                 return None
             grown, (least, most) = exponential(Y), chords(Y)
-            of_state = ageing * max(grown - 1 / aged, aged - 1 / grown)
+            of_state = ageing * (grown - 1 / aged)  # the larger end, as Y >= Z
             change = (task.pressure_per_slip * task.fastest + moved) * (a * Y + b * Z) + high * b * of_state
             change += pulls * task.rate * (exponential(fastest) - 1 + task.swing) + mu * moved
             stress = task.stress + rounding + change * task.inertia * task.rate * grown / (low * a)

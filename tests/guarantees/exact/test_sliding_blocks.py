@@ -77,6 +77,42 @@ def test_the_linear_part_is_that_of_the_springs_and_the_lag():
     assert plant.sectors["rate of block 1 by its pull"].within == CLAIMS.pull / 10**6
 
 
+@pytest.mark.parametrize(("state", "pull"), [("0.02", 30_000), ("0.2", 1000)])
+def test_the_largest_slip_rate_and_its_stress_are_consistent(state, pull):
+    """Y is not below the y of the balance of forces at the ends of z, w and s, and is the one that inertia counts."""
+    dense = replace(CHAIN.fault, density=2670e4, shear_modulus=32.04e9)
+    blocks = SlidingBlocks(chain=replace(CHAIN, fault=dense), lag=F(800), stress=F(10000))
+    claims = BlockClaims(log_state=F(state), pull=F(pull), push=F(200_000))
+    found, Z, low = blocks._ranges(claims), float(state), STRESS - K / MU - 2e5
+    for place, one in enumerate(found):
+        Y, stress = float(one.log_rate), float(one.stress)
+        (needed,) = log_rate(np.array([low]), np.array([-Z]), np.array([pull + stress]))
+        assert needed <= Y <= 1.1 * needed
+        moved, springs = 2 * 2e5 / LAG, K + SPRING * (4 if place == 1 else 2)
+        change = (K / MU * V + moved) * (A * Y + B * Z) + (STRESS + 2e5) * B * V / D * (np.exp(Y) - np.exp(-Z))
+        change += springs * V * np.expm1(float(max(other.log_rate for other in found))) + MU * moved
+        assert stress - 1e4 == pytest.approx(change * 2670e4 * 15e3 * V * np.exp(Y) / (low * A), rel=3e-3)
+
+
+def test_one_block_that_may_open_leaves_no_claim_for_the_others():
+    weak = replace(CHAIN.blocks[1], effective_normal_stress=3.6e6)
+    chain = replace(CHAIN, blocks=(CHAIN.blocks[0], weak, CHAIN.blocks[2]))
+    assert SlidingBlocks(chain=chain, lag=F(800), stress=F(10000)).log_rate(CLAIMS) is None
+
+
+@pytest.mark.parametrize("part", ["stiffness", "damping", "authority"])
+def test_a_box_of_one_unknown_constant_is_refused(part):
+    box = replace(CHAIN.fault.box, name="own", **{part: F(1, 10)})
+    with pytest.raises(QuakedesignError, match="box paper"):
+        SlidingBlocks(chain=replace(CHAIN, fault=replace(CHAIN.fault, box=box)), lag=F(800), stress=F(10000))
+
+
+@pytest.mark.parametrize(("lag", "stress"), [(0, 1), (1, 0), (-1, 1), (1, -1)])
+def test_lag_and_stress_are_positive(lag, stress):
+    with pytest.raises(QuakedesignError, match="a positive lag and a positive bound"):
+        SlidingBlocks(chain=CHAIN, lag=F(lag), stress=F(stress))
+
+
 def test_inertia_is_a_stress_of_less_than_a_pascal_and_grows_with_the_mass():
     light = float(BLOCKS.plant(CLAIMS).disturbances["stress on block 2"][1])
     dense = replace(CHAIN.fault, density=2670e3, shear_modulus=32.04e9)
