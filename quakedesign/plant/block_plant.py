@@ -160,16 +160,12 @@ def _parts(
     }
 
 
-def averages(shares: Sequence[Row]) -> Matrix:
-    """Weights of the blocks [-] in what each well measures: its shares, so that each row adds up to 1."""
-    columns = list(zip(*shares, strict=True))
-    return tuple(tuple(v / (sum(column) or 1) for v in column) for column in columns)
-
-
 def measured_by(shares: Sequence[Row]) -> Matrix:
-    """Weights of the blocks [-] in what is measured: each block, or averages where there are fewer wells."""
-    N = len(shares)
-    return averages(shares) if len(shares[0]) < N else tuple(unit(N, i) for i in range(N))
+    """Weights of the blocks [-] in what is measured: each block, or with fewer wells averages by shares of a well."""
+    N, columns = len(shares), list(zip(*shares, strict=True))
+    if len(columns) == N:
+        return tuple(unit(N, i) for i in range(N))
+    return tuple(tuple(v / (sum(column) or 1) for v in column) for column in columns)
 
 
 def require_independent(shares: Sequence[Row]) -> None:
@@ -180,7 +176,7 @@ def require_independent(shares: Sequence[Row]) -> None:
     ParameterError
     """
     N, m = len(shares), len(shares[0])
-    weights = averages(shares)
+    weights = measured_by(shares)
     through = [[sum((c * shares[i][k] for i, c in enumerate(row)), Fraction(0)) for k in range(m)] for row in weights]
     if inverse_of(through) is None:
         raise ParameterError(
@@ -196,7 +192,7 @@ def _averages(tasks: Sequence[FaultPlant], shares: Sequence[Row]) -> Matrix:
             f"fewer wells than blocks need blocks whose constants are known, box paper. Received {tasks[0].name} "
             "with spreads. Use fault.with_box('paper'), or a well for each block."
         )
-    return averages(shares)
+    return measured_by(shares)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -233,10 +233,8 @@ def _transmitted(chain: BlockChain, pole: float) -> np.ndarray:
     if not len(flow):
         return pressures
     K = len(flow)
-    found: np.ndarray = pressures[:, K:] + pressures[:, :K] @ np.linalg.solve(
-        pole * np.eye(K) - flow[:, :K], flow[:, K:]
-    )
-    return found
+    slow = np.linalg.solve(pole * np.eye(K) - flow[:, :K], flow[:, K:])
+    return np.asarray(pressures[:, K:] + pressures[:, :K] @ slow)
 
 
 def _modes(
