@@ -155,6 +155,10 @@ def test_the_common_mode_of_sliding_blocks_has_the_limits_of_one_block():
     rock = longest_diffusion(push, F(10**6), F(400))
     assert common.farthest_well == pytest.approx(float(farthest_well(rock, F(2))), rel=1e-9)
     assert found.slip_rate_error == pytest.approx([float(push.smallest_rate_error(F(400)))] * 3, rel=1e-9)
+    assert found.modes[2].frequency > 0
+    assert (found.modes[2].reached, found.modes[2].pressure, found.modes[2].longest_step) == (True, None, None)
+    weak = chain_limits(SLIDING, stress=1e4, pressure=1e4).modes[0]  # below the 16.7 kPa that are needed at once
+    assert (weak.longest_step, weak.farthest_well) == (0, 0)
 
 
 @pytest.mark.parametrize("critical_slip", [8e-3, 3e-4])
@@ -240,6 +244,9 @@ def test_stress_that_changes_the_state_and_poles_that_floats_confuse_give_no_lim
 
 
 def test_blocks_that_strengthen_have_no_unstable_mode():
-    found = chain_limits(sliding(evolution_effect=0.005))
+    found = chain_limits(sliding(evolution_effect=0.005), stress=1e4)
     assert found.modes == ()
+    strength = 50e6 * 0.010 + 1.0405e15 / 15e3**2 * 1e-6
+    assert found.slip_rate_error == pytest.approx([1e-6 * 1e4 / strength] * 3, rel=1e-9)  # at once, then less
     assert found.lines()[-1] == "no mode is unstable"
+    assert found.to_dict()["modes"] == []

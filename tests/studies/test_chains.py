@@ -254,7 +254,7 @@ def test_a_guarantee_of_slow_sliding_tells_its_lag_and_the_stress_that_it_covers
     lag, stress, rate, found = covered_stress(chain, claim)
     assert lag == 800
     assert "|slip error 1| <= 34.84 µm" in found.sentence()
-    assert "under any shear stress of at most 1e+04 Pa" in found.notes[0]
+    assert "under any shear stress of at most 10 kPa" in found.notes[0]
     assert 0.07 < rate < 0.0739  # of the proof, with larger claims: 0.0738
     assert 10_000 <= stress < 10_001
     smaller = tuple((entry, size / 2) for entry, size in claim.part.disturbances)

@@ -146,7 +146,7 @@ def _slip_rates(blocks: SlidingBlocks, rate: UpperBound) -> str:
     fastest, most = UpperBound(V * exponential(rate)), LowerBound(blocks.stress)
     return (
         f"so the slip rate of every block stays at most {fastest:.4g} m/s, |ln(v/V)| <= {rate:.3g} with "
-        f"V = {UpperBound(V):.4g} m/s, under any shear stress of at most {most:.4g} Pa on every block"
+        f"V = {UpperBound(V):.4g} m/s, under any shear stress of at most {most.quantity('Pa', 4)} on every block"
     )
 
 
