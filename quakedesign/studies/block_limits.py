@@ -254,7 +254,7 @@ def _modes(
         raise ParameterError(
             "limits of blocks need unstable poles that are real. Received complex ones. Simulate this fault."
         )
-    if np.linalg.cond(right) > _MOST_SKEWED:
+    if through is None and np.linalg.cond(right) > _MOST_SKEWED:
         raise ParameterError(_APART)
     left = np.linalg.inv(right)
     groups: list[list[int]] = []

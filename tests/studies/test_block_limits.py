@@ -243,8 +243,13 @@ def test_stress_that_changes_the_state_and_poles_that_floats_confuse_give_no_lim
         chain_limits(SLIDING)
 
 
+def test_the_largest_pressure_opens_no_block():
+    weak = replace(SLIDING.blocks[0], effective_normal_stress=45e6)
+    assert chain_limits(replace(SLIDING, blocks=(weak, *SLIDING.blocks[1:]))).largest_pressure == 45e6
+
+
 def test_blocks_that_strengthen_have_no_unstable_mode():
-    found = chain_limits(sliding(evolution_effect=0.005), stress=1e4)
+    found = chain_limits(sliding(evolution_effect=1e-4), stress=1e4)
     assert found.modes == ()
     strength = 50e6 * 0.010 + 1.0405e15 / 15e3**2 * 1e-6
     assert found.slip_rate_error == pytest.approx([1e-6 * 1e4 / strength] * 3, rel=1e-9)  # at once, then less
