@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.cli.app import new_file, progress
 from quakedesign.cli.options import Output, changed_options
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
-from quakedesign.exact import UpperBound, rational
+from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.files import hold, made_folder, require_room
 from quakedesign.text import counted
 
 if TYPE_CHECKING:
     from quakedesign.cli.options import LawOptions
     from quakedesign.fault import BlockChain
-    from quakedesign.studies.chains import ChainRun
+    from quakedesign.studies.chains import ChainRun, SlidingChainRun
 
 
 def several_blocks(
@@ -60,14 +60,11 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
     """What a statement about blocks depends on, and what its words mean."""
     from quakedesign.studies.chains import farthest_balance
 
-    blocks, wells = counted(len(chain.blocks), "block"), counted(len(chain.wells), "well")
     meant = "the load of a pressure is the pressure that balances the blocks on the reference"
     if chain.ages:
         return [
-            f"plant: {chain.name}, {blocks}, {wells}, its constants as they are, from steady sliding; the plan of the "
-            "reference reaches the fault as it is",
             "a log state is ln of the state over D_c/V; |y| is bounded for log states and pulls [MPa]; the load of a "
-            "pressure is the plan; a disturbance is the rate over V that the stress adds",
+            "pressure is the plan",
         ]
     if (far := farthest_balance(chain, found)) is not None:
         meant = (
@@ -75,18 +72,9 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
             "reference; slip errors are relative to the equilibrium of each block under these pressures, which is "
             f"within {far:.3g} m of the reference at every time"
         )
-    box = chain.fault.box
-    springs = ", springs between the blocks as they are" if any((box.stiffness, box.damping, box.authority)) else ""
-    along = chain.diffusivity
-    pressure = "" if along is None else f", pressures diffuse along the fault, {along:g} m²/s"
     excess = UpperBound(max(rational(block.friction.rest_excess) for block in chain.blocks))
     healed = f"not covered: friction at rest up to {excess:.3g} above friction in slip (healing of the fault file)"
-    return [
-        *([healed] if excess else []),
-        f"plant: {chain.name}, {blocks}, {wells}, any constants of box {box.name}{springs}{pressure}, without "
-        "stick (friction continues to negative slip rates)",
-        meant,
-    ]
+    return [*([healed] if excess else []), meant]
 
 
 def _facts(found: Any, chain: "BlockChain") -> dict[str, Any]:
@@ -102,14 +90,6 @@ def _lines(found: Any, chain: "BlockChain") -> list[str]:
     return [found.sentence(), *([far] if chain.diffusivity else [])]
 
 
-def _require_no_state(chain: "BlockChain", command: str) -> None:
-    if chain.ages:
-        raise ParameterError(
-            f"{command} of several blocks needs friction of slip and slip rate alone. Received "
-            f"{chain.blocks[0].friction.name}. Use guarantee with --lag and --stress."
-        )
-
-
 def show_chain(chain: "BlockChain", output: Output) -> int:
     """The command `fault`."""
     from quakedesign.studies.chains import chain_dict, chain_lines
@@ -118,12 +98,11 @@ def show_chain(chain: "BlockChain", output: Output) -> int:
     return 0
 
 
-def chain_limits(chain: "BlockChain", output: Output) -> int:
+def chain_limits(chain: "BlockChain", output: Output, **beside: Any) -> int:
     """The command `limits`."""
-    from quakedesign.studies import chains
+    from quakedesign.studies import chain_limits as limits
 
-    _require_no_state(chain, "limits")
-    found = chains.chain_limits(chain)
+    found = limits(chain, **beside)
     output.show(found.to_dict(), found.lines())
     return 0
 
@@ -165,12 +144,10 @@ def guarantee_chain(
         new_file(out, "certificate file", force=force)
     if sliding is None:
         found: Any = guarantee(chain, law, step=step)
-    elif controller != "elqr":
-        raise ParameterError("blocks in slow sliding have one kind of law. Received a controller. Omit --controller.")
     else:
         with progress() as tell:
             tell("design and proof", 0.0)
-            found = guarantee(chain, step=step, **sliding)
+            found = guarantee(chain, law, step=step, **sliding)
     if out is not None and found.proved:
         with made_folder(out.parent):
             save_guarantee(found, out)
@@ -180,42 +157,57 @@ def guarantee_chain(
     return 0 if found.proved else 1
 
 
-_HEADS = ("law", "proved", "", "found in the run", "", "pressure", "")
+_HEADS = ("law", "proved", "", "in the run", "", "pressure", "")
 
 
-def compare_chain(chain: "BlockChain", controller: str, output: Output) -> int:
+def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any], output: Output) -> int:
     """The command `compare`: laws whose wells know all measurements, or their own alone."""
-    from quakedesign.studies.chains import run_of_chain
+    from quakedesign.studies.chains import run_of_chain, run_sliding_chain
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
 
-    _require_no_state(chain, "compare")
+    require_loads(chain, sliding)
     laws = BLOCK_LAWS if controller == "all" else (block_law(controller, "all"),)
+    runs: list[ChainRun | SlidingChainRun] = []
     with progress() as tell:
-        runs = []
         for place, law in enumerate(laws):
             tell(f"{law}: design, proof and run", place / len(laws))
-            runs.append(run_of_chain(chain, law))
+            runs.append(run_sliding_chain(chain, law, sliding=sliding) if chain.ages else run_of_chain(chain, law))
     rows = [list(_HEADS), ["", "slip rate", "slip", "slip rate", "slip", "from", "to"], *(one.row() for one in runs)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     about = "its balance" if len(chain.wells) < len(chain.blocks) else "the reference"
-    said = [
-        f"{chain.name}: largest errors of {len(chain.blocks)} blocks under {counted(len(chain.wells), 'well')}",
+    meant = [
         f"(box {chain.fault.box.name}; slip of a block from {about} in what is proved,",
         "from the reference in the run)",
+    ]
+    last = "proved without stick; run with stick, where an error may pass its bound"
+    if chain.ages:
+        meant = ["(largest slip rate, slip from the reference, pressure beside the plan)"]
+        stress = LowerBound(sliding["stress"]).quantity("Pa")
+        last = f"proved for any shear stress of up to {stress}; run without inertia under a sine"
+    said = [
+        f"{chain.name}: largest errors of {len(chain.blocks)} blocks under {counted(len(chain.wells), 'well')}",
+        *meant,
         "",
         *("  ".join(f"{v:{w}}" for v, w in zip(row, widths, strict=True)).rstrip() for row in rows),
-        *(f"{one.controller}: {one.found.sentence()}" for one in runs if one.run is None),
+        *(f"{one.controller}: {one.found.sentence()}" for one in runs if one.run is None and one.found is not None),
         "",
-        "proved without stick; run with stick, where an error may pass its bound",
+        last,
     ]
     output.show({one.controller: _run_facts(one) for one in runs}, said)
-    return 0 if all(one.run is not None and not one.run.reversed and not one.run.opened for one in runs) else 1
+    return 0 if all(one.safe for one in runs) else 1
 
 
-def _run_facts(one: "ChainRun") -> dict[str, Any]:
-    if one.run is None:
-        return _facts(one.found, one.chain)
-    return {"guarantee": _facts(one.found, one.chain), "run": one.run.to_dict()}
+def require_loads(chain: "BlockChain", sliding: dict[str, Any]) -> None:
+    """Reject lag and stress of friction without a state."""
+    if not chain.ages and any(sliding.values()):
+        raise ParameterError("--lag and --stress of several blocks need friction with a state. Omit these options.")
+
+
+def _run_facts(one: "ChainRun | SlidingChainRun") -> dict[str, Any]:
+    if one.found is None:
+        return {"run": one.to_dict(), "guarantee": None}
+    found = _facts(one.found, one.chain)
+    return found if one.run is None else {"guarantee": found, "run": one.to_dict()}
 
 
 def export_chain(
@@ -226,7 +218,11 @@ def export_chain(
     from quakedesign.simulation.export import FILES, block_step, require_free, write_step
     from quakedesign.studies.chains import chain_law
 
-    _require_no_state(chain, "export")
+    if chain.ages and law.certificate is None:
+        raise ParameterError(
+            "export of blocks in slow sliding takes the law of a certificate. Received none. Use guarantee with --lag, "
+            "--stress and --out, then export with --certificate."
+        )
     controller = block_law(law.controller, "cta", law.certificate)
     folder = out or Path(f"quakedesign-{chain.name}-{controller}")
     require_free(folder, force)
@@ -236,7 +232,7 @@ def export_chain(
     if not found.proved:
         output.show(_facts(found, chain), [*_lines(found, chain), "nothing is exported, as no law is proved"])
         return 1
-    step = block_step(chain, found.law, remarks=(f"proved: {found.sentence()}", *_scope(found, chain)))
+    step = block_step(chain, found.law, remarks=(*found.lines(), *_scope(found, chain)))
     exported = write_step(step, folder, fmu=fmu, force=force)
     files = {"files": [str(folder / name) for name in (FILES if fmu else FILES[:2])], "premises": []}
     answer = exported.to_dict() | files
@@ -245,83 +241,37 @@ def export_chain(
 
 
 def run_chain(
-    chain: "BlockChain",
-    controller: str,
-    duration: float | None,
-    out: Path | None,
-    force: bool,
-    output: Output,
-    formats: Any = ("png",),
-    certificate: Path | None = None,
+    chain: "BlockChain", out: Path | None, force: bool, output: Output, formats: Any = ("png",), **given: Any
 ) -> int:
     """The commands `design` and `simulate`: a law, its proof, a run and, with a folder, files and a figure."""
     from quakedesign.report.folder import prepare
-    from quakedesign.studies.chains import run_of_chain
+    from quakedesign.studies.chains import run_of_chain, run_sliding_chain
 
-    _require_no_state(chain, "a run")
     if out is not None:
         prepare(out, force=force)
         require_room(out)
         hold(out)
     with progress() as tell:
         tell("design, proof and run", 0.0)
-        one = run_of_chain(chain, controller, duration, certificate=certificate)
-    found, run, facts = one.found, one.run, _run_facts(one)
-    if run is None:
-        output.show(facts, [*_lines(found, chain), "nothing is simulated, as no law is proved"])
-        return 1
-    said = [
-        *_lines(found, chain),
-        "",
-        f"run over {run.times[-1]:g} s on the stick-slip plant; what is proved is of the plant without stick, so that "
-        "here a slip, a slip rate, or a pressure less its load may pass its bound:",
-    ]
-    for i, (slip, rate, rest) in enumerate(zip(run.slip_error, run.slip_rate_error, run.rest, strict=True), 1):
-        said.append(f"block {i}: slip error {slip:.3g} m, slip-rate error {rate:.3g} m/s, at rest {100 * rest:.3g} %")
-    for i, (least, largest) in enumerate(zip(run.pressure.min(axis=0), run.pressure.max(axis=0), strict=True), 1):
-        said.append(f"well {i}: pressure {least:.3g} Pa to {largest:.3g} Pa")
-    for event, happened in (("a block would slip backward", run.reversed), ("a block opens", run.opened)):
-        said += [f"{event}: the run is outside the model"] if happened else []
-    if out is not None:
+        if chain.ages:
+            given |= {"tell": lambda done: tell("run", done)}
+        one = run_sliding_chain(chain, **given) if chain.ages else run_of_chain(chain, **given)
+    found: Any = one.found
+    facts = _run_facts(one)
+    said = [*([] if found is None else [*_lines(found, chain), ""]), *one.lines()]
+    if out is not None and one.run is not None:
         from quakedesign.files import whole_folder
         from quakedesign.guarantees.exact.guarantee_files import save_guarantee
         from quakedesign.report.block_figure import block_figure
         from quakedesign.report.drawing import file_names, write_figures, write_results
 
         with whole_folder(out) as folder:
-            save_guarantee(found, folder / "guarantee.json")
-            write_figures(folder, {"blocks": block_figure(chain, run, found.sentence())}, formats)
+            if found is not None:
+                save_guarantee(found, folder / "guarantee.json")
+            proved = "" if found is None else found.sentence()
+            write_figures(folder, {"blocks": block_figure(chain, one.run, proved)}, formats)
             write_results(folder, facts)
-        said.append(f"written: {out}/ (results.json, guarantee.json, {file_names('blocks', formats)})")
+        files = "results.json, " + ("" if found is None else "guarantee.json, ") + file_names("blocks", formats)
+        said.append(f"written: {out}/ ({files})")
     output.show(facts, said)
-    return 1 if run.reversed or run.opened else 0
-
-
-def run_sliding(chain: "BlockChain", plant: str, out: Path | None, force: bool, output: Output, **given: Any) -> int:
-    """The command `simulate` of blocks with rate-and-state friction."""
-    from quakedesign.report.folder import prepare
-    from quakedesign.simulation.slow_sliding import PLANTS
-    from quakedesign.studies.chains import run_sliding_chain
-
-    require_known(plant, PLANTS, "plant of rate-and-state friction")
-    if out is not None:
-        prepare(out, force=force)
-        require_room(out)
-        hold(out)
-    with progress() as tell:
-        tell("proof and run" if given["certificate"] else "run", 0.0)
-        one = run_sliding_chain(chain, inertia=PLANTS[plant], tell=lambda done: tell("run", done), **given)
-    proved, notes = ("", []) if one.found is None else (one.found.sentence(), _scope(one.found, chain))
-    facts = {"run": one.to_dict(), "guarantee": {"sentence": proved, "notes": notes} if proved else None}
-    said = [*([f"proved: {proved}", *notes] if proved else []), *one.lines()]
-    if out is not None:
-        from quakedesign.files import whole_folder
-        from quakedesign.report.block_figure import block_figure
-        from quakedesign.report.drawing import file_names, write_figures, write_results
-
-        with whole_folder(out) as folder:
-            write_figures(folder, {"blocks": block_figure(chain, one.run, proved)}, ("png",))
-            write_results(folder, facts)
-        said.append(f"written: {out}/ (results.json, {file_names('blocks', ('png',))})")
-    output.show(facts, said)
-    return 0
+    return 0 if one.safe else 1

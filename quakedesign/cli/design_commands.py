@@ -129,6 +129,11 @@ class DesignOptions(WellOptions):
         return {"options": options, "scheme": self.scheme}
 
     @property
+    def sliding(self) -> dict[str, Any]:
+        """Lag and stress of several blocks in slow sliding."""
+        return {"lag": self.setup().lag, "stress": None if self.stress is None else rational(self.stress)}
+
+    @property
     def _laws(self) -> str:
         """Laws that are asked for: of the slip alone the only one that there is."""
         if self.measured != "slip" or self.controller == "elqr":
@@ -169,13 +174,16 @@ def design(
         Also print the fault, gains, verdicts with premises, certified domains and all metrics, as in the report.
     """
     given = dict(locals())
-    from quakedesign.cli.block_commands import block_law, run_chain, several_blocks
+    from quakedesign.cli.block_commands import block_law, require_loads, run_chain, several_blocks
     from quakedesign.report.folder import prepare
 
-    known = ("out", "format", "verbose", "box", "controller")
+    known = ("out", "format", "verbose", "box", "controller", "lag", "stress")
     if (chain := several_blocks(fault, globals()["design"], given, known, options.box)) is not None:
-        law = block_law(options.controller, "all")
-        return run_chain(chain, law, None, out or Path(f"quakedesign-{chain.name}"), force, output, format)
+        require_loads(chain, options.sliding)
+        law = {"controller": block_law(options.controller, "all")} | (
+            {"sliding": options.sliding} if chain.ages else {}
+        )
+        return run_chain(chain, out or Path(f"quakedesign-{chain.name}"), force, output, format, **law)
     loaded, asked = options.asked(fault)
     folder = out or Path(f"quakedesign-{loaded.name}")
     prepare(folder, force=force)
@@ -260,8 +268,9 @@ def compare(
     from quakedesign.report.terminal import printed_lines
     from quakedesign.studies.paper import printed, table
 
-    if (chain := several_blocks(fault, compare, given, ("verbose", "box", "controller"), options.box)) is not None:
-        return compare_chain(chain, options.controller, output)
+    known = ("verbose", "box", "controller", "lag", "stress")
+    if (chain := several_blocks(fault, compare, given, known, options.box)) is not None:
+        return compare_chain(chain, options.controller, options.sliding, output)
     loaded, asked = options.asked(fault)
     with progress() as tell:
         comparison = designed_comparison(loaded, tell=tell, **asked)

@@ -111,7 +111,7 @@ def guarantee(
         Certificate file to write; for several faults a folder.
     """
     options = dict(locals())
-    from quakedesign.cli.block_commands import guarantee_chain, several_blocks
+    from quakedesign.cli.block_commands import guarantee_chain, require_loads, several_blocks
     from quakedesign.fault import load_fault, with_accepted_fit
     from quakedesign.studies.facts import box_sentence
     from quakedesign.synthesis import answers
@@ -120,8 +120,7 @@ def guarantee(
     known = ("step", "out", "controller", "stress", "lag")
     if (chain := several_blocks(fault, globals()["guarantee"], options, known, box)) is not None:
         sliding = {"stress": stress, "lag": around.setup().lag}
-        if not chain.ages and any(sliding.values()):
-            raise ParameterError("--lag and --stress of several blocks need friction with a state. Omit these options.")
+        require_loads(chain, sliding)
         return guarantee_chain(chain, controller, step, sliding if chain.ages else None, out, force, output)
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
@@ -293,8 +292,10 @@ def limits(
     from quakedesign.cli.block_commands import chain_limits, several_blocks
     from quakedesign.fault import load_fault
 
-    if (chain := several_blocks(fault, globals()["limits"], options, box=box)) is not None:
-        return chain_limits(chain, output)
+    spreads, known = around.diffusivity, ("stress", "pressure", "diffusivity")
+    if (chain := several_blocks(fault, globals()["limits"], options, known, box)) is not None:
+        rock = None if spreads is None else float(rational(spreads))
+        return chain_limits(chain, output, stress=stress, pressure=pressure, diffusivity=rock)
     loaded = load_fault(fault, box=box, disturbance=disturbance)
     if out is not None:
         from quakedesign.report.folder import prepare
@@ -305,7 +306,6 @@ def limits(
     from quakedesign.report.limits_table import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits
 
-    spreads = around.diffusivity
     answer = all_limits(
         loaded,
         replace(around, diffusivity=(spreads or "1") if around.well else None).setup(measured=measured),

@@ -35,7 +35,7 @@ from quakedesign.cli.options import (
     show_state_run,
     surroundings,
 )
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_known
 from quakedesign.files import hold
 from quakedesign.parallel import remedy
 
@@ -85,7 +85,7 @@ def simulate(
         NetCDF file to write; of a fault of several blocks, a folder.
     """
     options = dict(locals())
-    from quakedesign.cli.block_commands import block_law, run_chain, run_sliding, several_blocks
+    from quakedesign.cli.block_commands import block_law, run_chain, several_blocks
     from quakedesign.fault import load_fault
     from quakedesign.report.sentences import exceeded_line, proved_line
     from quakedesign.simulation import Load
@@ -105,14 +105,19 @@ def simulate(
                 "--out, then simulate with --certificate."
             )
         if blocks.ages:
-            loads |= {"certificate": law.certificate, "duration": run.duration, "loading_rate": run.drift}
-            return run_sliding(blocks, run.plant or "quasi-dynamic", out, force, output, **loads)
+            from quakedesign.simulation.slow_sliding import PLANTS as SLIDING
+
+            plant = run.plant or "quasi-dynamic"
+            require_known(plant, SLIDING, "plant of rate-and-state friction")
+            loads |= {"certificate": law.certificate, "loading_rate": run.drift, "inertia": SLIDING[plant]}
+            return run_chain(blocks, out, force, output, duration=run.duration, **loads)
         if run.plant or run.drift is not None or loads:
             raise ParameterError(
                 "--plant, --drift and --stress of several blocks need friction with a state. Received "
                 f"{blocks.blocks[0].friction.name}. Omit these options."
             )
-        return run_chain(blocks, kind, run.duration, out, force, output, certificate=law.certificate)
+        of_law: dict[str, Any] = {"controller": kind, "certificate": law.certificate}
+        return run_chain(blocks, out, force, output, duration=run.duration, **of_law)
     new_file(out, "output file", force=force)
     loaded = load_fault(fault)
     if loaded.friction.state_names:

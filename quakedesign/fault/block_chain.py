@@ -6,7 +6,7 @@ between the middles x_i of blocks of lengths L_i and the wells, which are the ne
 D/L_i·Σ(q_j − q_i)/|x_j − x_i| (finite volumes, without flow at the ends), and is that of the well where x_i is one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
@@ -197,6 +197,13 @@ class BlockChain:
     def alike(self) -> bool:
         """Whether all blocks have the same length, stress and friction."""
         return len(set(self.blocks)) == 1
+
+
+def add_springs(rows: Any, springs: Iterable[tuple[int, int, Fraction]], scale: Any = 1) -> None:
+    """Add, to rows of a matrix, what springs (i, j, K) pull block i by per slip of every block, times a scale."""
+    for i, j, K in springs:
+        rows[i][j] += K * scale
+        rows[i][i] -= K * scale
 
 
 def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool = False) -> BlockChain | None:

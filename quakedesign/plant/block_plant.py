@@ -33,8 +33,9 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from quakedesign.errors import ParameterError, require_known
-from quakedesign.exact import rational, shortly
+from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import BlockChain, Fault
+from quakedesign.fault.block_chain import add_springs
 from quakedesign.fault.units import exact_value
 from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.plant.plant_values import MOST, Matrix, Row, unit
@@ -62,7 +63,9 @@ def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupl
         N, m = len(fault.blocks), len(fault.wells)
         tasks = [uncertain_plant(one) for one in fault.faults]
         name = f"{fault.name}, {N} blocks, {counted(m, 'well')}"
-        return _parts(tasks, fault.springs, fault.shares, name, fault.flow, fault.pressures)
+        along = "" if fault.diffusivity is None else f", pressures diffuse along the fault, {fault.diffusivity:g} m²/s"
+        told = fault.fault.box.name + along
+        return _parts(tasks, fault.springs, fault.shares, name, told, fault.flow, fault.pressures)
     require_known(wells, ("each", "one"), "wells")
     if blocks is None or not 2 <= blocks <= MOST // 2:
         raise ParameterError(f"blocks must be 2 to {MOST // 2}. Received {blocks}.")
@@ -74,7 +77,7 @@ def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupl
     springs = [(a, b, K) for i in range(blocks - 1) for a, b in ((i, i + 1), (i + 1, i))]
     shares = [unit(blocks, i) for i in range(blocks)] if wells == "each" else [(Fraction(1),)] * blocks
     held = f"{blocks} wells" if wells == "each" else "one well"
-    return _parts([task] * blocks, springs, shares, f"{blocks} blocks of {task.name}, {held}")
+    return _parts([task] * blocks, springs, shares, f"{blocks} blocks of {task.name}, {held}", fault.box.name)
 
 
 def _parts(
@@ -82,13 +85,14 @@ def _parts(
     springs: Iterable[Spring],
     shares: Sequence[Row],
     name: str,
+    box: str,
     flow: Matrix = (),
     pressures: Matrix = (),
 ) -> dict[str, Any]:
     """Fields of a plant of blocks and wells, with pressures that diffuse between them as further states."""
     N, m, more, zero = len(tasks), len(shares[0]), len(flow), Fraction(0)
     size, springs, pressures = 2 * N + more, list(springs), pressures or tuple(shares)
-    inverse, weights, lost = _inverse(shares) if m == N else None, None, False
+    inverse, weights, lost = inverse_of(shares) if m == N else None, None, False
     if inverse is None:
         weights = _averages(tasks, shares)
         balance = _balance(tasks, springs, shares, weights)
@@ -96,12 +100,11 @@ def _parts(
     else:
         slopes, dampings = [task.slip_chord for task in tasks], [task.rate_chord for task in tasks]
     pulls = [[zero] * size for _ in range(N)]
-    for i, j, K in springs:
-        pulls[i][j], pulls[i][i] = pulls[i][j] + K, pulls[i][i] - K
+    add_springs(pulls, springs)
     for i, damping in enumerate(dampings):
         pulls[i][N + i] = -(damping[0] + damping[1]) / 2
     rate = [unit(size, N + i) for i in range(N)]
-    sectors, disturbances, first = {}, {}, tasks[0].reference_rates[0]
+    sectors, disturbances, needed, first = {}, {}, [], tasks[0].reference_rates[0]
     for i, task in enumerate(tasks):
         half, place = (dampings[i][1] - dampings[i][0]) / 2, i + 1
         within = _NOWHERE if lost else None
@@ -110,8 +113,8 @@ def _parts(
             sectors[f"damping of block {place}"] = dict(entry=rate[i], row=rate[i], slopes=(-half, half))
         acts = (*[zero] * (2 * N), *(task.authority * v for v in pressures[i]))
         sectors[f"input gain of block {place}"] = dict(entry=rate[i], row=acts, slopes=(zero, task.beta[1] - 1))
-        force = max(map(abs, dampings[i])) * first + task.reference_rates[1] + task.amplitude
-        disturbances[f"force on block {place}"] = (rate[i], force)
+        needed.append(max(map(abs, dampings[i])) * first + task.reference_rates[1])
+        disturbances[f"force on block {place}"] = (rate[i], needed[-1] + task.amplitude)
     if inverse is None:
         held = [unit(m, k) for k in range(m)]
         moving = [rate * first for rate in balance.pressures]
@@ -126,6 +129,7 @@ def _parts(
     steady = [row for row, read in zip(shares, pressures, strict=True) if any(read[:more])]
     shifts = [[*[zero] * (2 * N), *(_dot(row, one) for row in steady)] if more else None for one in held]
     order = ("slope", "damping", "input")
+    known = ", springs between the blocks as they are" if any(tasks[0].spreads) else ""
     return {
         "A": [*rate, *pulls, *((*[zero] * (2 * N), *row[:more]) for row in flow)],
         "B": [(zero,) * m] * N + [row[more:] for row in (*forces, *flow)],
@@ -147,12 +151,20 @@ def _parts(
         | {f"pressure {k + 1}": "Pa" for k in range(m)}
         | {name: "m/s" if name.startswith("balance") else "m/s²" for name in disturbances},
         "name": name,
+        "remarks": {
+            "plant": f"of {name}, without stick (friction continues to negative slip rates), for all friction and "
+            f"constants of box {box}{known}",
+            "disturbances": f"{LowerBound(tasks[0].amplitude).quantity('m/s²', 4)} of a force is the fault's "
+            f"disturbance, up to {UpperBound(max(needed)).quantity('m/s²')} acceleration and damping of the reference",
+        },
     }
 
 
-def averages(shares: Sequence[Row]) -> Matrix:
-    """Weights of the blocks [-] in what each well measures: its shares, so that each row adds up to 1."""
-    columns = list(zip(*shares, strict=True))
+def measured_by(shares: Sequence[Row]) -> Matrix:
+    """Weights of the blocks [-] in what is measured: each block, or with fewer wells averages by shares of a well."""
+    N, columns = len(shares), list(zip(*shares, strict=True))
+    if len(columns) == N:
+        return tuple(unit(N, i) for i in range(N))
     return tuple(tuple(v / (sum(column) or 1) for v in column) for column in columns)
 
 
@@ -164,9 +176,9 @@ def require_independent(shares: Sequence[Row]) -> None:
     ParameterError
     """
     N, m = len(shares), len(shares[0])
-    weights = averages(shares)
+    weights = measured_by(shares)
     through = [[sum((c * shares[i][k] for i, c in enumerate(row)), Fraction(0)) for k in range(m)] for row in weights]
-    if _inverse(through) is None:
+    if inverse_of(through) is None:
         raise ParameterError(
             f"a guarantee of several blocks needs wells that act independently. Received {counted(m, 'well')} for "
             f"{N} blocks, of which some act on the same blocks in the same proportion. Move or omit wells."
@@ -180,7 +192,7 @@ def _averages(tasks: Sequence[FaultPlant], shares: Sequence[Row]) -> Matrix:
             f"fewer wells than blocks need blocks whose constants are known, box paper. Received {tasks[0].name} "
             "with spreads. Use fault.with_box('paper'), or a well for each block."
         )
-    return averages(shares)
+    return measured_by(shares)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,10 +238,8 @@ def _balancing(
     rows = [[Fraction(0)] * N + list(acting[i]) for i in range(N)] + [[*row, *[Fraction(0)] * m] for row in weights]
     for i, value in enumerate(diagonal):
         rows[i][i] += value
-    for i, j, K in springs:
-        rows[i][j] += K
-        rows[i][i] -= K
-    return _inverse(rows)
+    add_springs(rows, springs)
+    return inverse_of(rows)
 
 
 def _stresses(
@@ -254,7 +264,7 @@ def _stresses(
         p = [_dot(row, right) for row in inverse[N:]]
         ends.append([task.normal_stress - _dot(row, p) for task, row in zip(tasks, shares, strict=True)])
     largest = [max(map(abs, pair)) for pair in zip(*ends, strict=True)]
-    reach = _through(shares, inverse[N:], N)
+    reach = product(shares, inverse[N:], N)
     gains = [[abs(v) * a * h for v, a, h in zip(row, area, half, strict=True)] for row in reach]
     apart = _closed(gains, [_dot(row, largest) for row in gains])
     if apart is None:
@@ -284,7 +294,7 @@ def _moving(
     right = [*(-v for v in s), *[Fraction(0)] * m]
     still = [_dot(row, right) for row in inverse]  # ξ and q with δs = δβ = 0
     gain_slip = [[abs(v) for v in row[:N]] for row in inverse[:N]]
-    gain_force = [[abs(v) for v in row] for row in _through(force, inverse[N:], N)]
+    gain_force = [[abs(v) for v in row] for row in product(force, inverse[N:], N)]
     at_rest = [abs(1 + v) for v in still[:N]]
     pushed = [abs(_dot(row, still[N:])) for row in force]
     gains = [
@@ -295,7 +305,9 @@ def _moving(
     F = _closed(gains, first)
     if F is None:
         return lost
-    moves = [_up(abs(v) + _dot(row, F)) for v, row in zip(still[:N], gain_slip, strict=True)]
+    moves = [
+        Fraction(ceil((abs(v) + _dot(row, F)) * _GRID), _GRID) for v, row in zip(still[:N], gain_slip, strict=True)
+    ]
     pressures = [abs(v) + _dot([abs(g) for g in row[:N]], F) for v, row in zip(still[N:], inverse[N:], strict=True)]
     return replace(lost, moves=moves, pressures=[Fraction(ceil(v)) for v in pressures])
 
@@ -318,20 +330,18 @@ def _middle(ends: Range) -> tuple[Fraction, Fraction]:
     return middle, max(ends[1] - middle, middle - ends[0])
 
 
-def _up(value: Fraction) -> Fraction:
-    return Fraction(ceil(value * _GRID), _GRID)
-
-
 def _dot(row: Iterable[Fraction], values: Iterable[Fraction]) -> Fraction:
     return sum((a * b for a, b in zip(row, values, strict=False) if a and b), Fraction(0))
 
 
-def _through(rows: Sequence[Row], columns: Sequence[Sequence[Fraction]], count: int) -> list[list[Fraction]]:
+def product(
+    rows: Sequence[Sequence[Fraction]], columns: Sequence[Sequence[Fraction]], count: int
+) -> list[list[Fraction]]:
     """Product of two matrices, its first columns."""
     return [[_dot(row, (line[j] for line in columns)) for j in range(count)] for row in rows]
 
 
-def _inverse(rows: Sequence[Sequence[Fraction]]) -> "list[list[Fraction]] | None":
+def inverse_of(rows: Sequence[Sequence[Fraction]]) -> "list[list[Fraction]] | None":
     """Rows of the inverse; None of a singular matrix."""
     matrix = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows])
     if matrix.det() == 0:

@@ -101,6 +101,8 @@ class UncertainPlant:
     units : mapping of str to str
         Units of outputs, controls and disturbances by their names, for what is printed: SI units, or MPa.
     name : str
+    remarks : mapping of str to str
+        Words that a statement has behind ``plant`` and ``disturbances``.
 
     Raises
     ------
@@ -122,6 +124,7 @@ class UncertainPlant:
     start: Any = None
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "plant"
+    remarks: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         keep: Any = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
@@ -246,29 +249,18 @@ class UncertainPlant:
         (n, m), zero = self.sizes, Fraction(0)
         still = (zero,) * m
 
-        def moved(row: Row) -> Row:
-            return (*row[:n], *row[n:], *still)
+        def behind(name: str, one: ExactSector) -> Sector:
+            given = self.sectors.get(name, one)
+            return Sector(entry=(*one.entry, *still), row=(*one.row, *still), slopes=given.slopes, within=given.within)
 
         exact = self.exact_sectors(lambda _: Fraction(1))
-        sectors = {
-            name: Sector(
-                entry=(*exact[name].entry, *still),
-                row=moved(exact[name].row),
-                slopes=one.slopes,
-                within=one.within,
-            )
-            for name, one in self.sectors.items()
-        }
-        for name in self.gains:
-            one_gain = exact[name]
-            sectors[name] = Sector(entry=(*one_gain.entry, *still), row=moved(one_gain.row), slopes=one_gain.slopes)
         return replace(
             self,
             A=[[*a, *b] for a, b in zip(self.A, self.B, strict=True)]
             + [[zero] * n + [-(i == j) / time for j in range(m)] for i in range(m)],
             B=[still] * n + [[(i == j) / time for j in range(m)] for i in range(m)],
             C=[(*row, *still) for row in self.C],
-            sectors=sectors,
+            sectors={name: behind(name, one) for name, one in exact.items()},
             gains={},
             disturbances={name: ((*entry, *still), size) for name, (entry, size) in self.disturbances.items()},
             loads={name: (one.control, (*one.shift, *one.control), one.rate) for name, one in self.loads.items()},

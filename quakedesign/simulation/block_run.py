@@ -12,10 +12,12 @@ from scipy.linalg import expm
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import rational
-from quakedesign.fault import BlockChain
-from quakedesign.plant.block_plant import averages
+from quakedesign.fault import BlockChain, SlidingReference
+from quakedesign.fault.block_chain import add_springs
+from quakedesign.plant.block_plant import measured_by
 from quakedesign.symbolic.casadi_printer import to_casadi
 
+MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
 SUBSTEPS = 8
 """Steps of one period; halving them moves errors in proportion."""
 _POINTS = 1000
@@ -79,11 +81,14 @@ def reference(chain: BlockChain, time: Any) -> tuple[Any, Any]:
 def decided(chain: BlockChain, law: Any, count: Any, x: Any, v: Any, z: Any) -> tuple[Any, Any]:
     """Pressures of the wells [Pa] that a law decides, and its states after that, in CasADi.
 
+    In slow sliding the pressures are those beside the plan.
+
     Parameters
     ----------
     chain : BlockChain
     law : MatrixLaw
-        Of errors of all blocks, or of the averages of slip and slip rate that each well measures.
+        Of errors of all blocks, or of the averages of slip and slip rate that each well measures; in slow sliding of
+        the slip alone, to pressures in MPa.
     count : SX
         Samples before this one [-].
     x, v : SX
@@ -91,14 +96,16 @@ def decided(chain: BlockChain, law: Any, count: Any, x: Any, v: Any, z: Any) -> 
     z : SX
         States of the law.
     """
-    r, moved = reference(chain, count * float(law.step))
-    told = len(law.measured[0]) if law.measured else len(law.feedback[0])
-    weights = ca.DM(np.array(averages(chain.shares), dtype=float))
-    errors = ca.vertcat(x - r, v - moved)
-    seen = errors if told == 2 * len(chain.blocks) else ca.vertcat(weights @ x - r, weights @ v - moved)
+    weights, time = ca.DM(np.array(measured_by(chain.shares), dtype=float)), count * float(law.step)
+    if chain.ages:
+        r, unit = SlidingReference(task=chain.fault.reference).slip(time), MPA
+        seen = weights @ x - r
+    else:
+        (r, moved), unit = reference(chain, time), 1
+        seen = ca.vertcat(weights @ x - r, weights @ v - moved)
     F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
     p = (ca.mtimes(H, z) if len(F) else 0) + ca.mtimes(D, seen)
-    return p, ca.mtimes(F, z) + ca.mtimes(G, seen) if len(F) else z
+    return unit * p, ca.mtimes(F, z) + ca.mtimes(G, seen) if len(F) else z
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -121,9 +128,7 @@ class _Period:
         slow, columns = len(flow), pressures.shape[1]
         through = expm(np.vstack([flow, np.zeros((columns - slow, columns))]) * h) if slow else np.eye(columns)
         pulls = np.zeros((N, N))
-        for i, j, K in chain.springs:
-            pulls[i, j] += float(K)
-            pulls[i, i] -= float(K)
+        add_springs(pulls, chain.springs, 1.0)
         stress = np.array([b.effective_normal_stress for b in chain.blocks])
         kicked = fault.disturbance
         phases = 2 * np.pi * np.arange(N) / N

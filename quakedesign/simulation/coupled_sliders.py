@@ -10,7 +10,7 @@ their logarithms. Pressures of cells or wells obey h' = Fh + Gu, and p is a comb
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -22,8 +22,10 @@ import sympy as sp
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import BlockChain, FrictionLaw, SlidingReference
+from quakedesign.fault.block_chain import add_springs
 from quakedesign.fault.model import magnitude, require_positive
-from quakedesign.plant.block_plant import averages
+from quakedesign.plant.block_plant import measured_by
+from quakedesign.simulation.block_run import MPA
 from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
 from quakedesign.simulation.smooth import Ramp, SmoothProblem
 from quakedesign.simulation.state_plant import TIDE, slip
@@ -32,7 +34,6 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
 
 MOST_EXPANDED = 40  # blocks whose equations are written out; more are matrices
-MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
 _LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
 _LONGEST_RUN = 1e5 * _LONGEST  # s
 _FARTHEST = 1e6  # critical slips that the far end travels: some thousand cycles
@@ -89,9 +90,7 @@ class CoupledSliders:
         """Blocks of a file; with a lag [s] pressures of its wells, beside what is planned, behind it."""
         N, m, fault = len(chain.blocks), len(chain.wells), chain.fault
         stiffness, mass = np.diag([fault.stiffness / fault.area] * N), fault.mass / fault.area
-        for i, j, K in chain.springs:
-            stiffness[i, j] -= float(K) * mass
-            stiffness[i, i] += float(K) * mass
+        add_springs(stiffness, chain.springs, -mass)
         wells = {} if lag is None else {"flow": -np.eye(m) / lag, "source": np.eye(m) / lag}
         return cls(
             laws=tuple(block.friction for block in chain.blocks),
@@ -290,6 +289,23 @@ class SlidersRun:
         return tuple(found)
 
 
+def _run_of(sliders: CoupledSliders, times: np.ndarray, values: np.ndarray, far: Any = 0.0, *more: Any) -> SlidersRun:
+    """A run of vectors of `CoupledSliders.start`, whose far end has moved; rate of that, onsets and evaluations."""
+    N, (rate, onsets, onset, evaluations) = len(sliders.laws), more or (0.0, np.empty(0), math.inf, 0)
+    return SlidersRun(
+        times=times,
+        slip=values[:, :N] + np.reshape(far, (-1, 1)),
+        slip_rate=np.exp(values[:, N : 2 * N]),
+        state=np.exp(values[:, 2 * N : 3 * N]),
+        pressure=values[:, 3 * N :],
+        reference=far,
+        onsets=onsets,
+        onset_rate=onset,
+        loading_rate=rate,
+        evaluations=evaluations,
+    )
+
+
 def simulate_sliders(
     sliders: CoupledSliders,
     start: "np.ndarray",
@@ -355,18 +371,8 @@ def simulate_sliders(
         y = part.values[:, -1]
     passed = np.concatenate([time for time, _ in pieces])
     values = np.concatenate([value for _, value in pieces], axis=1).T
-    return SlidersRun(
-        times=passed,
-        slip=values[:, :N] + loading_rate * passed[:, None],
-        slip_rate=np.exp(values[:, N : 2 * N]),
-        state=np.exp(values[:, 2 * N : 3 * N]),
-        pressure=values[:, 3 * N :],
-        reference=loading_rate * passed,
-        onsets=np.concatenate(crossings),
-        onset_rate=onset_rate,
-        loading_rate=loading_rate,
-        evaluations=evaluations,
-    )
+    crossed = np.concatenate(crossings)
+    return _run_of(sliders, passed, values, loading_rate * passed, loading_rate, crossed, onset_rate, evaluations)
 
 
 def natural_cycles(
@@ -411,6 +417,13 @@ def natural_cycles(
 
 # ----------------------------------------------------------------------
 # Runs under a law of slow sliding.
+
+
+def planned_per_slip(chain: BlockChain) -> float:
+    """Pressure that steady sliding at the first rate of the reference needs, per slip of the reference [Pa/m]."""
+    rate = float(SlidingReference(task=chain.fault.reference).first_rate)
+    steady = float(chain.blocks[0].friction.steady_coefficient(rate))
+    return float(chain.fault.stiffness / chain.fault.area / steady)
 
 
 def simulate_held_blocks(
@@ -461,8 +474,7 @@ def simulate_held_blocks(
         )
     sliders, course = CoupledSliders.of(chain, inertia=inertia, lag=lag), SlidingReference(task=chain.fault.reference)
     (N, m), V = sliders.sizes, float(course.first_rate)
-    steady = float(chain.blocks[0].friction.steady_coefficient(V))
-    per_slip = chain.fault.stiffness / chain.fault.area / steady
+    per_slip = planned_per_slip(chain)
     turn, phases = 2 * math.pi / period, 2 * np.pi * np.arange(N) / N
     y = sliders.start([V] * N, [float(one.steady_state(V)[0]) for one in sliders.laws])
     prestress = sliders.resisting(y)
@@ -476,7 +488,7 @@ def simulate_held_blocks(
     scales = [*slips, *[1.0] * (2 * N), *[MPA] * m]
     flow = adaptive_integrators()["cvodes"].flow(rates.expand(), scales, _SHARES, rtol=_TIGHT)
     F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
-    weights = np.array(averages(chain.shares), dtype=float) if D.shape[1] < N else np.eye(N)
+    weights = np.array(measured_by(chain.shares), dtype=float)
     z, rows, times = np.zeros(len(F)), [y], [0.0]
     for k in range(math.ceil(length / step)):
         now = k * step
@@ -491,16 +503,5 @@ def simulate_held_blocks(
         times += [now + share * step for share in _SHARES]
         y = found[:, -1]
         progress(min(1.0, (now + step) / length))
-    values = np.array(rows)
-    return SlidersRun(
-        times=np.array(times),
-        slip=values[:, :N],
-        slip_rate=np.exp(values[:, N : 2 * N]),
-        state=np.exp(values[:, 2 * N : 3 * N]),
-        pressure=values[:, 3 * N :],
-        reference=np.asarray(course.slip(np.array(times))),
-        onsets=np.empty(0),
-        onset_rate=math.inf,
-        loading_rate=0.0,
-        evaluations=0,
-    )
+    run = _run_of(sliders, np.array(times), np.array(rows))
+    return replace(run, reference=np.asarray(course.slip(run.times)))

@@ -28,6 +28,7 @@ from quakedesign.loop.schemes.base import Sampled
 from quakedesign.simulation.block_run import decided
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.compiled import c_file, compiler, expanded, shared_library
+from quakedesign.simulation.coupled_sliders import planned_per_slip
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.run import library_versions
 
@@ -50,11 +51,14 @@ _USE_OF_ONE = {
     "limited": "Where pump or valve limit the pressure, tell it what was applied: the law does not wind up then, as in "
     "simulate --saturation; else give a null pointer.",
 }
+_PLAN = "planned pressure"  # by which laws of blocks in slow sliding are told from others
 _USE_OF_WELLS = {
     "told": "",
-    "written": "the fluid pressure [Pa] of CONTROLLER_PRESSURES wells",
-    "limited": "Where pump or valve limit a pressure, the law winds up: they must let the proved pressures pass.",
+    "written": "the fluid pressure [Pa]{beside} of CONTROLLER_PRESSURES wells",
+    "limited": "{plan}Where pump or valve limit a pressure, the law winds up: they must let the proved pressures pass.",
 }
+_ADDED = """Add the planned pressure (below) to each, continuously in time and not in steps: the proof assumes that the
+plan reaches the fault as it is, while what is written here goes through the lag that it was proved with. """
 _TOLD_TO_IT = " and the pressure [Pa] applied since the last call"
 _APPLIED = """
    applied may be a null pointer: then it was the pressure of the last call. Before the first call it is 0."""
@@ -117,11 +121,13 @@ def header_text(exported: ControllerStep) -> str:
     kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(exported.start.items()))
     facts = (f"{name}: {value}" for name, value in exported.facts.items())
     said = [part for remark in exported.remarks for part in (*_wrapped(remark), "")]
+    own = {"beside": "", "plan": ""} if _PLAN not in exported.facts else {"beside": " beside the plan", "plan": _ADDED}
+    of_wells = {name: text.format(**own) for name, text in _USE_OF_WELLS.items()}
     lines = [
         *said,
         "A sampled controller for a fault, in SI units.",
         "",
-        *_wrapped(_USE.format(**(_USE_OF_ONE if exported.limited else _USE_OF_WELLS))),
+        *_wrapped(_USE.format(**(_USE_OF_ONE if exported.limited else of_wells))),
         "",
         _COMPILE,
         "",
@@ -377,7 +383,7 @@ def write_step(
 
 
 def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) -> ControllerStep:
-    """Sampled step of a law for several blocks, as `simulate_blocks` takes it.
+    """Sampled step of a law for several blocks, as `simulate_blocks` or `simulate_held_blocks` takes it.
 
     Parameters
     ----------
@@ -388,21 +394,21 @@ def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) ->
     remarks : tuple of str
         Sentences to be said first.
 
-    Raises
-    ------
-    ParameterError
-        For friction with a state.
     """
     N, states = len(chain.blocks), [f"state_{i + 1}" for i in range(len(law.update))]
-    chain.fault.require_memoryless("a controller in C")
-    measurement, memory = ca.SX.sym("measurement", 2 * N), ca.SX.sym("memory", 1 + len(states))
+    measured = (("slip", "m"),) if chain.ages else (("slip", "m"), ("slip_rate", "m/s"))
+    measurement, memory = ca.SX.sym("measurement", len(measured) * N), ca.SX.sym("memory", 1 + len(states))
     count, z = ca.vertsplit(memory, [0, 1, 1 + len(states)])
     pressures, later = decided(chain, law, count, measurement[:N], measurement[N:], z)
     outputs = ca.cse([ca.vertcat(count + 1, later), ca.densify(pressures)])
     known = {"fault": chain.name, "blocks": str(N), "wells [m]": _text(chain.wells)}
+    if chain.ages:
+        task, course = chain.fault.reference, "d((1 - c)t/T + c s^3(10 - 15s + 6s^2)), s = min(t/T, 1)"
+        values = f"d = {task.target_slip!r} m, T = {task.operation_time!r} s, c = {task.ramp or 0.0!r}"
+        known |= {_PLAN: f"{planned_per_slip(chain)!r} Pa/m times r(t), r = {course}, {values}"}
     return ControllerStep(
         function=expanded(ca.Function("sampled_step", [measurement, memory], outputs)),
-        measurement={f"{name}_{i + 1}": unit for name, unit in (("slip", "m"), ("slip_rate", "m/s")) for i in range(N)},
+        measurement={f"{name}_{i + 1}": unit for name, unit in measured for i in range(N)},
         start=dict.fromkeys(["sample", *states], 0.0),
         step=float(law.step),
         facts=known | library_versions("quakedesign", "casadi"),

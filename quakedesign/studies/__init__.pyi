@@ -1,6 +1,6 @@
+from .block_limits import ChainLimits as ChainLimits
+from .block_limits import chain_limits as chain_limits
 from .blocks import one_block as one_block
-from .chains import ChainLimits as ChainLimits
-from .chains import chain_limits as chain_limits
 from .comparison import Entry as Entry
 from .paper import FrontPoint as FrontPoint
 from .paper import objective_front as objective_front

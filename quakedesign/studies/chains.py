@@ -1,14 +1,6 @@
-"""Faults of several blocks: what is proved of them, how they run, and which modes no well holds.
+"""Faults of several blocks: what is proved of them, and how they run."""
 
-**Limit.** Let every block weaken at its steepest slope, with its least damping, and let ℓ be a left eigenvector of an
-unstable pole p of this linear plant: z = ℓ·(x, x′) obeys z′ = pz + ℓ·(φ + βbS(P − P*)). With constant φ of size H whose
-signs are those of ℓ, z grows from 0, as long as friction weakens so, unless Σ_j|ℓ·βb_j||P_j − P*_j| reaches HΣ|ℓ_i|: a
-controller of any kind needs pressures that far from balance, with the largest β. A mode that no well reaches grows.
-Pressures q that diffuse, q′ = Fq + G(P − P*) from q = 0, are those of S(p) = (pI − F)⁻¹G in place of S: unless the
-integral of e^{−pt}ℓ·(φ + βbq) is 0, z grows, and that of e^{−pt}q is S(p) times that of e^{−pt}(P − P*).
-"""
-
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -19,15 +11,16 @@ import numpy as np
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import BlockChain, SlidingReference
+from quakedesign.guarantees import NoGuarantee
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, named
+from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import UncertainPlant, uncertain_plant
-from quakedesign.simulation.block_run import BlockRun, simulate_blocks, whole_periods
+from quakedesign.simulation.block_run import MPA, BlockRun, simulate_blocks, whole_periods
 from quakedesign.simulation.coupled_sliders import (
-    MPA,
     BlockEvent,
     SlidersRun,
     natural_cycles,
@@ -38,147 +31,8 @@ from quakedesign.synthesis import guarantee
 from quakedesign.synthesis.guarantee import BLOCK_LAWS
 from quakedesign.text import counted, lasting, quantity
 
-_SAME = 1e-6  # poles that are one, relative to the largest
-_UNREACHED = 1e-9  # of a mode's vectors
 _NONE = UpperBound(0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UnstableMode:
-    """An unstable mode of a fault of several blocks."""
-
-    pole: float  # p [1/s]
-    shape: tuple[float, ...]  # Slips of the blocks, the largest 1 [-]
-    # Least size [Pa] of pressures less their balance that a controller of any kind needs; infinite where no well
-    # reaches the mode
-    pressure: float
-
-    @property
-    def reached(self) -> bool:
-        """Whether a well reaches it."""
-        return bool(np.isfinite(self.pressure))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ChainLimits:
-    """Unstable modes of a fault of several blocks under its wells, the fastest first; in floating point."""
-
-    chain: BlockChain
-    modes: tuple[UnstableMode, ...]
-
-    @property
-    def feasible(self) -> bool:
-        """Whether the wells reach every unstable mode."""
-        return all(mode.reached for mode in self.modes)
-
-    def lines(self) -> list[str]:
-        """For people, within 80 columns."""
-        blocks, wells = len(self.chain.blocks), len(self.chain.wells)
-        said = [
-            f"{self.chain.name}: limits of every controller, {blocks} blocks, {counted(wells, 'well')}",
-            f"(box {self.chain.fault.box.name}, every block at its steepest friction, for constant disturbances)",
-            "",
-            f"{'mode':>4}{'pole [1/s]':>12}{'pressure less equilibrium':>26}  slips of the blocks",
-        ]
-        for place, mode in enumerate(self.modes, 1):
-            needed = f"at least {mode.pressure:.3g} Pa" if mode.reached else "no well reaches it"
-            said.append(f"{place:4}{mode.pole:12.4g}{needed:>26}  {', '.join(f'{v:.2g}' for v in mode.shape)}")
-        escaping = sum(not mode.reached for mode in self.modes)
-        if escaping:
-            said += [
-                "",
-                f"infeasible for every controller: {counted(escaping, 'unstable mode')} out of reach",
-            ]
-        elif not self.modes:
-            said += ["", "no mode is unstable"]
-        return said
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI; pressure null where no well reaches a mode."""
-        modes = [
-            {
-                "pole": m.pole,
-                "shape": list(m.shape),
-                "reached": m.reached,
-                "pressure": m.pressure if m.reached else None,
-            }
-            for m in self.modes
-        ]
-        return {"fault": self.chain.name, "feasible": self.feasible, "modes": modes}
-
-
-def _count(chain: BlockChain, slopes: Sequence[Fraction]) -> int:
-    """Unstable modes of blocks that damping never pushes, exactly: pivots above 0 of what weakens less what holds."""
-    pulls, found, before = {(i, j): K for i, j, K in chain.springs}, 0, Fraction(0)
-    for i, slope in enumerate(slopes):
-        pivot = slope - pulls.get((i, i - 1), 0) - pulls.get((i, i + 1), 0)
-        if i:
-            pivot -= pulls[i, i - 1] * pulls[i - 1, i] / before
-        before = pivot or Fraction(-1, 10**60)
-        found += before > 0
-    return found
-
-
-def chain_limits(chain: BlockChain) -> ChainLimits:
-    """Unstable modes of blocks with springs, and the pressures that every controller needs for them."""
-    tasks, N = [uncertain_plant(fault) for fault in chain.faults], len(chain.blocks)
-    stiff = np.diag([float(task.slip_chord[1]) for task in tasks])
-    for i, j, K in chain.springs:
-        stiff[i, j] += float(K)
-        stiff[i, i] -= float(K)
-    damping = np.diag([-float(task.rate_chord[0]) for task in tasks])
-    A = np.block([[np.zeros((N, N)), np.eye(N)], [stiff, damping]])
-    authority = np.array([[float(task.authority * task.beta[1])] for task in tasks])
-    within = authority * np.array(chain.shares, dtype=float)
-    size = float(tasks[0].amplitude)
-    poles, right = np.linalg.eig(A)
-    if max(abs(poles[poles.real > 0].imag), default=0) > _SAME * max(abs(poles)):
-        raise ParameterError(
-            "limits of blocks need unstable poles that are real. Received complex ones. Simulate this fault."
-        )
-    left = np.linalg.inv(right)
-    order = [i for i in np.argsort(-poles.real) if poles[i].real > _SAME * max(abs(poles))]
-    if (np.diag(damping) <= 0).all() and len(order) != _count(chain, [task.slip_chord[1] for task in tasks]):
-        raise ParameterError(
-            "limits of blocks need modes that floating point tells apart. Received blocks of very different stiffness. "
-            "Make lengths, stresses and critical slips of the blocks more alike."
-        )
-    groups: list[list[int]] = []
-    for i in order:
-        if groups and poles[groups[-1][0]].real - poles[i].real <= _SAME * max(abs(poles)):
-            groups[-1].append(i)
-        else:
-            groups.append([i])
-    modes = []
-    for group in groups:  # of one pole: combinations that the wells reach, and those that none does
-        rows = np.real(left[group])
-        B = np.vstack([np.zeros_like(within), authority * _transmitted(chain, float(poles[group[0]].real))])
-        turned = np.linalg.svd(rows @ B)[0].T
-        shapes = np.real(right[:N, group]) @ np.linalg.inv(turned)
-        for row, shape in zip(turned @ rows, shapes.T, strict=True):
-            reach = np.abs(row @ B).sum()
-            steady = np.abs(row[N:] @ within).sum()
-            out = not reach or steady <= _UNREACHED * np.linalg.norm(row) * np.linalg.norm(within)
-            modes.append(
-                UnstableMode(
-                    pole=float(poles[group[0]].real),
-                    shape=tuple((shape / shape[np.argmax(np.abs(shape))]).tolist()),
-                    pressure=np.inf if out else size * float(np.abs(row[N:]).sum() / reach),
-                )
-            )
-    return ChainLimits(chain=chain, modes=tuple(modes))
-
-
-def _transmitted(chain: BlockChain, pole: float) -> np.ndarray:
-    """Transfer functions from pressures of wells (columns) to those of blocks (rows) at a pole [1/s]."""
-    flow, pressures = np.array(chain.flow, dtype=float), np.array(chain.pressures, dtype=float)
-    if not len(flow):
-        return pressures
-    K = len(flow)
-    found: np.ndarray = pressures[:, K:] + pressures[:, :K] @ np.linalg.solve(
-        pole * np.eye(K) - flow[:, :K], flow[:, K:]
-    )
-    return found
+_NO_RUN = "nothing is simulated, as no law is proved"
 
 
 def chain_lines(chain: BlockChain) -> list[str]:
@@ -236,45 +90,93 @@ class ChainRun:
     found: Any
     run: BlockRun | None
 
+    @property
+    def safe(self) -> bool:
+        """Whether there is a run, within its model."""
+        return self.run is not None and not self.run.reversed and not self.run.opened
+
     def row(self) -> list[str]:
         """Largest values of all blocks for a table: law, proved slip rate and slip, those of the run, pressures."""
         if self.run is None:
             return [self.controller, "none", *[""] * 5]
-        N = len(self.chain.blocks)
-        outputs = self.found.claims.outputs
-        slips, rates = UpperBound(max(outputs[:N])), UpperBound(max(outputs[N:]))
-        worst = (self.run.slip_rate_error.max(), self.run.slip_error.max())
-        ends = (self.run.pressure.min(), self.run.pressure.max())
-        return [
-            self.controller,
-            rates.quantity("m/s"),
-            slips.quantity("m"),
-            *(quantity(float(v), unit) for v, unit in zip(worst, ("m/s", "m"), strict=True)),
-            *(quantity(float(v), "Pa") for v in ends),
+        outputs, N = self.found.claims.outputs, len(self.chain.blocks)
+        worst = self.run.slip_rate_error.max(), self.run.slip_error.max()
+        return table_row(self.controller, max(outputs[N:]), max(outputs[:N]), worst, self.run.pressure)
+
+    def lines(self) -> list[str]:
+        """For people."""
+        run = self.run
+        if run is None:
+            return [_NO_RUN]
+        said = [
+            f"run over {run.times[-1]:g} s on the stick-slip plant; what is proved is of the plant without stick, so "
+            "that here a slip, a slip rate, or a pressure less its load may pass its bound:"
         ]
+        for i, (slip, rate, rest) in enumerate(zip(run.slip_error, run.slip_rate_error, run.rest, strict=True), 1):
+            said.append(
+                f"block {i}: slip error {slip:.3g} m, slip-rate error {rate:.3g} m/s, at rest {100 * rest:.3g} %"
+            )
+        for i, (least, largest) in enumerate(zip(run.pressure.min(axis=0), run.pressure.max(axis=0), strict=True), 1):
+            said.append(f"well {i}: pressure {least:.3g} Pa to {largest:.3g} Pa")
+        for event, happened in (("a block would slip backward", run.reversed), ("a block opens", run.opened)):
+            said += [f"{event}: the run is outside the model"] if happened else []
+        return said
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures of the run, SI."""
+        assert self.run is not None
+        return self.run.to_dict()
 
 
-def chain_law(chain: BlockChain, controller: str = BLOCK_LAWS[0], certificate: str | Path | None = None) -> Any:
+def table_row(law: str, rate: Fraction, slip: Fraction, worst: Sequence[float], pressure: np.ndarray) -> list[str]:
+    """Proved slip rate [m/s] and slip [m], the largest of a run, and the ends of its pressures [Pa], as texts."""
+    proved = [UpperBound(v).quantity(unit) for v, unit in ((rate, "m/s"), (slip, "m"))]
+    run = [*zip(worst, ("m/s", "m"), strict=True), (pressure.min(), "Pa"), (pressure.max(), "Pa")]
+    return [law, *proved, *(quantity(float(v), unit) for v, unit in run)]
+
+
+def chain_law(
+    chain: BlockChain, controller: str = BLOCK_LAWS[0], certificate: str | Path | None = None, **sliding: Any
+) -> Any:
     """Guarantee of a law for several blocks: designed, or that of a certificate, which is checked anew.
+
+    Parameters
+    ----------
+    chain : BlockChain
+    controller : str
+        ``centralised`` or ``decentralised``.
+    certificate : str or Path, optional
+    **sliding
+        Lag and stress for a design of blocks in slow sliding.
 
     Raises
     ------
-    CertificateError
+    ParameterError, CertificateError
         For a file that does not hold, or is about another plant.
     """
     if certificate is None:
-        return guarantee(chain, controller)
-    claim, plant = load_guarantee(certificate), UncertainPlant.from_blocks(chain)
-    if not isinstance(claim, PlantGuarantee) or claim.part != linear_part(plant, {}):
-        raise CertificateError(
-            f"a certificate must be about the fault. Received {certificate}, about another plant than {plant.name}. "
-            f"Give a file of guarantee {chain.name} --out FILE."
-        )
+        return guarantee(chain, controller, **sliding)
+    claim = load_guarantee(certificate)
+    if chain.ages:
+        if not isinstance(claim, PlantGuarantee):
+            raise CertificateError(
+                f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of "
+                "guarantee."
+            )
+        found: Any = covered_stress(chain, claim)[-1]
+    else:
+        plant = UncertainPlant.from_blocks(chain)
+        if not isinstance(claim, PlantGuarantee) or claim.part != linear_part(plant, {}):
+            raise CertificateError(
+                f"a certificate must be about the fault. Received {certificate}, about another plant than "
+                f"{plant.name}. Give a file of guarantee {chain.name} --out FILE."
+            )
+        found = named(claim, plant)
     if claim.law.delay or claim.check() is not Verdict.PROVED:
         raise CertificateError(
             f"a certificate must hold, for a law without delay. Received {certificate}. Prove it anew with guarantee."
         )
-    return named(claim, plant)
+    return found
 
 
 def run_of_chain(
@@ -315,9 +217,10 @@ class SlidingChainRun:
     """A run of blocks with rate-and-state friction: without control, or under the law of a guarantee."""
 
     chain: BlockChain
-    run: SlidersRun
+    run: SlidersRun | None
     inertia: bool
-    found: PlantGuarantee | None = None
+    found: PlantGuarantee | NoGuarantee | None = None
+    controller: str = ""
     # Lag [s] and largest stress [Pa] that the guarantee covers, its bound of |ln(v/V)|, and the stress of the run [Pa]
     lag: Fraction = Fraction(0)
     covered: Fraction = Fraction(0)
@@ -325,8 +228,23 @@ class SlidingChainRun:
     stress: float = 0.0
 
     @property
+    def safe(self) -> bool:
+        """Whether there is a run."""
+        return self.run is not None
+
+    def row(self) -> list[str]:
+        """As of `ChainRun`; slip rates themselves, and pressures beside the plan."""
+        if self.run is None or self.found is None:
+            return [self.controller, "none", *[""] * 5]
+        rate = SlidingReference(task=self.chain.fault.reference).first_rate * exponential(self.log_rate)
+        slip = max(self.found.claims.outputs[: len(self.chain.blocks)])  # type: ignore[union-attr]
+        worst = self.run.slip_rate.max(), self.errors["slip_error"].max()
+        return table_row(self.controller, rate, slip, worst, self.run.pressure)
+
+    @property
     def events(self) -> tuple[BlockEvent, ...]:
         """Events without control."""
+        assert self.run is not None
         fault = self.chain.fault
         per_slip = [fault.shear_modulus * fault.area * float(v) / fault.length for v in self.chain.lengths]
         return self.run.events(np.array(per_slip))
@@ -334,6 +252,7 @@ class SlidingChainRun:
     @property
     def errors(self) -> dict[str, "np.ndarray"]:
         """Largest slip error [m], |ln(v/V)| and |ln(θ/θ*)| of blocks, and pressure beside the plan [Pa] of wells."""
+        assert self.run is not None
         run, V = self.run, float(SlidingReference(task=self.chain.fault.reference).first_rate)
         steady = np.array([float(block.friction.steady_state(V)[0]) for block in self.chain.blocks])
         return {
@@ -346,7 +265,7 @@ class SlidingChainRun:
     @property
     def within(self) -> bool:
         """Whether all errors of a run under a law are within what is proved of their blocks and wells."""
-        assert self.found is not None
+        assert isinstance(self.found, PlantGuarantee)
         N, claims, errors = len(self.chain.blocks), self.found.claims, self.errors
         told = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
         proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
@@ -354,6 +273,8 @@ class SlidingChainRun:
 
     def lines(self) -> list[str]:
         """For people."""
+        if self.run is None:
+            return [_NO_RUN]
         end = lasting(float(self.run.times[-1]))
         if self.found is not None:
             covered = LowerBound(self.covered).quantity("Pa")
@@ -389,6 +310,7 @@ class SlidingChainRun:
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI."""
         run = self.run
+        assert run is not None
         facts: dict[str, Any] = {
             "plant": "smooth" if self.inertia else "quasi-dynamic",
             "duration": float(run.times[-1]),
@@ -409,8 +331,10 @@ class SlidingChainRun:
 
 def run_sliding_chain(
     chain: BlockChain,
+    controller: str = BLOCK_LAWS[0],
     *,
     certificate: str | Path | None = None,
+    sliding: Mapping[str, Any] | None = None,
     stress: float | None = None,
     stress_period: float = TIDE,
     loading_rate: float | None = None,
@@ -418,43 +342,41 @@ def run_sliding_chain(
     inertia: bool = False,
     tell: Callable[[float], None] = lambda _: None,
 ) -> SlidingChainRun:
-    """Run blocks with rate-and-state friction without control, or under the law of a certificate that is checked anew.
+    """Run blocks with rate-and-state friction without control, or under a law that is proved.
 
     Parameters
     ----------
     chain : BlockChain
-    certificate : str or Path, optional
-        File of a guarantee of this fault.
+    controller, certificate
+        As of `chain_law`.
+    sliding : mapping, optional
+        Lag and stress of a law that is designed. Without it and a certificate there is no control.
     stress : float, optional
         Amplitude of a sine of shear on every block, shifted by its share of a turn [Pa]; what is covered unless given.
     stress_period : float
         Its period [s].
     loading_rate, duration, inertia
-        As of `natural_cycles`, or of `simulate_held_blocks` with a certificate.
+        As of `natural_cycles`, or of `simulate_held_blocks` with a law.
 
     Raises
     ------
     ParameterError, CertificateError, SimulationError
     """
-    if certificate is None:
+    if certificate is None and sliding is None:
         if stress is not None:
             raise ParameterError("stress on blocks needs a law. Received no certificate. Give --certificate.")
         run = natural_cycles(chain, duration, loading_rate=loading_rate, inertia=inertia)
         return SlidingChainRun(chain=chain, run=run, inertia=inertia)
     if loading_rate is not None:
         raise ParameterError("the far end rests in slow sliding. Received a loading rate. Omit it.")
-    claim = load_guarantee(certificate)
-    if not isinstance(claim, PlantGuarantee):
-        raise CertificateError(
-            f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of guarantee."
-        )
-    lag, covered, rate = covered_stress(chain, claim)
-    if claim.check() is not Verdict.PROVED:
-        raise CertificateError(f"a certificate must hold. Received {certificate}. Prove it anew with guarantee.")
+    found = chain_law(chain, controller, certificate, **(sliding or {}))
+    if not found.proved:
+        return SlidingChainRun(chain=chain, run=None, inertia=inertia, found=found, controller=controller)
+    lag, covered, rate, _ = covered_stress(chain, found)
     size = float(covered) if stress is None else stress
     held = simulate_held_blocks(
         chain,
-        claim.law,
+        found.law,
         lag=float(lag),
         stress=size,
         period=stress_period,
@@ -462,6 +384,5 @@ def run_sliding_chain(
         inertia=inertia,
         progress=tell,
     )
-    return SlidingChainRun(
-        chain=chain, run=held, inertia=inertia, found=claim, lag=lag, covered=covered, log_rate=rate, stress=size
-    )
+    told: dict[str, Any] = {"lag": lag, "covered": covered, "log_rate": rate, "stress": size}
+    return SlidingChainRun(chain=chain, run=held, inertia=inertia, found=found, controller=controller, **told)

@@ -167,7 +167,7 @@ def guarantee(
         fault = replace(fault, fault=with_accepted_fit(fault.fault, accept_poor_fit))
         setup = setup if law is not None or setup.step else setup.with_given(step=rational(fault.fault.sampling_time))
         if fault.ages:
-            usual = (law, tuple(gains), controller) == (None, (), "elqr") and plant in (None, PRINTED)
+            usual = (law, tuple(gains), plant or PRINTED) == (None, (), PRINTED) and controller in ("elqr", *BLOCK_LAWS)
             usual = usual and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])
             usual = usual and not exact_value(spread, "", "spread")
             if not usual or stress is None or setup.given().keys() - {"step", "lag"}:
@@ -177,7 +177,7 @@ def guarantee(
                 )
             blocks = SlidingBlocks(chain=fault, lag=setup.lag, stress=exact_value(stress, "Pa", "stress"))
             assert setup.step is not None
-            return sliding_block_guarantee(blocks, setup.step)
+            return sliding_block_guarantee(blocks, setup.step, decentralised=controller == BLOCK_LAWS[1])
         fault = UncertainPlant.from_blocks(fault)
     if isinstance(fault, UncertainPlant):
         usual = plant in (None, PRINTED) and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])

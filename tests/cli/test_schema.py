@@ -49,6 +49,8 @@ QUICK = [
     "errata 3",
     f"fault {BLOCKS}",
     f"limits {BLOCKS}",
+    f"limits {SLIDING}",
+    f"limits {SLIDING} --stress 1kPa",
     f"simulate {SLIDING} --duration 1hour",
     *(
         pytest.param(line, marks=pytest.mark.slow)
@@ -61,6 +63,9 @@ QUICK = [
             f"simulate {BLOCKS} --duration 1min",
             f"export {BLOCKS} --force",
             f"simulate {SLIDING} --certificate {SLIDING.with_suffix('.json')} --duration 1hour",
+            f"export {SLIDING} --certificate {SLIDING.with_suffix('.json')} --force",
+            f"compare {SLIDING} --lag 800s --stress 10kPa",
+            f"design {SLIDING} --lag 800s --stress 10kPa --force",
         )
     ),
 ]

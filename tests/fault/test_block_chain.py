@@ -220,3 +220,11 @@ def test_what_takes_one_block_refuses_the_file_and_says_what_takes_it():
 def test_wells_that_a_guarantee_does_not_cover_are_refused(chain, given, said):
     with pytest.raises(ParameterError, match=said):
         qd.UncertainPlant.from_blocks(chain, **given)
+
+
+def test_wells_may_be_at_both_ends_of_a_fault_of_two_blocks_at_least():
+    ends = replace(CHAIN, wells=(0.0, CHAIN.fault.length))
+    assert [sum(row) for row in ends.shares] == [1, 1, 1]
+    assert ends.shares[0] == (1 - CHAIN.middles[0] / 5000, CHAIN.middles[0] / 5000)
+    with pytest.raises(ParameterError, match=r"2 to 20 blocks.*Received 1 block and 1 well"):
+        replace(CHAIN, blocks=(replace(CHAIN.blocks[0], length=CHAIN.fault.length),), wells=(1.0,))

@@ -12,7 +12,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import quakedesign as qd
-from quakedesign.errors import ParameterError
+from quakedesign.fault import SlidingReference
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
 from quakedesign.simulation import simulate_blocks
 from quakedesign.simulation.export import block_step, write_step
@@ -180,7 +180,42 @@ def test_an_fmu_has_a_pressure_for_each_well(tmp_path):
     assert simulated[:19] == pytest.approx(np.array(wanted)[:19], rel=1e-12)
 
 
-def test_a_law_of_slow_sliding_is_refused():
-    sliding = qd.load_chain(DATA / "three_sliding_blocks.toml")
-    with pytest.raises(ParameterError, match="a controller in C needs a friction law of slip and slip rate alone"):
-        block_step(sliding, law_of(3, 3, 2))
+@pytest.mark.parametrize("wells", [3, 2])
+@pytest.mark.parametrize("ramp", [None, 0.2])
+def test_a_law_of_slow_sliding_reads_slips_and_writes_pressures_beside_the_plan(wells, ramp, tmp_path):
+    """By hand: megapascals of the matrices; what the header says of the plan is what the blocks need, by K and mu."""
+    chain = qd.load_chain(DATA / "three_sliding_blocks.toml")
+    chain = replace(chain, wells=chain.wells if wells == 3 else (2500.0, 12500.0))
+    chain = replace(chain, fault=replace(chain.fault, reference=replace(chain.fault.reference, ramp=ramp)))
+    law = replace(law_of(wells, wells, 4), step=F(400))
+    found = write_step(block_step(chain, law), tmp_path / "c", fmu=wells == 2)
+    assert found.measurement == {f"slip_{i}": "m" for i in (1, 2, 3)}
+    step, memory = stepping(found, tmp_path / "c")
+    A, B, C, D = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output, law.feedback))
+    z, weights, share = np.zeros(4), averages_by_hand(chain), ramp or 0.0
+    for k, seen in enumerate(np.random.default_rng(4).normal(size=(50, 3)) * 1e-4):
+        s = min(k * 400 / 1e6, 1.0)
+        y = weights @ seen - ((1 - share) * k * 400 / 1e6 + share * s**3 * (10 - 15 * s + 6 * s**2))
+        assert step(seen) == pytest.approx(1e6 * (D @ y + C @ z), rel=1e-9)
+        z = A @ z + B @ y
+    assert memory[0] == 50
+    plan = found.facts["planned pressure"]
+    per_slip, formula = plan.split(" Pa/m times r(t), r = ")
+    assert float(per_slip) == pytest.approx(32.04e9 / 15e3 / chain_friction(chain), rel=1e-12)
+    assert formula.endswith(f"d = 1.0 m, T = 1000000.0 s, c = {share!r}")
+    body = (
+        formula.split(", s =")[0].replace("^", "**").replace("c s", "c*s").replace("15s", "15*s").replace("6s", "6*s")
+    )
+    body = body.replace("(1 - c)t", "(1 - c)*t").replace("**3(", "**3*(")
+    course = SlidingReference(task=chain.fault.reference)
+    for t in (0.0, 3e5, 9.9e5):
+        r = eval(body.replace("d(", "d*("), {"c": share, "t": t, "T": 1e6, "d": 1.0, "s": t / 1e6})
+        assert r == pytest.approx(float(course.slip(t)), rel=1e-12)
+    if wells == 2:
+        assert validate_fmu(str(tmp_path / "c" / "controller.fmu")) == []
+
+
+def chain_friction(chain):
+    """Steady friction at the first rate, mu_0 + (a - b)ln(V/v_0)."""
+    law, V = chain.blocks[0].friction, float(SlidingReference(task=chain.fault.reference).first_rate)
+    return law.reference_coefficient + (law.direct_effect - law.evolution_effect) * np.log(V / law.reference_rate)

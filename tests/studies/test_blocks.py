@@ -11,6 +11,8 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.cli import main
+from quakedesign.errors import ParameterError
+from quakedesign.fault.friction.weakening import SlipRateWeakening
 from quakedesign.guarantees.search import block_design
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.plant import block_plant, uncertain_plant
@@ -185,6 +187,65 @@ def test_blocks_that_differ_in_their_coefficient_alone_move_apart():
     assert float(plant.moves[0]) <= 1.5 * least
 
 
+def test_the_mean_of_blocks_stands_for_alike_ones_alone(monkeypatch):
+    """Two blocks of one length, whose springs are equal both ways, of which the second may have other friction."""
+    told, found = [], block_plant._stresses
+    monkeypatch.setattr(block_plant, "_stresses", lambda *given: told.append(1) or found(*given))
+    whole = replace(CHAIN.fault, length=2000.0)
+    for differs in (False, True):
+        blocks = [replace(block, length=1000.0) for block in (CHAIN.blocks[0], CHAIN.blocks[2 if differs else 0])]
+        chain = replace(CHAIN, fault=whole, blocks=tuple(blocks), wells=(1000.0,))
+        qd.UncertainPlant.from_blocks(chain)
+        assert bool(told) is differs
+    told.clear()
+    alike = replace(CHAIN, fault=whole, blocks=(replace(CHAIN.blocks[0], length=500.0),) * 4, wells=(250.0, 1750.0))
+    qd.UncertainPlant.from_blocks(alike)
+    assert told  # springs of two wells do not drop out
+
+
+def test_each_turn_of_alike_blocks_moves_them_less(monkeypatch):
+    given = ([uncertain_plant(REAL)] * 2, [(0, 1, F(20)), (1, 0, F(20))], [(F(1),)] * 2, ((F(1, 2),) * 2,))
+    often = block_plant._balance(*given).moves
+    monkeypatch.setattr(block_plant, "_TURNS", 1)
+    assert max(often) < max(block_plant._balance(*given).moves)
+
+
+@pytest.mark.parametrize("ends", [("1/3", "2/3"), ("1/7", "5/7"), ("-2/3", "1/9"), ("1", "1"), ("-8/9", "-1/7")])
+def test_a_range_is_covered_about_its_rounded_middle(ends):
+    low, high = map(F, ends)
+    middle, half = block_plant._middle((low, high))
+    assert middle - half <= low <= high <= middle + half
+    assert half <= (high - low) / 2 + F(1, 10**5)
+
+
+def test_weakening_strengthens_blocks_that_move_backward(monkeypatch):
+    """Blocks that move by 1 + X to 1 - X per slip of the mean, X = 3: they weaken 4 times and strengthen twice."""
+    task, told = uncertain_plant(CHAIN.faults[0]), []
+    law = replace(task.friction, strengthening=F(0), static=(task.friction.least + task.friction.largest) / 2)
+    task = replace(task, friction=law)
+
+    def moving(tasks, springs, shares, weights, stresses):
+        told.append(stresses)
+        return block_plant._Balance(slopes=[], dampings=[], moves=[F(3)] * 2, pressures=[F(1)])
+
+    monkeypatch.setattr(block_plant, "_moving", moving)
+    block_plant._balance([task] * 2, [(0, 1, F(1)), (1, 0, F(1))], [(F(1),)] * 2, ((F(1, 2),) * 2,))
+    ends = [
+        replace(task, friction=replace(law, weakening=4 * law.weakening, strengthening=by * law.weakening)).stress
+        for by in (2, 0)
+    ]
+    assert told[1] == [ends[0]] * 2 != [ends[1]] * 2
+
+
+@pytest.mark.parametrize("solved", [[1.9], [-5.0], [2.0]])
+def test_numbers_that_do_not_close_exactly_prove_no_balance(solved, monkeypatch):
+    """1 + F/2 < F needs F > 2, whatever floats propose."""
+    assert block_plant._closed([[F(1, 2)]], [F(1)])[0] > 2
+    monkeypatch.setattr(np.linalg, "solve", lambda *_: np.array(solved))
+    assert block_plant._closed([[F(1, 2)]], [F(1)]) is None
+    assert block_plant._closed([[F(2)]], [F(1)]) is None
+
+
 def test_a_stress_that_is_not_bounded_proves_no_balance(monkeypatch):
     tasks, K = known("0.29", "0.31"), F(1000)
     lost = [(-block_plant._LOST, block_plant._LOST)] * 2
@@ -210,3 +271,35 @@ def test_a_search_leaves_the_slip_rates_no_larger_than_its_start(monkeypatch):
     laws = (start, block_design.block_law(plant, F("0.184")))
     before, after = (block_design.estimate(part, law)[1][len(part.A) // 2 : len(part.A)].max() for law in laws)
     assert after <= before
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"blocks": 1}, "blocks must be 2 to 20. Received 1"),
+        ({"blocks": 21}, "blocks must be 2 to 20. Received 21"),
+        ({"blocks": 2, "coupling": 0}, "coupling of blocks must be positive"),
+    ],
+)
+def test_a_fault_is_cut_into_blocks_that_pull_each_other(given, said):
+    with pytest.raises(ParameterError, match=said):
+        qd.UncertainPlant.from_blocks(REAL, **given)
+
+
+@pytest.mark.parametrize("part", ["stiffness", "damping", "authority"])
+def test_fewer_wells_need_known_constants_each(part):
+    unknown = replace(REAL, box=replace(REAL.box, name="own", **{part: F(1, 10)}))
+    with pytest.raises(ParameterError, match="box paper"):
+        qd.UncertainPlant.from_blocks(unknown, 2, wells="one")
+
+
+def test_friction_of_the_slip_rate_is_a_sector_of_its_block():
+    """Its half-width is that of the damping; friction of the slip alone has none."""
+    assert not any("damping" in name for name in qd.UncertainPlant.from_blocks(REAL, 2).sectors)
+    law = SlipRateWeakening(residual=0.25, drop=0.08, critical_rate=1.0)
+    plant = qd.UncertainPlant.from_blocks(replace(REAL, friction=law), 2)
+    low, high = uncertain_plant(replace(REAL, friction=law)).rate_chord
+    for place in (1, 2):
+        assert plant.sectors[f"damping of block {place}"].slopes == (-(high - low) / 2, (high - low) / 2)
+        assert plant.A[1 + place][1 + place] == -(high + low) / 2
+    assert high > low

@@ -12,8 +12,8 @@ radius of M is below 1 (Collatz and Wielandt), W(t) is finite, and W(t) ≤ (1 �
 P_s, those with a bound strictly within it; as they are continuous and within it at first, they never leave it. ∎
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -71,6 +71,8 @@ class PlantGuarantee:
     units : tuple of str
         Those of outputs, controls and disturbances, for people; without entries numbers have none.
     name : str
+    remarks : mapping of str to str
+        As of `UncertainPlant`.
     notes : tuple of str
         What was changed when the law became one in exact numbers.
     """
@@ -87,6 +89,7 @@ class PlantGuarantee:
     controls: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
     name: str = "plant"
+    remarks: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -122,7 +125,8 @@ class PlantGuarantee:
         """What is guaranteed, for people, of the plant and the law in the file; what it covers is rounded inward."""
         part, law = self.part, self.law
         size = f"{counted(len(part.A), 'state')}, {counted(len(part.B[0]), 'control')}"
-        said = f"on the uncertain plant of the certificate ({size}), "
+        of_plant, of_forces = (self.remarks.get(name, "") for name in ("plant", "disturbances"))
+        said = f"on the uncertain plant of the certificate ({size}){of_plant and f' {of_plant}'}, "
         said += f"from |x_i(0)| <= {_listed(part.start)}" if any(part.start) else "from rest"
         said += f", with zero-order hold over {UpperBound(law.step):.6g} s"
         said += f", {UpperBound(law.delay):.6g} s late" if law.delay else ""
@@ -131,7 +135,7 @@ class PlantGuarantee:
         said += f", {len(regions)} of which hold for |y| <= {_listed(regions)}" if regions else ""
         sizes, first = [size for _, size in part.disturbances], len(self.claims.outputs)
         pushed = self.units[first + len(part.B[0]) :]
-        said += f", disturbances of at most {_listed(sizes, pushed)}" if sizes else ""
+        said += f", disturbances of at most {_listed(sizes, pushed)}{of_forces and f' ({of_forces})'}" if sizes else ""
         rates, unit = [load.rate for load in part.loads], self.units[first] if self.units else ""
         said += f", loads of rates of at most {_listed(rates, [unit and f'{unit}/s'] * len(rates))}" if rates else ""
         said += f", measurement noise of at most {_listed(part.noise)}" if any(part.noise) else ""
@@ -339,4 +343,4 @@ def named(claim: PlantGuarantee, plant: "UncertainPlant") -> PlantGuarantee:
     """A claim with the names and units of its plant, for people."""
     outputs, controls, units = tuple(plant.outputs or ()), tuple(plant.controls), plant.units
     told = tuple(units.get(name, "") for name in (*outputs, *controls, *plant.disturbances)) if units else ()
-    return replace(claim, outputs=outputs, controls=controls, units=told, name=plant.name)
+    return replace(claim, outputs=outputs, controls=controls, units=told, name=plant.name, remarks=plant.remarks)

@@ -23,11 +23,12 @@ from functools import cached_property
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.exact import UpperBound, rational, shortly
+from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import BlockChain
+from quakedesign.fault.block_chain import add_springs
 from quakedesign.guarantees.exact.sliding_small_gain import chords, exponential
 from quakedesign.plant import Sector, SlidingPlant, UncertainPlant, slow_sliding_plant
-from quakedesign.plant.block_plant import averages, require_independent
+from quakedesign.plant.block_plant import measured_by, require_independent
 from quakedesign.plant.plant_values import MOST, Row, unit
 from quakedesign.plant.sliding_plant import Range
 from quakedesign.text import counted
@@ -135,9 +136,7 @@ class SlidingBlocks:
         """Pull on every block (rows) per slip of every block [Pa/m], that of the far end included."""
         N, inertia = len(self.tasks), self.tasks[0].inertia
         rows = [[-task.stiffness * (i == j) for j in range(N)] for i, task in enumerate(self.tasks)]
-        for i, j, K in self.chain.springs:
-            rows[i][j] += K * inertia
-            rows[i][i] -= K * inertia
+        add_springs(rows, self.chain.springs, inertia)
         return tuple(map(tuple, rows))
 
     @property
@@ -181,7 +180,7 @@ class SlidingBlocks:
             if Y > _LARGEST:
                 return None
             grown, (least, most) = exponential(Y), chords(Y)
-            of_state = ageing * max(grown - 1 / aged, aged - 1 / grown)
+            of_state = ageing * (grown - 1 / aged)  # the larger end, as Y >= Z
             change = (task.pressure_per_slip * task.fastest + moved) * (a * Y + b * Z) + high * b * of_state
             change += pulls * task.rate * (exponential(fastest) - 1 + task.swing) + mu * moved
             stress = task.stress + rounding + change * task.inertia * task.rate * grown / (low * a)
@@ -228,7 +227,9 @@ class SlidingBlocks:
             disturbances[f"stress on block {place}"] = (slips, _outward(*[found.by_pull[1] * found.stress] * 2)[1])
             if task.swing:
                 disturbances[f"reference of block {place}"] = (unit(size, i), ageing * task.swing)
-        weights = averages(self.chain.shares) if m < N else tuple(unit(N, i) for i in range(N))
+        weights = measured_by(self.chain.shares)
+        more = UpperBound(max(found.stress for found in ranges) - self.stress)
+        name = f"{self.chain.name}, {N} blocks, {counted(m, 'well')}"
         return UncertainPlant(
             A=[(zero,) * size] * (2 * N) + [tuple(-v / self.lag for v in unit(size, 2 * N + k)) for k in range(m)],
             B=[(zero,) * m] * (2 * N) + [tuple(v / self.lag for v in unit(m, k)) for k in range(m)],
@@ -244,7 +245,13 @@ class SlidingBlocks:
             units={f"slip error {i + 1}": "m" for i in range(N)}
             | {f"pull {i + 1}": "MPa" for i in range(N)}
             | {f"pressure {k + 1}": "MPa" for k in range(m)},
-            name=f"{self.chain.name}, {N} blocks, {counted(m, 'well')}",
+            name=name,
+            remarks={
+                "plant": f"of {name}, in slow sliding with constants as they are, from steady sliding, behind a lag of "
+                f"{shortly(self.lag)} s that the plan of the reference does not have",
+                "disturbances": f"slip rates over V by {LowerBound(self.stress).quantity('Pa', 4)} of shear stress and "
+                f"up to {more.quantity('Pa')} of inertia and rounding",
+            },
         )
 
 

@@ -5,10 +5,10 @@ rates: of all blocks where each has a well, else of averages, one for each well.
 the same for its own slip and slip rate. A law for pressures that diffuse along the fault has a model of these.
 """
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-from flint import fmpq, fmpq_mat
 from scipy.linalg import block_diag, expm, solve_discrete_are
 from scipy.optimize import minimize
 
@@ -16,6 +16,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import rational, shortly
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
 from quakedesign.guarantees.search.plant_search import linear_part, pieces_of
+from quakedesign.plant.block_plant import inverse_of, product
 from quakedesign.plant.plant_values import Matrix, Row, unit
 from quakedesign.plant.user_plant import UncertainPlant
 
@@ -71,15 +72,12 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
         ) from None
 
 
-def _middle(part: LinearPart) -> tuple[np.ndarray, np.ndarray]:
+def middle(part: LinearPart) -> tuple[np.ndarray, np.ndarray]:
     """A and B with every sector at its middle."""
     A, B = np.array(part.A, dtype=float), np.array(part.B, dtype=float)
     for sector in part.sectors:
-        share = (
-            float(sum(sector.slopes))
-            / 2
-            * np.outer(np.array(sector.entry, dtype=float), np.array(sector.row, dtype=float))
-        )
+        entry, row = (np.array(values, dtype=float) for values in (sector.entry, sector.row))
+        share = float(sum(sector.slopes)) / 2 * np.outer(entry, row)
         A, B = A + share[:, : len(A)], B + share[:, len(A) :]
     return A, B
 
@@ -107,7 +105,7 @@ def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> Mat
     What is measured are all errors e, or averages of them for each well; q is a model of diffusing pressures.
     """
     blocks, count = len(part.outputs) // 2, len(part.C) // 2
-    A, B = _middle(part)
+    A, B = middle(part)
     weights = np.array(part.C, dtype=float)[:count, :blocks]
     flow, fed, read = A[2 * blocks :, 2 * blocks :], B[2 * blocks :], A[blocks : 2 * blocks, 2 * blocks :]
     acting = B[blocks : 2 * blocks] - read @ np.linalg.solve(flow, fed)  # at steady pressure
@@ -125,29 +123,24 @@ def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> Mat
     phi, reach = _held(whole, np.vstack([still, at_once, fed @ wells]), float(step))
     K = _feedback(phi, reach, x * (1, 1, 1, 1, not alone))
     scale = np.r_[np.ones(size), np.full(more, 1 / largest)]  # of the states, for pressures in Pa
-    feedback = _rounded(K * scale)
+    feedback = rounded(K * scale)
     pushed = _held(own, np.vstack([still, np.eye(count)]), float(step))[1]
-    learned = _rounded(float(x[2]) * np.linalg.inv(pushed[count:]))
+    learned = rounded(float(x[2]) * np.linalg.inv(pushed[count:]))
     closed = (phi - reach @ (np.array(feedback, dtype=float) / scale)) * scale / scale[:, None]
-    return _law(step, _rounded(gain), feedback, learned, _rounded(closed[count:]))
+    return _law(step, rounded(gain), feedback, learned, rounded(closed[count:]))
 
 
 def _law(
     step: Fraction, gains: Matrix, feedback: tuple[Row, ...], learned: tuple[Row, ...], expected: tuple[Row, ...]
 ) -> MatrixLaw:
     """States π [m/s], diffusing pressures [Pa] and d [m/s²]; a constant d is balanced by p = −g⁻¹d exactly."""
-    size, zero = len(feedback), Fraction(0)
+    size, zero, inverse = len(feedback), Fraction(0), inverse_of(gains)
     still, more = (zero,) * size, len(expected) - size
-    inverse = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in gains]).inv().tolist()
-    asked = [[-Fraction(int(v.p), int(v.q)) for v in row] for row in inverse]
+    if inverse is None:
+        raise ValueError("gains that are singular once rounded")
 
-    def acting(rows: list[Row]) -> Matrix:
-        return tuple(
-            tuple(
-                sum((a * v for a, v in zip(line, column, strict=True) if a), zero) for column in zip(*rows, strict=True)
-            )
-            for line in asked
-        )
+    def acting(rows: Sequence[Row]) -> Matrix:
+        return tuple(tuple(-v for v in row) for row in product(inverse, rows, len(rows[0])))
 
     learned_by = [(*(-v for v in row), *[zero] * more, *unit(size, i)) for i, row in enumerate(learned)]
     by_pressures = [(*still, *row[2 * size :], *still) for row in feedback]
@@ -165,8 +158,9 @@ def _sum(one: Row, other: Row) -> Row:
     return tuple(a + b for a, b in zip(one, other, strict=True))
 
 
-def _rounded(values: np.ndarray) -> tuple[Row, ...]:
-    return tuple(tuple(rational(f"{v:.{_DIGITS}g}") for v in row) for row in values)
+def rounded(values: np.ndarray, digits: int = _DIGITS) -> tuple[Row, ...]:
+    """Rows of a matrix as decimals."""
+    return tuple(tuple(rational(f"{v:.{digits}g}") for v in row) for row in values)
 
 
 def estimate(

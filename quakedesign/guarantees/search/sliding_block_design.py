@@ -16,14 +16,14 @@ from scipy.optimize import minimize
 from quakedesign.errors import CertificateError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import BlockChain
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, named
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
 from quakedesign.guarantees.exact.sliding_blocks import MPA, BlockClaims, SlidingBlocks
 from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.search.block_design import estimate
+from quakedesign.guarantees.search.block_design import estimate, middle, rounded
 from quakedesign.guarantees.search.plant_search import linear_part, plant_guarantee
-from quakedesign.plant.block_plant import averages
+from quakedesign.plant.block_plant import measured_by
 
 _STARTS = ((100.0, 100.0, 1e-2, 1e-9), (10.0, 100.0, 1e-4, 1e-9), (1000.0, 100.0, 1e-4, 1e-6), (100.0, 1.0, 1e-4, 1e-6))
 """Weight of the pressure, of the slip error, and variances of the pressure error and of the measured slip, scaled."""
@@ -39,7 +39,9 @@ _DIGITS = 10
 _HALVINGS = 20  # of a range of stresses
 
 
-def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuarantee | NoGuarantee:
+def sliding_block_guarantee(
+    blocks: SlidingBlocks, step: Fraction, *, decentralised: bool = False
+) -> PlantGuarantee | NoGuarantee:
     """Design a law for blocks in slow sliding and prove it, or say why none is proved.
 
     Parameters
@@ -47,8 +49,10 @@ def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuara
     blocks : SlidingBlocks
     step : Fraction
         T_s [s].
+    decentralised : bool
+        Whether the pressure of each well depends on its own measurements alone.
     """
-    search = _WeightSearch(blocks, step)
+    search = _WeightSearch(blocks, step, decentralised)
     x = min((np.log(start) for start in _STARTS), key=search.log_rate)
     simplex = np.vstack([x, x + _SPREAD * np.eye(len(x))])
     options = {"maxfev": _EVALUATIONS, "initial_simplex": simplex, "xatol": 0.05, "fatol": 1e-4}
@@ -73,8 +77,10 @@ def sliding_block_guarantee(blocks: SlidingBlocks, step: Fraction) -> PlantGuara
     return NoGuarantee(reason="the bounds that an estimate finds are not proved", small_gain=None)
 
 
-def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, Fraction, UpperBound]:
+def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, Fraction, UpperBound, PlantGuarantee]:
     """Lag [s] and largest shear stress [Pa] for which a guarantee is one of these blocks, and its bound of |ln(v/V)|.
+
+    Last the guarantee with the names of these blocks.
 
     The claims of the plant are read off its sectors, and Q off the bounds of its pressures: with a smaller one its
     sectors and disturbances still cover the blocks.
@@ -101,11 +107,13 @@ def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, 
     if not low or not covers(low):
         raise _of_another(chain)
     for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if covers(middle) else (low, middle)
-    rate = SlidingBlocks(chain=chain, lag=lag, stress=low).log_rate(claims)
-    assert rate is not None  # as the plant is known
-    return lag, low, rate
+        half = (low + high) / 2
+        low, high = (half, high) if covers(half) else (low, half)
+    blocks = SlidingBlocks(chain=chain, lag=lag, stress=low)
+    rate, plant = blocks.log_rate(claims), blocks.plant(claims)
+    assert rate is not None  # as it is covered
+    assert plant is not None
+    return lag, low, rate, replace(named(claim, plant), notes=(_slip_rates(blocks, rate),))
 
 
 def _within(asked: LinearPart, proved: LinearPart) -> bool:
@@ -138,7 +146,7 @@ def _slip_rates(blocks: SlidingBlocks, rate: UpperBound) -> str:
     fastest, most = UpperBound(V * exponential(rate)), LowerBound(blocks.stress)
     return (
         f"so the slip rate of every block stays at most {fastest:.4g} m/s, |ln(v/V)| <= {rate:.3g} with "
-        f"V = {UpperBound(V):.4g} m/s, under any shear stress of at most {most:.4g} Pa on every block"
+        f"V = {UpperBound(V):.4g} m/s, under any shear stress of at most {most.quantity('Pa', 4)} on every block"
     )
 
 
@@ -151,16 +159,16 @@ def _grown(claims: BlockClaims, by: float) -> BlockClaims:
 class _WeightSearch:
     """Laws by four weights, and what an estimate finds of them."""
 
-    def __init__(self, blocks: SlidingBlocks, step: Fraction) -> None:
+    def __init__(self, blocks: SlidingBlocks, step: Fraction, alone: bool) -> None:
         self.blocks, self.step = blocks, step
         task, shares = blocks.tasks[0], np.array(blocks.chain.shares, dtype=float)
         N, m = shares.shape
         self.slip = float(task.ranges["critical_slip"][0])
-        weights = np.array(averages(blocks.chain.shares), dtype=float) if m < N else np.eye(N)
+        weights = np.array(measured_by(blocks.chain.shares), dtype=float)
         spread = shares @ np.linalg.inv(weights @ shares) if m < N else np.eye(N)
         self.mean = np.block([[np.kron(np.eye(2), weights), np.zeros((2 * m, m))], [np.zeros((m, 2 * N)), np.eye(m)]])
         self.back = np.block([[np.kron(np.eye(2), spread), np.zeros((2 * N, m))], [np.zeros((m, 2 * m)), np.eye(m)]])
-        self.count = m
+        self.count, self.own = m, np.eye(m) if alone else np.ones((m, m))
         stress = float(blocks.stress)
         b = float(task.ranges["evolution_effect"][0]) * float(task.ranges["normal_stress"][0])
         self.small = BlockClaims(
@@ -212,14 +220,16 @@ class _WeightSearch:
         ]
         return np.array(rows)
 
+    def _kept(self, matrix: np.ndarray) -> np.ndarray:
+        """What joins signals of one well, where each has its own measurements alone."""
+        height, width = (size // self.count for size in matrix.shape)
+        return np.asarray(matrix * np.kron(np.ones((height, width)), self.own))
+
     def _law(self, part: Any, x: np.ndarray) -> MatrixLaw | None:
         """Feedback of the estimate, in exact numbers; None where an equation of Riccati has no solution."""
         pressure, slip, drift, noise = np.exp(x)
-        A, m = np.array(part.A, dtype=float), self.count
-        for sector in part.sectors:
-            entry, row = np.array(sector.entry, dtype=float), np.array(sector.row, dtype=float)[: len(A)]
-            A = A + float(sum(sector.slopes)) / 2 * np.outer(entry, row)
-        A, B = self.mean @ A @ self.back, self.mean @ np.array(part.B, dtype=float)
+        (A, B), m = middle(part), self.count
+        A, B = self._kept(self.mean @ A @ self.back), self._kept(self.mean @ B)
         stressed = self.mean @ np.array([entry for entry, _ in part.disturbances], dtype=float).T
         stressed = stressed * [float(size) for _, size in part.disturbances]
         k, T = len(A), float(self.step)
@@ -228,9 +238,13 @@ class _WeightSearch:
         As, Bs = held[: k + m, : k + m], held[: k + m, k + m :]
         C = np.hstack([np.eye(m), np.zeros((m, k))])
         entered = np.vstack([stressed, np.zeros((m, stressed.shape[1]))])
-        covariance = entered @ entered.T * T**2 + np.diag(np.r_[np.zeros(k), np.full(m, drift)]) + 1e-14 * np.eye(k + m)
+        covariance = (
+            self._kept(entered @ entered.T) * T**2
+            + np.diag(np.r_[np.zeros(k), np.full(m, drift)])
+            + 1e-14 * np.eye(k + m)
+        )
         rates = self.mean[:m, : len(self.blocks.tasks)] @ self._log_rates(part) @ self.back
-        aims = rates.T @ rates + np.diag(np.r_[np.full(m, slip), np.zeros(2 * m)])
+        aims = self._kept(rates.T @ rates) + np.diag(np.r_[np.full(m, slip), np.zeros(2 * m)])
         try:
             P = solve_discrete_are(As[:k, :k], Bs[:k], aims, pressure * np.eye(m))
             K = np.linalg.solve(pressure * np.eye(m) + Bs[:k].T @ P @ Bs[:k], Bs[:k].T @ P @ As[:k, :k])
@@ -238,17 +252,13 @@ class _WeightSearch:
             L = S @ C.T @ np.linalg.inv(C @ S @ C.T + noise * np.eye(m))
         except (ValueError, np.linalg.LinAlgError):
             return None
-        K = np.hstack([K, np.eye(m)])
+        K, L = self._kept(np.hstack([K, np.eye(m)])), self._kept(L)
         rest, moved = np.eye(k + m) - L @ C, As - Bs @ K
         return MatrixLaw(
             step=self.step,
             delay=Fraction(0),
-            update=_rounded(moved @ rest),
-            measured=_rounded(moved @ L / self.slip),
-            output=_rounded(-K @ rest),
-            feedback=_rounded(-K @ L / self.slip),
+            update=rounded(moved @ rest, _DIGITS),
+            measured=rounded(moved @ L / self.slip, _DIGITS),
+            output=rounded(-K @ rest, _DIGITS),
+            feedback=rounded(-K @ L / self.slip, _DIGITS),
         )
-
-
-def _rounded(values: np.ndarray) -> Any:
-    return tuple(tuple(rational(f"{v:.{_DIGITS}g}") for v in row) for row in values)

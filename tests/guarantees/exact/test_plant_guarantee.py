@@ -19,9 +19,11 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError
+from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, read_guarantee, save_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import named
+from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantGuarantee, named
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw, response_bounds
+from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.plant import uncertain_plant
 
 CHECK = Path(__file__).parents[3] / "proofs" / "check.py"
@@ -416,6 +418,28 @@ def test_a_sentence_names_every_size_that_it_covers_rounded_inward():
         assert bound <= Fraction(shown) * prefixes[prefix] < bound * Fraction(1002, 1000)
     assert "|y2| <= 0" in told
     assert "/s, measurement" not in named(found, replace(plant, units={"y1": "m"})).sentence()
+
+
+def test_a_statement_about_blocks_says_first_of_which_plant_and_how_much_of_a_force_is_the_faults():
+    """r″ is at most 10/√3 of d/T², r′ at most 15/8 of d/T; real-fault has no friction of the rate."""
+    plant, task = qd.UncertainPlant.from_blocks(REAL.with_box("ten-percent"), 2), REAL.reference
+    law = MatrixLaw(step=Fraction(1, 10), delay=Fraction(0), update=(), measured=(), output=((), ()), feedback=((), ()))
+    claims = PlantClaims(outputs=(UpperBound(1),) * 4, controls=(UpperBound(1),) * 2)
+    bare = PlantGuarantee(part=linear_part(plant, {}), law=law, pieces=1, inputs=(), claims=claims)
+    found = named(bare, plant)
+    before, after = found.sentence().split(" for all t >= 0: ")
+    assert "without stick (friction continues to negative slip rates)" in before
+    assert "for all friction and constants of box ten-percent, springs between the blocks as they are" in before
+    assert "stick" not in after
+    total, own, moved = (Fraction(v) / 10**6 for v in re.findall(r"([0-9.]+) µm/s²", before))
+    mean = task.target_slip / task.operation_time
+    needed = 10 / 3**0.5 * mean / task.operation_time + 1.1 * REAL.specific_damping * 15 / 8 * mean
+    sizes = {float(size) for _, size in found.part.disturbances}
+    assert own == REAL.disturbance_bounds[0] == Fraction("3.2e-4")
+    assert needed <= moved < 1.01 * needed
+    assert min(sizes) == max(sizes) == pytest.approx(float(own) + needed, rel=1e-4)
+    assert total <= min(sizes) < total * 1.001
+    assert "without stick" not in bare.sentence()  # a file is about its plant alone
 
 
 def test_units_of_unknown_names_are_refused():

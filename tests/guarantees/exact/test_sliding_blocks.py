@@ -1,6 +1,7 @@
 """Blocks in slow sliding beside their nonlinear equations, and runs of these beside what is proved."""
 
 import json
+import re
 from dataclasses import fields, replace
 from fractions import Fraction as F
 from pathlib import Path
@@ -76,6 +77,42 @@ def test_the_linear_part_is_that_of_the_springs_and_the_lag():
     assert plant.sectors["rate of block 1 by its pull"].within == CLAIMS.pull / 10**6
 
 
+@pytest.mark.parametrize(("state", "pull"), [("0.02", 30_000), ("0.2", 1000)])
+def test_the_largest_slip_rate_and_its_stress_are_consistent(state, pull):
+    """Y is not below the y of the balance of forces at the ends of z, w and s, and is the one that inertia counts."""
+    dense = replace(CHAIN.fault, density=2670e4, shear_modulus=32.04e9)
+    blocks = SlidingBlocks(chain=replace(CHAIN, fault=dense), lag=F(800), stress=F(10000))
+    claims = BlockClaims(log_state=F(state), pull=F(pull), push=F(200_000))
+    found, Z, low = blocks._ranges(claims), float(state), STRESS - K / MU - 2e5
+    for place, one in enumerate(found):
+        Y, stress = float(one.log_rate), float(one.stress)
+        (needed,) = log_rate(np.array([low]), np.array([-Z]), np.array([pull + stress]))
+        assert needed <= Y <= 1.1 * needed
+        moved, springs = 2 * 2e5 / LAG, K + SPRING * (4 if place == 1 else 2)
+        change = (K / MU * V + moved) * (A * Y + B * Z) + (STRESS + 2e5) * B * V / D * (np.exp(Y) - np.exp(-Z))
+        change += springs * V * np.expm1(float(max(other.log_rate for other in found))) + MU * moved
+        assert stress - 1e4 == pytest.approx(change * 2670e4 * 15e3 * V * np.exp(Y) / (low * A), rel=3e-3)
+
+
+def test_one_block_that_may_open_leaves_no_claim_for_the_others():
+    weak = replace(CHAIN.blocks[1], effective_normal_stress=3.6e6)
+    chain = replace(CHAIN, blocks=(CHAIN.blocks[0], weak, CHAIN.blocks[2]))
+    assert SlidingBlocks(chain=chain, lag=F(800), stress=F(10000)).log_rate(CLAIMS) is None
+
+
+@pytest.mark.parametrize("part", ["stiffness", "damping", "authority"])
+def test_a_box_of_one_unknown_constant_is_refused(part):
+    box = replace(CHAIN.fault.box, name="own", **{part: F(1, 10)})
+    with pytest.raises(QuakedesignError, match="box paper"):
+        SlidingBlocks(chain=replace(CHAIN, fault=replace(CHAIN.fault, box=box)), lag=F(800), stress=F(10000))
+
+
+@pytest.mark.parametrize(("lag", "stress"), [(0, 1), (1, 0), (-1, 1), (1, -1)])
+def test_lag_and_stress_are_positive(lag, stress):
+    with pytest.raises(QuakedesignError, match="a positive lag and a positive bound"):
+        SlidingBlocks(chain=CHAIN, lag=F(lag), stress=F(stress))
+
+
 def test_inertia_is_a_stress_of_less_than_a_pascal_and_grows_with_the_mass():
     light = float(BLOCKS.plant(CLAIMS).disturbances["stress on block 2"][1])
     dense = replace(CHAIN.fault, density=2670e3, shear_modulus=32.04e9)
@@ -84,6 +121,12 @@ def test_inertia_is_a_stress_of_less_than_a_pascal_and_grows_with_the_mass():
     assert 10000 < light / by_pull < 10001
     extra = float(heavy.disturbances["stress on block 2"][1]) / by_pull - 10000
     assert extra == pytest.approx(1000 * (light / by_pull - 10000), rel=0.05)
+    told = heavy.remarks["disturbances"]
+    own, more = re.search(r"by ([0-9.]+) kPa of shear stress and up to ([0-9.]+) Pa of", told).groups()
+    by_pull = float(heavy.sectors["rate of block 2 by its pull"].slopes[1]) / 1e6
+    extra = float(heavy.disturbances["stress on block 2"][1]) / by_pull - 10000
+    assert own == "10"
+    assert extra * 0.99 < float(more) < extra * 1.01
 
 
 def test_inertia_counts_the_pull_of_a_neighbour_that_is_faster():
@@ -212,14 +255,21 @@ def nonlinear_run(law, shares, weights, stress, signs, plan=K / MU):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("wells", "stress", "step", "most"),
-    [((2500.0, 7500.0, 12500.0), "10000", "400", 0.08), ((2500.0, 12500.0), "1000", "1600", 0.05)],
-    ids=["three wells", "two wells"],
+    ("wells", "stress", "step", "most", "kind"),
+    [
+        ((2500.0, 7500.0, 12500.0), "10000", "400", 0.08, "centralised"),
+        ((2500.0, 7500.0, 12500.0), "10000", "400", 0.08, "decentralised"),
+        ((2500.0, 12500.0), "1000", "1600", 0.05, "centralised"),
+    ],
+    ids=["three wells", "decentralised", "two wells"],
 )
-def test_nonlinear_blocks_stay_within_what_is_proved_and_both_checkers_decide(wells, stress, step, most, checker):
+def test_nonlinear_blocks_stay_within_what_is_proved_and_both_checkers_decide(wells, stress, step, most, kind, checker):
     chain = replace(CHAIN, wells=wells)
-    found = qd.guarantee(chain, stress=stress, lag="800", step=step)
+    found = qd.guarantee(chain, kind, stress=stress, lag="800", step=step)
     assert found.proved
+    for part in (found.law.update, found.law.measured, found.law.output, found.law.feedback):
+        apart = all(not v or i % 3 == j % 3 for i, row in enumerate(part) for j, v in enumerate(row))
+        assert apart is (kind == "decentralised")
     document = guarantee_document(found)
     assert checker.check(json.dumps(document)).verdict == "proved"
     told = float(found.notes[0].split("|ln(v/V)| <= ")[1].split()[0])
@@ -248,10 +298,10 @@ def run(*arguments):
         (("guarantee", PATH), "give stress, lag and, if you like, step"),
         (("guarantee", PATH, "--stress", "10 kPa"), "positive lag and a positive bound of the shear stress"),
         (("guarantee", PATH, "--stress", "10 kPa", "--lag", "800 s", "--delay", "1 s"), "Received --delay"),
-        (("design", PATH, "--out", "unwritten"), "Use guarantee with --lag and --stress"),
-        (("compare", PATH), "Use guarantee with --lag and --stress"),
-        (("limits", PATH), "Use guarantee with --lag and --stress"),
-        (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--controller", "decentralised"), "one kind of law"),
+        (("design", PATH, "--out", "unwritten"), "give stress, lag and, if you like, step"),
+        (("design", PATH, "--stress", "10 kPa", "--out", "unwritten"), "positive lag and a positive bound"),
+        (("compare", PATH), "give stress, lag and, if you like, step"),
+        (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--controller", "dia"), "centralised, decentralised"),
         (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--box", "ten-percent"), "box paper"),
         (("guarantee", PATH.with_name("three_blocks.toml"), "--lag", "1 s"), "need friction with a state"),
     ],

@@ -1,0 +1,285 @@
+"""Limits of every controller of a fault of several blocks: unstable modes, and which of them no well reaches.
+
+**Limit.** Let every block weaken at its steepest slope, with its least damping, and let ℓ be a left eigenvector of an
+unstable pole p of this linear plant: z = ℓ·(x, x′) obeys z′ = pz + ℓ·(φ + βbS(P − P*)). With constant φ of size H whose
+signs are those of ℓ, z grows from 0, as long as friction weakens so, unless Σ_j|ℓ·βb_j||P_j − P*_j| reaches HΣ|ℓ_i|: a
+controller of any kind needs pressures that far from balance, with the largest β. A mode that no well reaches grows.
+Pressures q that diffuse, q′ = Fq + G(P − P*) from q = 0, are those of S(p) = (pI − F)⁻¹G in place of S: unless the
+integral of e^{−pt}ℓ·(φ + βbq) is 0, z grows, and that of e^{−pt}q is S(p) times that of e^{−pt}(P − P*).
+
+Blocks in slow sliding are linearised as one is (`limit_theorems`): S_iy_i = −ΣK_ijx_j − W_iz_i + μ_iΣs_ijq_j + d_i, s
+the shares, x_i′ = Vy_i and z_i′ = −ρ_i(y_i + z_i). Theorem 2 there holds for ζ = ℓ·(x, z) of each mode with a real
+pole, with Σ_i|ℓ·e_i| and Σ_j|ℓ·b_j| in place of the gains of stress and pressure, where rock of one diffusion time lies
+before every well; theorem 1 holds for each y_i, with stresses that turn on all blocks.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+from quakedesign.errors import ParameterError
+from quakedesign.fault import BlockChain
+from quakedesign.fault.block_chain import add_springs
+from quakedesign.fault.model import require_positive
+from quakedesign.guarantees.search.lqg import mean_rate, sliding_model
+from quakedesign.plant import uncertain_plant
+from quakedesign.simulation.coupled_sliders import CoupledSliders
+from quakedesign.text import counted, quantity
+
+_SAME = 1e-6  # poles that are one, relative to the largest
+_UNREACHED = 1e-9  # of a mode's vectors
+_MOST_SKEWED = 1e10  # of the matrix of all modes
+_APART = (
+    "limits of blocks need modes that floating point tells apart. Received blocks of very different stiffness, or a "
+    "double pole. Make lengths, stresses and critical slips of the blocks more alike."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnstableMode:
+    """An unstable mode of a fault of several blocks."""
+
+    pole: float  # Its real part [1/s]
+    frequency: float  # Its imaginary part [rad/s]
+    shape: tuple[float, ...]  # Slips of the blocks, the largest 1 [-]
+    reached: bool  # Whether a well reaches it
+    # Least size [Pa] of pressures less their balance that a controller of any kind needs, where it is known
+    pressure: float | None
+    # Of blocks in slow sliding: longest T_s and delay [s], and farthest well from the fault [m], of such a controller
+    longest_step: float | None = None
+    farthest_well: float | None = None
+
+    def row(self) -> str:
+        """For people."""
+        needed = "oscillates" if self.frequency else "-"
+        needed = needed if self.pressure is None else f"at least {quantity(self.pressure, 'Pa')}"
+        ends = ((self.longest_step, "s"), (self.farthest_well, "m"))
+        most = "".join(f"{quantity(v, unit):>10}" for v, unit in ends if v is not None)
+        needed = needed if self.reached else "no well reaches it"
+        return f"{self.pole:12.4g}{needed:>21}{most}  {', '.join(f'{v + 0.0:.2g}' for v in np.round(self.shape, 9))}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChainLimits:
+    """Unstable modes of a fault of several blocks under its wells, the fastest first; in floating point."""
+
+    chain: BlockChain
+    modes: tuple[UnstableMode, ...]
+    stress: float | None = None  # On blocks in slow sliding [Pa]
+    largest_pressure: float = 0.0  # Pressure beside the plan of their wells [Pa]
+    diffusivity: float = 1.0  # Of the rock between them and the fault [m²/s]
+    slip_rate_error: tuple[float, ...] = ()  # Of every block in slow sliding [m/s], below which none stays
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the wells reach every unstable mode."""
+        return all(mode.reached for mode in self.modes)
+
+    def lines(self) -> list[str]:
+        """For people, within 80 columns."""
+        chain = self.chain
+        assumed = [f"(box {chain.fault.box.name}, every block at its steepest friction, for constant disturbances)"]
+        if chain.ages:
+            V = quantity(float(mean_rate(chain.fault)), "m/s")
+            assumed = [f"(linearised about steady sliding of every block at {V} and the pressure 0,"]
+            assumed += [f"without inertia, constants as they are, T_s = {chain.fault.sampling_time:g} s)"]
+        if self.stress is not None:
+            assumed[-1] = assumed[-1].replace(")", ";")
+            assumed += [f"for stress of {quantity(self.stress, 'Pa')} on every block, pressures within"]
+            assumed += [f"{quantity(self.largest_pressure, 'Pa')} of the plan, rock of {self.diffusivity:g} m^2/s)"]
+        said = [
+            f"{chain.name}: limits of every controller, {len(chain.blocks)} blocks, "
+            f"{counted(len(chain.wells), 'well')}",
+            *assumed,
+            "",
+            f"{'mode':>4}{'pole [1/s]':>12}{'less equilibrium':>21}"
+            + (f"{'T_s up to':>10}{'well in':>10}" if self.stress is not None else "")
+            + "  slips of the blocks",
+            *(f"{place:4}{mode.row()}" for place, mode in enumerate(self.modes, 1)),
+        ]
+        if chain.ages and self.stress is None:
+            said += ["", "--stress gives the pressure, T_s and distance of wells that every controller needs"]
+        if self.slip_rate_error:
+            rates = ", ".join(quantity(v, "m/s") for v in self.slip_rate_error)
+            said += ["", f"infeasible: slip-rate errors below {rates}"]
+        escaping = sum(not mode.reached for mode in self.modes)
+        if escaping:
+            said += ["", f"infeasible for every controller: {counted(escaping, 'unstable mode')} out of reach"]
+        return said if self.modes else [*said, "", "no mode is unstable"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; null where no well reaches a mode, where it oscillates, and where no stress is given."""
+        modes, known = [asdict(mode) for mode in self.modes], {"fault": self.chain.name, "feasible": self.feasible}
+        if not self.chain.ages:
+            told = ("pole", "shape", "reached", "pressure")
+            return known | {"modes": [{name: mode[name] for name in told} for mode in modes]}
+        beside = {name: getattr(self, name) for name in ("stress", "largest_pressure", "diffusivity")}
+        return known | {"modes": modes, **beside, "slip_rate_error": list(self.slip_rate_error) or None}
+
+
+def _count(chain: BlockChain, slopes: Sequence[Fraction]) -> int:
+    """Unstable modes of blocks that damping never pushes, exactly: pivots above 0 of what weakens less what holds."""
+    pulls, found, before = {(i, j): K for i, j, K in chain.springs}, 0, Fraction(0)
+    for i, slope in enumerate(slopes):
+        pivot = slope - pulls.get((i, i - 1), 0) - pulls.get((i, i + 1), 0)
+        if i:
+            pivot -= pulls[i, i - 1] * pulls[i - 1, i] / before
+        before = pivot or Fraction(-1, 10**60)
+        found += before > 0
+    return found
+
+
+def chain_limits(
+    chain: BlockChain, *, stress: float | None = None, pressure: float | None = None, diffusivity: float | None = None
+) -> ChainLimits:
+    """Unstable modes of blocks with springs, and the pressures that every controller needs for them.
+
+    Parameters
+    ----------
+    chain : BlockChain
+    stress, pressure : float, optional
+        Of blocks in slow sliding: bound of the shear stress on every block, without which modes alone are found, and
+        largest pressure beside the plan of the wells [Pa]; the smallest effective normal stress unless given.
+    diffusivity : float, optional
+        Of the rock between their wells and the fault [m²/s]; 1 unless given.
+
+    Raises
+    ------
+    ParameterError
+        For modes that floating point does not tell apart, and for numbers that are not positive.
+    """
+    if not chain.ages:
+        if {stress, pressure, diffusivity} != {None}:
+            raise ParameterError(
+                "stress, pressure and diffusivity of limits of several blocks need friction with a state. Received "
+                f"{chain.blocks[0].friction.name}. Omit these."
+            )
+        return ChainLimits(chain=chain, modes=tuple(_modes(*_steepest(chain))))
+    largest = min(block.effective_normal_stress for block in chain.blocks) if pressure is None else pressure
+    diffusivity = 1.0 if diffusivity is None else diffusivity
+    require_positive(pressure=largest, diffusivity=diffusivity, stress=1.0 if stress is None else stress)
+    A, entries, B, told, at_once = _sliding(chain)
+    modes, step = [], chain.fault.sampling_time
+    for mode in _modes(A, entries, B, stress):
+        if mode.pressure is not None:
+            ratio, p = largest / mode.pressure, mode.pole
+            late = float(np.log(max(ratio, 1.0))) / p
+            rock = float(np.arccosh(max(ratio * np.exp(-p * step), 1.0))) ** 2 / p
+            far = float(np.sqrt(rock * diffusivity))
+            needed = mode.pressure * float(np.exp(p * step))
+            mode = replace(mode, pressure=needed, longest_step=late, farthest_well=far)
+        modes.append(mode)
+    rates: tuple[float, ...] = ()
+    if stress is not None:
+        N, V = len(chain.blocks), float(mean_rate(chain.fault))
+        moved = expm(np.block([[A, entries], [np.zeros((N, 3 * N))]]) * step)[: 2 * N, 2 * N :]
+        later = np.abs(told @ moved + at_once).sum(axis=1)
+        rates = tuple((V * stress * np.maximum(np.diag(at_once), later)).tolist())
+    return ChainLimits(
+        chain=chain,
+        modes=tuple(modes),
+        stress=stress,
+        largest_pressure=largest,
+        diffusivity=diffusivity,
+        slip_rate_error=rates,
+    )
+
+
+def _steepest(chain: BlockChain) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, Callable[[float], np.ndarray]]:
+    """A, entries of the disturbances, B, their size [m/s²], and B at a pole, where every block weakens most."""
+    tasks, N = [uncertain_plant(fault) for fault in chain.faults], len(chain.blocks)
+    stiff = np.diag([float(task.slip_chord[1]) for task in tasks])
+    add_springs(stiff, chain.springs, 1.0)
+    damping = np.diag([-float(task.rate_chord[0]) for task in tasks])
+    A = np.block([[np.zeros((N, N)), np.eye(N)], [stiff, damping]])
+    poles = np.linalg.eigvals(A)
+    count = np.count_nonzero(poles.real > _SAME * max(abs(poles)))
+    if (np.diag(damping) <= 0).all() and count != _count(chain, [task.slip_chord[1] for task in tasks]):
+        raise ParameterError(_APART)
+    authority = np.array([[float(task.authority * task.beta[1])] for task in tasks])
+    entries = np.vstack([np.zeros((N, N)), np.eye(N)])
+    steady = entries @ (authority * np.array(chain.shares, dtype=float))
+    through = lambda pole: np.asarray(entries @ (authority * _transmitted(chain, pole)))  # noqa: E731
+    return A, entries, steady, float(tasks[0].amplitude), through
+
+
+def _sliding(chain: BlockChain) -> tuple[np.ndarray, ...]:
+    """A, entries of the stresses and B about slow sliding, of slip errors over D of block 1 and log states.
+
+    Then the rows of ln(v/V) over these states, and over the stresses.
+    """
+    if any(block.friction.stress_exponents[0] for block in chain.blocks):
+        raise ParameterError("limits of slow sliding need stress_sensitivity 0. Received another. Simulate this fault.")
+    models, N = [sliding_model(fault) for fault in chain.faults], len(chain.blocks)
+    strength, weakening, aged, friction = (
+        np.array([float(getattr(model, name)) for model in models])
+        for name in ("strength", "weakening", "state_rate", "coefficient")
+    )
+    length, at_once = float(models[0].rate / models[0].state_rate), np.diag(1 / strength)
+    told = at_once @ np.hstack([-CoupledSliders.of(chain).stiffness * length, np.diag(-weakening)])
+    into = np.vstack([aged[0] * np.eye(N), np.diag(-aged)])
+    A, entries = into @ told, into @ at_once
+    A[N:, N:] -= np.diag(aged)
+    return A, entries, entries @ (friction[:, None] * np.array(chain.shares, dtype=float)), told, at_once
+
+
+def _transmitted(chain: BlockChain, pole: float) -> np.ndarray:
+    """Transfer functions from pressures of wells (columns) to those of blocks (rows) at a pole [1/s]."""
+    flow, pressures = np.array(chain.flow, dtype=float), np.array(chain.pressures, dtype=float)
+    if not len(flow):
+        return pressures
+    K = len(flow)
+    slow = np.linalg.solve(pole * np.eye(K) - flow[:, :K], flow[:, K:])
+    return np.asarray(pressures[:, K:] + pressures[:, :K] @ slow)
+
+
+def _modes(
+    A: np.ndarray,
+    entries: np.ndarray,
+    B: np.ndarray,
+    size: float | None,
+    through: Callable[[float], np.ndarray] | None = None,
+) -> Iterator[UnstableMode]:
+    """Unstable modes under disturbances of a size, if it is known; B at a pole by `through`, without it as it is.
+
+    Without it poles may have waves, of which nothing is found but which are reached.
+    """
+    (poles, right), N = np.linalg.eig(A), len(A) // 2
+    largest = max(abs(poles))
+    if through is not None and max(abs(poles[poles.real > 0].imag), default=0) > _SAME * largest:
+        raise ParameterError(
+            "limits of blocks need unstable poles that are real. Received complex ones. Simulate this fault."
+        )
+    if through is None and np.linalg.cond(right) > _MOST_SKEWED:
+        raise ParameterError(_APART)
+    left = np.linalg.inv(right)
+    groups: list[list[int]] = []
+    for i in np.argsort(-poles.real, kind="stable"):
+        if poles[i].real <= _SAME * largest or poles[i].imag < -_SAME * largest:
+            continue
+        if groups and abs(poles[groups[-1][0]] - poles[i]) <= _SAME * largest:
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    for group in groups:  # of one pole: combinations that the wells reach, and those that none does
+        pole = poles[group[0]]
+        wave = float(pole.imag) if abs(pole.imag) > _SAME * largest else 0.0
+        rows, columns = (v if wave else np.real(v) for v in (left[group], right[:N, group]))
+        felt = B if through is None else through(float(pole.real))
+        turned = np.linalg.svd(rows @ felt)[0].conj().T
+        shapes = columns @ np.linalg.inv(turned)
+        for row, shape in zip(turned @ rows, shapes.T, strict=True):
+            reach, steady = np.abs(row @ felt).sum(), np.abs(row @ B).sum()
+            reached = bool(reach and steady > _UNREACHED * np.linalg.norm(row) * np.linalg.norm(B))
+            known = reached and not wave and size is not None
+            yield UnstableMode(
+                pole=float(pole.real),
+                frequency=wave,
+                shape=tuple(np.real(shape / shape[np.argmax(np.abs(shape))]).tolist()),
+                reached=reached,
+                pressure=size * float(np.abs(row @ entries).sum() / reach) if known and size is not None else None,
+            )
