@@ -81,7 +81,17 @@ def row(name, fault, options):
     )
 
 
-HEAD = ("loop", "slip rate", "slip behind … ahead", "found / proved", "facets", "CPU", "check.py", "attack", "slip rate of it / claim")
+HEAD = (
+    "loop",
+    "slip rate",
+    "slip behind … ahead",
+    "found / proved",
+    "facets",
+    "CPU",
+    "check.py",
+    "attack",
+    "slip rate of it / claim",
+)
 
 if __name__ == "__main__":
     print(f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}")

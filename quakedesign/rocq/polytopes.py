@@ -1,7 +1,7 @@
-"""An invariant polytope of the stick–slip plant in Gallina: loop, facets, responses, and multipliers for every facet."""
+"""An invariant polytope of the stick–slip plant in Gallina: loop, facets, responses, multipliers of every facet."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from itertools import product
 from math import ceil, floor, log10
@@ -17,7 +17,6 @@ from quakedesign.guarantees.exact.stick_slip_set import (
     BITS,
     COMBINATIONS,
     Period,
-    Ranges,
     Rows,
     Verifier,
     facet_rows,
@@ -33,8 +32,6 @@ _DIGITS = 12  # of ranges, rounded outward
 _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (3, 0), 6: (3, 1)}
 """Least or largest r' of four polytopes, by the order of `resting_rows`."""
 
-Text = dict[tuple[int, ...], str]
-
 
 def polytope_theorem(claim: StickSlipGuarantee) -> Iterator[str]:
     """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant."""
@@ -47,20 +44,32 @@ def polytope_theorem(claim: StickSlipGuarantee) -> Iterator[str]:
         deciding = verifiers(task, held, reach, found)
         sliding, resting = (_hints(deciding, rows) for rows in facet_rows(period, reach))
         yield _loop(period)
-        yield "Definition facets : list facet :=\n  " + gallina.listed(map(_facet, reach.facets, reach.multipliers), ";\n   ") + "."
+        yield (
+            "Definition facets : list facet :=\n  "
+            + gallina.listed(map(_facet, reach.facets, reach.multipliers), ";\n   ")
+            + "."
+        )
         yield f"Definition known : responses near :=\n  {_responses(period)}."
         count, falls = len(reach.facets), [row[2] <= 0 for row in reach.facets]
         by_slide, by_rest = _by_slide(sliding, count), _by_rest(resting, falls)
         pushed = _pushed(deciding[:3], period)
-    for name, kind, entries in (("hints_of_slides", "list (list hint)", by_slide), ("hints_of_rests", "list (list (hint * hint))", by_rest)):
+    for name, kind, entries in (
+        ("hints_of_slides", "list (list hint)", by_slide),
+        ("hints_of_rests", "list (list pair)", by_rest),
+    ):
         yield f"Definition {name} : list ({kind}) :=\n  " + gallina.listed(entries, ";\n   ") + "."
     low, high = map(gallina.rational, push)
     yield f"Definition proposed : proposals :=\n  Proposals hints_of_slides hints_of_rests {low} {high}\n  {pushed}."
+    stated = (getattr(claim.claims, one.name) for one in fields(claim.claims))
+    numbers = map(gallina.rational, (*stated, *found.rest_pressure))
+    yield f"Definition claimed : claims := Claims {' '.join(numbers)}."
+    yield gallina.accepted("follows plant facets proposed claimed", "followed")
     yield gallina.accepted("accepts plant facets known proposed")
-    yield _THEOREM
-
-
-_THEOREM = ""
+    yield (
+        "Theorem certificate : guaranteed plant facets known claimed.\n"
+        "Proof. exact (polytope_sound plant facets known proposed claimed accepted followed). Qed.\n"
+        "Print Assumptions certificate."
+    )
 
 
 def _outward(low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
@@ -101,7 +110,34 @@ def _near(value: Any) -> str:
     return f"Near ({gallina.integer(floor(middle))}) {gallina.integer(ceil(radius) + 1)}"
 
 
-def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Rows, dict[int, str]]]:
+@dataclass(frozen=True)
+class _Hint:
+    """How a facet is bounded: by itself or not, and multipliers of constraints."""
+
+    own: bool
+    shares: tuple[tuple[int, float], ...]
+    turn: int | None = None  # the constraint that the target rate is not negative
+
+    @classmethod
+    def of(cls, verifier: Verifier, basis: Any, shares: Any) -> "_Hint":
+        """By a vertex."""
+        return cls(False, tuple(zip(map(int, basis), shares, strict=True)))
+
+    @classmethod
+    def itself(cls, verifier: Verifier, left: Any) -> "_Hint":
+        """By the facet itself, and what `Verifier.largest` uses besides."""
+        more = [(len(verifier.rows) - 1, left[3])] if len(left) > 3 else []
+        more += [(verifier.last, left[0])] if verifier.last is not None else []
+        return cls(True, tuple((i, v * (1 + 2.0**-_GRAIN)) for i, v in more), verifier.last)
+
+    def text(self, *, without: int | None = None) -> str:
+        """As a term, without a constraint."""
+        whole = ((i, ceil(share * 2.0**_GRAIN)) for i, share in self.shares if share > 0 and i != without)
+        listed = gallina.listed((f"Share {i} {gallina.integer(p)}" for i, p in whole), ";")
+        return f"Hint {str(self.own).lower()} {listed}"
+
+
+def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Rows, dict[int, _Hint]]]:
     """For every facet of a set of rows what bounds it there."""
     for rows in given:
         verifier = deciding[rows.place]
@@ -110,31 +146,31 @@ def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Ro
         bases, shares = verifier.proposed(floats * np.vectorize(float, otypes=[float])(verifier.sizes))
         own = floats - np.vectorize(float, otypes=[float])(verifier.rows[rows.which])
         entries = zip(rows.which, tops, bases, shares, own, strict=True)
-        yield rows, {int(w): _hint(verifier, float(1 - top) > _CLOSE, b, s, left) for w, top, b, s, left in entries}
+        yield (
+            rows,
+            {
+                int(w): _Hint.of(verifier, b, s) if float(1 - top) > _CLOSE else _Hint.itself(verifier, left)
+                for w, top, b, s, left in entries
+            },
+        )
 
 
-def _hint(verifier: Verifier, alone: bool, basis: Any, shares: Any, left: Any) -> str:
-    """Multipliers; where they do not show it alone, the facet itself and what `Verifier.largest` uses besides."""
-    if not alone:
-        more = [(len(verifier.rows) - 1, left[3])] if len(left) > 3 else []
-        more += [(verifier.last, left[0])] if verifier.last is not None else []
-        basis, shares = zip(*more, strict=True) if more else ((), ())
-        shares = [max(v, 0) * (1 + 2.0**-40) for v in shares]
-    whole = ((int(i), ceil(share * 2.0**_GRAIN)) for i, share in zip(basis, shares, strict=True) if share > 0)
-    listed = gallina.listed((f"Share {i} {gallina.integer(p)}" for i, p in whole), ";")
-    return f"Hint {'false' if alone else 'true'} {listed}"
+def _pair(least: _Hint, largest: _Hint, *, positive: bool = False) -> str:
+    """At both ends of r'; without a positive target rate where it is as large as the sum of all else."""
+    bare = positive and largest.own and any(i == largest.turn and share > 0 for i, share in largest.shares)
+    return f"Pair {str(bare).lower()} ({least.text()}) ({largest.text(without=largest.turn if bare else None)})"
 
 
-def _by_slide(given: Iterator[tuple[Rows, dict[int, str]]], count: int) -> list[str]:
+def _by_slide(given: Iterator[tuple[Rows, dict[int, _Hint]]], count: int) -> list[str]:
     """Per facet: whether the innovation is cut off, chord, beta; end of r'."""
     found: dict[int, list[str]] = {i: [] for i in range(count)}
     for many in zip(*[given] * len(COMBINATIONS), strict=True):
         for facet in many[0][1]:
-            found[facet].append(gallina.listed(hints[facet] for _, hints in many))
+            found[facet].append(gallina.listed(hints[facet].text() for _, hints in many))
     return [gallina.listed(found[i], ";\n     ") for i in range(count)]
 
 
-def _by_rest(given: Iterator[tuple[Rows, dict[int, str]]], falls: list[bool]) -> list[str]:
+def _by_rest(given: Iterator[tuple[Rows, dict[int, _Hint]]], falls: list[bool]) -> list[str]:
     """Per facet: chord, share; polytope; least and largest r'."""
     raised, table = [i for i, fall in enumerate(falls) if not fall], {}
     groups = [2 if raised else 0, 1 if any(falls) else 0]
@@ -147,7 +183,7 @@ def _by_rest(given: Iterator[tuple[Rows, dict[int, str]]], falls: list[bool]) ->
     for facet, fall in enumerate(falls):
         cases = []
         for chord, share in product(range(2), range(1 if fall else 2)):
-            pairs = (f"({table[facet, chord, share, i, 0]}, {table[facet, chord, share, i, 1]})" for i in range(4))
+            pairs = (_pair(*(table[facet, chord, share, i, j] for j in (0, 1)), positive=i == 1) for i in range(4))
             cases.append(gallina.listed(pairs))
         found.append(gallina.listed(cases, ";\n     "))
     return found
@@ -159,5 +195,5 @@ def _pushed(slices: list[Verifier], period: Period) -> str:
     pairs = []
     for verifier in slices:
         bases, shares = verifier.proposed(np.array([-row, row]) * np.vectorize(float, otypes=[float])(verifier.sizes))
-        pairs.append(f"({_hint(verifier, True, bases[0], shares[0], ())}, {_hint(verifier, True, bases[1], shares[1], ())})")
+        pairs.append(_pair(*(_Hint.of(verifier, basis, share) for basis, share in zip(bases, shares, strict=True))))
     return gallina.listed(pairs)

@@ -863,7 +863,7 @@ def _bracket(task: FaultPlant, held: SampledStickSlip, found: Ranges, push: Frac
 def verifiers(
     task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, found: Ranges | None
 ) -> list[Verifier]:
-    """Of the 3 slices, and of the 7 combinations where ranges are known. Raises ParameterError as `stick_slip_bounds`."""
+    """Of the 3 slices, and of the 7 combinations where ranges are known; raises as `stick_slip_bounds`."""
     ahead, rate, up, lag, down = reach.box
     sizes, longest = [max(ahead, lag), rate, max(up, down)], _ZERO
     if found:
