@@ -4,8 +4,8 @@
    rest map, and bounds it on the polytope by multipliers that the file proposes. [polytope_sound] says once what its answer means:
    from rest, no sample leaves the polytope, for ever, where every period that begins inside of it is one of the two maps
    ([period]). The bounds of both maps are those of FORMAT.md ([sliding_bound], [resting_bound]); that they bound the motion of the
-   fault is argued there. Ranges of slopes, damping and input gain are numbers of the file, as are enclosures of the impulse
-   responses ([near_responses]): two other checkers compute them. Standard library alone. *)
+   fault is argued there. Ranges of slopes, damping and input gain are numbers of the file: two other checkers compute them. Enclosures of the
+   impulse responses follow from their differential equation ([responses_near]). Standard library alone. *)
 
 From Coq Require Import ZArith QArith Qreals Reals List Lra Lia Psatz.
 Import ListNotations.
@@ -1215,11 +1215,252 @@ Proof.
 Qed.
 End Invariant.
 
+(* ---------------------------------------------------------------- impulse responses, from their differential equation *)
+
+Fixpoint ev (p : list Q) (t : R) : R := match p with nil => 0 | c :: p => Q2R c + t * ev p t end.
+Fixpoint dv (p : list Q) (t : R) : R := match p with nil => 0 | c :: p => ev p t + t * dv p t end.
+Fixpoint evaluated (p : list Q) (t : Q) : Q := match p with nil => 0%Q | c :: p => Qred (c + t * evaluated p t)%Q end.
+Fixpoint raised (k : Z) (p : list Q) : list Q := match p with nil => nil | c :: p => (inject_Z k * c)%Q :: raised (Z.succ k) p end.
+Definition derived (p : list Q) : list Q := match p with nil => nil | _ :: p => raised 1 p end.
+(* a p + q *)
+Fixpoint summed (a : Q) (p q : list Q) : list Q :=
+  match p, q with
+  | nil, _ => q
+  | c :: p, nil => (a * c)%Q :: summed a p nil
+  | c :: p, d :: q => Qred (a * c + d)%Q :: summed a p q
+  end.
+Definition sizes_of (p : list Q) : list Q := map magnitude p.
+
+Lemma ev_derivable p t : derivable_pt_lim (ev p) t (dv p t).
+Proof.
+  induction p as [| c p ih]; cbn [ev dv]; [apply derivable_pt_lim_const |].
+  replace (ev p t + t * dv p t) with (0 + (1 * ev p t + t * dv p t)) by ring.
+  apply (derivable_pt_lim_plus (fun _ => Q2R c) (fun s => s * ev p s)); [apply derivable_pt_lim_const |].
+  apply (derivable_pt_lim_mult (fun s => s) (ev p)); [apply derivable_pt_lim_id | exact ih].
+Qed.
+
+Lemma ev_raised p t : forall k, ev (raised k p) t = IZR k * ev p t + t * dv p t.
+Proof.
+  induction p as [| c p ih]; intro k; cbn [raised ev dv]; [ring |].
+  rewrite ih, Q2R_mult, succ_IZR. replace (Q2R (inject_Z k)) with (IZR k) by (unfold Q2R, inject_Z; cbn; field). ring.
+Qed.
+
+Lemma ev_derived p t : ev (derived p) t = dv p t.
+Proof. destruct p as [| c p]; cbn [derived]; [reflexivity |]. rewrite ev_raised. cbn [dv]. ring. Qed.
+
+Lemma Qred_same q : Q2R (Qred q) = Q2R q.
+Proof. apply Qeq_eqR, Qred_correct. Qed.
+
+Lemma ev_summed a p : forall q t, ev (summed a p q) t = Q2R a * ev p t + ev q t.
+Proof.
+  induction p as [| c p ih]; intros [| d q] t; cbn [summed ev]; rewrite ?ih, ?Qred_same, ?Q2R_plus, ?Q2R_mult; cbn [ev]; ring.
+Qed.
+
+Lemma evaluated_sound p t : Q2R (evaluated p t) = ev p (Q2R t).
+Proof. induction p as [| c p ih]; cbn [evaluated ev]; [apply Q2R_0 |]. rewrite Qred_same, Q2R_plus, Q2R_mult, ih. ring. Qed.
+
+Lemma ev_bounded p t T : 0 <= t <= T -> Rabs (ev p t) <= ev (sizes_of p) T.
+Proof.
+  intros [l h]. induction p as [| c p ih]; cbn [sizes_of map ev] in *; [rewrite Rabs_R0; lra |].
+  eapply Rle_trans; [apply Rabs_triang |]. rewrite magnitude_sound. apply Rplus_le_compat_l. rewrite Rabs_mult, (Rabs_pos_eq t) by exact l.
+  apply Rmult_le_compat; auto using Rabs_pos.
+Qed.
+
+(* An energy that grows at most as fast as K times itself and c. *)
+Lemma line_derivable a t : derivable_pt_lim (fun s => a * s) t a.
+Proof.
+  assert (h := derivable_pt_lim_mult (fun _ => a) (fun s => s) t 0 1 (derivable_pt_lim_const a t) (derivable_pt_lim_id t)).
+  cbv beta in h. replace (0 * t + a * 1) with a in h by ring. exact h.
+Qed.
+
+Lemma grown E dE K c T : 0 <= K -> 0 <= c -> (forall t, derivable_pt_lim E t (dE t)) -> E 0 = 0 ->
+  (forall t, 0 <= t <= T -> dE t <= K * E t + c) -> forall t, 0 <= t <= T -> E t <= c * t * exp (K * t).
+Proof.
+  intros pK pc der z0 grow t [l h]. set (F := fun s => E s * exp (- K * s) - c * s).
+  set (dF := fun s => dE s * exp (- K * s) + E s * (exp (- K * s) * (- K)) - c).
+  assert (derF : forall s, derivable_pt_lim F s (dF s)).
+  { intro s. unfold F, dF. apply (derivable_pt_lim_minus (fun s => E s * exp (- K * s)) (fun s => c * s)).
+    - apply (derivable_pt_lim_mult E (fun s => exp (- K * s))); [apply der |].
+      apply (derivable_pt_lim_comp (fun s => - K * s) exp); [| apply derivable_pt_lim_exp].
+      apply line_derivable.
+    - apply line_derivable. }
+  assert (low : F t <= 0).
+  { destruct (Req_dec t 0) as [-> | ne]; [unfold F; rewrite z0, Rmult_0_l, Rmult_0_r; lra |].
+    destruct (MVT_cor2 F dF 0 t) as [s [eq hs]]; [lra | intros; apply derF |].
+    assert (F0 : F 0 = 0) by (unfold F; rewrite z0, Rmult_0_l, Rmult_0_r; lra). rewrite F0 in eq.
+    assert (dF s <= 0).
+    { unfold dF. assert (g := grow s ltac:(lra)). assert (pe := exp_pos (- K * s)).
+      assert (exp (- K * s) <= 1). { rewrite <- exp_0. destruct (Req_dec (K * s) 0) as [e | n]; [right; f_equal; lra |].
+        left. apply exp_increasing. assert (0 <= K * s) by (apply Rmult_le_pos; lra). lra. }
+      assert (dE s * exp (- K * s) <= (K * E s + c) * exp (- K * s)) by (apply Rmult_le_compat_r; lra).
+      assert (c * exp (- K * s) <= c * 1) by (apply Rmult_le_compat_l; lra). lra. }
+    assert (dF s * (t - 0) <= 0) by nra. lra. }
+  unfold F in low. replace (- K * t) with (- (K * t)) in low by ring. rewrite exp_Ropp in low. assert (pe := exp_pos (K * t)).
+  apply Rmult_le_reg_r with (/ exp (K * t)); [now apply Rinv_0_lt_compat |]. rewrite Rmult_assoc, Rinv_r by lra. lra.
+Qed.
+
+Lemma exp_bounded x n : x <= IZR (Z.of_nat n) -> exp x <= 3 ^ n.
+Proof.
+  intro h. apply Rle_trans with (exp (IZR (Z.of_nat n))).
+  - destruct h as [h | ->]; [left; now apply exp_increasing | right; reflexivity].
+  - clear h. induction n as [| n ih]; [cbn; rewrite exp_0; lra |].
+    rewrite Nat2Z.inj_succ, succ_IZR, exp_plus. cbn [pow]. rewrite Rmult_comm.
+    apply Rmult_le_compat; try (left; apply exp_pos); [apply exp_le_3 | exact ih].
+Qed.
+
+Section Impulse.
+Variable L : loop.
+Let s0 := ((slope_low L + slope_high L) * half)%Q.
+Let w0 := ((damping_low L + damping_high L) * half)%Q.
+
+(* Slip X and slip rate Y after a unit impulse, and the integral Z of X. *)
+Definition impulse (X Y Z : R -> R) : Prop :=
+  (forall t, derivable_pt_lim X t (Y t)) /\ (forall t, derivable_pt_lim Y t (Q2R s0 * X t - Q2R w0 * Y t)) /\
+  (forall t, derivable_pt_lim Z t (X t)) /\ X 0 = 0 /\ Y 0 = 1 /\ Z 0 = 0.
+Definition times_of_nodes : list Q := map (fun i => step L * (i # 1) / 16)%Q [16; 15; 14; 13; 12; 11; 10; 9; 8; 7; 6; 5; 4; 3; 2; 1; 0]%Z.
+Definition responses_of (X Y Z : R -> R) : responses R :=
+  Responses (map (fun t => (X (Q2R t), Y (Q2R t))) times_of_nodes) (Z (Q2R (step L))) (X (Q2R (step L))).
+
+(* Taylor's polynomials, for which nothing is assumed: what they lack of a solution is computed. *)
+Fixpoint coefficients (n : nat) (k : Z) (x y z : Q) : list Q * list Q * list Q :=
+  match n with
+  | O => (nil, nil, nil)
+  | S n => let '(a, b, c) := coefficients n (Z.succ k) (Qred (y / inject_Z k)) (Qred ((s0 * x - w0 * y) / inject_Z k)) (Qred (x / inject_Z k)) in
+      (x :: a, y :: b, z :: c)
+  end.
+
+Section Polynomials.
+Variables px py pz : list Q.
+Definition lack_x : list Q := summed (-1#1) py (derived px).
+Definition lack_y : list Q := summed (- s0) px (summed w0 py (derived py)).
+Definition lack_z : list Q := summed (-1#1) px (derived pz).
+Definition most (p : list Q) : Q := evaluated (sizes_of p) (step L).
+Definition close (off : Q) (a : near) (q : Q) : bool :=
+  Qle_bool (magnitude (q * inject_Z scale - inject_Z (middle a)) + off * inject_Z scale) (inject_Z (radius a)).
+
+Definition solved (n : nat) (off : Q) : bool :=
+  Qeq_bool (evaluated px 0) 0 && Qeq_bool (evaluated py 0) 1 && Qeq_bool (evaluated pz 0) 0 && Qle_bool 0 off && Qle_bool 0 (step L)
+  && Qle_bool ((3 + magnitude s0 + 2 * magnitude w0) * step L) (inject_Z (Z.of_nat n))
+  && Qle_bool ((most lack_x * most lack_x + most lack_y * most lack_y + most lack_z * most lack_z) * step L * inject_Z (3 ^ Z.of_nat n)) (off * off).
+Definition enclosed (r : responses near) (n : nat) (off : Q) : bool :=
+  solved n off && all2 (fun a t => close off (fst a) (evaluated px t) && close off (snd a) (evaluated py t) && Qle_bool 0 t && Qle_bool t (step L))
+    (nodes r) times_of_nodes
+  && close off (held_slip r) (evaluated pz (step L)) && close off (held_rate r) (evaluated px (step L)).
+
+Variables X Y Z : R -> R.
+Hypothesis motion : impulse X Y Z.
+
+Lemma Q2R_whole z : Q2R (inject_Z z) = IZR z.
+Proof. unfold Q2R, inject_Z. cbn. field. Qed.
+
+Lemma square_bounded u v : Rabs u <= v -> u * u <= v * v.
+Proof. intro h. rewrite <- (Rabs_pos_eq (u * u)) by apply Rle_0_sqr. rewrite Rabs_mult. apply Rmult_le_compat; auto using Rabs_pos. Qed.
+
+Lemma solution_near n off : solved n off = true -> forall t, 0 <= t <= Q2R (step L) ->
+  Rabs (X t - ev px t) <= Q2R off /\ Rabs (Y t - ev py t) <= Q2R off /\ Rabs (Z t - ev pz t) <= Q2R off.
+Proof.
+  intros ok t ht. unfold solved in ok. do 6 (apply andb_prop in ok as [ok ?]).
+  repeat match goal with h : Qle_bool _ _ = true |- _ => apply below_true in h end.
+  repeat match goal with h : Qeq_bool _ _ = true |- _ => apply Qeq_bool_iff, Qeq_eqR in h; rewrite evaluated_sound, Q2R_0 in h end.
+  rewrite Q2R_0, Q2R_1 in *.
+  repeat match goal with h : context [Q2R (_ * _)] |- _ => rewrite !Q2R_mult in h end. rewrite ?Q2R_whole in *.
+  match goal with h : _ <= IZR (Z.of_nat n) |- _ => rewrite !Q2R_plus, !Q2R_mult, !magnitude_sound in h end.
+  match goal with h : _ <= Q2R off * Q2R off |- _ => rewrite !Q2R_plus, !Q2R_mult in h end.
+  destruct motion as (dX & dY & dZ & X0 & Y0 & Z0).
+  set (x := fun t => X t - ev px t) in *. set (y := fun t => Y t - ev py t) in *. set (z := fun t => Z t - ev pz t) in *.
+  assert (lx : forall t, dv px t = ev lack_x t + ev py t) by (intro; unfold lack_x; rewrite ev_summed, ev_derived, Q2R_m1; ring).
+  assert (ly : forall t, dv py t = ev lack_y t + Q2R s0 * ev px t - Q2R w0 * ev py t).
+  { intro. unfold lack_y. rewrite !ev_summed, ev_derived, Q2R_opp. ring. }
+  assert (lz : forall t, dv pz t = ev lack_z t + ev px t) by (intro; unfold lack_z; rewrite ev_summed, ev_derived, Q2R_m1; ring).
+  set (E := fun t => x t * x t + y t * y t + z t * z t).
+  set (dE := fun t => 2 * (x t * (y t - ev lack_x t) + y t * (Q2R s0 * x t - Q2R w0 * y t - ev lack_y t) + z t * (x t - ev lack_z t))).
+  set (K := 3 + Rabs (Q2R s0) + 2 * Rabs (Q2R w0)).
+  set (c := Q2R (most lack_x) * Q2R (most lack_x) + Q2R (most lack_y) * Q2R (most lack_y) + Q2R (most lack_z) * Q2R (most lack_z)).
+  assert (der : forall t, derivable_pt_lim E t (dE t)).
+  { intro s. unfold E, dE.
+    assert (hx : derivable_pt_lim x s (y s - ev lack_x s)).
+    { replace (y s - ev lack_x s) with (Y s - dv px s) by (unfold y; rewrite lx; ring). apply derivable_pt_lim_minus; [apply dX | apply ev_derivable]. }
+    assert (hy : derivable_pt_lim y s (Q2R s0 * x s - Q2R w0 * y s - ev lack_y s)).
+    { replace (Q2R s0 * x s - Q2R w0 * y s - ev lack_y s) with (Q2R s0 * X s - Q2R w0 * Y s - dv py s) by (unfold x, y; rewrite ly; ring).
+      apply derivable_pt_lim_minus; [apply dY | apply ev_derivable]. }
+    assert (hz : derivable_pt_lim z s (x s - ev lack_z s)).
+    { replace (x s - ev lack_z s) with (X s - dv pz s) by (unfold x; rewrite lz; ring). apply derivable_pt_lim_minus; [apply dZ | apply ev_derivable]. }
+    assert (h := derivable_pt_lim_plus _ _ _ _ _ (derivable_pt_lim_plus _ _ _ _ _ (derivable_pt_lim_mult x x s _ _ hx hx) (derivable_pt_lim_mult y y s _ _ hy hy)) (derivable_pt_lim_mult z z s _ _ hz hz)).
+    match type of h with derivable_pt_lim _ _ ?l =>
+      replace (2 * _) with l by ring end. exact h. }
+  assert (grow : forall s, 0 <= s <= Q2R (step L) -> dE s <= K * E s + c).
+  { intros s hs. unfold dE, E, K, c.
+    assert (bx := square_bounded _ _ (ev_bounded lack_x s _ hs)). assert (by_ := square_bounded _ _ (ev_bounded lack_y s _ hs)).
+    assert (bz := square_bounded _ _ (ev_bounded lack_z s _ hs)). unfold most. rewrite !evaluated_sound.
+    generalize dependent (ev lack_x s). generalize dependent (ev lack_y s). generalize dependent (ev lack_z s). intros rz bz ry by_ rx bx.
+    generalize (x s) (y s) (z s). intros a b d.
+    assert (sq : forall u v, 2 * u * v <= u * u + v * v) by (intros u v; assert (0 <= (u - v) * (u - v)) by apply Rle_0_sqr; lra).
+    assert (hS : 2 * Q2R s0 * (a * b) <= Rabs (Q2R s0) * (a * a + b * b)).
+    { assert (h1 := sq a b). assert (h2 := sq a (- b)). unfold Rabs. destruct Rcase_abs; nra. }
+    assert (hw : - (Q2R w0 * (b * b)) <= Rabs (Q2R w0) * (b * b)).
+    { assert (0 <= b * b) by apply Rle_0_sqr. assert (h := Rle_abs (- Q2R w0)). rewrite Rabs_Ropp in h. nra. }
+    assert (0 <= Rabs (Q2R s0) * (d * d)) by (apply Rmult_le_pos; [apply Rabs_pos | apply Rle_0_sqr]).
+    assert (0 <= Rabs (Q2R w0) * (a * a)) by (apply Rmult_le_pos; [apply Rabs_pos | apply Rle_0_sqr]).
+    assert (0 <= Rabs (Q2R w0) * (d * d)) by (apply Rmult_le_pos; [apply Rabs_pos | apply Rle_0_sqr]).
+    assert (h1 := sq a b). assert (h2 := sq a (- rx)). assert (h3 := sq b (- ry)). assert (h4 := sq d a). assert (h5 := sq d (- rz)).
+    assert (0 <= a * a) by apply Rle_0_sqr. assert (0 <= b * b) by apply Rle_0_sqr. assert (0 <= d * d) by apply Rle_0_sqr. lra. }
+  assert (E0 : E 0 = 0). { unfold E, x, y, z. rewrite X0, Y0, Z0.
+    repeat match goal with h : ev _ 0 = _ |- _ => rewrite h end. ring. }
+  assert (pK : 0 <= K) by (unfold K; assert (a := Rabs_pos (Q2R s0)); assert (b := Rabs_pos (Q2R w0)); lra).
+  assert (pc : 0 <= c) by (unfold c; assert (a := Rle_0_sqr (Q2R (most lack_x))); assert (b := Rle_0_sqr (Q2R (most lack_y))); assert (d := Rle_0_sqr (Q2R (most lack_z))); unfold Rsqr in *; lra).
+  assert (g := grown E dE K c _ pK pc der E0 grow t ht).
+  assert (up : exp (K * t) <= 3 ^ n).
+  { apply exp_bounded. eapply Rle_trans; [apply Rmult_le_compat_l; [exact pK | apply ht] |].
+    match goal with h : _ <= IZR (Z.of_nat n) |- _ => eapply Rle_trans; [| exact h] end. right. unfold K.
+    replace (Q2R 3) with 3 by (unfold Q2R; cbn; field). replace (Q2R 2) with 2 by (unfold Q2R; cbn; field). reflexivity. }
+  match goal with h : _ <= Q2R off * Q2R off |- _ => rename h into small end. rewrite <- pow_IZR in small.
+  assert (whole : E t <= Q2R off * Q2R off).
+  { eapply Rle_trans; [exact g |]. eapply Rle_trans; [| exact small]. fold c. destruct ht as [l h].
+    apply Rmult_le_compat; [apply Rmult_le_pos; assumption | left; apply exp_pos | apply Rmult_le_compat_l; assumption | exact up]. }
+  assert (off0 : 0 <= Q2R off) by assumption.
+  assert (sq : forall u, u * u <= Q2R off * Q2R off -> Rabs u <= Q2R off).
+  { intros u h. rewrite <- (Rabs_pos_eq (Q2R off)) by exact off0. apply Rsqr_le_abs_0. exact h. }
+  assert (xx := Rle_0_sqr (x t)). assert (yy := Rle_0_sqr (y t)). assert (zz := Rle_0_sqr (z t)). unfold Rsqr, E in *.
+  repeat split; [apply (sq (x t)) | apply (sq (y t)) | apply (sq (z t))]; lra.
+Qed.
+
+Lemma close_sound off a q v : close off a q = true -> Rabs (v - Q2R q) <= Q2R off -> is_near a v.
+Proof.
+  intros ok h. unfold close in ok. apply below_true in ok. rewrite Q2R_plus, magnitude_sound, Q2R_minus, !Q2R_mult, !Q2R_whole in ok.
+  unfold is_near. assert (pu := scale_positive).
+  replace (v * IZR scale - IZR (middle a)) with ((Q2R q * IZR scale - IZR (middle a)) + (v - Q2R q) * IZR scale) by ring.
+  eapply Rle_trans; [apply Rabs_triang |]. eapply Rle_trans; [| exact ok]. apply Rplus_le_compat_l.
+  rewrite Rabs_mult, (Rabs_pos_eq (IZR scale)) by lra. apply Rmult_le_compat_r; lra.
+Qed.
+
+Theorem responses_near r n off : enclosed r n off = true -> near_responses r (responses_of X Y Z).
+Proof.
+  intro ok. unfold enclosed in ok. apply andb_prop in ok as [ok kr]. apply andb_prop in ok as [ok ks]. apply andb_prop in ok as [so kn].
+  assert (near_all := solution_near n off so).
+  assert (pT : 0 <= Q2R (step L)).
+  { unfold solved in so. do 6 (apply andb_prop in so as [so ?]). match goal with h : Qle_bool 0 (step L) = true |- _ => apply below_true in h; rewrite Q2R_0 in h; exact h end. }
+  assert (at_end := near_all (Q2R (step L)) (conj pT (Rle_refl _))). destruct at_end as (ex & _ & ez).
+  split; [| split; [apply (close_sound off _ _ _ ks) | apply (close_sound off _ _ _ kr)]; rewrite evaluated_sound; assumption].
+  unfold responses_of. cbn [nodes]. revert kn. generalize (nodes r) times_of_nodes. intros a times. revert a.
+  induction times as [| t times ih]; intros [| u a] h; cbn [all2 map] in *; try discriminate; constructor.
+  - apply andb_prop in h as [h _]. do 3 (apply andb_prop in h as [h ?]).
+    repeat match goal with h : Qle_bool _ _ = true |- _ => apply below_true in h; rewrite ?Q2R_0 in h end.
+    destruct (near_all (Q2R t)) as (hx & hy & _); [split; assumption |].
+    split; [apply (close_sound off _ (evaluated px t)) | apply (close_sound off _ (evaluated py t))]; try assumption; rewrite evaluated_sound; assumption.
+  - apply ih. now apply andb_prop in h as [_ h].
+Qed.
+End Polynomials.
+End Impulse.
+
+(* Taylor's polynomials of so many terms, 3^n at least e^KT, and what they may be off. *)
+Definition follows_from_flow (L : loop) (r : responses near) (terms n : nat) (off : Q) : bool :=
+  let '(px, py, pz) := coefficients L terms 1 0%Q 1%Q 0%Q in enclosed L px py pz r n off.
+
 (* From rest, for ever: where every period from inside of the polytope is one of the two maps, no sample leaves it, and the
    claims hold at every sample, with what the reference moves in a period to spare. *)
-Definition guaranteed (L : loop) (facets : list facet) (r : responses near) (c : claims) : Prop :=
-  forall x : responses R, near_responses r x -> forall z : nat -> state,
-  begun L (z 0%nat) -> (forall k, inside facets (z k) -> period L facets x (z k) (z (S k))) ->
+Definition guaranteed (L : loop) (facets : list facet) (c : claims) : Prop :=
+  forall X Y Z : R -> R, impulse L X Y Z -> forall z : nat -> state, begun L (z 0%nat) ->
+  (forall k, inside facets (z k) -> period L facets (responses_of L X Y Z) (z k) (z (S k))) ->
   forall k, inside facets (z k) /\
     let moved := Q2R (step L) * Q2R (rate L - told L) in let e := error (z k) - Q2R (slip_noise L) in
     - Q2R (slip_behind c) <= e - moved /\ e + moved <= Q2R (slip_ahead c) /\ 0 <= velocity (z k) <= Q2R (peak_slip_rate c) /\
@@ -1227,10 +1468,14 @@ Definition guaranteed (L : loop) (facets : list facet) (r : responses near) (c :
       Q2R (rest_low c) <= rest <= Q2R (rest_high c) ->
       Q2R (least_pressure c) <= rest - push L (z k) rate_ noise <= Q2R (largest_pressure c).
 
-Theorem polytope_sound (L : loop) (facets : list facet) (r : responses near) (p : proposals) (c : claims) :
-  accepts L facets r p = true -> follows L facets p c = true -> guaranteed L facets r c.
+Theorem polytope_sound (L : loop) (facets : list facet) (r : responses near) (p : proposals) (c : claims) terms n off :
+  accepts L facets r p = true -> follows L facets p c = true -> follows_from_flow L r terms n off = true -> guaranteed L facets c.
 Proof.
-  intros ok fo x known z at_first every.
+  intros ok fo flow X Y Z motion z at_first every.
+  assert (known : near_responses r (responses_of L X Y Z)).
+  { unfold follows_from_flow in flow. destruct (coefficients L terms 1 0%Q 1%Q 0%Q) as [[px py] pz].
+    exact (responses_near L px py pz X Y Z motion r n off flow). }
+  set (x := responses_of L X Y Z) in *.
   unfold accepts in ok. cbv zeta in ok. do 5 (apply andb_prop in ok as [ok ?]).
   assert (stays : forall k, inside facets (z k)).
   { induction k as [| k ih].

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from flint import ctx
 
+from quakedesign.errors import UnsupportedError
 from quakedesign.exact import fraction_of
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.guarantees.exact.stick_slip_set import (
@@ -29,6 +30,8 @@ from quakedesign.rocq import gallina
 _BITS, _GRAIN = 80, 40  # of numbers and of multipliers in polytope.v
 _CLOSE = 2.0**-30  # what multipliers must leave below 1; else a facet is bounded by itself
 _DIGITS = 12  # of ranges, rounded outward
+_OFF = 62  # bits to which polynomials give the impulse responses
+_MOST_TERMS = 400
 _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (3, 0), 6: (3, 1)}
 """Least or largest r' of four polytopes, by the order of `resting_rows`."""
 
@@ -64,10 +67,12 @@ def polytope_theorem(claim: StickSlipGuarantee) -> Iterator[str]:
     numbers = map(gallina.rational, (*stated, *found.rest_pressure))
     yield f"Definition claimed : claims := Claims {' '.join(numbers)}."
     yield gallina.accepted("follows plant facets proposed claimed", "followed")
+    flow = f"follows_from_flow plant known {_terms(period)} (1 # {1 << _OFF})"
+    yield gallina.accepted(flow, "solved_flow")
     yield gallina.accepted("accepts plant facets known proposed")
     yield (
-        "Theorem certificate : guaranteed plant facets known claimed.\n"
-        "Proof. exact (polytope_sound plant facets known proposed claimed accepted followed). Qed.\n"
+        "Theorem certificate : guaranteed plant facets claimed.\n"
+        "Proof. exact (polytope_sound plant facets known proposed claimed _ _ _ accepted followed solved_flow). Qed.\n"
         "Print Assumptions certificate."
     )
 
@@ -107,7 +112,28 @@ def _responses(period: Period) -> str:
 def _near(value: Any) -> str:
     """Middle and radius of a ball, in units."""
     middle, radius = (fraction_of(part.fmpq()) * (1 << _BITS) for part in (value.mid(), value.rad()))
-    return f"Near ({gallina.integer(floor(middle))}) {gallina.integer(ceil(radius) + 1)}"
+    return f"Near ({gallina.integer(floor(middle))}) {gallina.integer(ceil(radius) + (2 << _BITS - _OFF) + 2)}"
+
+
+def _terms(period: Period) -> str:
+    """Terms of Taylor's polynomials of the impulse responses, and n with e^KT <= 3^n for their error's growth K.
+
+    Raises
+    ------
+    UnsupportedError
+        For a period that is too long against the plant.
+    """
+    step, (s, w) = period.held.step, (sum(pair, Fraction(0)) / 2 for pair in (period.found.slope, period.found.damping))
+    n, terms = ceil((3 + abs(s) + 2 * abs(w)) * step), 1
+    x, y = Fraction(0), Fraction(1)
+    while terms < _MOST_TERMS:
+        lacking = (x**2 + y**2 + (s * x - w * y) ** 2) * step ** (2 * terms - 2)
+        if terms > 2 and lacking * step * 3**n * 4 ** (_OFF + 1) <= 1:
+            return f"{terms} {n}"
+        x, y, terms = y / terms, (s * x - w * y) / terms, terms + 1
+    raise UnsupportedError(
+        "T_s is too long against the plant for polynomials of its impulse responses in a file for coqc"
+    )
 
 
 @dataclass(frozen=True)

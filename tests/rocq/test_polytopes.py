@@ -121,7 +121,7 @@ WRONG = """
 Definition tiny : loop := Loop (1 # 4) (1 # 10) (1 # 1) (1 # 1) 0%Q 0%Q 0%Q 0%Q 0%Q 0%Q 0%Q 0%Q 0%Q 0%Q
   (1 # 1) (1 # 1) (1 # 1) 0%Q 0%Q 0%Q 0%Q.
 Definition lone_facet a b c := Facet a b c 0%Q false 0%Q false 0%Q.
-Definition axes := [lone_facet (1 # 2) 0 0; lone_facet 0 (1 # 3) 0; lone_facet 0 0 (1 # 1); lone_facet (-1 # 5) 0 0;
+Definition axes := [lone_facet (1 # 2) 0 0; lone_facet 0 (1 # 4) 0; lone_facet 0 0 (1 # 1); lone_facet (-1 # 5) 0 0;
   lone_facet 0 0 (-1 # 1)].
 Goal boxed axes = true. Proof. vm_compute. reflexivity. Qed.
 Goal boxed (tl axes) = false. Proof. vm_compute. reflexivity. Qed.
@@ -140,7 +140,7 @@ Goal at_most_one place (own 1) (none, value 0) (Hint false [Share 1 0x1000000000
 Proof. vm_compute. reflexivity. Qed.
 Goal at_most_one place (own 1) (none, value 0) (Hint false [Share 0 0x10000000000]) = false.
 Proof. vm_compute. reflexivity. Qed.
-Goal at_most_one place (own 1) (none, value 0) (Hint false []) = false. Proof. vm_compute. reflexivity. Qed.
+Goal at_most_one place (own 1) (none, value (1 # 1000)) (Hint false []) = false. Proof. vm_compute. reflexivity. Qed.
 Goal at_most_one place (own 1) (lifted closely (Vector 0 (1 # 9) 0 0)%Q, value 0) (Hint true []) = false.
 Proof. vm_compute. reflexivity. Qed.
 """
@@ -201,9 +201,17 @@ def test_coqc_accepts_facets_of_the_file_and_no_forged_number(text, tmp_path):
         assert compiled(begin + changed, tmp_path, f"forged{number}")[0] != 0
 
 
+def known_elsewhere(text):
+    """Responses of which the first is off by a millionth of a millionth."""
+    found = sentence(text, "known").replace("Definition known", "Definition other")
+    return re.sub(r"Near \((0x\w+)\)", lambda m: f"Near ({hex(int(m[1], 16) + 2**40)})", found, count=1)
+
+
 @needs_coqc
-def test_a_claim_that_does_not_follow_is_refused(text, tmp_path):
-    head = "\n".join(sentence(text, name) for name in ("plant", "facets", "claimed"))
+def test_claims_and_responses_that_do_not_follow_are_refused(text, tmp_path):
+    head = "\n".join(sentence(text, name) for name in ("plant", "facets", "claimed", "known"))
+    flow = re.search(r"^Lemma solved_flow : (follows_from_flow plant known .*) = true\.$", text, re.MULTILINE)[1]
+    assert known_elsewhere(text) != sentence(text, "known")
     low, high = re.search(r"hints_of_rests (\S+ # \S+|\S+) (\(\S+ # \d+\))", sentence(text, "proposed")).groups()
     end = (
         f"Definition some := Proposals [] [] {low} {high} [].\n"
@@ -223,6 +231,11 @@ def test_a_claim_that_does_not_follow_is_refused(text, tmp_path):
     wrong = "\n".join(
         f"{claim}\nGoal follows plant facets some claimed{i} = false. Proof. vm_compute. reflexivity. Qed."
         for i, claim in enumerate(changed)
+    )
+    wrong += (
+        f"\n{known_elsewhere(text)}\nGoal {flow} = true. Proof. vm_compute. reflexivity. Qed.\n"
+        f"Goal {flow.replace('known', 'other')} = false. Proof. vm_compute. reflexivity. Qed.\n"
+        f"Goal {flow.replace('# 4', '# 4000')} = false. Proof. vm_compute. reflexivity. Qed."
     )
     code, _, err = compiled("\n".join([*library(("polytope.v",)), head, end, wrong]), tmp_path)
     assert (code, err) == (0, "")
