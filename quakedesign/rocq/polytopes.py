@@ -7,7 +7,6 @@ from itertools import product
 from math import ceil, floor, log10
 from typing import Any
 
-import numpy as np
 from flint import ctx
 
 from quakedesign.errors import UnsupportedError
@@ -17,6 +16,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
     BALLS,
     BITS,
     COMBINATIONS,
+    EXACT,
     Period,
     Rows,
     Verifier,
@@ -39,7 +39,7 @@ _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (
 def polytope_theorem(claim: StickSlipGuarantee) -> Iterator[str]:
     """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant."""
     task, held, reach = claim.task, claim.held, claim.reach
-    with ctx.workprec(BITS), np.errstate(all="ignore"):
+    with ctx.workprec(BITS):
         push, moved = _outward(*pushes(task, held, reach)), task.reference_rates[0] * held.step
         found = ranges(task, reach.box[0] + moved, push, reach.box[1] * held.step)
         found = replace(found, **{name: _outward(*getattr(found, name)) for name in ("slope", "damping", "chord")})
@@ -168,9 +168,9 @@ def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Ro
     for rows in given:
         verifier = deciding[rows.place]
         tops = verifier.largest(rows.factors, rows.constants)
-        floats = np.vectorize(float, otypes=[float])(rows.factors)
-        bases, shares = verifier.proposed(floats * np.vectorize(float, otypes=[float])(verifier.sizes))
-        own = floats - np.vectorize(float, otypes=[float])(verifier.rows[rows.which])
+        floats = EXACT.middle(rows.factors)
+        bases, shares = verifier.proposed(floats * EXACT.middle(verifier.sizes))
+        own = floats - EXACT.middle(verifier.rows[rows.which])
         entries = zip(rows.which, tops, bases, shares, own, strict=True)
         yield (
             rows,
@@ -217,9 +217,10 @@ def _by_rest(given: Iterator[tuple[Rows, dict[int, _Hint]]], falls: list[bool]) 
 
 def _pushed(slices: list[Verifier], period: Period) -> str:
     law = period.held.law
-    row = np.array([float(law.target_gain * law.return_rate), float(law.rate_gain), 1.0])
+    row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)
+    factors = EXACT.middle(EXACT.array([[-v for v in row], row]))
     pairs = []
     for verifier in slices:
-        bases, shares = verifier.proposed(np.array([-row, row]) * np.vectorize(float, otypes=[float])(verifier.sizes))
+        bases, shares = verifier.proposed(factors * EXACT.middle(verifier.sizes))
         pairs.append(_pair(*(_Hint.of(verifier, basis, share) for basis, share in zip(bases, shares, strict=True))))
     return gallina.listed(pairs)

@@ -3,10 +3,12 @@
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.files import made_folder, sole_writer, write_whole
+from quakedesign.guarantees.exact.guarantee_files import read_guarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 from quakedesign.lyapunov.exact.certificate_files import (
     ATTRACTION,
     POLYNOMIAL,
@@ -20,15 +22,13 @@ from quakedesign.lyapunov.exact.obligations import claimed, different, statement
 from quakedesign.rocq import gallina
 from quakedesign.rocq.gallina import in_integers, multiplier_reason
 from quakedesign.rocq.loops import loop_theorems
+from quakedesign.rocq.polytopes import polytope_theorem
 from quakedesign.sos.exact.attraction import LyapunovProof
 from quakedesign.sos.exact.attraction import read as read_attraction_file
 from quakedesign.sos.exact.polynomial import evaluate
 from quakedesign.sos.exact.polynomial_files import read as read_polynomial_file
 from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Point, SumOfSquares
-
-if TYPE_CHECKING:
-    from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
 
 _LIBRARY = ("squares.v", "positivity.v", "loops.v")
 _POLYTOPES = "polytope.v"  # of a fault that sticks or slides
@@ -126,10 +126,7 @@ def library(names: Sequence[str] = _LIBRARY) -> list[str]:
 
 
 def _stick_slip(raw: Any) -> Iterator[str]:
-    from quakedesign.guarantees.exact.guarantee_files import read_guarantee
-    from quakedesign.rocq.polytopes import polytope_theorem
-
-    yield from polytope_theorem(cast("StickSlipGuarantee", read_guarantee(raw)))
+    yield from polytope_theorem(cast(StickSlipGuarantee, read_guarantee(raw)))
 
 
 def _polynomial(raw: Any) -> Iterator[str]:
