@@ -98,7 +98,8 @@ Proof.
   - apply andb_prop in none as [zp zr]. apply Z.eqb_eq in zp, zr. rewrite zp, zr in far. cbn [middle radius].
     apply Rmult_le_reg_r with (IZR scale); [exact pu |]. rewrite <- (Rabs_pos_eq (IZR scale)) at 2 by lra.
     rewrite <- Rabs_mult, Rmult_0_l. replace ((x * y * IZR scale - 0) * IZR scale) with (x * y * IZR scale * IZR scale - 0) by ring. exact far.
-  - cbn [middle radius]. rewrite !Z.shiftr_div_pow2 by discriminate. change (2 ^ digits)%Z with scale. destruct (floor_near p scale scale_positive_Z) as [pl ph]. destruct (floor_near r scale scale_positive_Z) as [rl rh].
+  - cbn [middle radius]. rewrite !Z.shiftr_div_pow2 by discriminate. change (2 ^ digits)%Z with scale.
+  destruct (floor_near p scale scale_positive_Z) as [pl ph]. destruct (floor_near r scale scale_positive_Z) as [rl rh].
     rewrite plus_IZR. apply Rabs_le.
     assert (t1 : x * y * IZR scale * IZR scale <= IZR p + IZR r).
     { pose proof (Rle_abs (x * y * IZR scale * IZR scale - IZR p)). lra. }
@@ -1021,7 +1022,8 @@ Proof.
     apply (at_most_one_sound _ _ _ _ _ _ _ _ ok).
     - apply sliding_row_near, parts_near, known.
     - now apply slice_table_holds.
-    - apply within_slice; [exact ins | exact sl |]. destruct (sign_facts L facets right_signs) as (_ & _ & _ & _ & _ & _ & _ & _ & _ & _ & g & _). lra.
+    - apply within_slice; [exact ins | exact sl |].
+    destruct (sign_facts L facets right_signs) as (_ & _ & _ & _ & _ & _ & _ & _ & _ & _ & g & _). lra.
     - now rewrite dot_own. }
   clear all. unfold seven, flat, sliding_ends in one. cbn [map nth combine fst Z.to_nat Pos.to_nat Pos.iter_op Init.Nat.add] in one.
   assert (t := turn_rate L facets right_signs). assert (tp := turn_positive).
@@ -1065,7 +1067,8 @@ Proof.
         -- assert (g := one 1%Z (to_the_error L true) ltac:(cbn; auto) sl). rewrite ec in *.
            unfold slide_level, slide_slope, sign_of, what_moves in *. cbn [positive to_the_error still] in *. rewrite !Bool.andb_false_r in *. lra.
     + assert (sl : slice L 2 z) by (unfold slice; cbn; lra).
-      assert (v <= 0). { unfold v. assert (Q2R (return_rate L) * Q2R (turn L) <= Q2R (return_rate L) * error z) by (apply Rmult_le_compat_l; lra). lra. }
+      assert (v <= 0). { unfold v.
+      assert (Q2R (return_rate L) * Q2R (turn L) <= Q2R (return_rate L) * error z) by (apply Rmult_le_compat_l; lra). lra. }
       apply (ends 0 (standing false) (to_the_rate L false)); auto; [rewrite e0', e1; lra | |].
       * apply (one 2%Z (standing false)); [cbn; auto 10 | exact sl].
       * apply (one 2%Z (to_the_rate L false)); [cbn; auto 10 | exact sl].
@@ -1166,7 +1169,8 @@ Proof.
       * apply (ends 1%Z (to_the_error L true) (to_the_rate L true)); auto; [cbn; auto | rewrite ec, e1; unfold v in pv; lra | discriminate].
       * apply (ends 1%Z (standing false) (to_the_error L false)); auto; [cbn; auto | rewrite e0, ec; unfold v in nv; lra | apply down; lra].
     + assert (sl : slice L 2 z) by (unfold slice; cbn; lra).
-      assert (v <= 0). { unfold v. assert (Q2R (return_rate L) * Q2R (turn L) <= Q2R (return_rate L) * error z) by (apply Rmult_le_compat_l; lra). lra. }
+      assert (v <= 0). { unfold v.
+      assert (Q2R (return_rate L) * Q2R (turn L) <= Q2R (return_rate L) * error z) by (apply Rmult_le_compat_l; lra). lra. }
       apply (ends 2%Z (standing false) (to_the_rate L false)); auto; [cbn; auto | rewrite e0, e1; lra].
 Qed.
 
@@ -1379,12 +1383,14 @@ Proof.
   assert (der : forall t, derivable_pt_lim E t (dE t)).
   { intro s. unfold E, dE.
     assert (hx : derivable_pt_lim x s (y s - ev lack_x s)).
-    { replace (y s - ev lack_x s) with (Y s - dv px s) by (unfold y; rewrite lx; ring). apply derivable_pt_lim_minus; [apply dX | apply ev_derivable]. }
+    { replace (y s - ev lack_x s) with (Y s - dv px s) by (unfold y; rewrite lx; ring).
+    apply derivable_pt_lim_minus; [apply dX | apply ev_derivable]. }
     assert (hy : derivable_pt_lim y s (Q2R s0 * x s - Q2R w0 * y s - ev lack_y s)).
     { replace (Q2R s0 * x s - Q2R w0 * y s - ev lack_y s) with (Q2R s0 * X s - Q2R w0 * Y s - dv py s) by (unfold x, y; rewrite ly; ring).
       apply derivable_pt_lim_minus; [apply dY | apply ev_derivable]. }
     assert (hz : derivable_pt_lim z s (x s - ev lack_z s)).
-    { replace (x s - ev lack_z s) with (X s - dv pz s) by (unfold x; rewrite lz; ring). apply derivable_pt_lim_minus; [apply dZ | apply ev_derivable]. }
+    { replace (x s - ev lack_z s) with (X s - dv pz s) by (unfold x; rewrite lz; ring).
+    apply derivable_pt_lim_minus; [apply dZ | apply ev_derivable]. }
     assert (h := derivable_pt_lim_plus _ _ _ _ _ (derivable_pt_lim_plus _ _ _ _ _ (derivable_pt_lim_mult x x s _ _ hx hx) (derivable_pt_lim_mult y y s _ _ hy hy)) (derivable_pt_lim_mult z z s _ _ hz hz)).
     match type of h with derivable_pt_lim _ _ ?l =>
       replace (2 * _) with l by ring end. exact h. }
@@ -1438,7 +1444,8 @@ Proof.
   intro ok. unfold enclosed in ok. apply andb_prop in ok as [ok kr]. apply andb_prop in ok as [ok ks]. apply andb_prop in ok as [so kn].
   assert (near_all := solution_near n off so).
   assert (pT : 0 <= Q2R (step L)).
-  { unfold solved in so. do 6 (apply andb_prop in so as [so ?]). match goal with h : Qle_bool 0 (step L) = true |- _ => apply below_true in h; rewrite Q2R_0 in h; exact h end. }
+  { unfold solved in so. do 6 (apply andb_prop in so as [so ?]).
+  match goal with h : Qle_bool 0 (step L) = true |- _ => apply below_true in h; rewrite Q2R_0 in h; exact h end. }
   assert (at_end := near_all (Q2R (step L)) (conj pT (Rle_refl _))). destruct at_end as (ex & _ & ez).
   split; [| split; [apply (close_sound off _ _ _ ks) | apply (close_sound off _ _ _ kr)]; rewrite evaluated_sound; assumption].
   unfold responses_of. cbn [nodes]. revert kn. generalize (nodes r) times_of_nodes. intros a times. revert a.
