@@ -30,7 +30,7 @@ from quakedesign.rocq import gallina
 _BITS, _GRAIN = 80, 40  # of numbers and of multipliers in polytope.v
 _CLOSE = 2.0**-30  # what multipliers must leave below 1; else a facet is bounded by itself
 _DIGITS = 12  # of ranges, rounded outward
-_OFF = 62  # bits to which polynomials give the impulse responses
+_OFF = 77  # bits to which polynomials give the impulse responses
 _MOST_TERMS = 400
 _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (3, 0), 6: (3, 1)}
 """Least or largest r' of four polytopes, by the order of `resting_rows`."""
