@@ -4,8 +4,10 @@
 
 Friction is any function of the slip with the slopes of the file, the disturbance turns within periods, and r' is any
 number of its range in each period. A sliding mode runs as it is: the end of its implicit step is found by bisection,
-wherever it lies. For every facet the courses that come nearest to it are continued. Printed are the
-largest facet value, which the file says never exceeds 1, and the largest values over the claims.
+wherever it lies. For every facet the courses that come nearest to it are continued. Then courses of 10 000 periods
+without selection: friction falls and rests in stairs of a slip, the disturbance turns within every period, with the
+period, after many periods or as a facet asks. Printed are the largest facet value, which the file says never exceeds
+1, and the largest values over the claims, of both.
 """
 
 import json
@@ -17,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 SUBSTEPS, BRANCHES, HALVINGS = 48, 24, 60
+LONG, COURSES, LONGEST_WAVE = 10_000, 320, 400  # periods, courses, periods between turns of the disturbance
 
 
 def numbers(raw):
@@ -99,27 +102,32 @@ class Attack:
         one.level = -self.rest_pressure(one)
         return one
 
-    def after(self, one):
-        """A period later."""
-        law, random, count = self.law, self.random, len(one.x)
-        step, rate = (
-            law["step"],
-            np.where(random.random(count) < 0.7, random.choice([0.0, 1.0], count), random.random(count)),
-        )
-        rate = rate * self.fastest
-        error = one.x + one.noise - one.r
-        back = -law["return_rate"] * error
-        v = rate + (back if self.pull is None else end_of_step(self.pull, step, error, one.y - rate))
-        p = -law["rate_gain"] * one.y + law["target_gain"] * v - one.level
+    def chosen(self, count):
+        """Of a period: r', a time at which the disturbance turns, its sign before, slopes of friction before and after.
+
+        The time is in periods; friction is what grows with the slip.
+        """
+        random = self.random
+        rate = np.where(random.random(count) < 0.7, random.choice([0.0, 1.0], count), random.random(count))
         turn, sign = random.uniform(0, 1, count), random.choice([-1.0, 1.0], count)
         turn = np.where(random.random(count) < 0.3, 1.0, turn)
         slopes = -self.friction["weakening"], self.friction["strengthening"]
         slope, other = random.choice(slopes, (2, count))
+        return rate * self.fastest, turn, sign, lambda x, early: np.where(early, slope, other)
+
+    def after(self, one, chosen=None):
+        """A period later."""
+        law, random, count, step = self.law, self.random, len(one.x), self.law["step"]
+        rate, turn, sign, growth = chosen or self.chosen(count)
+        error = one.x + one.noise - one.r
+        back = -law["return_rate"] * error
+        v = rate + (back if self.pull is None else end_of_step(self.pull, step, error, one.y - rate))
+        p = -law["rate_gain"] * one.y + law["target_gain"] * v - one.level
         h, x, y, mu = step / SUBSTEPS, one.x.copy(), one.y.copy(), one.mu.copy()
         hold = self.n * self.friction["static"] * self.stress
         for i in range(SUBSTEPS):
-            push = self.amplitude * np.where((i + 0.5) / SUBSTEPS < turn, sign, -sign)
-            grown = np.where((i + 0.5) / SUBSTEPS < turn, slope, other)
+            early = (i + 0.5) / SUBSTEPS < turn
+            push, grown = self.amplitude * np.where(early, sign, -sign), growth(x, early)
             force = hold - self.k * x - self.n * mu * (self.stress - p) + push
 
             steep = self.k + self.n * grown * (self.stress - p)  # the force is linear in the slip of a substep
@@ -144,32 +152,59 @@ class Attack:
         known = one.level + self.rest_pressure(one) - self.law["slip_gain"] * one.noise
         return np.column_stack([error + self.law["slip_noise"], one.y, known]) @ self.facets.T, error
 
-    def run(self, periods=300):
+    def run(self, periods=300, long=LONG):
         """Largest facet value, and largest values over the claims."""
-        claims = numbers(self.claims)
-        low, high = claims["least_pressure"], claims["largest_pressure"]
-        one, found, tried = (
-            self.begun(2000),
-            dict.fromkeys(("facet", "slip_rate", "behind", "ahead", "pressure"), 0.0),
-            0,
-        )
+        self.found = dict.fromkeys(("facet", "slip_rate", "behind", "ahead", "pressure"), 0.0)
+        one, tried = self.begun(2000), 0
         for _ in range(periods):
             one, p = self.after(one.picked(np.repeat(np.arange(len(one.x)), BRANCHES)))
             tried += len(p)
-            values, error = self.values(one)
-            for name, value in (
-                ("facet", values.max()),
-                ("slip_rate", one.y.max() / claims["peak_slip_rate"]),
-                ("behind", -error.min() / claims["slip_behind"]),
-                ("ahead", error.max() / claims["slip_ahead"]),
-                ("pressure", max(p.max() / high, p.min() / low)),
-            ):
-                found[name] = max(found[name], float(value))
-            kept = np.unique(values.argmax(axis=0))
+            kept = np.unique(self.seen(one, p).argmax(axis=0))
             kept = np.concatenate([kept, self.random.integers(0, len(p), 300)])
             inside = (one.x[kept] <= self.target) & (one.x[kept] >= 0)
             one = one.picked(kept[inside])
-        return found | {"periods": tried}
+        return self.found | {"periods": tried} | self.endured(long)
+
+    def endured(self, periods):
+        """Courses without selection; each has its stairs of friction, wave of the disturbance and of the reference."""
+        random, count, friction = self.random, COURSES, self.friction
+        one, before = self.begun(count), self.found
+        self.found = dict.fromkeys(before, 0.0)
+        kind, facet = random.integers(0, 4, count), random.integers(0, len(self.facets), count)
+        wave, rates = np.exp(random.uniform(0, np.log(LONGEST_WAVE), (2, count)))
+        turn, first = random.uniform(0, 1, count), random.choice([-1.0, 1.0], count)
+        stair, share = np.exp(random.uniform(np.log(1e-8), np.log(1e-3), count)), random.choice([0.2, 0.5, 0.8], count)
+        fall = -friction["weakening"], friction["strengthening"]
+        for period in range(periods):
+            known = one.level + self.rest_pressure(one)
+            state = np.column_stack([one.x - one.r, one.y, known]) * self.facets[facet]
+            flipped = np.where(np.floor(period / wave) % 2 == 0, first, -first)
+            asked = np.where(state.sum(axis=1) >= 0, 1.0, -1.0) * first
+            sign = np.choose(kind, [first, flipped, np.where(period % 2 == 0, first, -first), asked])
+            rate = np.where(np.floor(period / rates) % 2 == 0, self.fastest, 0.0)
+            rate = np.where(one.r + self.law["step"] * rate > self.target, 0.0, rate)
+
+            def growth(x, early):
+                return np.where(x / stair % 1 < share, fall[0], np.where(kind == 1, fall[1], 0.0))
+
+            one, p = self.after(one, (rate, np.where(kind == 1, 1.0, turn), sign, growth))
+            self.seen(one, p)
+        later, self.found = self.found, {name: max(value, self.found[name]) for name, value in before.items()}
+        return self.found | {"long_facet": later["facet"], "long_slip_rate": later["slip_rate"]}
+
+    def seen(self, one, p):
+        """Facet values, of which and of the rest the largest are kept."""
+        claims = numbers(self.claims)
+        values, error = self.values(one)
+        for name, value in (
+            ("facet", values.max()),
+            ("slip_rate", one.y.max() / claims["peak_slip_rate"]),
+            ("behind", -error.min() / claims["slip_behind"]),
+            ("ahead", error.max() / claims["slip_ahead"]),
+            ("pressure", max(p.max() / claims["largest_pressure"], p.min() / claims["least_pressure"])),
+        ):
+            self.found[name] = max(self.found[name], float(value))
+        return values
 
 
 if __name__ == "__main__":

@@ -3,16 +3,26 @@
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.files import made_folder, sole_writer, write_whole
-from quakedesign.lyapunov.exact.certificate_files import ATTRACTION, POLYNOMIAL, evidence_of, kind_of, read_json
+from quakedesign.guarantees.exact.guarantee_files import read_guarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.lyapunov.exact.certificate_files import (
+    ATTRACTION,
+    POLYNOMIAL,
+    STICK_SLIP,
+    evidence_of,
+    kind_of,
+    read_json,
+)
 from quakedesign.lyapunov.exact.claim import Evidence, Witness
 from quakedesign.lyapunov.exact.obligations import claimed, different, statement_of
 from quakedesign.rocq import gallina
 from quakedesign.rocq.gallina import in_integers, multiplier_reason
 from quakedesign.rocq.loops import loop_theorems
+from quakedesign.rocq.polytopes import polytope_theorem
 from quakedesign.sos.exact.attraction import LyapunovProof
 from quakedesign.sos.exact.attraction import read as read_attraction_file
 from quakedesign.sos.exact.polynomial import evaluate
@@ -21,7 +31,10 @@ from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Point, SumOfSquares
 
 _LIBRARY = ("squares.v", "positivity.v", "loops.v")
-_KINDS = "a certificate for coqc must be sos, negative or a proof for a closed loop or a region of attraction."
+_POLYTOPES = "polytope.v"  # of a fault that sticks or slides
+_KINDS = (
+    "a certificate for coqc must be sos, negative, stick_slip or a proof for a closed loop or a region of attraction."
+)
 _DATA = "(* " + "=" * 16 + " the certificate *)\n\nLocal Open Scope nat_scope.\n"
 
 
@@ -35,12 +48,13 @@ def rocq_text(raw: Any) -> str:
     UnsupportedError
         For a kind that has no theorem in ``proofs/rocq``.
     """
-    return "\n".join([*library(), _DATA, statement_text(raw)])
+    parts = (_POLYTOPES,) if kind_of(raw) == STICK_SLIP else _LIBRARY
+    return "\n".join([*library(parts), _DATA, statement_text(raw)])
 
 
 def statement_text(raw: Any) -> str:
     """Statement, data and theorem, without the library. Raises as `rocq_text`."""
-    written = {ATTRACTION: _attraction, POLYNOMIAL: _polynomial}.get(kind_of(raw), _loop)
+    written = {ATTRACTION: _attraction, POLYNOMIAL: _polynomial, STICK_SLIP: _stick_slip}.get(kind_of(raw), _loop)
     return "\n".join(written(raw)) + "\n"
 
 
@@ -95,8 +109,8 @@ def module_name(stem: str) -> str:
     return name if name[:1].isalpha() else f"certificate_{name}"
 
 
-def library() -> list[str]:
-    """Text of the files of ``proofs/rocq``, in order.
+def library(names: Sequence[str] = _LIBRARY) -> list[str]:
+    """Text of files of ``proofs/rocq``, in order.
 
     Raises
     ------
@@ -107,8 +121,12 @@ def library() -> list[str]:
     places = [base / "proofs" / "rocq" for base in (package, package.parent)]
     for place in places:
         if place.is_dir():
-            return [(place / name).read_text(encoding="utf-8") for name in _LIBRARY]
+            return [(place / name).read_text(encoding="utf-8") for name in names]
     raise UnsupportedError(f"the Rocq library must be in {places[0]}. Found nothing. Install the package again.")
+
+
+def _stick_slip(raw: Any) -> Iterator[str]:
+    yield from polytope_theorem(cast(StickSlipGuarantee, read_guarantee(raw)))
 
 
 def _polynomial(raw: Any) -> Iterator[str]:

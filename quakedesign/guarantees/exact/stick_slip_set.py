@@ -816,7 +816,7 @@ def stick_slip_bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlip
 
 
 def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
-    ahead, rate, up, lag, down = reach.box
+    ahead, rate, _, lag, _ = reach.box
     if any(row[0] * held.slip_noise + max(row[2], _ZERO) * held.push_noise > 1 for row in reach.facets):
         raise ParameterError("noise of the first measurement may put the loop outside of the polytope")
     fastest = task.reference_rates[0]
@@ -826,26 +826,13 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
         root = ImplicitRoot(pull=held.law.pull)
         if not holds(root, held.step, *held.errors(task, max(behind, before), rate)):
             raise ParameterError("the implicit step may not be deadbeat everywhere in the polytope")
-    sizes = [max(ahead, lag), rate, max(up, down)]
-    push = _push(task, held, reach, sizes)
+    push = pushes(task, held, reach)
     found = ranges(task, ahead + fastest * held.step, push, rate * held.step)
     if found.slope[1] * held.step**2 >= 1:
         raise ParameterError("T_s is too long against the weakening of friction")
-    constraints = polytopes(task, held, reach.facets, found)
-    longest = max(min(g * rate + h for g, h in stop_bounds(task, held, found)), Fraction(1, 10**30))
-    if task.amplitude + found.slope[0] * longest < 0:
-        raise ParameterError("the disturbance is too small for the condition of rest")
-    verifiers = [
-        Verifier(
-            lines, bases, sizes if len(bases[0]) == 3 else [*sizes, longest], place=place, facets=len(reach.facets)
-        )
-        for place, (lines, bases) in enumerate(zip(constraints, (*reach.sliding, *reach.resting), strict=True))
-    ]
-    period = Period.of(BALLS, task, held, found)
-    given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
-    sliding = sliding_rows(period, *map(_ball_array, given))
-    for rows in chain(sliding, resting_rows(EXACT, task, held, found, *map(_exact_array, given))):
-        tops = verifiers[rows.place].largest(rows.factors, rows.constants, rows.which)
+    deciding = verifiers(task, held, reach, found)
+    for rows in chain(*facet_rows(Period.of(BALLS, task, held, found), reach)):
+        tops = deciding[rows.place].largest(rows.factors, rows.constants, rows.which)
         for facet, top in zip(rows.which, tops, strict=True):
             if not top <= 1:
                 kind = "slides" if rows.place < SLICES else "ends at rest"
@@ -873,17 +860,36 @@ def _bracket(task: FaultPlant, held: SampledStickSlip, found: Ranges, push: Frac
     return share * task.authority * (task.beta[1] - task.beta[0]) * max(push, _ZERO)
 
 
-def _push(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, sizes: Sequence[Fraction]) -> Range:
+def verifiers(
+    task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, found: Ranges | None
+) -> list[Verifier]:
+    """Of the 3 slices, and of the 7 combinations where ranges are known; raises as `stick_slip_bounds`."""
+    ahead, rate, up, lag, down = reach.box
+    sizes, longest = [max(ahead, lag), rate, max(up, down)], _ZERO
+    if found:
+        longest = max(min(g * rate + h for g, h in stop_bounds(task, held, found)), Fraction(1, 10**30))
+        if task.amplitude + found.slope[0] * longest < 0:
+            raise ParameterError("the disturbance is too small for the condition of rest")
+    bases = (*reach.sliding, *(reach.resting if found else ()))
+    return [
+        Verifier(lines, basis, [*sizes, longest][: len(basis[0])], place=place, facets=len(reach.facets))
+        for place, (lines, basis) in enumerate(zip(polytopes(task, held, reach.facets, found), bases, strict=True))
+    ]
+
+
+def facet_rows(period: Period, reach: StickSlipPolytope) -> tuple[Iterator[Rows], Iterator[Rows]]:
+    """What the facets become in a period of the sliding map, by balls, and of the rest map, by rationals."""
+    given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
+    exact = resting_rows(EXACT, period.task, period.held, period.found, *map(_exact_array, given))
+    return sliding_rows(period, *map(_ball_array, given)), exact
+
+
+def pushes(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> Range:
     """Least and largest U = p* − p at a sample [Pa]."""
     law, fastest = held.law, task.reference_rates[0] + held.told
     row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)
     factors = _exact_array([list(row), [-v for v in row]])
     constants = _exact_array([_ZERO, law.target_gain * fastest])
-    tops = [
-        Verifier(lines, bases, sizes, place=place, facets=len(reach.facets)).largest(factors, constants)
-        for place, (lines, bases) in enumerate(
-            zip(polytopes(task, held, reach.facets, None), reach.sliding, strict=True)
-        )
-    ]
+    tops = [one.largest(factors, constants) for one in verifiers(task, held, reach, None)]
     high, low = (fraction_of(max(line[i] for line in tops)) for i in (0, 1))
     return -low - held.push_noise, high + held.push_noise

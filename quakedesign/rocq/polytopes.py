@@ -1,0 +1,226 @@
+"""An invariant polytope of the stick–slip plant in Gallina: loop, facets, responses, multipliers of every facet."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from itertools import product
+from math import ceil, floor, log10
+from typing import Any
+
+from flint import ctx
+
+from quakedesign.errors import UnsupportedError
+from quakedesign.exact import fraction_of
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.exact.stick_slip_set import (
+    BALLS,
+    BITS,
+    COMBINATIONS,
+    EXACT,
+    Period,
+    Rows,
+    Verifier,
+    facet_rows,
+    pushes,
+    ranges,
+    verifiers,
+)
+from quakedesign.rocq import gallina
+
+_BITS, _GRAIN = 80, 40  # of numbers and of multipliers in polytope.v
+_CLOSE = 2.0**-30  # what multipliers must leave below 1; else a facet is bounded by itself
+_DIGITS = 12  # of ranges, rounded outward
+_OFF = 77  # bits to which polynomials give the impulse responses
+_MOST_TERMS = 400
+_PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (3, 0), 6: (3, 1)}
+"""Least or largest r' of four polytopes, by the order of `resting_rows`."""
+
+
+def polytope_theorem(claim: StickSlipGuarantee) -> Iterator[str]:
+    """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant."""
+    task, held, reach = claim.task, claim.held, claim.reach
+    with ctx.workprec(BITS):
+        push, moved = _outward(*pushes(task, held, reach)), task.reference_rates[0] * held.step
+        found = ranges(task, reach.box[0] + moved, push, reach.box[1] * held.step)
+        found = replace(found, **{name: _outward(*getattr(found, name)) for name in ("slope", "damping", "chord")})
+        period = Period.of(BALLS, task, held, found)
+        deciding = verifiers(task, held, reach, found)
+        sliding, resting = (_hints(deciding, rows) for rows in facet_rows(period, reach))
+        yield _loop(period)
+        yield (
+            "Definition facets : list facet :=\n  "
+            + gallina.listed(map(_facet, reach.facets, reach.multipliers), ";\n   ")
+            + "."
+        )
+        yield f"Definition known : responses near :=\n  {_responses(period)}."
+        count, falls = len(reach.facets), [row[2] <= 0 for row in reach.facets]
+        by_slide, by_rest = _by_slide(sliding, count), _by_rest(resting, falls)
+        pushed = _pushed(deciding[:3], period)
+    for name, kind, entries in (
+        ("hints_of_slides", "list (list hint)", by_slide),
+        ("hints_of_rests", "list (list pair)", by_rest),
+    ):
+        yield f"Definition {name} : list ({kind}) :=\n  " + gallina.listed(entries, ";\n   ") + "."
+    low, high = map(gallina.rational, push)
+    yield f"Definition proposed : proposals :=\n  Proposals hints_of_slides hints_of_rests {low} {high}\n  {pushed}."
+    stated = (getattr(claim.claims, one.name) for one in fields(claim.claims))
+    numbers = map(gallina.rational, (*stated, *found.rest_pressure))
+    yield f"Definition claimed : claims := Claims {' '.join(numbers)}."
+    yield gallina.accepted("follows plant facets proposed claimed", "followed")
+    flow = f"follows_from_flow plant known {_terms(period)} (1 # {1 << _OFF})"
+    yield gallina.accepted(flow, "solved_flow")
+    yield gallina.accepted("accepts plant facets known proposed")
+    yield (
+        "Theorem certificate : guaranteed plant facets claimed.\n"
+        "Proof. exact (polytope_sound plant facets known proposed claimed _ _ _ accepted followed solved_flow). Qed.\n"
+        "Print Assumptions certificate."
+    )
+
+
+def _outward(low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
+    """A range around this one whose ends have few digits; 0 stays."""
+    size = max(abs(low), abs(high))
+    unit = Fraction(10) ** (ceil(log10(size)) - _DIGITS) if size else Fraction(1)
+    return (floor(low / unit) - 1) * unit if low else low, (ceil(high / unit) + 1) * unit if high else high
+
+
+def _loop(period: Period) -> str:
+    task, held, found, law = period.task, period.held, period.found, period.held.law
+    fastest, bend = task.reference_rates
+    bent = (_outward(Fraction(0), fraction_of(v.upper().fmpq()))[1] for v in period.bent)
+    numbers = (
+        *(held.step, task.amplitude, task.authority, task.beta[1], *found.slope, *found.chord, *found.damping),
+        *(fastest + held.told, bend, *bent, law.rate_gain, law.target_gain, law.return_rate, law.level_gain),
+        *(law.slip_gain, law.rest_slip, held.slip_noise),
+    )
+    return f"Definition plant : loop := Loop {' '.join(map(gallina.rational, numbers))}."
+
+
+def _facet(row: tuple[Fraction, ...], given: tuple[Fraction, ...]) -> str:
+    free, bare, cut, bare_cut, kept = given
+    flags = ["true" if flag else "false" for flag in (bare, bare_cut)]
+    entries = *map(gallina.rational, (*row, free)), flags[0], gallina.rational(cut), flags[1], gallina.rational(kept)
+    return f"Facet {' '.join(entries)}"
+
+
+def _responses(period: Period) -> str:
+    pairs = zip(*(reversed(list(part)) for part in period.impulses), strict=True)
+    nodes = gallina.listed((f"({_near(x)}, {_near(y)})" for x, y in pairs), ";\n   ")
+    return f"Responses {nodes}\n  ({_near(period.of_force[0])}) ({_near(period.of_force[1])})"
+
+
+def _near(value: Any) -> str:
+    """Middle and radius of a ball, in units."""
+    middle, radius = (fraction_of(part.fmpq()) * (1 << _BITS) for part in (value.mid(), value.rad()))
+    return f"Near ({gallina.integer(floor(middle))}) {gallina.integer(ceil(radius) + (2 << _BITS - _OFF) + 2)}"
+
+
+def _terms(period: Period) -> str:
+    """Terms of Taylor's polynomials of the impulse responses, and n with e^KT <= 3^n for their error's growth K.
+
+    Raises
+    ------
+    UnsupportedError
+        For a period that is too long against the plant.
+    """
+    step, (s, w) = period.held.step, (sum(pair, Fraction(0)) / 2 for pair in (period.found.slope, period.found.damping))
+    n, terms = ceil((3 + abs(s) + 2 * abs(w)) * step), 1
+    x, y = Fraction(0), Fraction(1)
+    while terms < _MOST_TERMS:
+        lacking = (x**2 + y**2 + (s * x - w * y) ** 2) * step ** (2 * terms - 2)
+        if terms > 2 and lacking * step * 3**n * 4 ** (_OFF + 1) <= 1:
+            return f"{terms} {n}"
+        x, y, terms = y / terms, (s * x - w * y) / terms, terms + 1
+    raise UnsupportedError(
+        "T_s is too long against the plant for polynomials of its impulse responses in a file for coqc"
+    )
+
+
+@dataclass(frozen=True)
+class _Hint:
+    """How a facet is bounded: by itself or not, and multipliers of constraints."""
+
+    own: bool
+    shares: tuple[tuple[int, float], ...]
+    turn: int | None = None  # the constraint that the target rate is not negative
+
+    @classmethod
+    def of(cls, verifier: Verifier, basis: Any, shares: Any) -> "_Hint":
+        """By a vertex."""
+        return cls(False, tuple(zip(map(int, basis), shares, strict=True)))
+
+    @classmethod
+    def itself(cls, verifier: Verifier, left: Any) -> "_Hint":
+        """By the facet itself, and what `Verifier.largest` uses besides."""
+        more = [(len(verifier.rows) - 1, left[3])] if len(left) > 3 else []
+        more += [(verifier.last, left[0])] if verifier.last is not None else []
+        return cls(True, tuple((i, v * (1 + 2.0**-_GRAIN)) for i, v in more), verifier.last)
+
+    def text(self, *, without: int | None = None) -> str:
+        """As a term, without a constraint."""
+        whole = ((i, ceil(share * 2.0**_GRAIN)) for i, share in self.shares if share > 0 and i != without)
+        listed = gallina.listed((f"Share {i} {gallina.integer(p)}" for i, p in whole), ";")
+        return f"Hint {str(self.own).lower()} {listed}"
+
+
+def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Rows, dict[int, _Hint]]]:
+    """For every facet of a set of rows what bounds it there."""
+    for rows in given:
+        verifier = deciding[rows.place]
+        tops = verifier.largest(rows.factors, rows.constants)
+        floats = EXACT.middle(rows.factors)
+        bases, shares = verifier.proposed(floats * EXACT.middle(verifier.sizes))
+        own = floats - EXACT.middle(verifier.rows[rows.which])
+        entries = zip(rows.which, tops, bases, shares, own, strict=True)
+        yield (
+            rows,
+            {
+                int(w): _Hint.of(verifier, b, s) if float(1 - top) > _CLOSE else _Hint.itself(verifier, left)
+                for w, top, b, s, left in entries
+            },
+        )
+
+
+def _pair(least: _Hint, largest: _Hint, *, positive: bool = False) -> str:
+    """At both ends of r'; without a positive target rate where it is as large as the sum of all else."""
+    bare = positive and largest.own and any(i == largest.turn and share > 0 for i, share in largest.shares)
+    return f"Pair {str(bare).lower()} ({least.text()}) ({largest.text(without=largest.turn if bare else None)})"
+
+
+def _by_slide(given: Iterator[tuple[Rows, dict[int, _Hint]]], count: int) -> list[str]:
+    """Per facet: whether the innovation is cut off, chord, beta; end of r'."""
+    found: dict[int, list[str]] = {i: [] for i in range(count)}
+    for many in zip(*[given] * len(COMBINATIONS), strict=True):
+        for facet in many[0][1]:
+            found[facet].append(gallina.listed(hints[facet].text() for _, hints in many))
+    return [gallina.listed(found[i], ";\n     ") for i in range(count)]
+
+
+def _by_rest(given: Iterator[tuple[Rows, dict[int, _Hint]]], falls: list[bool]) -> list[str]:
+    """Per facet: chord, share; polytope; least and largest r'."""
+    raised, table = [i for i, fall in enumerate(falls) if not fall], {}
+    groups = [2 if raised else 0, 1 if any(falls) else 0]
+    for part, chord in product(range(len(_PAIRS)), range(2)):
+        for place in range(sum(groups)):
+            for facet, hint in next(given)[1].items():
+                share = 0 if falls[facet] else place
+                table[facet, chord, share, *_PAIRS[part]] = hint
+    found = []
+    for facet, fall in enumerate(falls):
+        cases = []
+        for chord, share in product(range(2), range(1 if fall else 2)):
+            pairs = (_pair(*(table[facet, chord, share, i, j] for j in (0, 1)), positive=i == 1) for i in range(4))
+            cases.append(gallina.listed(pairs))
+        found.append(gallina.listed(cases, ";\n     "))
+    return found
+
+
+def _pushed(slices: list[Verifier], period: Period) -> str:
+    law = period.held.law
+    row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)
+    factors = EXACT.middle(EXACT.array([[-v for v in row], row]))
+    pairs = []
+    for verifier in slices:
+        bases, shares = verifier.proposed(factors * EXACT.middle(verifier.sizes))
+        pairs.append(_pair(*(_Hint.of(verifier, basis, share) for basis, share in zip(bases, shares, strict=True))))
+    return gallina.listed(pairs)
