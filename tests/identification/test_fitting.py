@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from statistics import NormalDist
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from quakedesign.errors import RecordError
 from quakedesign.identification import fitting
 from quakedesign.identification.experiment import Coordinate, Experiment
 from quakedesign.identification.fitting import (
+    BetterFit,
     Fit,
     Profile,
     _finite,
@@ -204,6 +206,69 @@ def test_runs_are_told_apart():
     residuals = np.resize([1.0, -1.0], 40)
     residuals[[3, 10, 11, 12, 20, 21, 30, 31, 32, 33, 38]] = -50.0
     assert outliers(residuals).nonzero()[0].tolist() == [3, 20, 21, 38]
+
+
+@pytest.mark.parametrize(("beside", "left_out"), [(3.9, True), (4.1, False), (-4.1, True)])
+def test_what_rises_from_a_neighbour_by_less_than_three_fifths_is_a_peak_and_stays(beside, left_out):
+    """The neighbour is no outlier itself: 4.8 is one among 42 of size 1."""
+    for place, neighbour in ((7, 8), (7, 6), (0, 1), (41, 40)):
+        residuals = np.resize([1.0, -1.0, 0.0], 42)
+        residuals[[place, neighbour]] = 10.0, beside
+        assert outliers(residuals).nonzero()[0].tolist() == [place] * left_out
+
+
+def test_searches_go_on_where_a_deviation_is_wider_than_what_is_searched():
+    """Two agree at once; the deviation of the noise over 1e-9 is far beyond the limits of 10."""
+    noise = np.resize([1.0, -1.0], 10)
+    assert fit(Linear(np.full((10, 1), 1e-9)), noise, seed=0).starts == 16
+    assert fit(Linear(np.ones((10, 1))), noise, seed=0).starts == 4
+
+
+def test_a_profile_that_comes_upon_a_better_fit_hands_it_on():
+    """The height is off by 0.08, which the profile of the slope sets right near the best slope."""
+    noise = np.resize([0.1, -0.1], 10)
+    best = np.linalg.lstsq(line(10).matrix, noise, rcond=None)[0]
+    with pytest.raises(BetterFit) as better:
+        Profile(made(line(10), noise, fitted=best + np.array([0.08, 0.0])), 1).interval(0.1)
+    left = noise - line(10).matrix @ better.value.fitted
+    assert left @ left < 10 * (0.1**2 + 0.08**2)
+    Profile(made(line(10), noise, fitted=best), 1).interval(0.1)
+
+
+def test_fits_with_correlated_noise_compare_by_their_whitened_squares():
+    one, other = (
+        SimpleNamespace(kept=np.ones(10, dtype=bool), squares=squares, correlation=correlation, correlated=noise)
+        for squares, correlation, noise in ((2.0, 2.0, None), (3.0, 5.0, object()))
+    )
+    assert advantage(one, other) == pytest.approx((1.5, 10 / 2 * np.log(1.5)), rel=1e-12)
+
+
+def test_the_freedom_of_noise_is_that_of_the_fewest_pieces():
+    found = made(Linear(np.ones((11, 1))), np.resize([1.0, -1.0], 11))
+    assert found.freedom_of_noise == 10
+    assert replace(found, pieces=3.5).freedom_of_noise == 3.5
+    assert replace(found, pieces=3.5, correlated=SimpleNamespace(pieces=2.5)).freedom_of_noise == 2.5
+    assert replace(found, pieces=20.0, correlated=SimpleNamespace(pieces=30.0)).freedom_of_noise == 10
+
+
+@dataclass(frozen=True)
+class Softening(Linear):
+    """Grows a little less than what is fitted."""
+
+    def friction(self, fitted):
+        return self.matrix @ (fitted - 1e-4 * fitted**3)
+
+    def slopes(self, fitted):
+        return self.matrix * (1 - 3e-4 * fitted**2)
+
+
+@pytest.mark.parametrize(("first", "followed"), [(9.414, True), (9.8515, False)])
+def test_an_end_at_the_limit_of_a_coordinate_is_none(first, followed):
+    """Of 11 means, with F(1, 10) = 4.965 at 95 %; the first trial falls short of the limit of 10, the next beyond."""
+    size = first * 11**0.5 / 4.9646**0.5
+    low, high = Profile(made(Softening(np.ones((11, 1))), size * np.array([1.0, -1.0] * 5 + [0.0])), 0).interval(4.9646)
+    assert (np.isfinite(low), np.isfinite(high)) == (followed, followed)
+    assert not followed or high == pytest.approx(9.5, rel=0.01)
 
 
 @dataclass(frozen=True)

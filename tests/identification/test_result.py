@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import friction_law
-from quakedesign.identification.assessment import Assessment
+from quakedesign.identification.assessment import Assessment, Check
 from quakedesign.identification.experiment import Coordinate, Experiment
 from quakedesign.identification.fitting import Fit, Profile
 from quakedesign.identification.identification_result import Identification, Outlier, ParameterEstimate, Rival, estimate
@@ -194,3 +194,25 @@ def test_the_file_of_a_result_has_its_numbers():
         "squares": 2.0,
         "excess": 3.0,
     }
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("stiffness",), ["--stiffness"]),
+        (("evolution_effect",), ["ten samples within"]),
+        (("direct_effect", "critical_slip"), ["ten samples within", "longer sliding after"]),
+        (("second_slip",), ["longer sliding after"]),
+        (("second_effect",), ["longer sliding after"]),
+        (("drop",), ["slip from rest"]),
+        (("residual",), ["slip from rest"]),
+        (("trend",), []),
+    ],
+)
+def test_what_is_open_has_an_experiment_that_tells_it(names, said):
+    found = identification(estimates={name: told(name, low=-math.inf) for name in names})
+    for experiment, words in zip(found.experiments(), said, strict=True):
+        assert words in experiment
+    sign = Check(name="sign", passed=False, value=0.0, limit=0.0, sentence="open")
+    assert ["before the step" in each for each in found.experiments(sign)].count(True) == 1
+    assert found.experiments(replace(sign, passed=True)) == found.experiments()
