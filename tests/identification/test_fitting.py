@@ -262,6 +262,21 @@ class Softening(Linear):
         return self.matrix * (1 - 3e-4 * fitted**2)
 
 
+@dataclass(frozen=True)
+class Breaking(Linear):
+    """There is no such experiment beyond 2."""
+
+    def friction(self, fitted):
+        return self.matrix @ np.where(fitted > 2, np.nan, fitted)
+
+
+def test_an_end_where_the_experiment_cannot_be_followed_is_none():
+    size = 3.0 * 11**0.5 / 4.9646**0.5
+    low, high = Profile(made(Breaking(np.ones((11, 1))), size * np.array([1.0, -1.0] * 5 + [0.0])), 0).interval(4.9646)
+    assert -3 * 1.0101 < low < -3 * 0.9999  # a hundredth of the distance is close enough
+    assert high == np.inf
+
+
 @pytest.mark.parametrize(("first", "followed"), [(9.414, True), (9.8515, False)])
 def test_an_end_at_the_limit_of_a_coordinate_is_none(first, followed):
     """Of 11 means, with F(1, 10) = 4.965 at 95 %; the first trial falls short of the limit of 10, the next beyond."""
