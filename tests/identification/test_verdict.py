@@ -1,14 +1,19 @@
 """What decides a verdict, at its thresholds, with fits made by hand: every number follows from the values beside it."""
 
 from importlib import import_module
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from quakedesign.errors import RecordError
+from quakedesign.exact import rational
+from quakedesign.fault import friction_law, load_fault
 from quakedesign.identification import assessment
 from quakedesign.identification.assessment import Assessment, checks_of, sign_check, unsteady_beginning
 from quakedesign.identification.experiment import TREND, TREND_IN_TIME
+from quakedesign.identification.fault_file import cover, identified_fault, next_command
 from quakedesign.identification.fitting import BetterFit
 from quakedesign.identification.identification_result import ParameterEstimate
 from quakedesign.identification.identify import _Choice, _Fitted, needed
@@ -263,3 +268,62 @@ def test_a_fit_with_another_trend_whose_valley_leads_elsewhere_leaves_the_sign_o
     assert told.experiments == (f"passed: {not opened}",)
     assert [check.name for check in told.checks] == ["sign"]
     assert [sentence.startswith("the sign of a - b is open") for sentence in told.open] == [True] * opened
+
+
+def written(share=0.1, low=-0.002, high=-0.001, verdict="explains the record"):
+    """What a file and the command after it are made from: a, b and D_c of 1 within a share of it."""
+    ends = {"low": 1 - share / 2, "high": 1 + share / 2, "least": 1 - share, "most": 1 + share}
+    names = ("direct_effect", "evolution_effect", "critical_slip")
+    kind, rates = (
+        friction_law("rate-and-state-aging"),
+        {"reference_rate": 1e-6, "slowest_rate": 1e-9, "fastest_rate": 1e-3},
+    )
+    return SimpleNamespace(
+        law=kind(**dict.fromkeys(kind.quantities(), 1.0) | rates),
+        estimates={name: ParameterEstimate(name=name, unit="", value=1.0, **ends) for name in names},
+        difference=between(low, high),
+        explained=verdict == "explains the record",
+        assessment=SimpleNamespace(verdict=verdict, open=("the sign",)),
+        determined=False,
+        record=SimpleNamespace(name="made"),
+        untold=lambda: ["D_c is not identifiable"],
+    )
+
+
+@pytest.mark.parametrize(("share", "spread"), [(0.199, " --spread 0.2"), (0.201, "")])
+def test_a_box_wider_than_a_fifth_has_no_spread_that_covers_it(share, spread):
+    said = next_command(written(share), "made.toml")
+    assert said.startswith(f"quakedesign design made.toml{spread}" if spread else "none that covers the record")
+    assert spread or "critical_slip within 20%" in said
+
+
+@pytest.mark.parametrize(
+    ("low", "told"), [(0.0, "quakedesign design"), (1e-9, "none is needed"), (-1e-9, "quakedesign")]
+)
+def test_friction_that_strengthens_for_certain_needs_no_controller(low, told):
+    assert next_command(written(low=low, high=0.002), "made.toml").startswith(told)
+    unclear = written(low=low, high=0.002, verdict="cannot tell")
+    assert next_command(unclear, "made.toml").startswith("none: the record cannot tell: the sign")
+
+
+def test_a_record_that_tells_not_every_parameter_makes_no_fault():
+    with pytest.raises(RecordError, match=r"needs every parameter. Received made: D_c is not identifiable."):
+        identified_fault(written(), load_fault("lab-fault"))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_cover_is_rounded_to_the_safe_side_exactly(seed):
+    """Of every corner, scaled to one static friction: no residual is below that of the cover, and no slope above."""
+    draw = np.random.default_rng(seed)
+    ranges = {
+        name: tuple(value * (1 + share) for share in (-draw.uniform(0.01, 0.05), draw.uniform(0.01, 0.05)))
+        for name, value in (("residual", 0.4), ("drop", 0.17), ("critical_slip", 2.5e-3))
+    }
+    law = friction_law("exponential-slip-weakening")(residual=0.4, drop=0.17, critical_slip=2.5e-3)
+    held, _ = cover(law, ranges, load_fault("lab-fault").box)
+    residual, drop, slip = (rational(getattr(held, name)) for name in ("residual", "drop", "critical_slip"))
+    for corner in product(*(ranges[name] for name in ("residual", "drop", "critical_slip"))):
+        left, fall, over = map(rational, corner)
+        scale = (residual + drop) / (left + fall)
+        assert left * scale >= residual
+        assert fall / over * scale <= drop / slip
