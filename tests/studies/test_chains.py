@@ -278,6 +278,15 @@ def test_a_guarantee_of_slow_sliding_tells_its_lag_and_the_stress_that_it_covers
             covered_stress(chain, replace(claim, part=replace(claim.part, sectors=sectors)))
 
 
+@pytest.mark.parametrize("own", [0, 1])
+def test_a_certificate_whose_pressures_have_no_lag_is_about_other_blocks(own):
+    chain, claim = qd.load_chain(SLIDING), load_guarantee(SLIDING.with_suffix(".json"))
+    A = [list(row) for row in claim.part.A]
+    A[6][6] = F(own)
+    with pytest.raises(CertificateError, match="about these blocks"):
+        covered_stress(chain, replace(claim, part=replace(claim.part, A=tuple(map(tuple, A)))))
+
+
 def test_inertia_counts_in_the_stress_that_a_guarantee_covers():
     """Of a rock a thousand times as dense, whose inertia takes some 30 Pa of what the disturbances allow."""
     chain, claim = qd.load_chain(SLIDING), load_guarantee(SLIDING.with_suffix(".json"))
