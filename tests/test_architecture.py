@@ -462,7 +462,7 @@ BUDGETS = {
     "identification": 4008,
     "studies": 4021,
     "report": 3978,
-    "cli": 3491,
+    "cli": 3455,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

@@ -228,3 +228,6 @@ def test_wells_may_be_at_both_ends_of_a_fault_of_two_blocks_at_least():
     assert ends.shares[0] == (1 - CHAIN.middles[0] / 5000, CHAIN.middles[0] / 5000)
     with pytest.raises(ParameterError, match=r"2 to 20 blocks.*Received 1 block and 1 well"):
         replace(CHAIN, blocks=(replace(CHAIN.blocks[0], length=CHAIN.fault.length),), wells=(1.0,))
+    for wells in ((), (1.0, 2.0, 3.0, 4.0)):
+        with pytest.raises(ParameterError, match="1 well to one well a block"):
+            replace(CHAIN, wells=wells)

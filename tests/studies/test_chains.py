@@ -18,6 +18,7 @@ from quakedesign.guarantees import NoGuarantee
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
 from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantGuarantee
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
+from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -275,6 +276,34 @@ def test_a_guarantee_of_slow_sliding_tells_its_lag_and_the_stress_that_it_covers
         sectors = (*claim.part.sectors[:place], narrow, *claim.part.sectors[place + 1 :])
         with pytest.raises(CertificateError):
             covered_stress(chain, replace(claim, part=replace(claim.part, sectors=sectors)))
+
+
+@pytest.mark.parametrize("own", [0, 1])
+def test_a_certificate_whose_pressures_have_no_lag_is_about_other_blocks(own):
+    chain, claim = qd.load_chain(SLIDING), load_guarantee(SLIDING.with_suffix(".json"))
+    A = [list(row) for row in claim.part.A]
+    A[6][6] = F(own)
+    with pytest.raises(CertificateError, match="about these blocks"):
+        covered_stress(chain, replace(claim, part=replace(claim.part, A=tuple(map(tuple, A)))))
+
+
+def test_inertia_counts_in_the_stress_that_a_guarantee_covers():
+    """Of a rock a thousand times as dense, whose inertia takes some 30 Pa of what the disturbances allow."""
+    chain, claim = qd.load_chain(SLIDING), load_guarantee(SLIDING.with_suffix(".json"))
+    dense = replace(chain, fault=replace(chain.fault, density=2670e3))
+    claims = BlockClaims(log_state=F("0.02"), pull=F(30_000), push=F(200_000))
+    plant = SlidingBlocks(chain=dense, lag=F(800), stress=F(10_000)).plant(claims)
+    part, controls = linear_part(plant, {}), (UpperBound(F("0.1999")),) * 3
+    found = replace(claim, part=part, claims=replace(claim.claims, controls=controls))
+    (size, slope) = part.disturbances[0][1], part.sectors[1].slopes[1]
+    assert size / slope * 10**6 > 10_020
+    assert covered_stress(dense, found)[1] == pytest.approx(10_000, abs=1)
+
+
+@pytest.mark.parametrize("happened", [(), ("reversed",), ("opened",), ("reversed", "opened")])
+def test_a_run_outside_its_model_is_not_safe(happened):
+    run = SimpleNamespace(**{name: name in happened for name in ("reversed", "opened")})
+    assert chains.ChainRun(chain=CHAIN, controller="", found=None, run=run).safe is (happened == ())
 
 
 @pytest.mark.slow
