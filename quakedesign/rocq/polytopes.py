@@ -171,14 +171,16 @@ def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Ro
         floats = EXACT.middle(rows.factors)
         bases, shares = verifier.proposed(floats * EXACT.middle(verifier.sizes))
         own = floats - EXACT.middle(verifier.rows[rows.which])
-        entries = zip(rows.which, tops, bases, shares, own, strict=True)
-        yield (
-            rows,
-            {
-                int(w): _Hint.of(verifier, b, s) if float(1 - top) > _CLOSE else _Hint.itself(verifier, left)
-                for w, top, b, s, left in entries
-            },
-        )
+        signed = floats.copy()
+        signed[:, 0], signed[:, 2] = signed[:, 0] * verifier.sign, abs(signed[:, 2])
+        signs = EXACT.middle(rows.constants) + (signed.clip(min=0) * EXACT.middle(verifier.sizes)).sum(axis=1)
+        found = {}
+        for w, top, sign, basis, share, left in zip(rows.which, tops, signs, bases, shares, own, strict=True):
+            if float(1 - top) > _CLOSE:
+                found[int(w)] = _Hint.of(verifier, basis, share)
+            else:
+                found[int(w)] = _Hint(False, ()) if 1 - sign > _CLOSE else _Hint.itself(verifier, left)
+        yield rows, found
 
 
 def _pair(least: _Hint, largest: _Hint, *, positive: bool = False) -> str:
