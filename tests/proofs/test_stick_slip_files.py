@@ -62,8 +62,8 @@ def test_both_prove_the_stored_file_and_say_the_same_entries():
 def test_both_derive_the_same_ranges():
     ours, claim = period_of(stored()), read_guarantee(stored())
     task, held, reach = claim.task, claim.held, claim.reach
-    ahead, rate, up, behind, down = reach.box
-    push = package._push(task, held, reach, [max(ahead, behind), rate, max(up, down)])
+    ahead, rate, *_ = reach.box
+    push = package.pushes(task, held, reach)
     found = package.ranges(task, ahead + task.reference_rates[0] * held.step, push, rate * held.step)
     assert [float(v) for v in ours.push] == pytest.approx([float(v) for v in push], rel=1e-12)
     for mine, theirs in (

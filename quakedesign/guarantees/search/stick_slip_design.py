@@ -45,7 +45,9 @@ TUNINGS = {
     "peak": ((0.3, 0.5, 0.1, 1.3), (0.5, 0.5, 0.1, 1.3), (0.5, 0.5, 0.3, 1.3)),
 }
 """Shares of the innovations that the estimate takes, of the slip error that a period takes back, and the input gain."""
-DEADBEAT = ((0.3, 0.5, 1.0, 1.4), (0.5, 0.7, 1.0, 1.4), (0.5, 0.5, 1.0, 1.4), (0.3, 0.5, 1.0, 1.3))
+DEADBEAT = tuple(
+    (*shares, 1.0, gain) for *shares, gain in ((0.3, 0.5, 1.4), (0.4, 0.6, 1.4), (0.5, 0.7, 1.4), (0.3, 0.5, 1.3))
+)
 """The same of a deadbeat step, which takes all of it back, for both objectives."""
 _VERTICES, _SETTLED = 250, 1e-4  # of the reached states that are kept, and change of their extents at the end
 _ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of one: they only propose

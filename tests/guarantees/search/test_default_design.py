@@ -180,7 +180,7 @@ def searched(longest, first, most=None):
     return asked, found[-1].held.step if found else None
 
 
-@pytest.mark.parametrize("first", ["1/10", "1", "40"])
+@pytest.mark.parametrize("first", [pytest.param("1/10", marks=pytest.mark.slow), "1", "40"])
 def test_the_longest_time_is_found_within_a_sixteenth(first):
     asked, found = searched(F(3), F(first))
     assert F(15, 16) * 3 <= found <= 3

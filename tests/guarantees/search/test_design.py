@@ -282,6 +282,7 @@ def test_noise_is_blamed_for_what_it_does_to_a_law_that_is_proved_without(noise,
     assert found.reason.endswith(": the fault may open; without it a law is proved")
 
 
+@pytest.mark.slow
 def test_the_first_words_are_that_nothing_is_guaranteed_at_the_step_that_was_asked_for(monkeypatch):
     """Where a design for a shorter one is: it comes second."""
     shorter = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
