@@ -86,7 +86,7 @@ def _facts(found: Any, chain: "BlockChain") -> dict[str, Any]:
 def _lines(found: Any, chain: "BlockChain") -> list[str]:
     if found.proved:
         return [*found.lines(), *_scope(found, chain)]
-    far = f"quakedesign limits {chain.name} gives the pressures that every controller needs with this diffusivity"
+    far = "the command limits gives the pressures that every controller of this file needs with its diffusivity"
     return [found.sentence(), *([far] if chain.diffusivity else [])]
 
 

@@ -178,7 +178,9 @@ class LoopAnswer(LoopResult):
         """For people; nothing of a law that does not grow."""
         if not self.found.proved:
             return []
-        return list(filter(None, [warning_at_rest(self.found.held.law, self.found.held.step)]))
+        law = self.found.controller
+        limited = getattr(law, "rest_limit", None) is not None
+        return list(filter(None, [warning_at_rest(self.found.held.law, self.found.held.step, limited=limited)]))
 
     def limit_lines(self) -> list[str]:
         """Performance limits at the same T_s, as text; empty if unknown."""

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 import sympy as sp
+from flint import fmpq, fmpq_mat
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
@@ -97,14 +98,29 @@ def growth_at_rest(law: LinearLaw, step: Fraction) -> float | None:
     return float(step) / log(growth) if growth > 1 + 1e-6 else None  # rounding moves double eigenvalues of 1 by less
 
 
-def warning_at_rest(law: LinearLaw, step: Fraction) -> str:
-    """Warning about a law whose pressure grows while the fault is at rest; empty for others."""
+def winds_up(law: LinearLaw) -> bool:
+    """Whether the eigenvalue 1 of the update has a Jordan block: by itself the law then ramps, as a double integral."""
+    if not law.states:
+        return False
+    rows = [[v - (i == j) for j, v in enumerate(row)] for i, row in enumerate(law.update)]
+    still = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows])
+    return bool(still.rank() > (still * still).rank())
+
+
+def warning_at_rest(law: LinearLaw, step: Fraction, *, limited: bool = False) -> str:
+    """Warning about a law whose pressure grows while the fault is at rest, limited there or not; empty for others."""
     time = growth_at_rest(law, step)
+    if time:
+        return (
+            "NOT for a fault that sticks: by itself the law is unstable, and while friction holds the fault at rest "
+            f"its pressure grows e-fold in {time:.3g} s: use a law whose matrix A has no eigenvalue outside the unit "
+            "circle"
+        )
+    if limited or not winds_up(law):
+        return ""
     return (
-        "NOT for a fault that sticks: by itself the law is unstable, and while friction holds the fault at rest its "
-        f"pressure grows e-fold in {time:.3g} s: use a law whose matrix A has no eigenvalue outside the unit circle"
-        if time
-        else ""
+        "MAY WIND UP on a fault that sticks: the law has a double integral (the eigenvalue 1 of A has a Jordan block), "
+        "which ramps the pressure while friction holds the fault at rest: run simulate before use, or use one integral"
     )
 
 
@@ -154,7 +170,7 @@ class SampledController(Controller):
     @property
     def warning_at_rest(self) -> str:  # type: ignore[override]
         """That its pressure grows while the fault is at rest; empty if it does not."""
-        return warning_at_rest(self.law, self.step)
+        return warning_at_rest(self.law, self.step, limited=self.rest_limit is not None)
 
     @property
     def of_slip(self) -> LinearLaw | None:

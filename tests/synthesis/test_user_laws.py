@@ -230,6 +230,17 @@ def test_none_names_what_fails():
     assert "an eigenvalue of size" in wild.lines()[0]
 
 
+def test_a_double_integral_is_said_to_wind_up_while_the_fault_is_at_rest():
+    double = qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7, 1e6], step="0.184")
+    assert double.warning_at_rest.startswith("MAY WIND UP on a fault that sticks: the law has a double integral")
+    assert double.warning_at_rest in qd.guarantee(REAL, law=double).lines()
+    for once in ([3e8, 2.5e8, 5e7], [3e8, 2.5e8]):
+        assert qd.SampledLaw.from_gains(once, step="0.184").warning_at_rest == ""
+    both = ([[1, 0], [0, 1]], [[1, 0], [0, 1]], [[-1e7, -1e7]], [[-3e8, -2e8]])  # two integrals side by side
+    apart = qd.SampledLaw.from_statespace(control.ss(*both, 0.184), inputs=["slip_error", "slip_rate_error"])
+    assert apart.warning_at_rest == ""
+
+
 def test_a_law_without_a_guarantee_names_a_factor_of_its_pressure_that_has_one():
     strong = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([6e8, 5e8, 1e8], step="0.184"))
     half = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], step="0.184"))
