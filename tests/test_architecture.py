@@ -460,7 +460,7 @@ BUDGETS = {
     "rocq": 841,
     "simulation": 9737,
     "identification": 4008,
-    "studies": 4021,
+    "studies": 4025,
     "report": 3978,
     "cli": 3455,
 }

@@ -96,7 +96,7 @@ class ChainLimits:
             f"{counted(len(chain.wells), 'well')}",
             *assumed,
             "",
-            f"{'mode':>4}{'pole [1/s]':>12}{'less equilibrium':>21}"
+            f"{'mode':>4}{'pole [1/s]':>12}{'from equilibrium':>21}"
             + (f"{'T_s up to':>10}{'well in':>10}" if self.stress is not None else "")
             + "  slips of the blocks",
             *(f"{place:4}{mode.row()}" for place, mode in enumerate(self.modes, 1)),
@@ -109,6 +109,10 @@ class ChainLimits:
         escaping = sum(not mode.reached for mode in self.modes)
         if escaping:
             said += ["", f"infeasible for every controller: {counted(escaping, 'unstable mode')} out of reach"]
+        most, needs = max(b.effective_normal_stress for b in chain.blocks), [m.pressure or 0 for m in self.modes]
+        if chain.diffusivity and max(needs, default=0) > most:
+            said += ["", f"a mode needs more than the effective normal stress, {quantity(most, 'Pa')}: move the wells"]
+            said += [f"closer to the blocks; the pressure diffuses along the fault with {chain.diffusivity:g} m^2/s"]
         return said if self.modes else [*said, "", "no mode is unstable"]
 
     def to_dict(self) -> dict[str, Any]:

@@ -391,7 +391,7 @@ class Samples(DesignMethod[SampledController]):
         return answer
 
 
-_FACTORS = tuple(Fraction(v) for v in ("1/2", "2", "1/4", "4"))  # of the pressure of a law without a guarantee
+_FACTORS = tuple(map(Fraction, ("1/2", "2", "1/4", "4", "-1", "1/16", "16")))  # tried where a law has no guarantee
 _STANDING = (
     "the law leaves an error under a constant pressure at rest, as it has no integral action: give it an integral of "
     "the slip error or an estimate of the disturbance"

@@ -72,6 +72,9 @@ def test_a_well_that_diffuses_needs_more_pressure_by_its_transfer_function_at_th
     through = 1e5 / 2500**2
     felt = (1 + through / (one.pole + through)) / 2  # by the mean of both blocks
     assert aside.modes[0].pressure == pytest.approx(one.pressure / felt, rel=1e-9)
+    told = chain_limits(replace(chain, diffusivity=1.0)).lines()
+    assert told[-2].endswith("a mode needs more than the effective normal stress, 50 MPa: move the wells")
+    assert not any("needs more than" in line for line in slow.lines() + steady.lines())
 
 
 def test_blocks_that_hardly_pull_each_other_need_a_well_each():
