@@ -77,15 +77,25 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
     return [*([healed] if excess else []), meant]
 
 
-def _facts(found: Any, chain: "BlockChain") -> dict[str, Any]:
+def _facts(found: Any, chain: "BlockChain", one: Any = None) -> dict[str, Any]:
     if not found.proved:
         return {"verdict": "undecided", "reason": found.reason}
-    return {**found.to_dict(), "notes": [*found.notes, *_scope(found, chain)]}
+    told = {**found.to_dict(), "notes": [*found.notes, *_scope(found, chain)]}
+    return told if one is None or chain.ages else told | one.proved_facts()
 
 
-def _lines(found: Any, chain: "BlockChain") -> list[str]:
+def _lines(found: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> list[str]:
+    """The answer, a table of blocks and wells, then what it depends on; without a state in 80 columns."""
     if found.proved:
-        return [*found.lines(), *_scope(found, chain)]
+        from textwrap import wrap
+
+        conditions = [*found.lines(), *_scope(found, chain)]
+        if one is None:
+            return conditions
+        if chain.ages:
+            return [*conditions, "", *one.lines()]
+        told = [line for text in conditions for line in wrap(text, 80, subsequent_indent="  ", break_on_hyphens=False)]
+        return [*wrap(one.answer, 80), "", *one.lines(), "", *told]  # type: ignore[union-attr]
     far = "the command limits gives the pressures that every controller of this file needs with its diffusivity"
     return [found.sentence(), *([far] if chain.diffusivity else [])]
 
@@ -153,7 +163,10 @@ def guarantee_chain(
             save_guarantee(found, out)
     unwritten = [f"{out} is not written, as nothing is proved"] if out is not None and not found.proved else []
     written = None if out is None or not found.proved else str(out)
-    output.show({**_facts(found, chain), "certificate": written}, [*_lines(found, chain), *unwritten])
+    from quakedesign.studies.chains import ChainRun
+
+    one = None if sliding is not None else ChainRun(chain=chain, controller=law, found=found, run=None)
+    output.show({**_facts(found, chain, one), "certificate": written}, [*_lines(found, chain, one), *unwritten])
     return 0 if found.proved else 1
 
 
@@ -206,7 +219,7 @@ def require_loads(chain: "BlockChain", sliding: dict[str, Any]) -> None:
 def _run_facts(one: "ChainRun | SlidingChainRun") -> dict[str, Any]:
     if one.found is None:
         return {"run": one.to_dict(), "guarantee": None}
-    found = _facts(one.found, one.chain)
+    found = _facts(one.found, one.chain, one)
     return found if one.run is None else {"guarantee": found, "run": one.to_dict()}
 
 
@@ -258,7 +271,8 @@ def run_chain(
         one = run_sliding_chain(chain, **given) if chain.ages else run_of_chain(chain, **given)
     found: Any = one.found
     facts = _run_facts(one)
-    said = [*([] if found is None else [*_lines(found, chain), ""]), *one.lines()]
+    said = one.lines() if found is None else _lines(found, chain, one)
+    said += [] if found is None or one.run is not None else [*one.lines()]
     if out is not None and one.run is not None:
         from quakedesign.files import whole_folder
         from quakedesign.guarantees.exact.guarantee_files import save_guarantee

@@ -154,8 +154,8 @@ def _parts(
         "remarks": {
             "plant": f"of {name}, without stick (friction continues to negative slip rates), for all friction and "
             f"constants of box {box}{known}",
-            "disturbances": f"{LowerBound(tasks[0].amplitude).quantity('m/s²', 4)} of a force is the fault's "
-            f"disturbance, up to {UpperBound(max(needed)).quantity('m/s²')} acceleration and damping of the reference",
+            "disturbances": f"on a block: {LowerBound(tasks[0].amplitude).quantity('m/s²', 4)} of disturbance and at "
+            f"most {UpperBound(max(needed)).quantity('m/s²')} that the reference needs",
         },
     }
 

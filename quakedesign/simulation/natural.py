@@ -75,7 +75,7 @@ def natural_earthquake(
             f"Received {pressure!r} Pa."
         )
     growth = derive(fault).eigenvalues[0].real
-    nudge = _nudge(fault) if growth > 0 else 0.0
+    nudge = event_nudge(fault) if growth > 0 else 0.0
     nudged = _released(fault).with_disturbance(Disturbance(constant=nudge))
     step = min(fault.sampling_time, FINENESS / fault.natural_frequency)
     setting = RunSetting.of(nudged, step, _duration(fault, growth), 2000, 0.0)
@@ -95,7 +95,7 @@ def natural_earthquake(
 def _with_peak(earthquake: Trajectory, fault: Fault, growth: float) -> Trajectory:
     """Reference event of an unstable fault, if it moves more than by the nudge alone."""
     peak = earthquake.metrics.peak_slip_rate  # none where the run diverges
-    if peak is not None and peak <= STILL * _nudge(fault) / growth:
+    if peak is not None and peak <= STILL * event_nudge(fault) / growth:
         raise SimulationError(
             f"{fault.name} is unstable (eigenvalue {growth:.4g} 1/s), but its simulation does not move: its peak is "
             f"{peak!r} m/s. Rounding may drown its friction; check the numbers of the law."
@@ -122,7 +122,7 @@ def _alone(fault: Fault) -> Fault:
     return fault.with_disturbance(Disturbance()).with_box("paper")
 
 
-def _nudge(fault: Fault) -> float:
+def event_nudge(fault: Fault) -> float:
     """Acceleration [m/s²] that is small beside the forces of an event."""
     low, high = fault.friction.bounds
     return NUDGE * (high - low) * fault.authority * fault.effective_normal_stress

@@ -1,7 +1,7 @@
 """Faults of several blocks: what is proved of them, and how they run."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -10,28 +10,33 @@ import numpy as np
 
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
-from quakedesign.fault import BlockChain, SlidingReference
+from quakedesign.fault import BlockChain, Disturbance, SlidingReference
 from quakedesign.guarantees import NoGuarantee
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, named
+from quakedesign.guarantees.exact.plant_loop import MatrixLaw
 from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import UncertainPlant, uncertain_plant
-from quakedesign.simulation.block_run import MPA, BlockRun, simulate_blocks, whole_periods
+from quakedesign.plant.block_plant import inverse_of
+from quakedesign.simulation.block_run import MPA, SUBSTEPS, BlockRun, simulate_blocks, whole_periods
 from quakedesign.simulation.coupled_sliders import (
     BlockEvent,
     SlidersRun,
     natural_cycles,
     simulate_held_blocks,
 )
+from quakedesign.simulation.natural import STILL, event_nudge
 from quakedesign.simulation.state_plant import TIDE
+from quakedesign.studies.block_limits import chain_limits
 from quakedesign.synthesis import guarantee
 from quakedesign.synthesis.guarantee import BLOCK_LAWS
-from quakedesign.text import counted, lasting, quantity
+from quakedesign.text import PREFIXES, counted, lasting, plain, power_of, quantity
 
 _NONE = UpperBound(0)
+_FINENESS = 1e-3  # substep times natural frequency of a run without control
 _NO_RUN = "nothing is simulated, as no law is proved"
 
 
@@ -41,14 +46,18 @@ def chain_lines(chain: BlockChain) -> list[str]:
         f"{chain.name}: {len(chain.blocks)} blocks, {counted(len(chain.wells), 'well')} (box {chain.fault.box.name}, "
         f"task {chain.fault.reference.target_slip:g} m in {chain.fault.reference.operation_time:g} s)",
         "",
-        f"{'block':>5}{'length [m]':>12}{'stress [Pa]':>13}  {'share of each well':24}friction",
+        f"{'block':>5}{'length [m]':>12}{'stress':>13}  {'share of each well':24}friction",
     ]
     for place, (block, row) in enumerate(zip(chain.blocks, chain.shares, strict=True), 1):
         shares = ", ".join(f"{float(v):.3g}" for v in row)
         stress = block.effective_normal_stress
-        said.append(f"{place:5}{block.length:12g}{stress:13.4g}  {shares:24}{block.friction.name}")
+        said.append(f"{place:5}{block.length:12g}{quantity(stress, 'Pa', 4):>13}  {shares:24}{block.friction.name}")
     springs = ", ".join(f"{float(K):.4g}" for i, j, K in chain.springs if i < j)
     said += ["", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
+    pole, peak = _growth(chain), None if chain.ages else natural_peak(chain)
+    stable = "stable" if pole == 0 else "stability unknown, as floating point does not tell its modes apart"
+    said += [f"without control: {f'unstable, errors grow with up to {pole:.4g} 1/s' if pole else stable}"]
+    said += [] if peak is None else [f"natural earthquake: slip rate up to {quantity(peak, 'm/s')}"]
     if chain.diffusivity is not None:
         said.append(
             f"pressure along the fault diffuses with {chain.diffusivity:g} m^2/s; shares are those at steady state"
@@ -65,7 +74,8 @@ def chain_dict(chain: BlockChain) -> dict[str, Any]:
     springs = [{"block": i + 1, "pulled_by": j + 1, "stiffness_over_mass": float(K)} for i, j, K in chain.springs]
     shares = [[float(v) for v in row] for row in chain.shares]
     along = {"wells": list(chain.wells), "shares": shares, "diffusivity": chain.diffusivity}
-    return {"fault": chain.name, "blocks": blocks, **along, "springs": springs}
+    events = {"growth_rate": _growth(chain), "natural_peak_slip_rate": None if chain.ages else natural_peak(chain)}
+    return {"fault": chain.name, "blocks": blocks, **along, "springs": springs, **events}
 
 
 # ----------------------------------------------------------------------
@@ -79,6 +89,33 @@ def farthest_balance(chain: BlockChain, found: PlantGuarantee) -> UpperBound | N
         return None
     moves = [size for _, size in found.part.disturbances[N:]]  # behind the forces on the blocks
     return UpperBound(max(moves) / task.reference_rates[0] * task.target_slip)
+
+
+def _growth(chain: BlockChain) -> float | None:
+    """Largest pole without control [1/s], 0 where no mode is unstable; None where floating point cannot tell."""
+    try:
+        return max((mode.pole for mode in chain_limits(chain).modes), default=0.0)
+    except ParameterError:
+        return None
+
+
+def natural_peak(chain: BlockChain) -> float | None:
+    """Largest slip rate of blocks without control [m/s], released as by `natural_earthquake`.
+
+    None where no mode is unstable, and for friction that heals, of which no run of blocks is had.
+    """
+    pole = None if any(block.friction.rest_excess for block in chain.blocks) else _growth(chain)
+    if not pole:
+        return None
+    nudge, omega = max(map(event_nudge, chain.faults)), chain.fault.natural_frequency
+    released = replace(chain, fault=chain.fault.with_disturbance(Disturbance(constant=nudge)))
+    still = ((Fraction(0),) * 2 * len(chain.wells),) * len(chain.wells)
+    none = ((),) * len(still)
+    step = SUBSTEPS * rational(_FINENESS / omega)
+    law = MatrixLaw(step=step, delay=Fraction(0), update=(), measured=(), output=none, feedback=still)
+    run = simulate_blocks(released, law, duration=max(90 / pole, 30 / pole + 20 * np.pi / omega))
+    peak = float(run.slip_rate.max())
+    return peak if peak > STILL * nudge / pole else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,23 +140,95 @@ class ChainRun:
         worst = self.run.slip_rate_error.max(), self.run.slip_error.max()
         return table_row(self.controller, max(outputs[N:]), max(outputs[:N]), worst, self.run.pressure)
 
-    def lines(self) -> list[str]:
-        """For people."""
-        run = self.run
-        if run is None:
-            return [_NO_RUN]
-        said = [
-            f"run over {run.times[-1]:g} s on the stick-slip plant; what is proved is of the plant without stick, so "
-            "that here a slip, a slip rate, or a pressure less its load may pass its bound:"
-        ]
-        for i, (slip, rate, rest) in enumerate(zip(run.slip_error, run.slip_rate_error, run.rest, strict=True), 1):
-            said.append(
-                f"block {i}: slip error {slip:.3g} m, slip-rate error {rate:.3g} m/s, at rest {100 * rest:.3g} %"
+    @property
+    def answer(self) -> str:
+        """What is guaranteed, beside the natural earthquake."""
+        N, peak = len(self.chain.blocks), natural_peak(self.chain)
+        rate, slip = max(self.proved_slip_rates), max(self.found.claims.outputs[:N])
+        ratio = "" if peak is None else f"{UpperBound(100 * rate / rational(peak)):.2g} % of "
+        share = ratio and f" ({ratio}the natural earthquake's {quantity(peak, 'm/s')})"  # type: ignore[arg-type]
+        far = farthest_balance(self.chain, self.found)
+        about = "the reference"
+        if far is not None:
+            about = f"its equilibrium, which lies within {far.quantity('m')} of the reference"
+        return (
+            f"{self.chain.name}: guaranteed on the plant without stick. With the {self.controller} law the slip rate "
+            f"of no block exceeds {rate.quantity('m/s')}{share}, and the slip of each stays within "
+            f"{UpperBound(slip).quantity('m')} of {about}."
+        )
+
+    @property
+    def proved_slip_rates(self) -> list[UpperBound]:
+        """Bounds of the slip rates themselves [m/s], that of the reference included."""
+        first = uncertain_plant(self.chain.fault).reference_rates[0]
+        return [UpperBound(first + error) for error in self.found.claims.outputs[len(self.chain.blocks) :]]
+
+    @property
+    def proved_pressures(self) -> list[tuple[LowerBound, UpperBound]] | None:
+        """Bounds of the pressures themselves [Pa]; None for wells fewer than blocks, and where pressure diffuses."""
+        chain = self.chain
+        if chain.diffusivity is not None or len(chain.wells) < len(chain.blocks):
+            return None
+        if (inverse := inverse_of(chain.shares)) is None:
+            return None
+        rest = [uncertain_plant(fault).rest_pressure for fault in chain.faults]
+        ends = []
+        for row, error in zip(inverse, self.found.claims.controls, strict=True):
+            low, high = (
+                sum((v * p[(v < 0) != side] for v, p in zip(row, rest, strict=True)), Fraction(0)) for side in (0, 1)
             )
-        for i, (least, largest) in enumerate(zip(run.pressure.min(axis=0), run.pressure.max(axis=0), strict=True), 1):
-            said.append(f"well {i}: pressure {least:.3g} Pa to {largest:.3g} Pa")
-        for event, happened in (("a block would slip backward", run.reversed), ("a block opens", run.opened)):
-            said += [f"{event}: the run is outside the model"] if happened else []
+            ends.append((LowerBound(low - error), UpperBound(high + error)))
+        return ends
+
+    def proved_facts(self) -> dict[str, Any]:
+        """Proved slip rates of blocks [m/s] and pressures of wells [Pa], and the peak without control [m/s]."""
+        ends = self.proved_pressures
+        return {
+            "slip_rates": [v.exact for v in self.proved_slip_rates],
+            "pressures": ends and [[low.exact, high.exact] for low, high in ends],
+            "natural_peak_slip_rate": natural_peak(self.chain),
+        }
+
+    def lines(self) -> list[str]:
+        """Lines of at most 80 characters: blocks and wells, what is proved beside what a run shows."""
+        chain, run, N = self.chain, self.run, len(self.chain.blocks)
+        if not self.found.proved:
+            return [_NO_RUN]
+        rates, slips = self.proved_slip_rates, [UpperBound(v) for v in self.found.claims.outputs[:N]]
+        powers = [power_of(float(max(values))) for values in (rates, slips)]
+        heads = ["", f"slip rate [{PREFIXES[powers[0]]}m/s]", f"slip error [{PREFIXES[powers[1]]}m]"]
+        said = [
+            f"{heads[0]:10}{heads[1]:>20}{heads[2]:>20}",
+            f"{'':10}{'proved':>10}{'run':>10}{'proved':>10}{'run':>10}",
+        ]
+        for i in range(N):
+            seen = (None, None) if run is None else (run.slip_rate[:, i].max(), run.slip_error[i])
+            cells = ""
+            for bound, value, power in zip((rates[i], slips[i]), seen, powers, strict=True):
+                shown = "–" if value is None else plain(float(value) / 10.0**power)
+                cells += f"{plain(float(f'{UpperBound(bound / Fraction(10) ** power):.3g}')):>10}{shown:>10}"
+            rests = "" if run is None else f"   at rest {100 * run.rest[i]:.3g} % of the run"
+            said.append(f"{f'block {i + 1}':10}{cells}{rests}")
+        ends, left = self.proved_pressures, False
+        said += [] if ends is None and run is None else ["pressure"]
+        for j in range(len(chain.wells)):
+            told = []
+            if ends is not None:
+                told.append(f"proved {ends[j][0].quantity('Pa')} to {ends[j][1].quantity('Pa')}")
+            if run is not None:
+                low, high = float(run.pressure[:, j].min()), float(run.pressure[:, j].max())
+                outside = ends is not None and not ends[j][0] <= low <= high <= ends[j][1]
+                told.append(f"run {quantity(low, 'Pa')} to {quantity(high, 'Pa')}{' (OUTSIDE)' if outside else ''}")
+                left |= outside
+            said += [f"{f'well {j + 1}':10}{', '.join(told)}"] if told else []
+        if run is not None:
+            did = ", as pressures do here" if left else ""
+            said += [f"run: {lasting(float(run.times[-1]))} on the stick-slip plant, where errors and pressures may"]
+            said += [f"exceed bounds, which are proved of the plant without stick{did}"]
+            if len(chain.wells) < N:
+                said.append("slip error: proved from the equilibrium of a block, in the run from the reference")
+            for event, happened in (("a block would slip backward", run.reversed), ("a block opens", run.opened)):
+                said += [f"{event}: the run is outside the model"] if happened else []
         return said
 
     def to_dict(self) -> dict[str, Any]:

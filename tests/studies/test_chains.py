@@ -22,6 +22,7 @@ from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBloc
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.simulation.natural import natural_peak
 from quakedesign.studies import chains
 
 PATH = Path(__file__).parents[1] / "data" / "three_blocks.toml"
@@ -69,6 +70,9 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
             output=((),) * 3,
             feedback=tuple((*(F(0),) * 6,) for _ in range(3)),
         )
+        claims = PlantClaims(
+            outputs=tuple(UpperBound(F(i, 10**5)) for i in range(1, 7)), controls=(UpperBound(10),) * 3
+        )
 
         def lines(self):
             return [f"proved: {self.sentence()}"]
@@ -85,12 +89,18 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
     told = " ".join(capsys.readouterr().out.split())
     assert "the load of a pressure is the pressure that balances the blocks on the reference" in told
     assert "equilibrium of each block" not in told
+    first = "With the centralised law the slip rate of no block exceeds 62.3 µm/s (0.078 % of the natural earthquake's"
+    assert first in told  # 60 µm/s of error and 15/8 of 785 mm in 663012 s
+    assert "slip of each stays within 30 µm of the reference" in told
+    assert "block 1 42.3 – 10 –" in told
     alone = PATH.read_text().split("[[block]]")[0] + '[[block]]\nlength = "2.5 km"\n' * 2
     (tmp_path / "blocks.toml").write_text(alone + '[[well]]\nposition = "1 km"\n')
     assert run("guarantee", tmp_path / "blocks.toml") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "slip errors are relative to the equilibrium of each block under these pressures" in told
     assert re.search(r"within 0\.\d+ m of the reference at every time", told)
+    assert re.search(r"of its equilibrium, which lies within 35\.\d mm of the reference", told)
+    assert "proved -" not in told
     assert run("guarantee", PATH, "--json") == 0
     notes = json.loads(capsys.readouterr().out)["notes"]
     assert notes[0] == "a note"
@@ -103,9 +113,44 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
     assert "has no healing" in " ".join(capsys.readouterr().err.split())
     assert run("simulate", PATH, "--duration", "2 s") == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "run over 1.84 s on the stick-slip plant" in told
-    assert "of the plant without stick, so that here a slip, a slip rate, or a pressure less its load may pass" in told
-    assert "well 3: pressure 0 Pa to 0 Pa" in told
+    assert "run: 1.84 s on the stick-slip plant, where errors and pressures may exceed bounds" in told
+    assert re.search(r"well 3 proved -[\d.]+ MPa to [\d.]+ MPa, run 0 Pa to 0 Pa", told)
+
+
+def test_equal_blocks_slip_as_one_block_does_without_control():
+    one = qd.load_fault("real-fault")
+    chain = replace(CHAIN, blocks=(replace(CHAIN.blocks[0], length=2500.0),) * 2, wells=(1000.0,))
+    assert chains.natural_peak(chain) == pytest.approx(natural_peak(one), rel=1e-4)
+    stiff = replace(chain, fault=replace(chain.fault, shear_modulus=3e12))
+    assert chains.natural_peak(stiff) is None
+    healed = replace(chain.blocks[0], friction=replace(chain.blocks[0].friction, healing=0.01))
+    assert chains.natural_peak(replace(chain, blocks=(healed, healed))) is None
+
+
+def test_pressures_themselves_are_those_of_equilibrium_and_what_is_proved_beside_them():
+    """Friction falls to its least after one critical slip, or stays at its largest over the whole task."""
+    chain = replace(CHAIN, blocks=(replace(CHAIN.blocks[0], length=2500.0),) * 2, wells=(1250.0, 3750.0))
+    claims = PlantClaims(outputs=(UpperBound(1),) * 4, controls=(UpperBound(1000), UpperBound(2000)))
+    found = SimpleNamespace(claims=claims, proved=True)
+    pressures = np.array([[0.0, -14.1e6], [1e6, -14.2e6], [2e6, 14.1e6]])
+    seen = {"slip_rate": np.zeros((3, 2)), "slip_error": np.zeros(2), "rest": np.ones(2), "times": [7.0]}
+    run = SimpleNamespace(pressure=pressures, reversed=False, opened=True, **seen)
+    one = chains.ChainRun(chain=chain, controller="centralised", found=found, run=run)
+    unloading, strength = 30e9 / 5000, 0.3353 * 50e6  # per slip, at first [Pa/m], [Pa]
+    least = 50e6 - (strength - unloading * 0.27635) / 0.2353
+    largest = 50e6 - (strength - unloading * 0.785) / 0.3353
+    for (low, high), error in zip(one.proved_pressures, (1000, 2000), strict=True):
+        assert [float(low), float(high)] == pytest.approx([least - error, largest + error], abs=100)
+    apart = replace(one, chain=replace(chain, wells=(1000.0, 4000.0)))  # a block has 11/12 of its well's pressure
+    low, high = apart.proved_pressures[0]
+    expected = [1.1 * least - 0.1 * largest - 1000, 1.1 * largest - 0.1 * least + 1000]
+    assert [float(low), float(high)] == pytest.approx(expected, abs=100)
+    assert replace(apart, chain=replace(chain, diffusivity=1e6)).proved_pressures is None
+    told = one.lines()
+    assert [line.endswith("(OUTSIDE)") for line in told if line.startswith("well")] == [False, True]
+    assert "as pressures do here" in " ".join(told)
+    assert told[-1] == "a block opens: the run is outside the model"
+    assert max(map(len, told)) <= 80
 
 
 def test_a_duration_out_of_range_is_refused_before_the_search(tmp_path, capsys):
