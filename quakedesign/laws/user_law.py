@@ -240,13 +240,15 @@ class SampledLaw(SampledController):
 
     def to_dict(self) -> dict[str, Any]:
         """Content of a file of the law: exact numbers as texts, SI."""
-        law = self.law
-        moved = law.of_reference or ((Fraction(0),) * 2,) * (len(law.states) + 1)
-        rows = [(*a, *b) for a, b in zip((*law.measured, law.feedback), moved, strict=True)]
+        law, inputs = self.law, ["slip_error", "slip_rate_error"]
+        rows = [*law.measured, law.feedback]
+        if law.of_reference:
+            rows = [(*a, *b) for a, b in zip(rows, law.of_reference, strict=True)]
+            inputs += ["reference", "reference_rate"]
         return {
             "label": self.label,
             "step": str(self.step),
-            "inputs": ["slip_error", "slip_rate_error", "reference", "reference_rate"],
+            "inputs": inputs,
             "output": OUTPUT,
             "A": [list(map(str, row)) for row in law.update],
             "B": [list(map(str, row)) for row in rows[:-1]],

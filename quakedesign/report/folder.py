@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 def prepare(out: Path, *, force: bool) -> None:
     """Refuse early a folder that cannot be written or that holds results."""
     if os.path.exists(out) and not force:
-        raise OutputError(f"output folder must be new. Received {out}, which exists. Give --force to replace it.")
+        raise OutputError(
+            f"output folder must be new. Received {out}, which exists. Give another --out, or --force to replace it."
+        )
     if os.path.exists(out) and not (out / "results.json").is_file():
         raise OutputError(f"only a folder with results.json is replaced. Received {out}. Choose another --out.")
     require_room(out)

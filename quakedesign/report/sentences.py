@@ -529,7 +529,8 @@ def proved_line(sentence: str | None, outside: list[str], exceeded: str = "") ->
         return ""
     if outside:
         beyond = f"{exceeded}; " if exceeded else ""
-        return f"NOT proved of this run, which differs in {', '.join(outside)}; {beyond}the proof says: {sentence}"
+        others = f"this run is NOT covered by the proof, which is for another {', '.join(outside)}"
+        return f"{others}; {beyond}the proof says: {sentence}"
     return f"proved: {sentence}"
 
 
