@@ -124,7 +124,7 @@ def cell_bounds(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[s
     try:
         gains = norms(loop)
     except ParameterError:
-        return NoGuarantee(reason="even the nominal loop is unstable, or decays too slowly", small_gain=None)
+        return NoGuarantee(reason="even the nominal loop is not stable, or decays too slowly", small_gain=None)
     return bounds_from(task, held, claims, loop, gains, after_a_step(loop))
 
 

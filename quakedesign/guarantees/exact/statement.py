@@ -467,7 +467,7 @@ def _bounds(
 
 def _unstable(held: Held) -> NoGuarantee:
     over = f"with zero-order hold over {_seconds(held.step)}"
-    return NoGuarantee(reason=f"{over} even the nominal loop is unstable, or decays too slowly", small_gain=None)
+    return NoGuarantee(reason=f"{over} even the nominal loop is not stable, or decays too slowly", small_gain=None)
 
 
 def _off_schedule(measured: Fraction, arrived: Fraction) -> str:
@@ -569,7 +569,7 @@ def _continuous_bounds(task: FaultPlant, law: ContinuousLaw) -> Bounds | NoGuara
     try:
         return certified_bounds(task, loop)
     except ParameterError:
-        reason = f"{WHEN} even the nominal loop is unstable, or decays too slowly"
+        reason = f"{WHEN} even the nominal loop is not stable, or decays too slowly"
         return NoGuarantee(reason=reason, small_gain=None)
 
 

@@ -221,7 +221,7 @@ def test_a_loop_that_is_not_seen_to_be_stable_has_no_guarantee(monkeypatch):
 
     monkeypatch.setattr(statement, "certified_bounds", refuse)
     found = guarantee(TASK, HELD)
-    assert found.reason == "with zero-order hold over 0.1 s even the nominal loop is unstable, or decays too slowly"
+    assert found.reason == "with zero-order hold over 0.1 s even the nominal loop is not stable, or decays too slowly"
 
 
 def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monkeypatch):
