@@ -182,7 +182,9 @@ def test_loops_that_are_not_stable_have_no_bounds(asked, monkeypatch):
     monkeypatch.setattr(module, "norms", refuse)
     claim = Guarantee(task=TASK, held=HELD, claims=claims_of(F(1)), slow_gain=SLOW)
     for found in (claim.bounds(), guarantee(TASK, HELD, SLOW)):
-        assert found.reason == "with zero-order hold over 0.1 s even the nominal loop is not stable, or decays too slowly"
+        assert (
+            found.reason == "with zero-order hold over 0.1 s even the nominal loop is not stable, or decays too slowly"
+        )
     assert (claim.check(), asked[1]) == (Verdict.UNDECIDED, [])
 
 
