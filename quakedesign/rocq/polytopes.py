@@ -43,9 +43,9 @@ def polytope_theorem(claim: StickSlipGuarantee) -> Iterator[str]:
         push, moved = _outward(*pushes(task, held, reach)), task.reference_rates[0] * held.step
         found = ranges(task, reach.box[0] + moved, push, reach.box[1] * held.step)
         found = replace(found, **{name: _outward(*getattr(found, name)) for name in ("slope", "damping", "chord")})
-        period = Period.of(BALLS, task, held, found)
+        (period,) = periods = Period.all(BALLS, task, held, found, reach.box[1], push)
         deciding = verifiers(task, held, reach, found)
-        sliding, resting = (_hints(deciding, rows) for rows in facet_rows(period, reach))
+        sliding, resting = (_hints(deciding, rows) for rows in facet_rows(periods, reach))
         yield _loop(period)
         yield (
             "Definition facets : list facet :=\n  "
