@@ -709,7 +709,8 @@ def proved(
     fresh = list[StickSlipGuarantee | NoGuarantee]()
 
     def search() -> dict[str, Any]:
-        fresh.append(_searched(task, held, tell))
+        with np.errstate(all="ignore"):  # floats that overflow propose nothing
+            fresh.append(_searched(task, held, tell))
         return {"set": set_document(fresh[0].reach)} if fresh[0].proved else {"reason": fresh[0].reason}
 
     kept = search_once(search, "polytope of a stick-slip law", task, held)
