@@ -52,6 +52,14 @@ which moves up to 2cNT less than that, and U is m·n larger. Where the innovatio
 m(rest_slip + 2N) to −mTv⁺/2 of it, never less than without cut-off; otherwise noise leaves d. At first e1 = N, and d =
 0 as x⁻ = 0 and the first innovation, n, is not cut off; d from 0 to m·N is checked.
 
+**Aperiodic sampling.** Each interval between samples is any h from T to T_m, and T is a constant of the law. The bound
+of a facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|m(h − s)ds over [0, h], where g
+is its response to an impulse and m(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. It
+is required that m ≥ 0 up to T_m, so that V is one for all h, not of the state's own h alone. g is Lipschitz, so V″ ≥ −B
+almost everywhere, and V stays below its chord over Δ plus Δ²B/8: bounds at five intervals decide, with B from |l″|,
+|g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so that both ends decide, and a period that ends at
+rest is one of T_m whose last part nothing releases: the slip until a stop has the bound of T_m.
+
 **Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ =
 −wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
 """
