@@ -2,12 +2,12 @@
 
     python benchmarks/stick_slip_attack.py proofs/certificates/stick_slip_real-fault.json
 
-Friction is any function of the slip with the slopes of the file, the disturbance turns within periods, and r' is any
-number of its range in each period. A sliding mode runs as it is: the end of its implicit step is found by bisection,
-wherever it lies. For every facet the courses that come nearest to it are continued. Then courses of 10 000 periods
-without selection: friction falls and rests in stairs of a slip, the disturbance turns within every period, with the
-period, after many periods or as a facet asks. Printed are the largest facet value, which the file says never exceeds
-1, and the largest values over the claims, of both.
+Intervals between samples are any in the range of the file. Friction is any function of the slip with its slopes, the
+disturbance turns within periods, and r' is any number of its range in each period. A sliding mode runs as it is: the
+end of its implicit step is found by bisection, wherever it lies. For every facet the courses that come nearest to it
+are continued. Then courses of 10 000 periods without selection: friction falls and rests in stairs of a slip, the
+disturbance turns within every period, with the period, after many periods or as a facet asks. Printed are the largest
+facet value, which the file says never exceeds 1, and the largest values over the claims, of both.
 """
 
 import json
@@ -115,15 +115,23 @@ class Attack:
         slope, other = random.choice(slopes, (2, count))
         return rate * self.fastest, turn, sign, lambda x, early: np.where(early, slope, other)
 
+    def interval(self, count):
+        """Of each course to its next sample [s]: an end of the range for most, and otherwise anywhere within."""
+        step = self.law["step"]
+        longest, random = self.law.get("longest", step), self.random
+        ends = random.choice([step, longest], count)
+        return np.where(random.random(count) < 0.7, ends, random.uniform(step, longest, count))
+
     def after(self, one, chosen=None):
-        """A period later."""
+        """A sample later."""
         law, random, count, step = self.law, self.random, len(one.x), self.law["step"]
         rate, turn, sign, growth = chosen or self.chosen(count)
         error = one.x + one.noise - one.r
         back = -law["return_rate"] * error
         v = rate + (back if self.pull is None else end_of_step(self.pull, step, error, one.y - rate))
         p = -law["rate_gain"] * one.y + law["target_gain"] * v - one.level
-        h, x, y, mu = step / SUBSTEPS, one.x.copy(), one.y.copy(), one.mu.copy()
+        interval = self.interval(count)
+        h, x, y, mu = interval / SUBSTEPS, one.x.copy(), one.y.copy(), one.mu.copy()
         hold = self.n * self.friction["static"] * self.stress
         for i in range(SUBSTEPS):
             early = (i + 0.5) / SUBSTEPS < turn
@@ -144,7 +152,7 @@ class Attack:
         lowest = -step * predicted / 2 - law["rest_slip"]
         innovation = np.where(y == 0, np.maximum(innovation, lowest), innovation)
         level = one.level + law["level_gain"] * (y - predicted) + law["slip_gain"] * innovation
-        return Courses(x, y, mu, level, predicted, one.x, one.y, one.r + step * rate, noise), p
+        return Courses(x, y, mu, level, predicted, one.x, one.y, one.r + interval * rate, noise), p
 
     def values(self, one):
         """Facets of courses, (courses, facets), and slip less reference."""
@@ -182,7 +190,8 @@ class Attack:
             asked = np.where(state.sum(axis=1) >= 0, 1.0, -1.0) * first
             sign = np.choose(kind, [first, flipped, np.where(period % 2 == 0, first, -first), asked])
             rate = np.where(np.floor(period / rates) % 2 == 0, self.fastest, 0.0)
-            rate = np.where(one.r + self.law["step"] * rate > self.target, 0.0, rate)
+            longest = self.law.get("longest", self.law["step"])
+            rate = np.where(one.r + longest * rate > self.target, 0.0, rate)
 
             def growth(x, early):
                 return np.where(x / stair % 1 < share, fall[0], np.where(kind == 1, fall[1], 0.0))

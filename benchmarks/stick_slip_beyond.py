@@ -9,8 +9,7 @@ samples, the largest slip rate and slip errors that are reached, whether these h
 the convex hull of the reached states: a polytope of the theorem needs about as many, and the theorem takes at most 400.
 
 A delay of one period adds the pressure that is under way to the state. A lag adds the pressure in the fault. With a
-slip rate that is measured within M the law reads max(measured − M, 0), so that it reads 0 at rest. Samples T to 2T
-apart are those of a law that takes T for the interval.
+slip rate that is measured within M the law reads max(measured − M, 0), so that it reads 0 at rest.
 
 Rock between well and fault has eight modes, which make 12 states. *One mode*: the slowest and the well's pressure are
 states, and the others an input, bounded by the largest step of the well so far; 5 states. *Held at rest*: while the law
@@ -39,7 +38,6 @@ class Loop:
     late: bool = False  # the pressure acts one period late
     lag: float = 0.0
     creep: float = 0.0  # twice the bound of the noise of the slip rate
-    longest: float = 1.0  # period over T_s
     level: float = 0.5
     slip: float = 0.5
     back: float = 0.3
@@ -67,14 +65,13 @@ class Fault:
 
 
 def slide(fault, loop, y, pressed, random):
-    """Slip rate, slip and rise of p* after a period, and its length; `pressed` is U in the fault at a time of it."""
+    """Slip rate, slip and rise of p* after a period; `pressed` is U in the fault at a time of it."""
     count = len(y)
     beta = random.choice([1.0, fault.beta], count)
     slope, other = random.choice(fault.slopes, (2, count))
     turn, sign = random.uniform(0, 1, count), random.choice([-1.0, 1.0], count)
     turn = np.where(random.random(count) < 0.3, 1.0, turn)
-    length = fault.step * (random.choice([1.0, loop.longest], count) if loop.longest > 1 else np.ones(count))
-    h, moved, now, lost = length / SUBSTEPS, np.zeros(count), y.copy(), np.zeros(count)
+    h, moved, now, lost = fault.step / SUBSTEPS, np.zeros(count), y.copy(), np.zeros(count)
     for i in range(SUBSTEPS):
         early = (i + 0.5) / SUBSTEPS < turn
         push = np.where(early, sign, -sign) * fault.amplitude
@@ -86,7 +83,7 @@ def slide(fault, loop, y, pressed, random):
         way = np.where(rests, 0, way)
         now = np.where(rests | stops, 0, end)
         moved, lost = moved + way, lost + np.where(early, slope, other) * way
-    return now, moved, lost / (fault.authority * beta), length
+    return now, moved, lost / (fault.authority * beta)
 
 
 def through_rock(fault, loop, states, random):
@@ -133,7 +130,7 @@ def through_rock(fault, loop, states, random):
         most = fault.step_seen * abs(shares[1]) * np.exp(-rates[1] * time) / (1 - np.exp(-rates[1] * fault.step))
         return asked - kept + np.where(time < turn, sign, -sign) * most
 
-    now, moved, lifted, _ = slide(fault, loop, y, pressed, random)
+    now, moved, lifted = slide(fault, loop, y, pressed, random)
     innovation = moved - fault.step * (y + predicted) / 2
     innovation = np.where(now <= 0, np.maximum(innovation, -fault.step * predicted / 2), innovation)
     level = d + per_rate * (loop.level * (now - predicted) + loop.slip / fault.step * innovation) - lifted
@@ -173,14 +170,14 @@ def period(fault, loop, states, random):
     def pressed(time):
         return asked + (under_way - asked) * np.exp(-time / loop.lag) if loop.lag else acting
 
-    now, moved, lifted, length = slide(fault, loop, y, pressed, random)
+    now, moved, lifted = slide(fault, loop, y, pressed, random)
     innovation = moved - fault.step * (seen + predicted) / 2
     innovation = np.where(now <= loop.creep, np.maximum(innovation, -fault.step * predicted / 2), innovation)
     read = np.maximum(now - loop.creep * random.choice([0.0, 1.0], count), 0)
     level = d + per_rate * loop.level * (read - predicted) + per_rate * loop.slip / fault.step * innovation - lifted
-    columns = [e1 + moved - length * r_rate, now, level]
+    columns = [e1 + moved - fault.step * r_rate, now, level]
     if states.shape[1] > 3:
-        columns.append(pressed(length) - lifted)
+        columns.append(pressed(fault.step) - lifted)
     return np.column_stack(columns)
 
 
@@ -217,9 +214,6 @@ def rows():
     yield Loop("lag of 0.05 s", lag=0.05)
     yield Loop("lag of 0.05 s, slower estimate", lag=0.05, level=0.3, slip=0.3, back=0.1, gain=1.425)
     yield Loop("lag of 0.2 s, slower estimate", lag=0.2, level=0.2, slip=0.2, back=0.1, gain=1.425)
-    yield Loop("samples T to 1.2T apart", longest=1.2)
-    yield Loop("samples T to 2T apart", longest=2.0)
-    yield Loop("samples T to 2T apart, slower estimate", longest=2.0, level=0.2, slip=0.2, back=0.1, gain=1.425)
     for path in (0.3, 1.0, 2.0):
         rock = Loop(f"rock of {path:g} s, all modes", path=path, rounds=100)
         yield rock

@@ -46,7 +46,7 @@ class StickSlipAnswer(LoopResult):
         if not self.found.proved:
             return None
         task = replace(self.found.task, amplitude=self.found.disturbance)  # which healing does not enlarge
-        return smallest_stick_slip_rate(task, self.found.held.step)
+        return smallest_stick_slip_rate(task, self.found.held.longest)
 
     def limit_lines(self) -> list[str]:
         """Performance limit at the same T_s, as text; empty if unknown."""
@@ -54,7 +54,7 @@ class StickSlipAnswer(LoopResult):
         if least is None or not self.found.proved:
             return []
         return [
-            f"no controller with zero-order hold over T_s = {float(self.found.held.step):.6g} s keeps the slip rate "
+            f"no controller with zero-order hold over T_s = {float(self.found.held.longest):.6g} s keeps the slip rate "
             f"below {least.quantity('m/s')} for all disturbances"
         ]
 
@@ -98,13 +98,14 @@ class StickSlipAnswer(LoopResult):
             },
             "limit": None if (least := self.least_slip_rate) is None else {"slip_rate": least.exact},
             "step": str(self.found.held.step),
+            **({"longest_step": str(self.found.held.longest_step)} if self.found.held.longest_step else {}),
             **{name: str(size) for name, size in self.found.held.noise.items()},
             "law": {name: str(getattr(law, name)) for name in GAIN_UNITS},
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
 
 
-TAKEN = frozenset({"step", "slip_noise"})
+TAKEN = frozenset({"step", "slip_noise", "longest_step"})
 """Quantities of a loop setup that the theorem knows."""
 
 
@@ -123,7 +124,7 @@ def answer_stick_slip(
     fault : Fault
         Its friction depends on slip and slip rate alone.
     setup : LoopSetup
-        Only its sampling time and noise of the slip may be given.
+        Only its sampling time, its longest interval and noise of the slip may be given.
     objective : str
         ``tracking`` or ``peak``.
     sliding : SlidingMode, optional
@@ -146,6 +147,7 @@ def answer_stick_slip(
     tell = progress or (lambda what, done: None)
     healing = rational(fault.friction.rest_excess)
     wanted: Any = {"objective": objective, "slip_noise": setup.slip_noise, "healing": healing, "tell": tell}
+    wanted["longest_step"] = setup.longest_step
     if sliding is None:
         return attacked_stick_slip(fault, design_stick_slip(task, step, **wanted))
     made = design_sticking(task, sliding, step, **wanted)

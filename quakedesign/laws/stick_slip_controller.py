@@ -56,6 +56,8 @@ class StickSlipController(Controller):
         T_s [s].
     sticks : bool
         Whether the predicted slip rate and the innovation at rest are cut off; without, the law is linear.
+    longest : Fraction
+        Of aperiodic sampling in runs, as of `Sampling` [s].
 
     Raises
     ------
@@ -73,6 +75,7 @@ class StickSlipController(Controller):
     law: StickSlipLaw
     step: Fraction
     sticks: bool = True
+    longest: Fraction = Fraction(0)
 
     def __post_init__(self) -> None:
         if self.law.pull:
@@ -83,7 +86,7 @@ class StickSlipController(Controller):
         object.__setattr__(self, "gains", MappingProxyType({name: getattr(self.law, name) for name in GAIN_UNITS}))
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
-        return partial(type(self), law=self.law, step=self.step, sticks=self.sticks), ()
+        return partial(type(self), law=self.law, step=self.step, sticks=self.sticks, longest=self.longest), ()
 
     @property
     def while_moving(self) -> "StickSlipController":
@@ -93,7 +96,7 @@ class StickSlipController(Controller):
     @property
     def sampling(self) -> Sampling:
         """By the scheme ``explicit``, once every T_s."""
-        return Sampling(step=self.step)
+        return Sampling(step=self.step, longest=self.longest)
 
     def pressure(self, signals: Signals) -> sp.Expr:
         """p of the law [Pa]."""

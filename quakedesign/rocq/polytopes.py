@@ -39,13 +39,15 @@ _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (
 def polytope_theorem(claim: StickSlipGuarantee) -> Iterator[str]:
     """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant."""
     task, held, reach = claim.task, claim.held, claim.reach
+    if held.longest_step:
+        raise UnsupportedError("Rocq verifies the stick-slip loop for periodic sampling alone. Use the two checkers")
     with ctx.workprec(BITS):
         push, moved = _outward(*pushes(task, held, reach)), task.reference_rates[0] * held.step
         found = ranges(task, reach.box[0] + moved, push, reach.box[1] * held.step)
         found = replace(found, **{name: _outward(*getattr(found, name)) for name in ("slope", "damping", "chord")})
-        period = Period.of(BALLS, task, held, found)
+        (period,) = periods = Period.all(BALLS, task, held, found, reach.box[1], push)
         deciding = verifiers(task, held, reach, found)
-        sliding, resting = (_hints(deciding, rows) for rows in facet_rows(period, reach))
+        sliding, resting = (_hints(deciding, rows) for rows in facet_rows(periods, reach))
         yield _loop(period)
         yield (
             "Definition facets : list facet :=\n  "

@@ -453,7 +453,7 @@ def test_a_well_is_told_by_its_distance_and_the_diffusivity_of_the_rock():
 def test_samples_by_no_clock_are_in_the_answer_and_in_the_file(call, tmp_path, monkeypatch):
     monkeypatch.setattr(design, "_FEWER", 8)
     path, asked = tmp_path / "loop.json", ("lab-fault", "--step", "1 ms", "--longest-step", "3/2000")
-    code, out, _ = call(*asked, "--objective", "peak", "--out", str(path))
+    code, out, _ = call(*asked, "--objective", "peak", "--out", str(path), "--plant", "printed")
     said = " ".join(out.split())
     assert (code, "with zero-order hold over sampling intervals from 0.001 s to 0.0015 s in any order" in said) == (
         0,
@@ -466,6 +466,19 @@ def test_samples_by_no_clock_are_in_the_answer_and_in_the_file(call, tmp_path, m
     for more in (("--controller", "cta"), ("--delay", "1/2000"), ("--jitter", "1/10000"), ("--rate-limit", "1 MPa/s")):
         code, _, err = call(*asked, *more)
         assert (code, "aperiodic sampling needs a linear law" in err) == (2, True)
+
+
+@pytest.mark.slow
+def test_aperiodic_sampling_is_proved_where_friction_sticks(call, tmp_path):
+    path = tmp_path / "loop.json"
+    code, out, _ = call("real-fault", "--step", "92 ms", "--longest-step", "184 ms", "--out", str(path), "--json")
+    found = json.loads(out)
+    assert (code, found["plant"], found["step"], found["longest_step"]) == (0, "stick-slip", "23/250", "23/125")
+    assert "over sampling intervals from 0.092 s to 0.184 s in any order" in found["sentence"]
+    assert float(F(found["peak_slip_rate"])) < 1.9e-4  # 2.6e-4 is what some other laws reach in floating point
+    assert found["worst_found"]["slip_rate"] < float(F(found["peak_slip_rate"]))
+    assert found["limit"]["slip_rate"] is not None
+    assert check_files([path], "real-fault")[str(path)][0] == "proved"
 
 
 def test_no_law_is_designed_for_intervals_that_no_controller_could_wait_for(call):

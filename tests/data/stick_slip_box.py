@@ -33,6 +33,7 @@ MULTIPLIERS = [
 
 
 NOISE = {False: {"rest_slip": "0", "slip_noise": "0"}, True: {"rest_slip": "1/40", "slip_noise": "1/90"}}
+NOISE["aperiodic"] = NOISE[True] | {"step": "3/8", "longest": "1/2"}
 
 
 def bases(cuts, more=()):

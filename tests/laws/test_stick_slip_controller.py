@@ -12,9 +12,9 @@ REAL = qd.load_fault("real-fault")
 CERTIFICATES = Path(__file__).parents[2] / "proofs" / "certificates"
 
 
-@pytest.fixture(scope="module", params=["stick_slip_real-fault.json", "stick_slip_noise_real-fault.json"])
+@pytest.fixture(scope="module", params=["", "noise_", "aperiodic_"])
 def law(request):
-    return qd.load_guarantee(CERTIFICATES / request.param).controller
+    return qd.load_guarantee(CERTIFICATES / f"stick_slip_{request.param}real-fault.json").controller
 
 
 def recursion(law, seen, reference, *, sticks=True):

@@ -30,7 +30,7 @@ LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES, *SLIDING, *STI
 each = pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 # a proof of each kind is checked by both elsewhere
 LONG = {"sliding_crustal-patch", "cta3_1_2_2_0.05_0.02_0.01", "uncertain_plant_pendulum"}
-LONG |= {"stick_slip_real-fault", "stick_slip_cta_real-fault"}
+LONG |= {f"stick_slip_{loop}real-fault" for loop in ("", "cta_", "aperiodic_")}
 each_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda p: p.stem)
 
 # L̄ and [b_m, b_M] of every file; four 2-CTA sets are those of Torres-González et al. (2017) for L̄ = 1, the fifth and
@@ -61,7 +61,7 @@ def test_the_catalogue_is_complete():
     loops = {"real-fault", "lab-fault", "cta_real-fault", "late_real-fault", "no-clock_lab-fault"}
     assert {p.stem for p in GUARANTEES} == {f"guarantee_{loop}" for loop in loops}
     assert {p.stem for p in SLIDING} == {"sliding_crustal-patch"}
-    sticking = {"real-fault", "noise_real-fault", "cta_real-fault"}
+    sticking = {"real-fault", "noise_real-fault", "cta_real-fault", "aperiodic_real-fault"}
     assert {p.stem for p in STICKING} == {f"stick_slip_{loop}" for loop in sticking}
     assert {p.stem for p in PLANTS} == {"uncertain_plant_pendulum", "uncertain_plant_real-fault-2-blocks"}
     assert {p.stem for p in POLYNOMIALS} == {"motzkin_not-sos", "motzkin_multiplier_sos"}

@@ -15,7 +15,7 @@ def stored(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["", "noise_", "cta_"])
+@pytest.mark.parametrize("kind", ["", "noise_", "cta_", "aperiodic_"])
 def test_no_course_leaves_the_polytope_or_passes_a_claim(kind):
     found = Attack(stored(f"stick_slip_{kind}real-fault.json")).run(periods=150, long=2000)
     assert 0.7 < found["facet"] < 1

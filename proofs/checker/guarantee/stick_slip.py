@@ -19,6 +19,7 @@ from .task import Rock, Task, read_rock, read_task
 MAX_FACETS, MAX_BASES = 400, 40_000
 PIECES = 16  # of a period, for integrals of impulse responses
 LINES = 5  # bounds of the slip until a stop, less one
+PARTS = 4  # of a range of intervals between samples
 AXES = ((0, 1), (1, 1), (2, 1), (0, -1), (2, -1))
 LAW = ("rate_gain", "target_gain", "return_rate", "level_gain", "slip_gain", "rest_slip")
 CLAIMS = ("slip_behind", "slip_ahead", "peak_slip_rate", "least_pressure", "largest_pressure")
@@ -43,7 +44,10 @@ class End:
 
 @dataclass
 class Law:
-    """Gains of the law, its period, what it takes for rest, noise of its measurements, and its implicit step."""
+    """Gains of the law, its period, what it takes for rest, noise of its measurements, and its implicit step.
+
+    Intervals between samples are from `step` to `longest`, which is 0 where all are `step`.
+    """
 
     step: Fraction
     rate: Fraction
@@ -53,7 +57,19 @@ class Law:
     slip: Fraction
     rest_slip: Fraction
     slip_noise: Fraction
+    longest: Fraction
     pull: Sum
+
+    @property
+    def most(self) -> Fraction:
+        """The longest interval."""
+        return self.longest or self.step
+
+    @property
+    def intervals(self) -> list[Fraction]:
+        """Those that decide."""
+        parts = PARTS if self.longest else 0
+        return [self.step + (self.most - self.step) * i / (parts or 1) for i in range(parts + 1)]
 
     @property
     def told(self) -> Fraction:
@@ -76,10 +92,13 @@ class Reach:
 
 def read_law(value: Any) -> Law:
     """Gains and period."""
-    implicit = type(value) is dict and "pull" in value
-    given = keys(value, "loop", "step", *LAW, "slip_noise", *(("pull",) if implicit else ()))
-    pull = read_sum(given["pull"]) if implicit else []
-    law = Law(*(number(given[name], name) for name in ("step", *LAW, "slip_noise")), pull)
+    more = [name for name in ("pull", "longest") if type(value) is dict and name in value]
+    given = keys(value, "loop", "step", *LAW, "slip_noise", *more)
+    pull = read_sum(given["pull"]) if "pull" in more else []
+    longest = number(given["longest"], "longest") if "longest" in more else Fraction(0)
+    law = Law(*(number(given[name], name) for name in ("step", *LAW, "slip_noise")), longest, pull)
+    need("longest" not in more or law.longest > law.step, "longest must be above step where it is given")
+    need(not (law.longest and pull), "a sliding mode must have one step alone, so no longest")
     need(min(law.step, law.rate, law.target, law.back) > 0, "step, rate, target and return gains must be > 0")
     need(min(law.level, law.slip) >= 0, "level_gain and slip_gain must be >= 0")
     need(0 <= 2 * law.slip_noise <= law.rest_slip, "slip_noise must be from 0 to half of rest_slip")
@@ -131,7 +150,7 @@ class Period:
         self.task, self.law, self.reach = task, law, reach
         self.bend, self.force = task.reference_acceleration, task.amplitude
         self.rate = task.reference_rate + law.told  # as the law is told it
-        self.still = self.bend * law.step / 2 + law.told  # r' up to which the reference may stand still
+        self.still = self.bend * law.most / 2 + law.told  # r' up to which the reference may stand still
         ahead, self.peak, up, behind, down = (1 / abs(sum(row)) for row in reach.facets[:5])
         self.ahead, self.behind, self.level = ahead, behind, max(up, down)
         zero, one = Fraction(0), Fraction(1)
@@ -169,7 +188,7 @@ class Period:
     def find_ranges(self, rock: Rock, target: Fraction, growths: Row) -> None:
         """Ranges of slopes and damping, and what must hold of them."""
         task, law = self.task, self.law
-        slip = target + self.ahead + task.reference_rate * law.step
+        slip = target + self.ahead + task.reference_rate * law.most
         still = rock.stress(slip, growths[0])
         stress = still[0] + self.push[0], still[1] + self.push[1]
         need(stress[0] > 0, "the fault must not open")
@@ -181,8 +200,8 @@ class Period:
         stiffness = max(rock.stiffness[1] - growths[0], Fraction(0))
         load = rock.area[0] * rock.mu["static"] * task.normal_stress
         need(load > stiffness * slip + self.force, "the shear stress must not reverse")
-        need(self.slope[1] * law.step**2 < 1, "the step must be short against the weakening of friction")
-        moves = 1 + task.slope_of_beta * law.step * self.peak
+        need(self.slope[1] * law.most**2 < 1, "the step must be short against the weakening of friction")
+        moves = 1 + task.slope_of_beta * law.most * self.peak
         low, high = (moves * v for v in rock.of_slip(still, growths[0]))
         self.chord = min(low, Fraction(0)), max(high, Fraction(0))
         self.longest = min(g * self.peak + h for g, h in self.stops())
@@ -191,29 +210,52 @@ class Period:
 
     def find_responses(self) -> None:
         """Impulse responses at the ends of the pieces, their integrals and what bounds their curvature."""
-        step, zero, one = self.law.step, Fraction(0), Fraction(1)
+        step, zero, one = self.law.most, Fraction(0), Fraction(1)
         (s, ds), (w, dw) = (((high + low) / 2, (high - low) / 2) for low, high in (self.slope, self.damping))
         self.growth = 1 / (1 - self.slope[1] * step**2 / 2)
         self.per_slip, self.per_rate = ds * self.growth, dw  # what counts beside the force
-        whole = exponential([[zero, one, zero], [s, -w, one], [zero, zero, zero]], step)
-        self.of_rate, self.of_force = ([Near(whole.rows[i][j], whole.error) for i in (0, 1)] for j in (1, 2))
-        flow = [[zero, one], [s, -w]]
-        nodes = [exponential(flow, step * i / PIECES) for i in range(PIECES + 1)]
-        self.nodes = [[Near(node.rows[i][1], node.error) for i in (0, 1)] for node in reversed(nodes)]
         within = exponential([[zero, one], [abs(s), max(-w, zero)]], step).size()
         square = [[abs(s), abs(w)], [abs(s * w), abs(s + w * w)]]
-        self.bent = [
-            Near.of(square[i][0]) * Near(within.rows[0][1], 0) + Near.of(square[i][1]) * Near(within.rows[1][1], 0)
-            for i in (0, 1)
+        once = [[zero, one], [abs(s), abs(w)]]
+        own = [Near(within.rows[i][1], 0) for i in (0, 1)]
+        moved, self.bent = ([Near.of(a) * own[0] + Near.of(b) * own[1] for a, b in rows] for rows in (once, square))
+        self.between = self.beside(own, moved)
+
+    def beside(self, own: list[Near], moved: list[Near]) -> list[Near]:
+        """What factors of slip and slip rate may make of a facet at an interval between two that decide, beyond these.
+
+        Squared distance of these over 8, times a bound of the second derivative by the interval.
+        """
+        law, task, most = self.law, self.task, self.law.most
+        part = (most - law.step) ** 2 / PARTS**2 / 8
+        noise = law.slip * law.slip_noise
+        pushed = task.beta[1] * task.b * (max(map(abs, self.push)) + law.target * self.still + noise)
+        force, steep = self.force + pushed, 3 * self.per_rate * self.slope[1] * self.growth
+        first, last = self.force + self.per_rate * self.peak, self.per_rate * force
+        last += most * force * (self.per_slip + steep * most)
+        return [
+            (bent.times(self.peak) + step.times(pushed + first) + size.times(last)).times(part)
+            for size, step, bent in zip(own, moved, self.bent, strict=True)
         ]
+
+    def respond(self, interval: Fraction) -> None:
+        """Responses to slip rate, force and impulses over an interval between samples."""
+        self.interval, zero, one = interval, Fraction(0), Fraction(1)
+        (s, w) = (sum(pair) / 2 for pair in (self.slope, self.damping))
+        whole = exponential([[zero, one, zero], [s, -w, one], [zero, zero, zero]], interval)
+        self.of_rate, self.of_force = ([Near(whole.rows[i][j], whole.error) for i in (0, 1)] for j in (1, 2))
+        flow = [[zero, one], [s, -w]]
+        nodes = [exponential(flow, interval * i / PIECES) for i in range(PIECES + 1)]
+        self.nodes = [[Near(node.rows[i][1], node.error) for i in (0, 1)] for node in reversed(nodes)]
         alone = self.integrals(one, zero)
         of_rate, of_force = self.others(alone)
         off = (self.task.beta[1] - 1) ** 2 / (4 * self.task.beta[1] * self.task.b)  # of a chord of 1/beta
         self.gap = (self.of_rate[0] + of_rate).times(off), (self.of_force[0] + of_force).times(off)
+        self.beyond = self.between[0].times(off)
 
     def integrals(self, of_slip: Fraction, of_rate: Fraction) -> list[Near]:
         """Integrals of h(t)·t^j over a period, h >= |of_slip·X(T - t) + of_rate·Y(T - t)| by chords between nodes."""
-        first, second, piece = Near.of(of_slip), Near.of(of_rate), self.law.step / PIECES
+        first, second, piece = Near.of(of_slip), Near.of(of_rate), self.interval / PIECES
         above = (abs(first) * self.bent[0] + abs(second) * self.bent[1]).times(piece**2 / 8)
         sizes = [abs(first * x + second * y) + above for x, y in self.nodes]
         off = max(v.off for v in sizes)
@@ -234,16 +276,16 @@ class Period:
         law = self.law
         return [law.target * (law.back - end.of_error), law.rate, Fraction(1)], -law.target * end.constant
 
-    def carried(self, facet: Row, end: End) -> tuple[Fraction, Fraction, Fraction]:
+    def carried(self, facet: Row, end: End, interval: Fraction) -> tuple[Fraction, Fraction, Fraction]:
         """What law and reference make of a facet: of e1, a constant, and of r' where the end takes it as 0."""
         law, (n1, _, n3) = self.law, facet
         predicted = n3 * (law.level + law.slip * law.step / 2)
         sign = int(end.positive)
-        of_error = n1 - n1 * law.step * end.of_error - predicted * sign * (end.of_error - law.back)
-        constant = -n1 * law.step * end.constant - predicted * sign * end.constant
+        of_error = n1 - n1 * interval * end.of_error - predicted * sign * (end.of_error - law.back)
+        constant = -n1 * interval * end.constant - predicted * sign * end.constant
         if n1 > 0 and end.still:  # the reference never falls
             return of_error, constant, -predicted * sign
-        constant += abs(n1) * self.bend * law.step**2 / 2 + max(n1, Fraction(0)) * law.told * law.step
+        constant += abs(n1) * self.bend * interval**2 / 2 + max(n1, Fraction(0)) * law.told * interval
         return of_error, constant, Fraction(0)
 
     def sliding(self, facet: Row, given: Row, cut: bool) -> Iterator[tuple[int, Function]]:
@@ -256,7 +298,8 @@ class Period:
         for chord in self.chord:
             slips = [n1 + n3 * ((0 if cut else law.slip) - chord / (beta * task.b)) for beta in task.beta]
             slips = [max(v, Fraction(0)) if flag else v for v in slips]
-            bent = [v.times(abs(n3 * chord) if any(slips) else Fraction(0)) for v in self.gap]
+            curved = abs(n3 * chord) if any(slips) else Fraction(0)
+            bent = [v.times(curved) for v in self.gap]
             for beta, of_slip in zip(task.beta, slips, strict=True):
                 area = self.integrals(of_slip, of_rate)
                 beside = self.others(area)
@@ -270,9 +313,11 @@ class Period:
                     by_rate += Near.of(-n3 * law.slip * law.step / 2)
                 by_force = (area[0] + beside[1] + bent[1]).times(self.force)
                 by_force += abs(by_push).times(law.slip * law.slip_noise)
+                by_force += self.between[0].times(abs(of_slip)) + self.between[1].times(abs(of_rate))
+                by_force += self.beyond.times(curved)
                 for end in self.ends:
                     row, push = self.pushed(end)
-                    of_error, constant, late = self.carried(facet, end)
+                    of_error, constant, late = self.carried(facet, end, self.interval)
                     more = [by_push.times(share) for share in row]
                     more[1] += by_rate
                     total = by_push.times(push) + by_force
@@ -283,7 +328,7 @@ class Period:
 
     def stops(self) -> list[Range]:
         """Factors and constants of y that bound the slip until a last stop."""
-        step, (low, high) = self.law.step, self.damping
+        step, (low, high) = self.law.most, self.damping
         least = Fraction(1, 2) + low * step / 24
         found = []
         for i in range(LINES + 1):
@@ -321,14 +366,15 @@ class Period:
     def stopped(self, facet: Row, given: Row, end: End) -> Iterator[Function]:
         """Bounds of a facet after a period that ends at rest, functions of (e1, y, d) and the slip until a stop."""
         law, (n1, _, n3) = self.law, facet
-        of_error, constant, late = self.carried(facet, end)
-        constant += max(late, Fraction(0)) * self.still
-        for chord in self.chord:
-            for share in (Fraction(0), Fraction(1)) if n3 > 0 else (given[4],):
-                part = n3 * law.slip * share
-                less = Fraction(0) if n3 > 0 else (part - n3 * law.slip) * (law.rest_slip + 2 * law.slip_noise)
-                row = [of_error, -part * law.step / 2, n3, n1 - n3 * chord / self.task.b + part]
-                yield Function(row, constant + less, [NOTHING] * 4)
+        for interval in {law.step, law.most}:
+            of_error, constant, late = self.carried(facet, end, interval)
+            constant += max(late, Fraction(0)) * self.still
+            for chord in self.chord:
+                for share in (Fraction(0), Fraction(1)) if n3 > 0 else (given[4],):
+                    part = n3 * law.slip * share
+                    less = Fraction(0) if n3 > 0 else (part - n3 * law.slip) * (law.rest_slip + 2 * law.slip_noise)
+                    row = [of_error, -part * law.step / 2, n3, n1 - n3 * chord / self.task.b + part]
+                    yield Function(row, constant + less, [NOTHING] * 4)
 
     def verify(self) -> None:
         """Refuse the set unless no facet exceeds 1 after a period."""
@@ -336,25 +382,27 @@ class Period:
         at_first = self.law.slip_noise, self.law.slip * self.law.slip_noise
         inside = all(n1 * at_first[0] + max(n3, 0) * at_first[1] <= 1 for n1, _, n3 in self.reach.facets)
         need(inside, "the set must hold the loop at first, with noise of its first measurement")
-        for which, (facet, multipliers) in given:
-            for cut in (False, True) if facet[2] > 0 else (False,):
-                for place, function in self.sliding(facet, multipliers, cut):
-                    within = self.flat[place].largest(function, which) <= ONE
-                    need(within, f"facet {which} must hold after a period that slides. It may not")
+        for interval in self.law.intervals:
+            self.respond(interval)
+            for which, (facet, multipliers) in given:
+                for cut in (False, True) if facet[2] > 0 else (False,):
+                    for place, function in self.sliding(facet, multipliers, cut):
+                        within = self.flat[place].largest(function, which) <= ONE
+                        need(within, f"facet {which} must hold after a period that slides. It may not")
         for polytope, ends in self.resting():
             for which, (facet, multipliers) in given:
                 for end in ends:
                     for function in self.stopped(facet, multipliers, end):
                         within = polytope.largest(function, which) <= ONE
                         need(within, f"facet {which} must hold after a period that ends at rest. It may not")
-        step = self.law.step
+        step, least = self.law.most, Fraction(0 if self.law.longest else 1)
         share = self.per_slip * step**2 / 2 + self.per_rate * step * (1 + self.slope[1] * self.growth * step**2)
-        spread = self.task.b * (self.task.beta[1] - self.task.beta[0]) * max(self.push[1], Fraction(0))
+        spread = self.task.b * (self.task.beta[1] - least) * max(self.push[1], Fraction(0))
         need(share * spread <= self.force, "the disturbance must outweigh the range of the input gain")
 
     def bounds(self) -> dict[str, Fraction]:
         """What the set gives, by claims."""
-        noise, moved = self.law.slip_noise, self.task.reference_rate * self.law.step
+        noise, moved = self.law.slip_noise, self.task.reference_rate * self.law.most
         pressure = self.rest[0] - self.push[1], self.rest[1] - self.push[0]
         return dict(
             zip(CLAIMS, (self.behind + noise + moved, self.ahead - noise + moved, self.peak, *pressure), strict=True)
@@ -422,8 +470,9 @@ def statement(document: dict[str, Any], period: Period, claims: dict[str, Fracti
         f"derived accelerations: of a slip within a period [{lower(period.slope[0])}, {upper(period.slope[1])}] 1/s^2, "
         f"of a slip rate less [{lower(period.damping[0])}, {upper(period.damping[1])}] 1/s, of a pressure "
         f"{upper(task.b)} m^2/kg times [1, {upper(task.beta[1])}]",
-        f"{'sliding mode' if law.pull else 'law'} for friction that sticks, every {document['loop']['step']} s, its "
-        f"pressure held, {measured}; a set of {len(period.reach.facets)} facets"
+        f"{'sliding mode' if law.pull else 'law'} for friction that sticks, every {document['loop']['step']} s"
+        + (f" to {document['loop']['longest']} s in any order" if law.longest else "")
+        + f", its pressure held, {measured}; a set of {len(period.reach.facets)} facets"
         + ("; its implicit step is deadbeat, w = -e1/step, on this set" if law.pull else ""),
         f"disturbance: {kind}; from rest, along the reference, for all t >= 0",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",

@@ -1,6 +1,7 @@
 """Files of guarantees on the stick–slip plant (proofs/FORMAT.md)."""
 
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 from quakedesign.exact import exact_text
@@ -30,6 +31,7 @@ def stick_slip_document(claim: StickSlipGuarantee) -> dict[str, Any]:
             **{name: exact_text(getattr(claim.held, name)) for name in _OF_LOOP},
             **{name: exact_text(getattr(claim.held.law, name)) for name in GAIN_UNITS},
             **({"pull": sum_document(claim.held.law.pull)} if claim.held.law.pull else {}),
+            **({"longest": exact_text(claim.held.longest_step)} if claim.held.longest_step else {}),
         },
         "set": set_document(claim.reach),
     }
@@ -58,11 +60,15 @@ def read_stick_slip(raw: Any, task: FaultPlant, claims: Callable[[type], Any]) -
     pull: tuple[Power, ...] = ()
     if isinstance(given, dict) and "pull" in given:
         pull = ImplicitRoot(pull=read_sum(given.pop("pull"))).pull
-    loop = read_exactly(given, (*_OF_LOOP, *GAIN_UNITS))
+    aperiodic = isinstance(given, dict) and "longest" in given
+    loop = read_exactly(given, (*_OF_LOOP, *GAIN_UNITS, *(("longest",) if aperiodic else ())))
+    need(not aperiodic or loop["longest"] > 0, "longest must be positive where it is given")
     law = StickSlipLaw(**{name: loop[name] for name in GAIN_UNITS}, pull=pull)
     return StickSlipGuarantee(
         task=task,
-        held=SampledStickSlip(law=law, **{name: loop[name] for name in _OF_LOOP}),
+        held=SampledStickSlip(
+            law=law, **{name: loop[name] for name in _OF_LOOP}, longest_step=loop.get("longest", Fraction(0))
+        ),
         reach=read_set(raw["set"]),
         claims=claims(StickSlipClaims),
     )

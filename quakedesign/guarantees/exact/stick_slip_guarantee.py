@@ -76,7 +76,7 @@ class StickSlipGuarantee:
                 "a certificate of a sliding mode states its implicit step, got no gains of a law: use the controller "
                 "of the design, or recovered of the certificate"
             )
-        return laws.StickSlipController(law=self.held.law, step=self.held.step)
+        return laws.StickSlipController(law=self.held.law, step=self.held.step, longest=self.held.longest_step)
 
     def covered_healing(self, disturbance: Fraction = Fraction(0)) -> LowerBound:
         """Healing Δμ_h [-] that these claims cover as well where the disturbance is at most the given one [m/s²].
@@ -135,8 +135,11 @@ class StickSlipGuarantee:
             size += f" and friction at rest up to {LowerBound(self.healing):.3g} above friction in slip"
         behind, ahead = claims.slip_behind.quantity("m"), claims.slip_ahead.quantity("m")
         pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
+        over = f"{UpperBound(held.step):.6g} s"
+        if held.longest_step:
+            over = f"sampling intervals from {over} to {LowerBound(held.longest_step):.6g} s in any order"
         return (
-            f"from rest, with zero-order hold over {UpperBound(held.step):.6g} s and {self._measured()}, "
+            f"from rest, with zero-order hold over {over} and {self._measured()}, "
             f"for every disturbance of at most {size}, for all friction and constant parameters of the box: "
             f"the slip rate never exceeds {claims.peak_slip_rate.quantity('m/s')}, whether the fault slides or sticks, "
             f"the slip stays between {behind} behind and {ahead} ahead of the reference, the pressure between "

@@ -52,6 +52,14 @@ which moves up to 2cNT less than that, and U is m·n larger. Where the innovatio
 m(rest_slip + 2N) to −mTv⁺/2 of it, never less than without cut-off; otherwise noise leaves d. At first e1 = N, and d =
 0 as x⁻ = 0 and the first innovation, n, is not cut off; d from 0 to m·N is checked.
 
+**Aperiodic sampling.** Each interval between samples is any h from T to T_m, and T is a constant of the law. The bound
+of a facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|m(h − s)ds over [0, h], where g
+is its response to an impulse and m(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. It
+is required that m ≥ 0 up to T_m, so that V is one for all h, not of the state's own h alone. g is Lipschitz, so V″ ≥ −B
+almost everywhere, and V stays below its chord over Δ plus Δ²B/8: bounds at five intervals decide, with B from |l″|,
+|g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so that both ends decide, and a period that ends at
+rest is one of T_m whose last part nothing releases: the slip until a stop has the bound of T_m.
+
 **Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ =
 −wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
 """
@@ -78,6 +86,7 @@ from quakedesign.plant.ranges import FaultPlant, Range
 BITS = 128
 NODES = 16  # pieces of a period, for integrals of impulse responses
 LINES = 5  # bounds of the slip until a stop, less one
+PIECES = 4  # of a range of intervals between samples
 MOST_FACETS, MOST_BASES = 400, 40_000
 _GRAIN = 2.0**-40  # of multipliers
 _FLAT = 1e-12  # volume below which the normals of a vertex count as dependent
@@ -180,21 +189,29 @@ class SampledStickSlip:
         T_s [s].
     slip_noise : Fraction
         Bound of the measurement error of the slip [m], at most half of the law's rest_slip. The slip rate is exact.
+    longest_step : Fraction
+        Of aperiodic sampling: each interval between samples is from `step` to this [s]; 0 for periodic sampling.
 
     Raises
     ------
     ParameterError
-        For a step that is not positive, noise out of its range, or a sliding mode with other gains than a deadbeat
-        step has.
+        For a step that is not positive, a longest step that is not larger, noise out of its range, or a sliding mode
+        with other gains than a deadbeat step has, or with aperiodic sampling.
     """
 
     law: StickSlipLaw
     step: Fraction
     slip_noise: Fraction = _ZERO
+    longest_step: Fraction = _ZERO
 
     def __post_init__(self) -> None:
         if self.step <= 0:
             raise ParameterError(f"T_s must be positive, got {shortly(self.step)} s")
+        if self.longest_step and (self.longest_step <= self.step or self.law.pull):
+            raise ParameterError(
+                f"longest_step must be 0 or above T_s, {shortly(self.step)} s, and 0 for a sliding mode, got "
+                f"{shortly(self.longest_step)} s"
+            )
         if not 0 <= 2 * self.slip_noise <= self.law.rest_slip:
             raise ParameterError(
                 f"slip_noise must be from 0 to half of rest_slip, {shortly(self.law.rest_slip)} m, "
@@ -212,6 +229,18 @@ class SampledStickSlip:
     def noise(self) -> dict[str, Fraction]:
         """Bounds of measurement errors, as `Held.noise`."""
         return {"slip_noise": self.slip_noise} if self.slip_noise else {}
+
+    @property
+    def longest(self) -> Fraction:
+        """Longest interval between samples [s]."""
+        return self.longest_step or self.step
+
+    @property
+    def intervals(self) -> tuple[Fraction, ...]:
+        """Intervals between samples that decide for all [s]."""
+        if not self.longest_step:
+            return (self.step,)
+        return tuple(self.step + (self.longest_step - self.step) * i / PIECES for i in range(PIECES + 1))
 
     @property
     def told(self) -> Fraction:
@@ -304,7 +333,7 @@ class Numbers:
 
     number: Callable[[Fraction], Any]
     exponential: Callable[[tuple[tuple[Fraction, ...], ...]], list[list[Any]]]
-    bent: Callable[[tuple[tuple[Fraction, ...], ...], Fraction], tuple[Any, Any]]
+    bent: Callable[[tuple[tuple[Fraction, ...], ...], Fraction], tuple[tuple[Any, Any], ...]]
     array: Callable[[Any], np.ndarray]
     middle: Callable[[np.ndarray], np.ndarray]
 
@@ -318,12 +347,12 @@ def _ball_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[Any]]
     return found
 
 
-def curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[Any, Any]:
-    """Bounds of |(A²e^{Aτ})_12| and |(A²e^{Aτ})_22| for 0 ≤ τ ≤ T."""
+def curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[tuple[Any, Any], ...]:
+    """Bounds of |(A^k e^{Aτ})_12| and |(A^k e^{Aτ})_22| for 0 ≤ τ ≤ T, k = 0 to 2."""
     a = matrix(flow)
     within = absolute((majorant(a) * ball(step)).exp())
-    found = absolute(a * a) * within
-    return found[0, 1].upper(), found[1, 1].upper()
+    powers = (within, absolute(a) * within, absolute(a * a) * within)
+    return tuple((found[0, 1].upper(), found[1, 1].upper()) for found in powers)
 
 
 def _ball_array(values: Any) -> np.ndarray:
@@ -415,7 +444,7 @@ def stop_bounds(task: FaultPlant, held: SampledStickSlip, found: Ranges) -> tupl
     ParameterError
         For a period that is long against the plant.
     """
-    step, amplitude = held.step, task.amplitude
+    step, amplitude = held.longest, task.amplitude
     low, high = found.damping
     least = Fraction(1, 2) + low * step / 24
     pairs = []
@@ -432,36 +461,56 @@ def stop_bounds(task: FaultPlant, held: SampledStickSlip, found: Ranges) -> tupl
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Period:
-    """One period in numbers of a back end; SI units."""
+    """One interval between samples in numbers of a back end; SI units."""
 
     back: Numbers
     task: FaultPlant
     held: SampledStickSlip
     found: Ranges
+    interval: Fraction
     of_rate: tuple[Any, Any]  # ξ and y at the end, of y
     of_force: tuple[Any, Any]  # and of a constant force
     impulses: tuple[np.ndarray, np.ndarray]  # ξ and y, a time after an impulse, at the nodes
     bent: tuple[Any, Any]
+    between: tuple[Any, ...]  # what ξ and y may be more at an interval between two that decide
 
     @classmethod
-    def of(cls, back: Numbers, task: FaultPlant, held: SampledStickSlip, found: Ranges) -> "Period":
-        """From exact ranges."""
+    def all(
+        cls, back: Numbers, task: FaultPlant, held: SampledStickSlip, found: Ranges, rate: Fraction, push: Range
+    ) -> "list[Period]":
+        """Those that decide, from exact ranges, the largest slip rate [m/s] and the range of U [Pa]."""
+        return [cls._of(back, task, held, found, interval, rate, push) for interval in held.intervals]
+
+    @classmethod
+    def _of(
+        cls,
+        back: Numbers,
+        task: FaultPlant,
+        held: SampledStickSlip,
+        found: Ranges,
+        interval: Fraction,
+        rate: Fraction,
+        push: Range,
+    ) -> "Period":
         zero, one = _ZERO, Fraction(1)
         slope, damping = (sum(pair, _ZERO) / 2 for pair in (found.slope, found.damping))
         flow = (zero, one), (slope, -damping)
         tall = (*((*row, entry) for row, entry in zip(flow, (zero, one), strict=True)), (zero, zero, zero))
-        whole = back.exponential(tuple(tuple(v * held.step for v in row) for row in tall))
-        piece = held.step / NODES
+        whole = back.exponential(tuple(tuple(v * interval for v in row) for row in tall))
+        piece = interval / NODES
         nodes = [back.exponential(tuple(tuple(v * piece * i for v in row) for row in flow)) for i in range(NODES + 1)]
+        sizes = back.bent(flow, held.longest)
         return cls(
             back=back,
             task=task,
             held=held,
             found=found,
+            interval=interval,
             of_rate=(whole[0][1], whole[1][1]),
             of_force=(whole[0][2], whole[1][2]),
             impulses=(back.array([node[0][1] for node in nodes]), back.array([node[1][1] for node in nodes])),
-            bent=back.bent(flow, held.step),
+            bent=sizes[2],
+            between=_between(back, task, held, found, sizes, rate, push),
         )
 
     def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
@@ -470,7 +519,7 @@ class Period:
         On a piece h is the chord of its ends plus h²/8·max|g″|. All integrals are of this one function, as what they
         multiply may be negative alone.
         """
-        number, h = self.back.number, self.held.step / NODES
+        number, h = self.back.number, self.interval / NODES
         above = (abs(of_slip) * self.bent[0] + abs(of_rate) * self.bent[1]) * number(h**2 / 8)
         sizes = abs(of_slip[:, None] * self.impulses[0] + of_rate[:, None] * self.impulses[1]) + above[:, None]
         sizes = sizes[:, ::-1]  # from the start of the period on
@@ -482,11 +531,40 @@ class Period:
     def more(self, whole: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """What the ranges of slope and damping add to factors of y and of H − bβU."""
         number, found = self.back.number, self.found
-        growth = 1 / (1 - found.slope[1] * self.held.step**2 / 2)
+        growth = 1 / (1 - found.slope[1] * self.held.longest**2 / 2)
         per_slip = number((found.slope[1] - found.slope[0]) / 2 * growth)
         per_rate, steepest = number((found.damping[1] - found.damping[0]) / 2), number(found.slope[1] * growth)
         of_rate = per_slip * whole[1] + per_rate * (whole[0] + steepest * whole[2])
         return of_rate, (per_slip * whole[2] + per_rate * steepest * whole[3]) / 2 + per_rate * whole[1]
+
+
+def _between(
+    back: Numbers,
+    task: FaultPlant,
+    held: SampledStickSlip,
+    found: Ranges,
+    sizes: tuple[tuple[Any, Any], ...],
+    rate: Fraction,
+    push: Range,
+) -> tuple[Any, ...]:
+    """Bounds of Δ²/8 times the second derivative of a facet by the interval, of factors of ξ and y; Δ that of pieces.
+
+    `sizes` are bounds of the impulse responses of ξ and y and of their first two derivatives.
+    """
+    number, longest, most = back.number, held.longest, task.beta[1] * task.authority
+    step = (longest - held.step) / PIECES if held.longest_step else _ZERO
+    still = task.reference_rates[1] * longest / 2 + held.told
+    pushed = most * (max(map(abs, push)) + held.law.target_gain * still + held.push_noise)
+    growth = 1 / (1 - found.slope[1] * longest**2 / 2)
+    per_slip, per_rate = (found.slope[1] - found.slope[0]) / 2 * growth, (found.damping[1] - found.damping[0]) / 2
+    force = task.amplitude + pushed
+    first, later = task.amplitude + per_rate * rate, per_rate * force
+    last = longest * force * (per_slip + 3 * per_rate * found.slope[1] * growth * longest)
+    own, moved, bent = sizes
+    return tuple(
+        number(step**2 / 8) * (c * number(rate) + b * number(pushed + first) + a * number(later + last))
+        for a, b, c in zip(own, moved, bent, strict=True)
+    )
 
 
 def _weights() -> list[list[Fraction]]:
@@ -567,13 +645,14 @@ def _carried(
     back: Numbers,
     task: FaultPlant,
     held: SampledStickSlip,
+    step: Fraction,
     facets: np.ndarray,
     ends: Sequence[tuple[int, _Combination]],
 ) -> Iterator[_Carried]:
-    number, law, step = back.number, held.law, held.step
+    number, law = back.number, held.law
     n1, _, n3 = facets.T
     (fastest, bend), told = task.reference_rates, held.told
-    predicted = n3 * number(law.level_gain + law.slip_gain * step / 2)
+    predicted = n3 * number(law.level_gain + law.slip_gain * held.step / 2)
     for place, combination in ends:
         push, push0, (q1, q0) = push_row(held, fastest + told, combination)
         p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
@@ -584,7 +663,7 @@ def _carried(
         late = back.array(moves.tolist()) * late
         of_error = n1 - n1 * number(step * q1) - predicted * number(p1)
         constant = late - n1 * number(step * q0) - predicted * number(p0)
-        kept = back.array((1 - moves).tolist()) * number(bend * step / 2 + told)
+        kept = back.array((1 - moves).tolist()) * number(bend * held.longest / 2 + told)
         yield _Carried(place, push, push0, of_error, constant, -predicted * int(combination[1]), kept)
 
 
@@ -610,7 +689,8 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
             (period.of_rate[0], period.of_force[0]), period.more(period.integrals(lone, none)), strict=True
         )
     ]
-    carried = list(_carried(back, task, held, facets, list(enumerate(COMBINATIONS))))
+    carried = list(_carried(back, task, held, period.interval, facets, list(enumerate(COMBINATIONS))))
+    between = period.between[0] * off  # of what 1/β lacks of its chord
     for cut in (False, True):
         which = raised if cut else everyone
         if not len(which):
@@ -633,6 +713,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
                 of_y = of_y if cut else of_y - a3 * slip * half
                 force = bound * (whole[0] + of_force + curved * gaps[1])
                 force = force + abs(pushed) * number(held.push_noise)
+                force = force + abs(of_slip) * period.between[0] + abs(of_rate) * period.between[1] + curved * between
                 for part in carried:
                     factors = [pushed * number(v) for v in part.push]
                     columns = [part.of_error[which] + factors[0], of_y + factors[1], a3 + factors[2]]
@@ -655,7 +736,8 @@ def resting_rows(
     rises = back.middle(n3) > 0
     raised, lowered = np.flatnonzero(rises), np.flatnonzero(~rises)
     slip, half = number(law.slip_gain), number(held.step / 2)
-    for part in _carried(back, task, held, facets, _AT_REST):
+    both = (held.step, held.longest) if held.longest_step else (held.step,)
+    for part in chain(*(_carried(back, task, held, interval, facets, _AT_REST) for interval in both)):
         for end in found.chord:
             chord = number(end / task.authority)
             for which, share in ((raised, 0), (raised, 1), (lowered, None)):
@@ -820,18 +902,19 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
     if any(row[0] * held.slip_noise + max(row[2], _ZERO) * held.push_noise > 1 for row in reach.facets):
         raise ParameterError("noise of the first measurement may put the loop outside of the polytope")
     fastest = task.reference_rates[0]
-    moved = fastest * held.step
+    moved = fastest * held.longest
     behind, before = lag + held.slip_noise + moved, ahead - held.slip_noise + moved
     if held.law.pull:
         root = ImplicitRoot(pull=held.law.pull)
         if not holds(root, held.step, *held.errors(task, max(behind, before), rate)):
             raise ParameterError("the implicit step may not be deadbeat everywhere in the polytope")
     push = pushes(task, held, reach)
-    found = ranges(task, ahead + fastest * held.step, push, rate * held.step)
-    if found.slope[1] * held.step**2 >= 1:
+    found = ranges(task, ahead + moved, push, rate * held.longest)
+    if found.slope[1] * held.longest**2 >= 1:
         raise ParameterError("T_s is too long against the weakening of friction")
     deciding = verifiers(task, held, reach, found)
-    for rows in chain(*facet_rows(Period.of(BALLS, task, held, found), reach)):
+    periods = Period.all(BALLS, task, held, found, rate, push)
+    for rows in chain(*facet_rows(periods, reach)):
         tops = deciding[rows.place].largest(rows.factors, rows.constants, rows.which)
         for facet, top in zip(rows.which, tops, strict=True):
             if not top <= 1:
@@ -852,12 +935,13 @@ def _bracket(task: FaultPlant, held: SampledStickSlip, found: Ranges, push: Frac
     """What |a| ≤ H + δS·ξ + δw·y loses at most where ξ and y of one β stand beside the U of another [m/s²].
 
     As long as it is below H, |a| has a bound of 0 or more at both ends of β, also where the response of a facet changes
-    its sign between them.
+    its sign between them. For aperiodic sampling all that U takes counts: |a| has one over the longest interval.
     """
-    step, growth = held.step, 1 / (1 - found.slope[1] * held.step**2 / 2)
+    step, growth = held.longest, 1 / (1 - found.slope[1] * held.longest**2 / 2)
     width, damping = (found.slope[1] - found.slope[0]) / 2, (found.damping[1] - found.damping[0]) / 2
     share = width * growth * step**2 / 2 + damping * step * (1 + found.slope[1] * growth * step**2)
-    return share * task.authority * (task.beta[1] - task.beta[0]) * max(push, _ZERO)
+    least = _ZERO if held.longest_step else task.beta[0]
+    return share * task.authority * (task.beta[1] - least) * max(push, _ZERO)
 
 
 def verifiers(
@@ -877,11 +961,12 @@ def verifiers(
     ]
 
 
-def facet_rows(period: Period, reach: StickSlipPolytope) -> tuple[Iterator[Rows], Iterator[Rows]]:
-    """What the facets become in a period of the sliding map, by balls, and of the rest map, by rationals."""
+def facet_rows(periods: Sequence[Period], reach: StickSlipPolytope) -> Iterator[Iterator[Rows]]:
+    """What the facets become in each period of the sliding map, by balls, and then in the rest map, by rationals."""
     given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
-    exact = resting_rows(EXACT, period.task, period.held, period.found, *map(_exact_array, given))
-    return sliding_rows(period, *map(_ball_array, given)), exact
+    for period in periods:
+        yield sliding_rows(period, *map(_ball_array, given))
+    yield resting_rows(EXACT, periods[0].task, periods[0].held, periods[0].found, *map(_exact_array, given))
 
 
 def pushes(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> Range:

@@ -49,6 +49,8 @@ DEADBEAT = tuple(
     (*shares, 1.0, gain) for *shares, gain in ((0.3, 0.5, 1.4), (0.4, 0.6, 1.4), (0.5, 0.7, 1.4), (0.3, 0.5, 1.3))
 )
 """The same of a deadbeat step, which takes all of it back, for both objectives."""
+APERIODIC = ((0.3, 0.3, 0.2, 1.2), (0.3, 0.4, 0.2, 1.2), (0.5, 0.5, 0.3, 1.3))
+"""The same for aperiodic sampling; the gain is larger still by the ratio of the longest interval to T_s."""
 _VERTICES, _SETTLED = 250, 1e-4  # of the reached states that are kept, and change of their extents at the end
 _ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of one: they only propose
 _FACETS = 130  # of the first polytope
@@ -77,9 +79,8 @@ def _float_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[Any]
     return found
 
 
-def _float_curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[Any, Any]:
-    first, second = curvature(flow, step)
-    return float(first), float(second)
+def _float_curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[tuple[Any, Any], ...]:
+    return tuple((float(first), float(second)) for first, second in curvature(flow, step))
 
 
 FLOATS = Numbers(
@@ -169,8 +170,10 @@ class _Start:
         predicted = np.maximum(target, 0)
         return cls(task, held, noise, slip, rate, level, reference, beta, slope, predicted, scaled, force)
 
-    def ended(self, moved: np.ndarray, end: np.ndarray, rests: np.ndarray, later: float | None = None) -> np.ndarray:
-        """States after a period, of the slip in it, the slip rate at its end, and whether the fault rests then.
+    def ended(
+        self, moved: np.ndarray, end: np.ndarray, rests: np.ndarray, interval: float, later: float | None = None
+    ) -> np.ndarray:
+        """States after an interval, of the slip in it, the slip rate at its end, and whether the fault rests then.
 
         Noise of the next sample is the opposite one unless given.
         """
@@ -180,7 +183,7 @@ class _Start:
         innovation = np.where(rests, np.maximum(innovation, lowest), innovation) + self.noise - later
         lifted = -moved * self.slope / (self.beta * float(self.task.authority))
         level = self.level + float(law.level_gain) * (end - self.predicted) + float(law.slip_gain) * innovation + lifted
-        return np.stack([self.slip + moved - 2 * half * self.reference, end + 0 * level, level], axis=-1)
+        return np.stack([self.slip + moved - interval * self.reference, end + 0 * level, level], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -190,26 +193,34 @@ class _Reach:
     task: FaultPlant
     held: SampledStickSlip
     found: Ranges
-    period: Period
+    periods: list[Period]
     excess: float = 0.0  # of friction at rest above that in slip [m/s²], in runs
 
     @classmethod
     def of(cls, task: FaultPlant, held: SampledStickSlip) -> "_Reach":
-        found = ranges(task, task.target_slip / 100, (Fraction(0), Fraction(0)), task.amplitude * held.step**2)
-        return cls(task, held, found, Period.of(FLOATS, task, held, found))
+        none = Fraction(0), Fraction(0)
+        found = ranges(task, task.target_slip / 100, none, task.amplitude * held.longest**2)
+        return cls(task, held, found, Period.all(FLOATS, task, held, found, Fraction(0), none))
 
     def after(self, states: np.ndarray) -> np.ndarray:
         """States a period later: those of runs, and extremes of both maps."""
         found = list[np.ndarray]()
         for noise in _noises(self.held):
             start = _Start.of(self.task, self.held, self.found, states, noise)
-            found += [self.simulated(states, noise).reshape(-1, 3), *self._resting(start), *self._sliding(start)]
+            found += [self.simulated(states, noise).reshape(-1, 3), *self._resting(start)]
+            found += [ends for period in self.periods for ends in self._sliding(start, period)]
         return np.vstack(found)
 
     def simulated(self, states: np.ndarray, noise: float, later: float | None = None) -> np.ndarray:
         """States after a period of the plant that sticks, (states, choices, 3); the input gain changes slowest."""
         start = _Start.of(self.task, self.held, self.found, states, noise)
-        runs = [start.ended(*self._run(start, sign, turn), later) for sign in (1, -1) for turn in (0, 3, 6, 9)]
+        ends = sorted({float(self.held.step), float(self.held.longest)})
+        runs = [
+            start.ended(*self._run(start, sign, turn, end), end, later)
+            for end in ends
+            for sign in (1, -1)
+            for turn in (0, 3, 6, 9)
+        ]
         return np.stack(runs, axis=2).reshape(len(states), -1, 3)
 
     def _resting(self, start: "_Start") -> Iterator[np.ndarray]:
@@ -221,17 +232,18 @@ class _Reach:
         most, amplitude = float(self.task.beta[1] / self.task.beta[0]), float(self.task.amplitude)
         for share in (0.0, 0.5, 1.0):
             possible = most * start.push >= amplitude + float(self.found.slope[0]) * share * stop
-            yield start.ended(share * stop, 0 * stop, np.full(stop.shape, True))[possible]
+            for interval in {float(self.held.step), float(self.held.longest)}:
+                yield start.ended(share * stop, 0 * stop, np.full(stop.shape, True), interval)[possible]
 
-    def _sliding(self, start: "_Start") -> Iterator[np.ndarray]:
+    def _sliding(self, start: "_Start", period: Period) -> Iterator[np.ndarray]:
         """Ends of the sliding map, whose end alone is known to be forward."""
-        step, amplitude = float(self.held.step), float(self.task.amplitude)
-        of_slip, of_rate = self.period.impulses
+        step, amplitude = float(period.interval), float(self.task.amplitude)
+        of_slip, of_rate = period.impulses
         times = step - np.linspace(0, step, len(of_slip))
         largest = times * start.rate[..., None] + times**2 / 2 * (amplitude - start.force[..., None])
         width = float(self.found.slope[1] - self.found.slope[0]) / 2 / (1 - float(self.found.slope[1]) * step**2 / 2)
         sizes, size = amplitude + width * np.maximum(largest, 0), step / (len(of_slip) - 1)
-        of_state = zip(self.period.of_rate, self.period.of_force, strict=True)
+        of_state = zip(period.of_rate, period.of_force, strict=True)
         plain = [r * start.rate - f * start.force for r, f in of_state]
         for sign in (1, -1):
             for turn in (0, 4, 8, 12):
@@ -242,11 +254,11 @@ class _Reach:
                 for factor, rests in ((np.ones_like(scaled), False), (scaled, True)):
                     moved, end = plain[0] + factor * more[0], plain[1] + factor * more[1]
                     sound = (np.abs(factor) <= 1) & (moved >= 0) & (end >= -1e-12 * np.abs(start.rate).max())
-                    yield start.ended(moved, np.maximum(end, 0), np.full(moved.shape, rests))[sound]
+                    yield start.ended(moved, np.maximum(end, 0), np.full(moved.shape, rests), step)[sound]
 
-    def _run(self, start: "_Start", sign: int, turn: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Slip and slip rate after a period of the plant that sticks, and whether it rests."""
-        size, amplitude = float(self.held.step) / _SUBSTEPS, float(self.task.amplitude)
+    def _run(self, start: "_Start", sign: int, turn: int, interval: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Slip and slip rate after an interval of the plant that sticks, and whether it rests."""
+        size, amplitude = interval / _SUBSTEPS, float(self.task.amplitude)
         damping = float(sum(self.found.damping)) / 2
         moved, now = np.zeros_like(start.force), start.rate + np.zeros_like(start.force)
         for i in range(_SUBSTEPS):
@@ -309,8 +321,9 @@ def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarra
 # A polytope around them.
 
 
-def _rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
-    yield from sliding_rows(period, facets, multipliers)
+def _rows(periods: list[Period], facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
+    for period in periods:
+        yield from sliding_rows(period, facets, multipliers)
     yield from resting_rows(FLOATS, period.task, period.held, period.found, facets, multipliers)
 
 
@@ -387,12 +400,16 @@ def _dyadic(value: float) -> Fraction:
 
 
 @lru_cache(maxsize=64)
-def _wide_ranges(task: FaultPlant, held: SampledStickSlip, size: tuple[float, ...]) -> Ranges:
+def _wide_periods(task: FaultPlant, held: SampledStickSlip, size: tuple[float, ...]) -> list[Period]:
     """For states of a size."""
     law, (slip, rate, level) = held.law, (_ROOM * short(v, 4) for v in size)
     most = law.target_gain * (law.return_rate * slip + _ROOM * (task.reference_rates[0] + held.told))
-    most = most + law.rate_gain * rate + level + held.push_noise
-    return ranges(task, slip, (-most, most), rate * held.step)
+    push = (
+        -(most + law.rate_gain * rate + level + held.push_noise),
+        most + law.rate_gain * rate + level + held.push_noise,
+    )
+    found = ranges(task, slip, push, rate * held.longest)
+    return Period.all(FLOATS, task, held, found, rate / _ROOM, (push[0] / _ROOM, push[1] / _ROOM))
 
 
 @dataclass
@@ -433,15 +450,16 @@ class _Growing:
         box = 1 / np.abs(self.facets[:5].sum(axis=1))
         return np.array([max(box[0], box[3]), box[1], max(box[2], box[4])])
 
-    def exact_ranges(self) -> Ranges:
-        """Of the plant, a little wide; sizes of two digits, as these ranges take a while."""
-        return _wide_ranges(self.task, self.held, tuple(float(f"{float(v):.1e}") for v in self.size))
+    def periods(self) -> list[Period]:
+        """With ranges of the plant that are a little wide; sizes of two digits, as these ranges take a while."""
+        return _wide_periods(self.task, self.held, tuple(float(f"{float(v):.1e}") for v in self.size))
 
     def images(self) -> "_Images | None":
         """Largest value of every normal after a period, with the best multipliers; None where a set is empty."""
-        found = self.exact_ranges()
+        periods = self.periods()
+        found = periods[0].found
         facets = [tuple(Fraction(float(v)) for v in row) for row in self.facets]
-        sizes = np.append(self.size, self.size[1] * float(self.held.step))
+        sizes = np.append(self.size, self.size[1] * float(self.held.longest))
         corners = []
         for place, lines in enumerate(polytopes(self.task, self.held, facets, found)):
             tall = len(lines[0][0])
@@ -453,13 +471,13 @@ class _Growing:
             corners.append(at)
         self.touching = np.unique(np.concatenate([np.arange(5), *(at[1].ravel() for at in corners if at is not None)]))
         self.touching = self.touching[self.touching < len(facets)]
-        tried, period = self._tried(self.turn % _TRIED_EACH == 1), Period.of(FLOATS, self.task, self.held, found)
-        tops = self._tops(period, corners, tried)
+        tried = self._tried(self.turn % _TRIED_EACH == 1)
+        tops = self._tops(periods, corners, tried)
         best, row = tops.argmin(axis=0), np.arange(len(facets))
         self.multipliers = np.column_stack(
             [*tried[best[0], row, :2].T, *tried[best[1], row, 2:4].T, tried[best[2], row, 4]]
         )
-        return self._images(period, corners)
+        return self._images(periods, corners)
 
     def _tried(self, many: bool) -> np.ndarray:
         """Multipliers of every facet that are tried: the present ones, some near them, and if `many` a grid."""
@@ -474,11 +492,11 @@ class _Growing:
             tried.append(np.column_stack([np.maximum(-plain, 0), fixed, -n2, fixed, fixed]))
         return np.array(tried)
 
-    def _tops(self, period: Period, corners: list[Any], tried: np.ndarray) -> np.ndarray:
+    def _tops(self, periods: list[Period], corners: list[Any], tried: np.ndarray) -> np.ndarray:
         """Largest values for each choice of multipliers: while sliding, where the innovation is cut off, at rest."""
         choices, count = tried.shape[:2]
         found = np.full((3, choices * count), -np.inf)
-        for rows in _rows(period, np.tile(self.normals, (choices, 1)), tried.reshape(-1, 5)):
+        for rows in _rows(periods, np.tile(self.normals, (choices, 1)), tried.reshape(-1, 5)):
             kind = 2 if rows.place >= SLICES else int(rows.cut)
             at = corners[rows.place]
             if at is not None:
@@ -486,12 +504,12 @@ class _Growing:
                 found[kind, rows.which] = np.maximum(found[kind, rows.which], tops)
         return np.asarray(found.reshape(3, choices, count).swapaxes(0, 1))
 
-    def _images(self, period: Period, corners: list[Any]) -> "_Images":
+    def _images(self, periods: list[Period], corners: list[Any]) -> "_Images":
         """The largest values, as functions of the heights, and what of the state a facet becomes."""
-        sizes = np.append(self.size, self.size[1] * float(self.held.step))
-        count, steps = len(self.normals), np.array(stop_bounds(self.task, self.held, period.found), dtype=float)
+        sizes = np.append(self.size, self.size[1] * float(self.held.longest))
+        count, steps = len(self.normals), np.array(stop_bounds(self.task, self.held, periods[0].found), dtype=float)
         found = _Images(np.full(count, -np.inf), np.zeros((count, count)), np.zeros((count, 3)), np.zeros(count))
-        for rows in _rows(period, self.normals, self.multipliers):
+        for rows in _rows(periods, self.normals, self.multipliers):
             at = corners[rows.place]
             if at is None:
                 continue
@@ -539,7 +557,7 @@ class _Growing:
             self.turn = turn + 1
             if turn in _REFINED and self.last is not None:
                 self.refine(self.last)
-            self.normals = self._neutral(self.normals, self.exact_ranges().chord[1])
+            self.normals = self._neutral(self.normals, self.periods()[0].found.chord[1])
             after = self.images()
             if after is None or (self.size > _FAR * first).any():
                 return False
@@ -611,7 +629,7 @@ class _Growing:
         growth, factors = last.growth[self.touching], last.factors[self.touching]
         for name in ("normals", "heights", "least", "multipliers"):
             setattr(self, name, getattr(self, name)[self.touching])
-        size, chord = self.size, self.exact_ranges().chord[1]
+        size, chord = self.size, self.periods()[0].found.chord[1]
         known = self.normals * size
         widths = np.linalg.norm(known, axis=1)
         known, more = known / widths[:, None], list[np.ndarray]()
@@ -641,15 +659,15 @@ class _Growing:
     def exact(self) -> StickSlipPolytope | None:
         """In rational numbers of few digits, with the constraints that meet at each vertex."""
         facets = tuple(tuple(_dyadic(float(v)) for v in row) for row in self.facets)
-        found, bases = self.exact_ranges(), list[list[tuple[int, ...]]]()
-        sizes = np.append(self.size, self.size[1] * float(self.held.step))
-        lines = polytopes(self.task, self.held, facets, found)
+        periods, bases = self.periods(), list[list[tuple[int, ...]]]()
+        sizes = np.append(self.size, self.size[1] * float(self.held.longest))
+        lines = polytopes(self.task, self.held, facets, periods[0].found)
         for constraints in lines:
             at = _corners(constraints, sizes[: len(constraints[0][0])])
             if at is None:
                 return None
             bases.append([tuple(int(v) for v in basis) for basis in at[1]])
-        self._complete(Period.of(FLOATS, self.task, self.held, found), np.array(facets, dtype=float), lines, bases)
+        self._complete(periods, np.array(facets, dtype=float), lines, bases)
         return StickSlipPolytope(
             facets=facets,
             multipliers=tuple(tuple(short(float(v), _DIGITS) for v in row) for row in self._scaled()),
@@ -658,15 +676,19 @@ class _Growing:
         )
 
     def _complete(
-        self, period: Period, facets: np.ndarray, lines: list[list[Constraint]], bases: list[list[tuple[int, ...]]]
+        self,
+        periods: list[Period],
+        facets: np.ndarray,
+        lines: list[list[Constraint]],
+        bases: list[list[tuple[int, ...]]],
     ) -> None:
         """Add vertices that rounding hid, by linear programs, where a function would have a negative multiplier."""
-        sizes = [short(float(v), 6) for v in (*self.size, self.size[1] * float(self.held.step))]
+        sizes = [short(float(v), 6) for v in (*self.size, self.size[1] * float(self.held.longest))]
         verifiers = [
             Verifier(constraints, known, sizes[: len(known[0])], place=place, facets=len(facets))
             for place, (constraints, known) in enumerate(zip(lines, bases, strict=True))
         ]
-        for rows in _rows(period, facets, self._scaled()):
+        for rows in _rows(periods, facets, self._scaled()):
             verifier = verifiers[rows.place]
             scaled = rows.factors * np.array(sizes[: rows.factors.shape[1]], dtype=float)
             shares = verifier.proposed(scaled)[1]
@@ -687,7 +709,8 @@ def proved(
     fresh = list[StickSlipGuarantee | NoGuarantee]()
 
     def search() -> dict[str, Any]:
-        fresh.append(_searched(task, held, tell))
+        with np.errstate(all="ignore"):  # floats that overflow propose nothing
+            fresh.append(_searched(task, held, tell))
         return {"set": set_document(fresh[0].reach)} if fresh[0].proved else {"reason": fresh[0].reason}
 
     kept = search_once(search, "polytope of a stick-slip law", task, held)
@@ -727,6 +750,7 @@ def design_stick_slip(
     *,
     objective: str = "tracking",
     slip_noise: Fraction = Fraction(0),
+    longest_step: Fraction = Fraction(0),
     healing: Fraction = Fraction(0),
     implicit: bool = False,
     tell: Tell = lambda said, done: None,
@@ -742,6 +766,8 @@ def design_stick_slip(
         ``tracking``: small slip error; ``peak``: small slip rate.
     slip_noise : Fraction
         Bound of the measurement error of the slip [m].
+    longest_step : Fraction
+        Of aperiodic sampling, as of `SampledStickSlip` [s].
     healing : Fraction
         Δμ_h [-], proved as a larger disturbance, see `StickSlipGuarantee.covered_healing`.
     implicit : bool
@@ -752,10 +778,15 @@ def design_stick_slip(
     if not task.amplitude and not healing:
         reason = "the stick-slip theorem needs a disturbance above 0 m/s^2: give amplitude in [disturbance]"
         return NoGuarantee(reason=reason, small_gain=None)
+    if longest_step and implicit:
+        reason = "a sliding mode is proved on the stick-slip plant for periodic sampling alone"
+        return NoGuarantee(reason=reason, small_gain=None)
     none = list[StickSlipGuarantee | NoGuarantee]()
-    for tuning in DEADBEAT if implicit else TUNINGS[objective]:
+    longer = float(longest_step / step) if longest_step else 1.0
+    for *shares, gain in DEADBEAT if implicit else APERIODIC if longest_step else TUNINGS[objective]:
         try:
-            held = tuned(task, step, tuning, slip_noise, implicit=implicit)
+            held = tuned(task, step, (*shares, gain * longer), slip_noise, implicit=implicit)
+            held = replace(held, longest_step=longest_step)
         except (ParameterError, ArithmeticError, ValueError):
             return NoGuarantee(reason="no gains of this size are floats", small_gain=None)
         found = _healed(task, held, healing, tell)
