@@ -5,17 +5,19 @@ from fractions import Fraction as F
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from standalone_guarantee import CHECK
 from stick_slip_box import CLAIMS, STICK, box, changed, package_refuses, period_of, refused, times
 
 from quakedesign.checking import check_files
-from quakedesign.errors import CertificateError
+from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.guarantees import read_guarantee
 from quakedesign.guarantees.exact import stick_slip_set as package
 from quakedesign.lyapunov.exact.claim import Verdict
 
 PATH = Path(__file__).parents[2] / "proofs" / "certificates" / "stick_slip_real-fault.json"
+APERIODIC = PATH.with_name("stick_slip_aperiodic_real-fault.json")
 
 
 @cache
@@ -39,9 +41,6 @@ def test_both_prove_the_file_with_noise_and_refuse_more_of_it():
     assert CHECK.check(json.dumps(other)).statement != found.statement
     for name in CLAIMS:
         assert refused(changed(document, (("claims", name), times("99/100"))), f"claim {name} must follow")
-
-
-APERIODIC = PATH.with_name("stick_slip_aperiodic_real-fault.json")
 
 
 @pytest.mark.slow
@@ -73,6 +72,32 @@ def test_a_longest_interval_that_is_none_is_refused(longest):
     assert package_refuses(document)
 
 
+@pytest.mark.parametrize("which", range(5))
+def test_both_ask_for_every_facet_at_each_interval_that_decides(which, monkeypatch):
+    """A slide breaks facet 3 over one of the five intervals alone."""
+    document = json.loads(APERIODIC.read_text())
+    ours, claim = period_of(document), read_guarantee(document)
+    beyond = F(23, 250) * (1 + F(which, 4))
+    zeros = [F(0)] * 3
+
+    def sliding(facet, *_):
+        high = ours.interval == beyond and facet is ours.reach.facets[3]
+        yield 0, STICK.Function(zeros, F(3, 2) if high else F(1, 2), [STICK.NOTHING] * 3)
+
+    monkeypatch.setattr(ours, "sliding", sliding)
+    with pytest.raises(CHECK.Refused, match="facet 3 must hold after a period that slides"):
+        ours.verify()
+
+    def rows(period, *_):
+        factors, high = package._exact_array([zeros]), period.interval == beyond
+        yield package.Rows(0, np.array([3]), factors, package._exact_array([F(3, 2) if high else F(1, 2)]))
+
+    monkeypatch.setattr(package, "sliding_rows", rows)
+    monkeypatch.setattr(package, "resting_rows", lambda *_: iter(()))
+    with pytest.raises(ParameterError, match="facet 3 in a period that slides"):
+        package.stick_slip_bounds(claim.task, claim.held, claim.reach)
+
+
 def test_a_sliding_mode_has_no_range_of_intervals():
     document = json.loads(PATH.with_name("stick_slip_cta_real-fault.json").read_text())
     document["loop"]["longest"] = "1/5"
@@ -99,12 +124,16 @@ def test_both_prove_the_stored_file_and_say_the_same_entries():
         assert part in said
 
 
-def test_both_derive_the_same_ranges():
-    ours, claim = period_of(stored()), read_guarantee(stored())
-    task, held, reach = claim.task, claim.held, claim.reach
-    ahead, rate, *_ = reach.box
-    push = package.pushes(task, held, reach)
-    found = package.ranges(task, ahead + task.reference_rates[0] * held.step, push, rate * held.step)
+@pytest.mark.parametrize("path", [PATH, APERIODIC], ids=["periodic", "aperiodic"])
+def test_both_derive_the_same_ranges(path, monkeypatch):
+    document = json.loads(path.read_text())
+    ours, claim = period_of(document), read_guarantee(document)
+    known, ranges = [], package.ranges
+    monkeypatch.setattr(package, "ranges", lambda *given: known.append(given) or ranges(*given))
+    monkeypatch.setattr(package, "facet_rows", lambda *_: iter(()))
+    proved = package.stick_slip_bounds(claim.task, claim.held, claim.reach)
+    (given,) = known
+    found, push = ranges(*given), given[2]
     assert [float(v) for v in ours.push] == pytest.approx([float(v) for v in push], rel=1e-12)
     for mine, theirs in (
         (ours.slope, found.slope),
@@ -113,8 +142,15 @@ def test_both_derive_the_same_ranges():
         (ours.rest, found.rest_pressure),
     ):
         assert [float(v) for v in mine] == pytest.approx([float(v) for v in theirs], rel=1e-12)
-    theirs = package.stop_bounds(task, held, replace_ranges(found, ours))
+    theirs = package.stop_bounds(claim.task, claim.held, replace_ranges(found, ours))
     assert theirs == tuple(ours.stops())
+    for name, value in ours.bounds().items():
+        assert float(getattr(proved, name)) == pytest.approx(float(value), rel=1e-12)
+    longest = F(document["loop"].get("longest", document["loop"]["step"]))
+    fastest, (ahead, rate, _, behind, _) = F("15/8") * F("0.785") / 663012, claim.reach.box  # of 10 t³ - 15 t⁴ + 6 t⁵
+    assert given[1] == ahead + fastest * longest
+    assert given[3] == rate * longest
+    assert (proved.slip_ahead, proved.slip_behind) == (ahead + fastest * longest, behind + fastest * longest)
 
 
 def replace_ranges(found, ours):
@@ -251,6 +287,7 @@ CONDITIONS = [
     ("damping must not be negative", "damping", (("fault", "friction", "rate_slope"), "1/4")),
     ("shear stress must not reverse", "shear stress may reverse", (("disturbance", "amplitude"), "2")),
     ("short against the weakening", "too long against the weakening", (("loop", "step"), "1")),
+    ("short against the weakening", "too long against the weakening", (("loop",), lambda old: old | {"longest": "1"})),
     ("short against damping and slope", "too long against the damping", (("fault", "damping"), "150")),
     ("short against damping and slope", "too long against the damping", (("fault", "damping"), "400")),
     ("short against damping and slope", "too long against the damping", (("fault", "damping"), "3000")),
@@ -270,13 +307,42 @@ def test_what_the_theorem_needs_is_asked_for_by_both(reason, theirs, change):
     assert theirs in read_guarantee(document).bounds().reason
 
 
-def test_the_disturbance_must_outweigh_the_range_of_the_input_gain():
-    period = period_of(stored())
-    period.sliding, period.resting = lambda *_: iter(()), list
-    period.verify()
-    period.push = period.push[0], F(10**9)
+@pytest.mark.parametrize("path", [PATH, APERIODIC], ids=["periodic", "aperiodic"])
+@pytest.mark.parametrize(("share", "holds"), [("999/1000", True), ("1001/1000", False)])
+def test_the_disturbance_must_outweigh_the_range_of_the_input_gain(path, share, holds, monkeypatch):
+    """U⁺ just below and above H over (δS·q·T²/2 + δw·T(1 + S⁺q·T²))·b·(β1 − 1), or β1 in place of β1 − 1."""
+    document = json.loads(path.read_text())
+    period, claim = period_of(document), read_guarantee(document)
+    monkeypatch.setattr(period, "sliding", lambda *_: iter(()))
+    monkeypatch.setattr(period, "resting", list)
+    monkeypatch.setattr(package, "facet_rows", lambda *_: iter(()))
+    loop = {name: float(F(v)) for name, v in document["loop"].items()}
+    step = loop.get("longest", loop["step"])
+    (low, high), (least, most) = ([float(v) for v in pair] for pair in (period.slope, period.damping))
+    q = 1 / (1 - high * step**2 / 2)
+    of_push = (high - low) / 2 * q * step**2 / 2 + (most - least) / 2 * step * (1 + high * q * step**2)
+    top = 0.3353 / 0.2353
+    largest = 0.00032 / (of_push * 8e-8 * 0.2353 * (top if "longest" in loop else top - 1))
+    push = period.push[0], F(largest) * F(share)
+    period.push = push
+    found = package.ranges(*_range_inputs(claim))
+    monkeypatch.setattr(package, "pushes", lambda *_: push)
+    monkeypatch.setattr(package, "ranges", lambda *_: found)
+    monkeypatch.setattr(package.Period, "all", lambda *_: [])
+    if holds:
+        period.verify()
+        package.stick_slip_bounds(claim.task, claim.held, claim.reach)
+        return
     with pytest.raises(CHECK.Refused, match="outweigh the range of the input gain"):
         period.verify()
+    with pytest.raises(ParameterError, match="too small against what the range of the input gain makes"):
+        package.stick_slip_bounds(claim.task, claim.held, claim.reach)
+
+
+def _range_inputs(claim):
+    held, (ahead, rate, *_) = claim.held, claim.reach.box
+    moved = claim.task.reference_rates[0] * held.longest
+    return claim.task, ahead + moved, package.pushes(claim.task, held, claim.reach), rate * held.longest
 
 
 @pytest.mark.parametrize(("sign", "noise", "holds"), [(1, 49, True), (1, 51, False), (-1, 99, True), (-1, 101, False)])
