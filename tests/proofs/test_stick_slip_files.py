@@ -70,6 +70,10 @@ def test_a_longest_interval_that_is_none_is_refused(longest):
     document["loop"]["longest"] = longest
     assert refused(document)
     assert package_refuses(document)
+    if longest in ("23/250", "1/20"):
+        assert refused(document, "longest must be above step")
+        with pytest.raises(CertificateError, match="must be 0 or above T_s"):
+            read_guarantee(document)
 
 
 @pytest.mark.parametrize("which", range(5))
@@ -102,7 +106,8 @@ def test_a_sliding_mode_has_no_range_of_intervals():
     document = json.loads(PATH.with_name("stick_slip_cta_real-fault.json").read_text())
     document["loop"]["longest"] = "1/5"
     assert refused(document, "one step alone")
-    assert package_refuses(document)
+    with pytest.raises(CertificateError, match="0 for a sliding mode"):
+        read_guarantee(document)
 
 
 @pytest.mark.slow
