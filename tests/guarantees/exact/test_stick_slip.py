@@ -23,14 +23,16 @@ from quakedesign.symbolic import plant
 
 FOLDER = Path(__file__).parents[3] / "proofs" / "certificates"
 FILE, NOISY_FILE = FOLDER / "stick_slip_real-fault.json", FOLDER / "stick_slip_noise_real-fault.json"
+FILES = {False: FILE, True: NOISY_FILE, "aperiodic": FOLDER / "stick_slip_aperiodic_real-fault.json"}
 NOISY = pytest.mark.parametrize("noisy", [False, True], ids=["exact", "noisy"])
+EACH = pytest.mark.parametrize("noisy", FILES, ids=["exact", "noisy", "aperiodic"])
 ROUNDING = 1e-9  # of n·z, which is 1 exactly where the fault rests on the boundary
 
 
 @cache
 def case(noisy=False):
-    """Numbers of a file, in floating point, read without the package; both are about one fault."""
-    data = json.loads((NOISY_FILE if noisy else FILE).read_text())
+    """Numbers of a file, in floating point, read without the package; all are about one fault."""
+    data = json.loads(FILES[noisy].read_text())
     fault, loop = (
         {k: float(F(v)) for k, v in data[name].items() if isinstance(v, str) and k != "name"}
         for name in ("fault", "loop")
@@ -82,7 +84,7 @@ def piece(rate, force, slope, disturbance, time, healed=0.0):
     stops = np.flatnonzero(moves & (y < 0))
     if len(stops):
         begin = rate[stops], total[stops], slope[stops]
-        low, high = np.zeros(len(stops)), np.full(len(stops), time)
+        low, high = np.zeros(len(stops)), np.broadcast_to(time, rate.shape)[stops]
         for _ in range(30):
             middle = (low + high) / 2
             forward = flow(*begin, middle)[1] > 0
@@ -159,6 +161,14 @@ def vertices(noisy=False):
     return found / np.maximum((found @ facets.T).max(axis=1), 1)[:, None]
 
 
+def intervals(at, random, count):
+    """To the next sample of each fault [s]: the same, or of aperiodic sampling either end or anywhere within."""
+    if not hasattr(at, "longest"):
+        return np.full(count, at.step)
+    ends = random.choice([at.step, at.longest], count)
+    return np.where(random.random(count) < 0.5, ends, random.uniform(at.step, at.longest, count))
+
+
 def one_period(random, count, pieces, amplitude=1.0, healing=0.0, noisy=False):
     """States in P before and after a period, the slip in it and the slip rate that it reached."""
     at, corners = case(noisy), vertices(noisy)
@@ -168,6 +178,7 @@ def one_period(random, count, pieces, amplitude=1.0, healing=0.0, noisy=False):
     state = np.einsum("nk,nkc->nc", weights, corners[random.integers(0, len(corners), (count, 4))])
     error, rate, level = state.T  # the slip error plus the bound of the noise; the level without its own noise
     error, level = error - at.slip_noise, level + at.slip_gain * off
+    interval = intervals(at, random, count)
     reference = random.random(count) * at.fastest
     choice = random.integers(0, 4, count)
     reference = np.select(
@@ -184,24 +195,24 @@ def one_period(random, count, pieces, amplitude=1.0, healing=0.0, noisy=False):
     blocks.push(before - (level + at.rate_gain * rate - at.target_gain * wanted))
     facets = at.facets[random.integers(0, len(at.facets), count)]
     switches, sign, aimed = (
-        random.random((count, 4)) * 1.5 * at.step,
+        random.random((count, 4)) * 1.5 * interval[:, None],
         random.choice([-1.0, 1.0], count),
         random.random(count) < 0.5,
     )
     for i in range(pieces):
-        now = (i + 0.5) * at.step / pieces
-        best = worst_signs(facets, at.slip_gain, at.level_gain, at.step - now)
-        turned = sign * (-1.0) ** (switches < now).sum(axis=1)
+        now = (i + 0.5) * interval / pieces
+        best = worst_signs(facets, at.slip_gain, at.level_gain, interval - now)
+        turned = sign * (-1.0) ** (switches < now[:, None]).sum(axis=1)
         way = np.where(aimed, best, turned)
-        blocks.advance(amplitude * at.amplitude * way, way > 0, at.step / pieces)
+        blocks.advance(amplitude * at.amplitude * way, way > 0, interval / pieces)
     moved = blocks.slip - slip
     innovation = moved + later - off - at.step * (rate + expected) / 2
     innovation = np.where(blocks.rate == 0, np.maximum(innovation, -at.step * expected / 2 - at.rest_slip), innovation)
     change = rest_pressure(blocks.slip, blocks.friction) - before
-    late = random.choice([-1, 0, 1], count) * at.bend * at.step**2 / 2
+    late = random.choice([-1, 0, 1], count) * at.bend * interval**2 / 2
     after = np.column_stack(
         [
-            error + at.slip_noise + moved - np.maximum(at.step * reference + late, 0),
+            error + at.slip_noise + moved - np.maximum(interval * reference + late, 0),
             blocks.rate,
             level + change + at.level_gain * (blocks.rate - expected) + at.slip_gain * (innovation - later),
         ]
@@ -210,14 +221,14 @@ def one_period(random, count, pieces, amplitude=1.0, healing=0.0, noisy=False):
     return state, after, moved, blocks.peak
 
 
-@NOISY
+@EACH
 def test_vertices_are_those_of_the_file(noisy):
     tops = vertices(noisy) @ case(noisy).facets.T
     assert tops.max() <= 1 + ROUNDING
     assert ((tops > 1 - 1e-6).sum(axis=1) + (vertices(noisy)[:, 1] < 1e-12) >= 3).all()
 
 
-@NOISY
+@EACH
 @pytest.mark.parametrize("trials", [2_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
 def test_one_period_from_anywhere_in_the_polytope_ends_in_it(trials, noisy):
     at, random, slid = case(noisy), np.random.default_rng(7), 0.0
@@ -249,10 +260,17 @@ def test_friction_that_heals_at_rest_takes_the_place_of_a_part_of_the_disturbanc
     assert slid > 0.8
 
 
-@NOISY
+@EACH
 def test_a_larger_disturbance_drives_states_out(noisy):
     _, after, _, _ = one_period(np.random.default_rng(7), 2_000, 30, amplitude=1.5, noisy=noisy)
     assert (after @ case(noisy).facets.T).max() > 1.01
+
+
+def test_a_longer_interval_drives_states_out(monkeypatch):
+    at = case("aperiodic")
+    monkeypatch.setattr(at, "longest", 1.2 * at.longest)
+    _, after, _, _ = one_period(np.random.default_rng(7), 2_000, 30, noisy="aperiodic")
+    assert (after @ at.facets.T).max() > 1.1
 
 
 # ----------------------------------------------------------------------
@@ -300,10 +318,11 @@ def long_runs(periods, start, seed, noisy=False):
         tops = max(tops, (now @ at.facets.T).max())
         blocks.push(pressure)
         follows = np.where(random.random(count) < 0.15, hold, 1)
+        time = intervals(at, random, count) / pieces
         for i in range(pieces):
-            way = follows * worst_signs(facets, at.slip_gain, at.level_gain, (pieces - i - 0.5) * at.step / pieces)
-            blocks.advance(at.amplitude * way, way > 0, at.step / pieces)
-            reference = reference + rates * at.step / pieces
+            way = follows * worst_signs(facets, at.slip_gain, at.level_gain, (pieces - i - 0.5) * time)
+            blocks.advance(at.amplitude * way, way > 0, time)
+            reference = reference + rates * time
             error = blocks.slip - reference
             held = (-error.min(), error.max(), blocks.rate.max(), pressure.min(), pressure.max())
             shares = np.maximum(shares, np.array(held) / list(at.claims.values()))
@@ -313,7 +332,7 @@ def long_runs(periods, start, seed, noisy=False):
 @pytest.mark.parametrize(
     ("periods", "start"), [(100, 0.2), *(pytest.param(10_000, x, marks=pytest.mark.slow) for x in (0.0, 0.5))]
 )
-@NOISY
+@EACH
 def test_long_runs_stay_within_the_claims(periods, start, noisy):
     assert list(case(noisy).claims) == [
         "slip_behind",
