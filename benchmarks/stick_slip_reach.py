@@ -40,9 +40,11 @@ def rows():
         )
     for step in ("0.5", "1", "2", "3", "4"):
         yield f"lab fault, {step} ms", lab, {"step": f"{step} ms"}
-    for first, last in ((92, 184), (150, 184), (184, 368)):
+    for first, last in ((92, 184), (150, 184), (50, 184), (184, 368)):
         options = {"step": f"{first} ms", "longest_step": f"{last} ms"}
         yield f"real fault, aperiodic, {first} to {last} ms", real, options
+    peak = {"step": "92 ms", "longest_step": "184 ms", "objective": "peak"}
+    yield "real fault, aperiodic, 92 to 184 ms, peak", real, peak
     for first, last in ((0.5, 1), (1, 2)):
         yield f"lab fault, aperiodic, {first} to {last} ms", lab, {"step": f"{first} ms", "longest_step": f"{last} ms"}
     yield "2.5 km, 110 ms", replace(real, length=2500.0), {"step": "110 ms"}

@@ -481,6 +481,17 @@ def test_aperiodic_sampling_is_proved_where_friction_sticks(call, tmp_path):
     assert check_files([path], "real-fault")[str(path)][0] == "proved"
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("step", "more", "most"), [("50 ms", (), 2.5e-4), ("92 ms", ("--objective", "peak"), 1.75e-4)], ids=["wide", "peak"]
+)
+def test_a_wider_range_and_the_smallest_slip_rate_have_gains_of_their_own(call, step, more, most):
+    code, out, _ = call("real-fault", "--step", step, "--longest-step", "184 ms", *more, "--json")
+    found = json.loads(out)
+    assert (code, found["plant"], found["longest_step"]) == (0, "stick-slip", "23/125")
+    assert float(F(found["peak_slip_rate"])) < most
+
+
 def test_no_law_is_designed_for_intervals_that_no_controller_could_wait_for(call):
     code, out, _ = call("lab-fault", "--step", "1 ms", "--longest-step", "2 s", "--json")
     assert (code, json.loads(out)["verdict"]) == (1, "undecided")
