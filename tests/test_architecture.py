@@ -459,7 +459,7 @@ BUDGETS = {
     "synthesis": 1894,
     "rocq": 843,
     "simulation": 9737,
-    "identification": 4008,
+    "identification": 4016,
     "studies": 4139,
     "report": 3981,
     "cli": 3469,

@@ -364,7 +364,10 @@ class _Choice:
         return replace(self, record=record, loading=loading, told=told)
 
     def _chosen(self, fits: list[_Fitted]) -> tuple[_Fitted, Rival | None, dict[str, tuple[_Fitted, float]]]:
-        """The best law, with trend and beginning where these are likelier; the next law, and fits with other trends."""
+        """The best law, with trend and beginning where these are likelier; the next law, and fits that may be right.
+
+        These are fits with other trends, and of the next law where the record hardly tells the laws apart.
+        """
         noise, rival = self._noise(min(fits, key=lambda fitted: fitted.best.squares)), None
         fits = sorted((_with_noise(each, noise) for each in fits), key=lambda fitted: fitted.best.squares)
         if len(fits) > 1:
@@ -372,7 +375,12 @@ class _Choice:
             rival = Rival(law=fits[1].kind.name, squares=squares, excess=excess)
         better = self._extended(fits[0])
         better, others = self._trend(self._without_start(_with_noise(better, self._noise(better))))
-        return _with_noise(better, self._noise(better)), rival, others
+        noise = self._noise(better)
+        better = _with_noise(better, noise)
+        if rival is not None and rival.excess < DECISIVE:
+            other = _with_noise(self._fitted(fits[1].kind, _nuisance(better), fits[1].best, start=False), noise)
+            others[f"by {rival.law}"] = other, advantage(better.best, other.best)[1]
+        return better, rival, others
 
     def _trend(self, fitted: _Fitted) -> tuple[_Fitted, dict[str, tuple[_Fitted, float]]]:
         """The fit with the trend that is taken or without one; others, with what their AIC is higher by.

@@ -14,7 +14,7 @@ from quakedesign.fault import fault_toml, load_fault, parse_fault, with_accepted
 from quakedesign.identification.assessment import _beginning, in_doubt, sign_check
 from quakedesign.identification.fault_file import identified_fault, next_command, poor_fit
 from quakedesign.identification.identification_result import ParameterEstimate
-from quakedesign.identification.identify import identify
+from quakedesign.identification.identify import AGEING, SLIP, identify
 from quakedesign.identification.record import Record
 from quakedesign.report.identification_page import identification_lines
 from quakedesign.synthesis import design, guarantee
@@ -238,3 +238,26 @@ def test_a_record_of_nothing_but_noise_tells_nothing():
 def test_a_trend_is_told_with_the_unit_of_what_it_is_along():
     said = _beginning({"trend": 5.0, "trend_in_time": 3e-6}, SimpleNamespace(first_rate=1e-6)).sentence
     assert said.endswith("at 1e-06 m/s, on a trend of 5 1/m, on a trend of 3e-06 1/s")
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_sign_that_the_other_law_does_not_have_is_open(seed):
+    """A short step on a strong trend, which each law explains, with another sign of a - b; the truth is +0.0005."""
+    made = synthetic.sliding(
+        AGEING,
+        ((200.0, 1e-6), (12.0, 1e-5)),
+        sample=0.1,
+        stiffness_given=False,
+        a=0.006,
+        b=0.0055,
+        critical_slip=40e-6,
+        spring=2e-3,
+    )
+    drawn = replace(made, noise=4e-4).noisy(seed)
+    drawn = replace(drawn, friction=drawn.friction + 400 * drawn.load_point)
+    found, alone = identify(drawn), {law: identify(drawn, law).difference for law in (AGEING, SLIP)}
+    assert alone[AGEING].low > 0 > alone[SLIP].high
+    assert found.rival.excess < 10
+    assert found.assessment.verdict == "cannot tell"
+    other = {AGEING: SLIP, SLIP: AGEING}[found.law.name]
+    assert f"by {other} (AIC +{found.rival.excess:.3g})" in found.assessment.open[0]
