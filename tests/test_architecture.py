@@ -462,7 +462,7 @@ BUDGETS = {
     "identification": 4016,
     "studies": 4139,
     "report": 3981,
-    "cli": 3469,
+    "cli": 3471,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 
