@@ -461,8 +461,8 @@ BUDGETS = {
     "simulation": 9737,
     "identification": 4016,
     "studies": 4139,
-    "report": 3981,
-    "cli": 3471,
+    "report": 3990,
+    "cli": 3491,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

@@ -4,8 +4,10 @@ The first proves bounds of the sampled loop for all t ≥ 0; the second gives th
 every controller.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, Literal
@@ -30,7 +32,7 @@ from quakedesign.cli.options import (
     Shaking,
     Whole,
 )
-from quakedesign.errors import ParameterError, QuakedesignError
+from quakedesign.errors import ParameterError, QuakedesignError, SimulationError
 from quakedesign.exact import rational
 from quakedesign.files import hold, made_folder, require_room
 
@@ -118,10 +120,10 @@ def guarantee(
     from quakedesign.synthesis import guarantee as guaranteed
 
     known = ("step", "out", "controller", "stress", "lag")
-    if (chain := several_blocks(fault, globals()["guarantee"], options, known, box)) is not None:
+    if (several := several_blocks(fault, globals()["guarantee"], options, known, box)) is not None:
         sliding = {"stress": stress, "lag": around.setup().lag}
-        require_loads(chain, sliding)
-        return guarantee_chain(chain, controller, step, sliding if chain.ages else None, out, force, output)
+        require_loads(several, sliding)
+        return guarantee_chain(several, controller, step, sliding if several.ages else None, out, force, output)
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)
@@ -144,7 +146,7 @@ def guarantee(
         written = f"written: {files[0]}" if _proved(found[0]) else f"{files[0]} is not written, as nothing is proved"
         box_of = [box_sentence(faults[0])] if _proved(found[0]) and not faults[0].friction.state_names else []
         lines = [*found[0].lines(), *box_of, *([written] if files[0] else [])]
-        output.show(_facts(found[0], files[0]) | said, lines)
+        output.show(_facts(found[0], files[0]) | said, chain(_first(faults[0], found[0]), lines))
     else:
         each = zip(faults, found, files, strict=True)
         facts = [{"fault": one.name} | _facts(proof, path) for one, proof, path in each]
@@ -155,6 +157,23 @@ def guarantee(
 
 def _proved(answer: Any) -> bool:
     return not isinstance(answer, QuakedesignError) and answer.proved
+
+
+def _first(fault: Any, answer: Any) -> Iterator[str]:
+    """The guarantee beside the natural earthquake, and a blank line; nothing without a proof."""
+    if not _proved(answer):
+        return
+    from textwrap import wrap
+
+    from quakedesign.report.summary import guaranteed_sentence
+    from quakedesign.simulation.natural import natural_peak
+
+    try:
+        peak = None if fault.friction.state_names else natural_peak(fault)
+    except SimulationError:  # whose earthquake cannot be computed
+        peak = None
+    yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', answer.found, peak)}.", 80)
+    yield ""
 
 
 def _lines(answer: Any) -> list[str]:

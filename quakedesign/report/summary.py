@@ -67,20 +67,29 @@ def _answer(comparison: "Compared", best: "Entry | None") -> str:
     natural, name = comparison.uncontrolled, comparison.fault.name
     if best is None or best.guaranteed is None:
         return f"{name}: no guarantee for any designed controller"
-    found, peak = best.guaranteed, natural.outcome.peak_slip_rate
-    share = ""
-    if peak and natural.outcome.kind == "earthquake":
-        ratio = UpperBound(100 * Fraction(found.peak_slip_rate) / Fraction(peak))
-        share = f" ({ratio:.2g} % of the natural earthquake's {quantity(peak, 'm/s')})"
-    first = f"On the plant without stick, with the {best.label}," if _without_stick(best) else f"With the {best.label}"
+    earthquake = natural.outcome.peak_slip_rate if natural.outcome.kind == "earthquake" else None
+    first = best.design.other_step_first or "guaranteed"
+    return guaranteed_sentence(f"{name}: {first}", best.guaranteed, earthquake, f"with the {best.label}")
+
+
+def guaranteed_sentence(
+    first: str, found: Guarantee | SlidingGuarantee | StickSlipGuarantee, earthquake: float | None, law: str = ""
+) -> str:
+    """The guarantee in a sentence, relative to the slip rate of the natural earthquake [m/s] if there is one."""
+    rate, share = found.peak_slip_rate, ""
+    if earthquake:
+        ratio = UpperBound(100 * Fraction(rate) / Fraction(earthquake))
+        share = f" ({ratio:.2g} % of the natural earthquake's {quantity(earthquake, 'm/s')})"
+    plant = "on the plant without stick" if isinstance(found, Guarantee) else ""
+    under = ", ".join(filter(None, (plant, law)))
+    under = f"{under[:1].upper()}{under[1:]}{',' if plant else ''} the" if under else "The"
     sticks = ", whether the fault slides or sticks" if isinstance(found, StickSlipGuarantee) else ""
     slow = ""
     if isinstance(found, SlidingGuarantee):
         slow = f" {found.lasts} and shear stress is disturbed by at most {LowerBound(found.task.stress).quantity('Pa')}"
     return (
-        f"{name}: {best.design.other_step_first or 'guaranteed'}. {first} the slip rate never exceeds "
-        f"{found.peak_slip_rate.quantity('m/s')}{share}{sticks}{slow}, and the slip stays within "
-        f"{found.claims.slip_error.quantity('m')} of the reference"
+        f"{first}. {under} slip rate never exceeds {rate.quantity('m/s')}{share}{sticks}{slow}, and the slip stays "
+        f"within {found.claims.slip_error.quantity('m')} of the reference"
     )
 
 
