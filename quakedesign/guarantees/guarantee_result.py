@@ -178,8 +178,7 @@ class LoopAnswer(LoopResult):
         """For people; nothing of a law that does not grow."""
         if not self.found.proved:
             return []
-        law = self.found.controller
-        limited = getattr(law, "rest_limit", None) is not None
+        limited = self.found.rest_limit is not None
         return list(filter(None, [warning_at_rest(self.found.held.law, self.found.held.step, limited=limited)]))
 
     def limit_lines(self) -> list[str]:

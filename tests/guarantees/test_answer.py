@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import WorstFound, attacked, guarantee
+from quakedesign.guarantees import LoopAnswer, WorstFound, attacked, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 
@@ -80,3 +80,11 @@ def test_what_is_widened_is_proved_or_not_said(monkeypatch):
     monkeypatch.setattr(type(SLOW), "check", lambda _: Verdict.UNDECIDED)
     monkeypatch.setattr(MODULE, "guarantee", lambda *_: WIDE)
     assert stuck(monkeypatch, between("slip_error"), 0.0).found == SLOW
+
+
+def test_a_sliding_mode_of_a_file_whose_law_states_no_gains_has_lines():
+    """Its law is run from the controller of the design, and its pressure has a limit at rest: nothing to warn of."""
+    claim = parse_guarantee(FILE.with_name("guarantee_cta_real-fault.json").read_text())
+    told = LoopAnswer(fault=load_fault("real-fault"), found=claim).lines()
+    assert told[0] == f"proved: {claim.sentence()}"
+    assert not any("on a fault that sticks" in line for line in told)
