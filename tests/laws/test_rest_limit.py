@@ -381,7 +381,8 @@ def test_behind_a_lag_and_rock_a_fault_that_sticks_does_not_wind_up(name):
         for plant in ("printed", "stick-slip")
         for one in (found.controller, free)
     }
-    assert np.array_equal(runs["printed", True].pressure, runs["printed", False].pressure)
+    with_limit, without = (runs["printed", alone].pressure for alone in (False, True))
+    assert np.abs(with_limit - without).max() <= 1e-12 * np.abs(without).max()  # their sums are rounded differently
     assert runs["stick-slip", True].pressure.min() < 1.5 * runs["stick-slip", False].pressure.min()
     assert runs["stick-slip", False].pressure.min() > -1.02 * float(found.rest_limit.width)
     for run in (runs["stick-slip", False], runs["printed", False]):
