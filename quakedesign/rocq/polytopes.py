@@ -45,7 +45,7 @@ def polytope_theorem(claim: StickSlipGuarantee) -> Iterator[str]:
         push, moved = _outward(*pushes(task, held, reach)), task.reference_rates[0] * held.step
         found = ranges(task, reach.box[0] + moved, push, reach.box[1] * held.step)
         found = replace(found, **{name: _outward(*getattr(found, name)) for name in ("slope", "damping", "chord")})
-        (period,) = periods = Period.all(BALLS, task, held, found, reach.box[1], push)
+        (period,) = periods = Period.deciding(BALLS, task, held, found, reach.box[1], push)
         deciding = verifiers(task, held, reach, found)
         sliding, resting = (_hints(deciding, rows) for rows in facet_rows(periods, reach))
         yield _loop(period)

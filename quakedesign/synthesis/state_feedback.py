@@ -140,8 +140,9 @@ def may_stick(law: type[Controller], setup: LoopSetup, disturbance_class: str) -
 
 def sticking_options(problem: GainProblem[Any]) -> dict[str, Any]:
     """Options of `design_stick_slip` for a problem."""
-    healing, noise = rational(problem.fault.friction.rest_excess), problem.setup.slip_noise
-    return {"objective": problem.objective, "slip_noise": noise, "healing": healing, "tell": problem.tell}
+    healing, setup = rational(problem.fault.friction.rest_excess), problem.setup
+    noise = {"slip_noise": setup.slip_noise, "longest_step": setup.longest_step}
+    return {"objective": problem.objective, **noise, "healing": healing, "tell": problem.tell}
 
 
 def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:

@@ -333,7 +333,7 @@ def test_the_disturbance_must_outweigh_the_range_of_the_input_gain(path, share, 
     found = package.ranges(*_range_inputs(claim))
     monkeypatch.setattr(package, "pushes", lambda *_: push)
     monkeypatch.setattr(package, "ranges", lambda *_: found)
-    monkeypatch.setattr(package.Period, "all", lambda *_: [])
+    monkeypatch.setattr(package.Period, "deciding", lambda *_: [])
     if holds:
         period.verify()
         package.stick_slip_bounds(claim.task, claim.held, claim.reach)

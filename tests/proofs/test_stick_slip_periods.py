@@ -166,7 +166,7 @@ def test_bounds_at_the_intervals_that_decide_hold_for_all_between():
     """Beside a grid of intervals, where the bounds of some facets are larger than at the intervals that decide."""
     p, (before, place, *_) = period("aperiodic"), courses(1, "aperiodic")
     plain, larger = copy(p), set()
-    plain.between = [STICK.Near.of(Fraction(0))] * 2
+    plain.margin = [STICK.Near.of(Fraction(0))] * 2
     for facet, (row, given) in enumerate(zip(p.reach.facets, p.reach.multipliers, strict=True)):
         for one in range(3):
             mine = before[:, place == one]
@@ -193,7 +193,7 @@ def packages(noisy=False):
     given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
     functions = defaultdict(list)
     with ctx.workprec(package.BITS):
-        periods = package.Period.all(package.BALLS, task, held, found, reach.box[1], own.push)
+        periods = package.Period.deciding(package.BALLS, task, held, found, reach.box[1], own.push)
         sliding = [package.sliding_rows(one, *map(package._ball_array, given)) for one in periods]
         resting = package.resting_rows(package.EXACT, task, held, found, *map(package._exact_array, given))
         for rows in chain(*sliding, resting):

@@ -225,6 +225,7 @@ def test_the_same_certificate_gives_the_same_bytes_in_another_process():
     assert told.decode() == rocq_text(read_json(path))
 
 
+NO_THEOREM = ("guarantee", "sliding", "uncertain_plant", "stick_slip_aperiodic")
 KINDS = {
     "motzkin_not-sos": "not-sos",
     "guarantee_lab-fault": "a guarantee",
@@ -237,6 +238,11 @@ KINDS = {
 def test_a_kind_without_theorem_is_refused(name, kind):
     with pytest.raises(UnsupportedError, match=f"Received {kind}"):
         rocq_text(read_json(CERTIFICATES / f"{name}.json"))
+
+
+def test_an_aperiodic_stick_slip_loop_is_refused():
+    with pytest.raises(UnsupportedError, match="for periodic sampling alone"):
+        rocq_text(read_json(CERTIFICATES / "stick_slip_aperiodic_real-fault.json"))
 
 
 def test_a_point_that_refutes_an_attraction_is_refused():
@@ -386,7 +392,7 @@ def test_coqc_accepts_the_catalogue(path, tmp_path):
     try:
         text = rocq_text(read_json(path))
     except UnsupportedError:
-        assert path.stem == "motzkin_not-sos" or path.stem.startswith(("guarantee", "sliding", "uncertain_plant"))
+        assert path.stem == "motzkin_not-sos" or path.stem.startswith(NO_THEOREM)
         return
     code, out, err = compiled(text, tmp_path)
     assert (code, err) == (0, "")

@@ -1,5 +1,6 @@
 """On which plant a design and a guarantee are proved: the stick-slip plant where possible, else that without stick."""
 
+import pickle
 from dataclasses import replace
 from fractions import Fraction as F
 from importlib import import_module
@@ -12,6 +13,7 @@ import quakedesign as qd
 from quakedesign.guarantees import LoopAnswer, NoGuarantee, StickSlipAnswer, guarantee_of, load_guarantee
 from quakedesign.guarantees.search import compensated_search as COMPENSATED
 from quakedesign.guarantees.search.compensated_search import recovered, sorted_terms, sticking_loop
+from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
 from quakedesign.laws import StickSlipController, control_law
 from quakedesign.plant import uncertain_plant
 from quakedesign.report.sentences import sentences
@@ -23,6 +25,7 @@ REAL = qd.load_fault("real-fault")
 GUARANTEE, FEEDBACK, SLIDING = (
     import_module(f"quakedesign.synthesis.{name}") for name in ("guarantee", "state_feedback", "sliding_mode_design")
 )
+ANSWER = import_module("quakedesign.guarantees.stick_slip_answer")
 NONE = NoGuarantee(reason="no polytope", small_gain=None)
 
 
@@ -85,7 +88,7 @@ def test_a_design_hands_down_what_the_theorem_takes(monkeypatch, sticking):
     healed = replace(REAL, friction=replace(REAL.friction, healing=1e-5))
     qd.design(healed, "elqr", objective="peak", slip_noise="1 um")
     assert seen.pop("tell")
-    assert seen == {"objective": "peak", "slip_noise": F(1, 10**6), "healing": F(1, 10**5)}
+    assert seen == {"objective": "peak", "slip_noise": F(1, 10**6), "longest_step": 0, "healing": F(1, 10**5)}
 
 
 def test_a_guarantee_hands_down_what_the_theorem_takes(monkeypatch, sticking):
@@ -224,3 +227,33 @@ def test_the_answer_of_a_summary_names_the_plant(sticking, plain):
     assert "m/s, whether the fault slides or sticks, and" in said(sticking)
     assert "On the plant without stick, with the e-LQR, the slip rate" in said(plain)
     assert "sticks" not in said(plain)
+
+
+def test_a_guarantee_for_aperiodic_sampling_is_searched_on_the_stick_slip_plant(monkeypatch):
+    given = []
+    monkeypatch.setattr(ANSWER, "design_stick_slip", lambda task, step, **wanted: given.append((step, wanted)) or NONE)
+    monkeypatch.setattr(GUARANTEE, "_sampled", lambda *_: LoopAnswer(fault=REAL, found=NONE))
+    found = qd.guarantee(REAL, step="92 ms", longest_step="184 ms")
+    ((step, wanted),) = given
+    assert (step, wanted["longest_step"], found.not_at_rest) == (F("0.092"), F("0.184"), "no polytope")
+
+
+def test_a_sliding_mode_has_no_aperiodic_proof_on_the_stick_slip_plant():
+    task, longest = uncertain_plant(REAL), F("0.184")
+    found = design_stick_slip(task, F("0.092"), longest_step=longest, implicit=True)
+    assert found.reason == "a sliding mode that sticks is proved for periodic sampling alone"
+
+
+def test_an_aperiodic_guarantee_states_its_range_and_the_limit_at_its_longest_interval():
+    found = load_guarantee(PROOFS / "stick_slip_aperiodic_real-fault.json")
+    answer = StickSlipAnswer(fault=REAL, found=found)
+    assert "zero-order hold over sampling intervals from 0.092 s to 0.184 s in any order" in answer.lines()[0]
+    assert (
+        "no controller with zero-order hold over T_s = 0.184 s keeps the slip rate below 101 µm/s" in answer.lines()[-1]
+    )
+    facts = answer.to_dict()
+    assert (facts["step"], facts["longest_step"]) == ("23/250", "23/125")
+    law = pickle.loads(pickle.dumps(found.controller))
+    assert (law.sampling.step, law.sampling.longest) == (F("0.092"), F("0.184"))
+    periodic = load_guarantee(PROOFS / "stick_slip_real-fault.json")
+    assert "longest_step" not in StickSlipAnswer(fault=REAL, found=periodic).to_dict()

@@ -61,7 +61,7 @@ class Law:
     pull: Sum
 
     @property
-    def most(self) -> Fraction:
+    def longest_interval(self) -> Fraction:
         """The longest interval."""
         return self.longest or self.step
 
@@ -69,7 +69,7 @@ class Law:
     def intervals(self) -> list[Fraction]:
         """Those that decide."""
         parts = PARTS if self.longest else 0
-        return [self.step + (self.most - self.step) * i / (parts or 1) for i in range(parts + 1)]
+        return [self.step + (self.longest_interval - self.step) * i / (parts or 1) for i in range(parts + 1)]
 
     @property
     def told(self) -> Fraction:
@@ -150,7 +150,7 @@ class Period:
         self.task, self.law, self.reach = task, law, reach
         self.bend, self.force = task.reference_acceleration, task.amplitude
         self.rate = task.reference_rate + law.told  # as the law is told it
-        self.still = self.bend * law.most / 2 + law.told  # r' up to which the reference may stand still
+        self.still = self.bend * law.longest_interval / 2 + law.told  # r' up to which the reference may stand still
         ahead, self.peak, up, behind, down = (1 / abs(sum(row)) for row in reach.facets[:5])
         self.ahead, self.behind, self.level = ahead, behind, max(up, down)
         zero, one = Fraction(0), Fraction(1)
@@ -173,7 +173,7 @@ class Period:
         self.flat = [Polytope(*given) for given in zip(self.slices, self.sizes, self.signs, reach.sliding, strict=True)]
         self.push = self.pushes()
         self.find_ranges(rock, target, growths)
-        self.find_responses()
+        self.find_curvature()
 
     def pushes(self) -> Range:
         """Least and largest U of the set."""
@@ -188,7 +188,7 @@ class Period:
     def find_ranges(self, rock: Rock, target: Fraction, growths: Row) -> None:
         """Ranges of slopes and damping, and what must hold of them."""
         task, law = self.task, self.law
-        slip = target + self.ahead + task.reference_rate * law.most
+        slip = target + self.ahead + task.reference_rate * law.longest_interval
         still = rock.stress(slip, growths[0])
         stress = still[0] + self.push[0], still[1] + self.push[1]
         need(stress[0] > 0, "the fault must not open")
@@ -200,17 +200,17 @@ class Period:
         stiffness = max(rock.stiffness[1] - growths[0], Fraction(0))
         load = rock.area[0] * rock.mu["static"] * task.normal_stress
         need(load > stiffness * slip + self.force, "the shear stress must not reverse")
-        need(self.slope[1] * law.most**2 < 1, "the step must be short against the weakening of friction")
-        moves = 1 + task.slope_of_beta * law.most * self.peak
+        need(self.slope[1] * law.longest_interval**2 < 1, "the step must be short against the weakening of friction")
+        moves = 1 + task.slope_of_beta * law.longest_interval * self.peak
         low, high = (moves * v for v in rock.of_slip(still, growths[0]))
         self.chord = min(low, Fraction(0)), max(high, Fraction(0))
         self.longest = min(g * self.peak + h for g, h in self.stops())
         large = self.force + self.slope[0] * self.longest >= 0
         need(large, "the disturbance must be large enough for the condition of rest")
 
-    def find_responses(self) -> None:
-        """Impulse responses at the ends of the pieces, their integrals and what bounds their curvature."""
-        step, zero, one = self.law.most, Fraction(0), Fraction(1)
+    def find_curvature(self) -> None:
+        """Bounds of the impulse responses and their curvature over the longest interval, and what follows from them."""
+        step, zero, one = self.law.longest_interval, Fraction(0), Fraction(1)
         (s, ds), (w, dw) = (((high + low) / 2, (high - low) / 2) for low, high in (self.slope, self.damping))
         self.growth = 1 / (1 - self.slope[1] * step**2 / 2)
         self.per_slip, self.per_rate = ds * self.growth, dw  # what counts beside the force
@@ -219,14 +219,14 @@ class Period:
         once = [[zero, one], [abs(s), abs(w)]]
         own = [Near(within.rows[i][1], 0) for i in (0, 1)]
         moved, self.bent = ([Near.of(a) * own[0] + Near.of(b) * own[1] for a, b in rows] for rows in (once, square))
-        self.between = self.beside(own, moved)
+        self.margin = self.margins(own, moved)
 
-    def beside(self, own: list[Near], moved: list[Near]) -> list[Near]:
-        """What factors of slip and slip rate may make of a facet at an interval between two that decide, beyond these.
+    def margins(self, own: list[Near], moved: list[Near]) -> list[Near]:
+        """What bounds at two intervals may lack between these, for factors of slip and slip rate.
 
-        Squared distance of these over 8, times a bound of the second derivative by the interval.
+        It is the squared distance of the two over 8, times a bound of the second derivative by the interval.
         """
-        law, task, most = self.law, self.task, self.law.most
+        law, task, most = self.law, self.task, self.law.longest_interval
         part = (most - law.step) ** 2 / PARTS**2 / 8
         noise = law.slip * law.slip_noise
         pushed = task.beta[1] * task.b * (max(map(abs, self.push)) + law.target * self.still + noise)
@@ -251,7 +251,7 @@ class Period:
         of_rate, of_force = self.others(alone)
         off = (self.task.beta[1] - 1) ** 2 / (4 * self.task.beta[1] * self.task.b)  # of a chord of 1/beta
         self.gap = (self.of_rate[0] + of_rate).times(off), (self.of_force[0] + of_force).times(off)
-        self.beyond = self.between[0].times(off)
+        self.gap_margin = self.margin[0].times(off)
 
     def integrals(self, of_slip: Fraction, of_rate: Fraction) -> list[Near]:
         """Integrals of h(t)·t^j over a period, h >= |of_slip·X(T - t) + of_rate·Y(T - t)| by chords between nodes."""
@@ -313,8 +313,8 @@ class Period:
                     by_rate += Near.of(-n3 * law.slip * law.step / 2)
                 by_force = (area[0] + beside[1] + bent[1]).times(self.force)
                 by_force += abs(by_push).times(law.slip * law.slip_noise)
-                by_force += self.between[0].times(abs(of_slip)) + self.between[1].times(abs(of_rate))
-                by_force += self.beyond.times(curved)
+                by_force += self.margin[0].times(abs(of_slip)) + self.margin[1].times(abs(of_rate))
+                by_force += self.gap_margin.times(curved)
                 for end in self.ends:
                     row, push = self.pushed(end)
                     of_error, constant, late = self.carried(facet, end, self.interval)
@@ -328,7 +328,7 @@ class Period:
 
     def stops(self) -> list[Range]:
         """Factors and constants of y that bound the slip until a last stop."""
-        step, (low, high) = self.law.most, self.damping
+        step, (low, high) = self.law.longest_interval, self.damping
         least = Fraction(1, 2) + low * step / 24
         found = []
         for i in range(LINES + 1):
@@ -366,7 +366,7 @@ class Period:
     def stopped(self, facet: Row, given: Row, end: End) -> Iterator[Function]:
         """Bounds of a facet after a period that ends at rest, functions of (e1, y, d) and the slip until a stop."""
         law, (n1, _, n3) = self.law, facet
-        for interval in {law.step, law.most}:
+        for interval in {law.step, law.longest_interval}:
             of_error, constant, late = self.carried(facet, end, interval)
             constant += max(late, Fraction(0)) * self.still
             for chord in self.chord:
@@ -395,14 +395,14 @@ class Period:
                     for function in self.stopped(facet, multipliers, end):
                         within = polytope.largest(function, which) <= ONE
                         need(within, f"facet {which} must hold after a period that ends at rest. It may not")
-        step, least = self.law.most, Fraction(0 if self.law.longest else 1)
+        step, least = self.law.longest_interval, Fraction(0 if self.law.longest else 1)
         share = self.per_slip * step**2 / 2 + self.per_rate * step * (1 + self.slope[1] * self.growth * step**2)
         spread = self.task.b * (self.task.beta[1] - least) * max(self.push[1], Fraction(0))
         need(share * spread <= self.force, "the disturbance must outweigh the range of the input gain")
 
     def bounds(self) -> dict[str, Fraction]:
         """What the set gives, by claims."""
-        noise, moved = self.law.slip_noise, self.task.reference_rate * self.law.most
+        noise, moved = self.law.slip_noise, self.task.reference_rate * self.law.longest_interval
         pressure = self.rest[0] - self.push[1], self.rest[1] - self.push[0]
         return dict(
             zip(CLAIMS, (self.behind + noise + moved, self.ahead - noise + moved, self.peak, *pressure), strict=True)

@@ -472,46 +472,37 @@ class Period:
     of_force: tuple[Any, Any]  # and of a constant force
     impulses: tuple[np.ndarray, np.ndarray]  # ξ and y, a time after an impulse, at the nodes
     bent: tuple[Any, Any]
-    between: tuple[Any, ...]  # what ξ and y may be more at an interval between two that decide
+    margin: tuple[Any, ...]  # of factors of ξ and y: what their bounds at two intervals may lack between these
 
     @classmethod
-    def all(
+    def deciding(
         cls, back: Numbers, task: FaultPlant, held: SampledStickSlip, found: Ranges, rate: Fraction, push: Range
     ) -> "list[Period]":
-        """Those that decide, from exact ranges, the largest slip rate [m/s] and the range of U [Pa]."""
-        return [cls._of(back, task, held, found, interval, rate, push) for interval in held.intervals]
-
-    @classmethod
-    def _of(
-        cls,
-        back: Numbers,
-        task: FaultPlant,
-        held: SampledStickSlip,
-        found: Ranges,
-        interval: Fraction,
-        rate: Fraction,
-        push: Range,
-    ) -> "Period":
+        """Those that decide for all intervals, from exact ranges, the largest slip rate [m/s] and U [Pa]."""
         zero, one = _ZERO, Fraction(1)
         slope, damping = (sum(pair, _ZERO) / 2 for pair in (found.slope, found.damping))
         flow = (zero, one), (slope, -damping)
         tall = (*((*row, entry) for row, entry in zip(flow, (zero, one), strict=True)), (zero, zero, zero))
-        whole = back.exponential(tuple(tuple(v * interval for v in row) for row in tall))
-        piece = interval / NODES
-        nodes = [back.exponential(tuple(tuple(v * piece * i for v in row) for row in flow)) for i in range(NODES + 1)]
-        sizes = back.bent(flow, held.longest)
-        return cls(
-            back=back,
-            task=task,
-            held=held,
-            found=found,
-            interval=interval,
-            of_rate=(whole[0][1], whole[1][1]),
-            of_force=(whole[0][2], whole[1][2]),
-            impulses=(back.array([node[0][1] for node in nodes]), back.array([node[1][1] for node in nodes])),
-            bent=sizes[2],
-            between=_between(back, task, held, found, sizes, rate, push),
-        )
+        sizes, periods = back.bent(flow, held.longest), []
+        margin = _margin(back, task, held, found, sizes, rate, push)
+        for interval in held.intervals:
+            whole = back.exponential(tuple(tuple(v * interval for v in row) for row in tall))
+            ends = [tuple(tuple(v * interval / NODES * i for v in row) for row in flow) for i in range(NODES + 1)]
+            nodes = list(map(back.exponential, ends))
+            period = cls(
+                back=back,
+                task=task,
+                held=held,
+                found=found,
+                interval=interval,
+                of_rate=(whole[0][1], whole[1][1]),
+                of_force=(whole[0][2], whole[1][2]),
+                impulses=(back.array([node[0][1] for node in nodes]), back.array([node[1][1] for node in nodes])),
+                bent=sizes[2],
+                margin=margin,
+            )
+            periods.append(period)
+        return periods
 
     def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
         """∫h(t)·t^j dt for j = 0 to 3, h(t) ≥ |g(T − t)|, g = `of_slip`·ξ + `of_rate`·y of an impulse.
@@ -538,7 +529,7 @@ class Period:
         return of_rate, (per_slip * whole[2] + per_rate * steepest * whole[3]) / 2 + per_rate * whole[1]
 
 
-def _between(
+def _margin(
     back: Numbers,
     task: FaultPlant,
     held: SampledStickSlip,
@@ -547,7 +538,7 @@ def _between(
     rate: Fraction,
     push: Range,
 ) -> tuple[Any, ...]:
-    """Bounds of Δ²/8 times the second derivative of a facet by the interval, of factors of ξ and y; Δ that of pieces.
+    """Bounds of Δ²/8·|V″| for factors of ξ and y, Δ from one interval that decides to the next.
 
     `sizes` are bounds of the impulse responses of ξ and y and of their first two derivatives.
     """
@@ -690,7 +681,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
         )
     ]
     carried = list(_carried(back, task, held, period.interval, facets, list(enumerate(COMBINATIONS))))
-    between = period.between[0] * off  # of what 1/β lacks of its chord
+    gap_margin = period.margin[0] * off  # of what 1/β lacks of its chord
     for cut in (False, True):
         which = raised if cut else everyone
         if not len(which):
@@ -713,7 +704,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
                 of_y = of_y if cut else of_y - a3 * slip * half
                 force = bound * (whole[0] + of_force + curved * gaps[1])
                 force = force + abs(pushed) * number(held.push_noise)
-                force = force + abs(of_slip) * period.between[0] + abs(of_rate) * period.between[1] + curved * between
+                force = force + abs(of_slip) * period.margin[0] + abs(of_rate) * period.margin[1] + curved * gap_margin
                 for part in carried:
                     factors = [pushed * number(v) for v in part.push]
                     columns = [part.of_error[which] + factors[0], of_y + factors[1], a3 + factors[2]]
@@ -913,7 +904,7 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
     if found.slope[1] * held.longest**2 >= 1:
         raise ParameterError("T_s is too long against the weakening of friction")
     deciding = verifiers(task, held, reach, found)
-    periods = Period.all(BALLS, task, held, found, rate, push)
+    periods = Period.deciding(BALLS, task, held, found, rate, push)
     for rows in chain(*facet_rows(periods, reach)):
         tops = deciding[rows.place].largest(rows.factors, rows.constants, rows.which)
         for facet, top in zip(rows.which, tops, strict=True):

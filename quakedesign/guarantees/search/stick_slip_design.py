@@ -201,7 +201,7 @@ class _Reach:
     def of(cls, task: FaultPlant, held: SampledStickSlip) -> "_Reach":
         none = Fraction(0), Fraction(0)
         found = ranges(task, task.target_slip / 100, none, task.amplitude * held.longest**2)
-        return cls(task, held, found, Period.all(FLOATS, task, held, found, Fraction(0), none))
+        return cls(task, held, found, Period.deciding(FLOATS, task, held, found, Fraction(0), none))
 
     def after(self, states: np.ndarray) -> np.ndarray:
         """States a period later: those of runs, and extremes of both maps."""
@@ -405,12 +405,9 @@ def _wide_periods(task: FaultPlant, held: SampledStickSlip, size: tuple[float, .
     """For states of a size."""
     law, (slip, rate, level) = held.law, (_ROOM * short(v, 4) for v in size)
     most = law.target_gain * (law.return_rate * slip + _ROOM * (task.reference_rates[0] + held.told))
-    push = (
-        -(most + law.rate_gain * rate + level + held.push_noise),
-        most + law.rate_gain * rate + level + held.push_noise,
-    )
-    found = ranges(task, slip, push, rate * held.longest)
-    return Period.all(FLOATS, task, held, found, rate / _ROOM, (push[0] / _ROOM, push[1] / _ROOM))
+    most = most + law.rate_gain * rate + level + held.push_noise
+    found = ranges(task, slip, (-most, most), rate * held.longest)
+    return Period.deciding(FLOATS, task, held, found, rate / _ROOM, (-most / _ROOM, most / _ROOM))
 
 
 @dataclass
