@@ -77,25 +77,18 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
     return [*([healed] if excess else []), meant]
 
 
-def _facts(found: Any, chain: "BlockChain", one: Any = None) -> dict[str, Any]:
+def _facts(found: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> dict[str, Any]:
     if not found.proved:
         return {"verdict": "undecided", "reason": found.reason}
-    told = {**found.to_dict(), "notes": [*found.notes, *_scope(found, chain)]}
-    return told if one is None or chain.ages else told | one.proved_facts()
+    proved = {} if one is None else one.proved_facts()
+    return {**found.to_dict(), "notes": [*found.notes, *_scope(found, chain)], **proved}
 
 
 def _lines(found: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> list[str]:
-    """The answer, a table of blocks and wells, then what it depends on; without a state in 80 columns."""
+    """What is proved and what it depends on, with a run if there is one; else why nothing is proved."""
     if found.proved:
-        from textwrap import wrap
-
         conditions = [*found.lines(), *_scope(found, chain)]
-        if one is None:
-            return conditions
-        if chain.ages:
-            return [*conditions, "", *one.lines()]
-        told = [line for text in conditions for line in wrap(text, 80, subsequent_indent="  ", break_on_hyphens=False)]
-        return [*wrap(one.answer, 80), "", *one.lines(), "", *told]  # type: ignore[union-attr]
+        return conditions if one is None else one.screen(conditions)
     far = "the command limits gives the pressures that every controller of this file needs with its diffusivity"
     return [found.sentence(), *([far] if chain.diffusivity else [])]
 
@@ -271,8 +264,8 @@ def run_chain(
         one = run_sliding_chain(chain, **given) if chain.ages else run_of_chain(chain, **given)
     found: Any = one.found
     facts = _run_facts(one)
-    said = one.lines() if found is None else _lines(found, chain, one)
-    said += [] if found is None or one.run is not None else [*one.lines()]
+    said = [] if found is None else _lines(found, chain, one)
+    said += one.lines() if found is None or not found.proved else []
     if out is not None and one.run is not None:
         from quakedesign.files import whole_folder
         from quakedesign.guarantees.exact.guarantee_files import save_guarantee

@@ -183,7 +183,7 @@ def design(
         law = {"controller": block_law(options.controller, "all")} | (
             {"sliding": options.sliding} if chain.ages else {}
         )
-        return run_chain(chain, out or Path(f"quakedesign-{Path(fault).stem}"), force, output, format, **law)
+        return run_chain(chain, out or Path(f"quakedesign-{chain.name}"), force, output, format, **law)
     loaded, asked = options.asked(fault)
     folder = out or Path(f"quakedesign-{loaded.name}")
     prepare(folder, force=force)

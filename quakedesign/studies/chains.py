@@ -3,7 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -54,7 +56,7 @@ def chain_lines(chain: BlockChain) -> list[str]:
         said.append(f"{place:5}{block.length:12g}{quantity(stress, 'Pa', 4):>13}  {shares:24}{block.friction.name}")
     springs = ", ".join(f"{float(K):.4g}" for i, j, K in chain.springs if i < j)
     said += ["", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
-    pole, peak = _growth(chain), None if chain.ages else natural_peak(chain)
+    pole, peak = _growth(chain), natural_peak(chain)
     stable = "stable" if pole == 0 else "stability unknown, as floating point does not tell its modes apart"
     said += [f"without control: {f'unstable, errors grow with up to {pole:.4g} 1/s' if pole else stable}"]
     said += [] if peak is None else [f"natural earthquake: slip rate up to {quantity(peak, 'm/s')}"]
@@ -74,7 +76,7 @@ def chain_dict(chain: BlockChain) -> dict[str, Any]:
     springs = [{"block": i + 1, "pulled_by": j + 1, "stiffness_over_mass": float(K)} for i, j, K in chain.springs]
     shares = [[float(v) for v in row] for row in chain.shares]
     along = {"wells": list(chain.wells), "shares": shares, "diffusivity": chain.diffusivity}
-    events = {"growth_rate": _growth(chain), "natural_peak_slip_rate": None if chain.ages else natural_peak(chain)}
+    events = {"growth_rate": _growth(chain), "natural_peak_slip_rate": natural_peak(chain)}
     return {"fault": chain.name, "blocks": blocks, **along, "springs": springs, **events}
 
 
@@ -91,6 +93,7 @@ def farthest_balance(chain: BlockChain, found: PlantGuarantee) -> UpperBound | N
     return UpperBound(max(moves) / task.reference_rates[0] * task.target_slip)
 
 
+@lru_cache(maxsize=8)
 def _growth(chain: BlockChain) -> float | None:
     """Largest pole without control [1/s], 0 where no mode is unstable; None where floating point cannot tell."""
     try:
@@ -99,12 +102,14 @@ def _growth(chain: BlockChain) -> float | None:
         return None
 
 
+@lru_cache(maxsize=8)
 def natural_peak(chain: BlockChain) -> float | None:
     """Largest slip rate of blocks without control [m/s], released as by `natural_earthquake`.
 
-    None where no mode is unstable, and for friction that heals, of which no run of blocks is had.
+    None where no mode is unstable, for friction with a state, and for friction that heals, which no run of blocks has.
     """
-    pole = None if any(block.friction.rest_excess for block in chain.blocks) else _growth(chain)
+    beyond = chain.ages or any(block.friction.rest_excess for block in chain.blocks)
+    pole = None if beyond else _growth(chain)
     if not pole:
         return None
     nudge, omega = max(map(event_nudge, chain.faults)), chain.fault.natural_frequency
@@ -145,8 +150,10 @@ class ChainRun:
         """What is guaranteed, beside the natural earthquake."""
         N, peak = len(self.chain.blocks), natural_peak(self.chain)
         rate, slip = max(self.proved_slip_rates), max(self.found.claims.outputs[:N])
-        ratio = "" if peak is None else f"{UpperBound(100 * rate / rational(peak)):.2g} % of "
-        share = ratio and f" ({ratio}the natural earthquake's {quantity(peak, 'm/s')})"  # type: ignore[arg-type]
+        share = ""
+        if peak is not None:
+            ratio = UpperBound(100 * rate / rational(peak))
+            share = f" ({ratio:.2g} % of the natural earthquake's {quantity(peak, 'm/s')})"
         far = farthest_balance(self.chain, self.found)
         about = "the reference"
         if far is not None:
@@ -167,9 +174,8 @@ class ChainRun:
     def proved_pressures(self) -> list[tuple[LowerBound, UpperBound]] | None:
         """Bounds of the pressures themselves [Pa]; None for wells fewer than blocks, and where pressure diffuses."""
         chain = self.chain
-        if chain.diffusivity is not None or len(chain.wells) < len(chain.blocks):
-            return None
-        if (inverse := inverse_of(chain.shares)) is None:
+        square = chain.diffusivity is None and len(chain.wells) == len(chain.blocks)
+        if not square or (inverse := inverse_of(chain.shares)) is None:
             return None
         rest = [uncertain_plant(fault).rest_pressure for fault in chain.faults]
         ends = []
@@ -188,6 +194,11 @@ class ChainRun:
             "pressures": ends and [[low.exact, high.exact] for low, high in ends],
             "natural_peak_slip_rate": natural_peak(self.chain),
         }
+
+    def screen(self, conditions: Sequence[str]) -> list[str]:
+        """Lines of at most 80 characters: the answer, a table of blocks and wells, and what the proof depends on."""
+        wrapped = [wrap(line, 80, subsequent_indent="  ", break_on_hyphens=False) for line in conditions]
+        return [*wrap(self.answer, 80), "", *self.lines(), "", *(line for lines in wrapped for line in lines)]
 
     def lines(self) -> list[str]:
         """Lines of at most 80 characters: blocks and wells, what is proved beside what a run shows."""
@@ -379,6 +390,14 @@ class SlidingChainRun:
         told = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
         proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
         return bool((np.concatenate(told) <= np.array(proved, dtype=float)).all())
+
+    def screen(self, conditions: Sequence[str]) -> list[str]:
+        """What the proof depends on, and the run."""
+        return [*conditions, "", *self.lines()]
+
+    def proved_facts(self) -> dict[str, Any]:
+        """Nothing beyond the guarantee: its bounds are those of the blocks."""
+        return {}
 
     def lines(self) -> list[str]:
         """For people."""

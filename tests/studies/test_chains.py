@@ -12,7 +12,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.cli import main
-from quakedesign.errors import CertificateError
+from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees import NoGuarantee
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
@@ -127,6 +127,27 @@ def test_equal_blocks_slip_as_one_block_does_without_control():
     assert chains.natural_peak(replace(chain, blocks=(healed, healed))) is None
 
 
+def test_a_fault_that_is_unstable_in_its_box_alone_has_no_earthquake():
+    """Friction weakens by 1.447 1/s², in the box by up to 1.6; a stiffness of 1.5 1/s² holds the fault as it is."""
+    one = (replace(CHAIN.blocks[0], length=2500.0),) * 2
+    chain = replace(CHAIN, blocks=one, wells=(1000.0,), fault=CHAIN.fault.with_box("ten-percent"))
+    stiff = replace(chain, fault=replace(chain.fault, shear_modulus=1.5 / 0.48 * chain.fault.shear_modulus))
+    assert chains._growth(stiff) > 0
+    assert chains.natural_peak(stiff) is None
+    assert chains.natural_peak(qd.load_chain(SLIDING)) is None
+
+
+def test_modes_that_floating_point_does_not_tell_apart_leave_the_stability_unknown(monkeypatch):
+    def unknown(_):
+        raise ParameterError("modes are too close")
+
+    monkeypatch.setattr(chains, "chain_limits", unknown)
+    chain = replace(CHAIN, wells=(900.0, 2500.0, 4000.0))  # not in the cache
+    assert any("stability unknown" in line for line in chains.chain_lines(chain))
+    facts = chains.chain_dict(chain)
+    assert (facts["growth_rate"], facts["natural_peak_slip_rate"]) == (None, None)
+
+
 def test_pressures_themselves_are_those_of_equilibrium_and_what_is_proved_beside_them():
     """Friction falls to its least after one critical slip, or stays at its largest over the whole task."""
     chain = replace(CHAIN, blocks=(replace(CHAIN.blocks[0], length=2500.0),) * 2, wells=(1250.0, 3750.0))
@@ -146,6 +167,11 @@ def test_pressures_themselves_are_those_of_equilibrium_and_what_is_proved_beside
     expected = [1.1 * least - 0.1 * largest - 1000, 1.1 * largest - 0.1 * least + 1000]
     assert [float(low), float(high)] == pytest.approx(expected, abs=100)
     assert replace(apart, chain=replace(chain, diffusivity=1e6)).proved_pressures is None
+    assert not any("from the equilibrium of a block" in line for line in one.lines())
+    alone = SimpleNamespace(**{**vars(run), "pressure": pressures[:, :1]})
+    lone = replace(one, chain=replace(chain, wells=(1250.0,)), run=alone).lines()
+    assert "slip error: proved from the equilibrium of a block, in the run from the reference" in lone
+    assert [line for line in lone if line.startswith("well")] == ["well 1    run 0 Pa to 2 MPa"]
     told = one.lines()
     assert [line.endswith("(OUTSIDE)") for line in told if line.startswith("well")] == [False, True]
     assert "as pressures do here" in " ".join(told)
