@@ -297,9 +297,8 @@ def identify(
     written = ", ".join(str(path) for path in (figure, file) if path is not None)
     told = [*law_remarks(identification, around), *([f"written: {written}"] if written else []), *told]
     told = [line for each in told for line in wrap(each, 80, subsequent_indent="  ", break_long_words=False)]
-    usable = out is None and identification.explained
-    told += ["next: --out FILE writes a fault file for design and guarantee"] if usable else []
-    told += [f"next: {next_command(identification, file)}"] if file is not None else []
+    usable = file is not None or (out is None and identification.explained)
+    told += [f"next: {next_command(identification, file)}"] if usable else []
     facts = found.to_dict() | {"figure": figure and str(figure), "file": file and str(file)}
     told += [] if verbose else ["tests, noise and assumptions: --verbose"]
     output.show(facts, [*identification_lines(found, verbose=verbose), *told])

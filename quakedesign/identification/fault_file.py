@@ -151,11 +151,16 @@ def law_remarks(identification: Identification, fault: Fault) -> list[str]:
     return [f"{fault.name} names {named.name}, {why} {found.name}; --law {named.name} takes the other"]
 
 
-def next_command(identification: Identification, path: str | Path) -> str:
-    """The command that designs for a fault file of a record, for all constants that the record allows."""
+def next_command(identification: Identification, path: str | Path | None) -> str:
+    """The command that designs for a fault file of a record, for all constants that the record allows.
+
+    Without a path, the option that writes a file.
+    """
     difference = identification.difference
     if identification.explained and difference is not None and difference.low > 0:
         return "none is needed: friction strengthens with rate, so that the fault creeps without control"
+    if path is None:
+        return "--out FILE writes a fault file for design and guarantee"
     if why := poor_fit(identification):
         return f"none: {why}. Design refuses the file without --accept-poor-fit"
     if not covers(identification.law) and (wide := _too_wide(identification)):

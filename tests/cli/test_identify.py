@@ -56,6 +56,8 @@ def test_text_keeps_within_80_columns_and_says_what_is_not_from_the_record(recor
     assert "next: none: the fit does not explain the record" in written
     exponential = (*told[:2], "exponential-slip-weakening", *told[3:], "--out", str(tmp_path / "better.toml"))
     assert f"next: quakedesign design {tmp_path / 'better.toml'}" in run(capsys, *exponential)[1]
+    assert "next: " not in out
+    assert "next: --out FILE writes a fault file for design" in run(capsys, *exponential[:-2])[1]
     assert max(map(len, out.splitlines())) <= 80
 
 

@@ -304,6 +304,8 @@ def test_a_box_wider_than_a_fifth_has_no_spread_that_covers_it(share, spread):
 )
 def test_friction_that_strengthens_for_certain_needs_no_controller(low, told):
     assert next_command(written(low=low, high=0.002), "made.toml").startswith(told)
+    before = next_command(written(low=low, high=0.002), None)
+    assert before.startswith("none is needed" if low > 0 else "--out FILE writes a fault file")
     unclear = written(low=low, high=0.002, verdict="cannot tell")
     assert next_command(unclear, "made.toml").startswith("none: the record cannot tell: the sign")
 
