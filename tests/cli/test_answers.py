@@ -9,7 +9,7 @@ import pytest
 
 from quakedesign import files
 from quakedesign.cli import main
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.loop.loop_setup import IDEAL
 
 guarantee_commands = import_module("quakedesign.cli.guarantee_commands")
@@ -113,6 +113,15 @@ def test_only_proofs_for_every_fault_are_code_zero(prove, answers, code, json_to
         else:
             named = [{"fault": name, **one} for name, one in zip(faults, each, strict=True)]
             assert told == {"guarantees": named, "class": "amplitude"}
+
+
+def test_a_fault_whose_earthquake_cannot_be_computed_has_its_guarantee_without(prove, monkeypatch):
+    def drowned(_):
+        raise SimulationError("is unstable, but its simulation does not move")
+
+    monkeypatch.setattr("quakedesign.simulation.natural.natural_peak", drowned)
+    code, out, _ = prove([proof(True)], "real-fault")
+    assert (code, out.splitlines()[0]) == (0, "real-fault: guaranteed: claim beside None m/s.")
 
 
 def test_friction_with_a_state_has_no_box(prove):

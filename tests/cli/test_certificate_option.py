@@ -90,6 +90,13 @@ def test_a_run_that_is_not_what_is_proved_says_so(file, capsys, more, outside):
         assert f"proved: {CLAIM.sentence()}" in out
 
 
+def test_a_run_does_not_call_the_law_of_a_file_by_the_name_of_a_design(file, capsys):
+    code, out, _ = told(
+        capsys, "simulate", "real-fault", "--certificate", file, "--duration", "3 s", "--plant", "printed"
+    )
+    assert (code, out.splitlines()[0]) == (0, "real-fault, law of the certificate, plant without stick")
+
+
 def test_the_pressure_of_a_run_is_compared_with_that_in_the_fault(file, capsys, monkeypatch):
     compared = []
     monkeypatch.setattr("quakedesign.report.sentences.exceeded_line", lambda *seen: compared.append(seen) or "TOO FAR")

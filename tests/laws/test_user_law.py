@@ -142,6 +142,14 @@ def test_a_file_may_have_gains(content, same, tmp_path):
     assert qd.SampledLaw.load(path).law == same().law
 
 
+@pytest.mark.parametrize("inputs", [ERRORS, ["slip", "slip_rate_error"]])
+def test_a_saved_law_has_inputs_of_the_reference_only_where_it_uses_them(inputs):
+    saved = qd.SampledLaw.from_statespace(control.ss([[0.1]], [[1, 2]], [[3]], [[4, 5]], STEP), inputs=inputs).to_dict()
+    more = [] if inputs == ERRORS else ["reference", "reference_rate"]
+    assert saved["inputs"] == ["slip_error", "slip_rate_error", *more]
+    assert {len(row) for row in (*saved["B"], *saved["D"])} == {len(saved["inputs"])}
+
+
 MATRICES = {"A": [[1]], "B": [[1, 0]], "C": [[1]], "D": [[0, 0]], "inputs": ERRORS, "step": 1}
 
 
