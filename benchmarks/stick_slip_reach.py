@@ -2,9 +2,9 @@
 
     python benchmarks/stick_slip_reach.py [WORDS OF ROWS]
 
-prints a table: what `guarantee` proves, the worst case found over the claim, CPU time of design and proof, the verdict
-of `proofs/check.py`, and what the simulator of `stick_slip_attack` reaches: the largest facet value (1 is never passed)
-and slip rate over the claim, of selected courses and of 10 000 periods without selection.
+prints a table: what `guarantee` proves, rounded outward, the worst case found over the claim, CPU time of design and
+proof, the verdict of `proofs/check.py`, and what the simulator of `stick_slip_attack` reaches: the largest facet value
+(1 is never passed) and slip rate over the claim, of selected courses and of 10 000 periods without selection.
 """
 
 import json
@@ -77,8 +77,8 @@ def row(name, fault, options):
         seen = Attack(json.loads(path.read_text())).run()
     return (
         name,
-        f"{float(claims.peak_slip_rate):.3g} m/s",
-        f"{float(claims.slip_behind):.3g} … {float(claims.slip_ahead):.3g} m",
+        f"{claims.peak_slip_rate:.3g} m/s",
+        f"{claims.slip_behind:.3g} … {claims.slip_ahead:.3g} m",
         f"{answer.worst.peak_slip_rate / float(claims.peak_slip_rate):.2f}",
         str(len(answer.found.reach.facets)),
         f"{spent:.1f} s",
