@@ -453,16 +453,16 @@ BUDGETS = {
     "laws": 3226,
     "loop": 4240,
     "plant": 1355,
-    "guarantees": 13180,
+    "guarantees": 13168,
     "lyapunov": 7000,
     "linear": 2400,
-    "synthesis": 1894,
+    "synthesis": 1895,
     "rocq": 843,
     "simulation": 9737,
-    "identification": 4016,
-    "studies": 4139,
+    "identification": 4021,
+    "studies": 4156,
     "report": 3990,
-    "cli": 3491,
+    "cli": 3482,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

@@ -88,3 +88,11 @@ def test_a_sliding_mode_of_a_file_whose_law_states_no_gains_has_lines():
     told = LoopAnswer(fault=load_fault("real-fault"), found=claim).lines()
     assert told[0] == f"proved: {claim.sentence()}"
     assert not any("on a fault that sticks" in line for line in told)
+
+
+def test_a_law_that_would_wind_up_is_warned_of_unless_its_pressure_is_limited_at_rest(monkeypatch):
+    monkeypatch.setattr("quakedesign.laws.sampled_controller.winds_up", lambda _: True)
+    answer = LoopAnswer(fault=load_fault("real-fault"), found=SLOW)
+    assert any(line.startswith("MAY WIND UP") for line in answer.lines())
+    monkeypatch.setattr(type(SLOW), "rest_limit", property(lambda _: "a limit"))
+    assert not any(line.startswith("MAY WIND UP") for line in answer.lines())

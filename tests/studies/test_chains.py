@@ -102,7 +102,11 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
     assert re.search(r"of its equilibrium, which lies within 35\.\d mm of the reference", told)
     assert "proved -" not in told
     assert run("guarantee", PATH, "--json") == 0
-    notes = json.loads(capsys.readouterr().out)["notes"]
+    facts = json.loads(capsys.readouterr().out)
+    assert [float(F(v)) for v in facts["slip_rates"]] == pytest.approx([4.22e-5, 5.22e-5, 6.22e-5], rel=1e-3)
+    assert len(facts["pressures"]) == 3
+    assert facts["natural_peak_slip_rate"] == pytest.approx(0.0806, rel=1e-3)
+    notes = facts["notes"]
     assert notes[0] == "a note"
     assert notes[1].startswith("the load of a pressure")
     healed = tmp_path / "healed.toml"
