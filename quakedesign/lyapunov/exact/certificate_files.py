@@ -123,7 +123,7 @@ def evidence_of(raw: Any) -> Evidence:
             "longer read. Make the new file with certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE."
         )
     refutes = isinstance(raw, dict) and "refutation" in raw
-    return _evidence(headed(raw, _REFUTATION if refutes else _PROOF))
+    return _evidence(with_keys(headed(raw), _REFUTATION if refutes else _PROOF))
 
 
 _COMMON = {"law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field"}

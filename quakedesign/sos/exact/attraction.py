@@ -27,6 +27,7 @@ from quakedesign.sos.exact.strict import (
     polynomial_text,
     read_polynomial,
     read_rational,
+    with_keys,
     write_readable,
 )
 from quakedesign.sos.exact.work import limited
@@ -260,7 +261,7 @@ def read(raw: Any) -> Attraction:
         When it breaks a rule of FORMAT.md.
     """
     refuted = isinstance(raw, dict) and "negative" in raw
-    headed(raw, _CLAIM | ({"negative"} if refuted else _PROOF), "attraction")
+    with_keys(headed(raw, "attraction"), _CLAIM | ({"negative"} if refuted else _PROOF))
     names = variables(raw)
     size = len(names)
     field = listed(raw["field"], "field", length=size)

@@ -37,7 +37,7 @@ def read(raw: Any) -> tuple[Statement, Proof]:
         When it breaks a rule of FORMAT.md.
     """
     kind = next((k for k in _KINDS if isinstance(raw, dict) and k in raw), "sos")
-    headed(raw, _STATEMENT | {kind})
+    with_keys(headed(raw), _STATEMENT | {kind})
     asked = _statement(raw, variables(raw))
     return asked, read_proof(raw[kind], kind, asked)
 

@@ -4,15 +4,21 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import MISSING, fields, is_dataclass
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, NoReturn, cast
+from typing import Any, NoReturn, TypeVar, cast
+
+import msgspec
 
 from quakedesign.errors import CertificateError
 from quakedesign.exact import exact_text
 from quakedesign.files import write_whole
+from quakedesign.text import shown
+
+_Kind = TypeVar("_Kind")
 
 LARGEST_FILE = 4 << 20
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -81,12 +87,13 @@ def with_keys(raw: Any, keys: set[str]) -> dict[str, Any]:
     return raw
 
 
-def headed(raw: Any, keys: set[str], kind: str = "") -> dict[str, Any]:
-    """Object of a file with the given keys, the format's number and, if there is one, its kind."""
-    with_keys(raw, {"format", *keys} | ({"kind"} if kind else set()))
-    need(type(raw["format"]) is int and raw["format"] == 1, "format must be 1")
-    need(not kind or raw["kind"] == kind, f"kind must be {kind}")
-    return cast(dict[str, Any], raw)
+def headed(raw: Any, kind: str = "") -> dict[str, Any]:
+    """Entries of a file without the format's number and, if there is one, its kind, which must be the given one."""
+    if not isinstance(raw, dict):
+        _refuse("the file must be an object")
+    need(type(raw.get("format")) is int and raw["format"] == 1, "format must be 1")
+    need(not kind or raw.get("kind") == kind, f"kind must be {kind}")
+    return {key: entry for key, entry in raw.items() if key != "format" and (key != "kind" or not kind)}
 
 
 def listed(raw: Any, what: str, limit: int | None = None, length: int | None = None) -> list[Any]:
@@ -205,3 +212,98 @@ def write_readable(path: str | Path, written: str, load: Callable[[str], Any]) -
     """Write a text whole or not at all, and only if it can be read again."""
     load(written)
     write_whole(Path(path), written)
+
+
+# ----------------------------------------------------------------------
+# Objects of a file with typed fields: reading and writing follow from the types.
+
+
+class Entries(msgspec.Struct, forbid_unknown_fields=True):
+    """An object of a file; its fields are the keys, and one that equals its default value is left out."""
+
+
+def read_as(kind: type[_Kind], raw: Any, what: str = "the file") -> _Kind:
+    """Value of a type from parsed entries, such that `written` gives these entries again.
+
+    Parameters
+    ----------
+    kind : type
+        An `Entries`, a dataclass, or a tuple of these, of rationals, integers and texts.
+    raw : object
+        As `parse` gives it.
+    what : str
+        Name of the entries for messages.
+
+    Raises
+    ------
+    CertificateError
+        For another type, a missing or unknown key, a number that is not canonical, a default value that is given, or a
+        value that its class rejects.
+    """
+    try:
+        value = msgspec.convert(raw, kind, dec_hook=_decoded)
+    except msgspec.ValidationError as error:
+        reason, _, place = str(error).partition(" - at `$")
+        _refuse(f"{place.strip('.`') or what}: {reason[:1].lower()}{reason[1:].rstrip('.')}")
+    if place := _difference(raw, written(value)):
+        _refuse(f"{place.strip('. ')} must be known, and must be omitted where it has its default value")
+    return value
+
+
+def written(value: Any) -> Any:
+    """Entries of a file that `read_as` reads as a value."""
+    if isinstance(value, Fraction):
+        return exact_text(value)
+    if isinstance(value, tuple | list):
+        return [written(entry) for entry in value]
+    if isinstance(value, dict):
+        return {key: written(entry) for key, entry in value.items()}
+    if defaults := _defaults(cast(Any, type(value))):
+        entries = ((name, getattr(value, name), default) for name, default in defaults.items())
+        return {name: written(entry) for name, entry, default in entries if default is _NONE or entry != default}
+    return value
+
+
+_NONE = object()
+
+
+@cache
+def _defaults(kind: Any) -> dict[str, Any]:
+    """Default value of every field of an object; empty for other types."""
+    if issubclass(kind, msgspec.Struct):
+        parts = ((part.name, part.default) for part in msgspec.structs.fields(kind))
+        return {name: _NONE if default is msgspec.NODEFAULT else default for name, default in parts}
+    if is_dataclass(kind):
+        return {part.name: _NONE if part.default is MISSING else part.default for part in fields(kind)}
+    return {}
+
+
+def _decoded(kind: type, raw: Any) -> Any:
+    number = read_rational(raw)
+    return number if kind is Fraction else kind(number)
+
+
+def _difference(raw: Any, again: Any) -> str:
+    """Place of the first entry that differs between what was read and what would be written; empty without one."""
+    if type(raw) is not type(again):
+        return " "
+    if isinstance(raw, dict):
+        for key, entry in raw.items():
+            if key not in again:
+                return f".{shown(key)}"
+            if place := _difference(entry, again[key]):
+                return f".{key}{place}"
+    elif isinstance(raw, list):
+        for number, pair in enumerate(zip(raw, again, strict=True)):
+            if place := _difference(*pair):
+                return f"[{number}]{place}"
+    return "" if raw == again else " "
+
+
+def made(kind: type[_Kind], *sources: Any, **entries: Any) -> _Kind:
+    """Object whose fields are given, or attributes of the same name of one of the sources, or have their defaults."""
+    for name in _defaults(cast(Any, kind)):
+        found = [getattr(source, name) for source in sources if hasattr(source, name)]
+        if name not in entries and found:
+            entries[name] = found[0]
+    return kind(**entries)

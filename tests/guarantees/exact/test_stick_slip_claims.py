@@ -175,7 +175,7 @@ HUGE = "1" + "0" * 399
         (lambda s: {"sliding": [[[0, 1]], *s["sliding"][1:]]}, "3"),
         (lambda s: {"sliding": [[[0, 1, -1]], *s["sliding"][1:]]}, "by numbers from 0"),
         (lambda s: {"resting": [[], *s["resting"][1:]]}, "bases for 3 slices and 7 combinations"),
-        (lambda s: {"resting": [[["0", "1", "2", "3"]], *s["resting"][1:]]}, "must be integers"),
+        (lambda s: {"resting": [[["0", "1", "2", "3"]], *s["resting"][1:]]}, "expected `int`"),
         (lambda s: {"resting": [s["resting"][0][:1] * 40_000, *s["resting"][1:]]}, "at most 40000 bases"),
     ],
 )

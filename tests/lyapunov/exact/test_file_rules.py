@@ -31,7 +31,7 @@ def twelve(count):
 
 
 CASES = {
-    "an array": (lambda: ["refutation"], "must have exactly the keys"),
+    "an array": (lambda: ["refutation"], "the file must be an object"),
     "domain": (lambda: hand.relay() | {"domain": "complex"}, "domain must be"),
     "names that are none": (lambda: hand.relay() | {"lifts": {"n m": hand.X1}}, "need names"),
     "no states": (lambda: hand.relay() | twelve(0), "need names"),
@@ -90,7 +90,7 @@ CASES = {
         lambda: hand.edited(hand.relay(), ("witnesses", 0, "obligation", 7)),
         "named once",
     ),
-    "a number": (lambda: 5, "must have exactly the keys"),
+    "a number": (lambda: 5, "the file must be an object"),
     "a state twice in a term": (
         lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "1", "s"], ["x", "1", "a"]])),
         "longer|twice in a term",
