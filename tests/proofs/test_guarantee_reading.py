@@ -513,7 +513,7 @@ def test_a_slow_gain_is_refused_from_a_file_that_breaks_its_rules():
         with pytest.raises(CertificateError, match=r"slow_gain.parts: expected `int`"):
             read_guarantee(steady | {"slow_gain": slow | wrong})
     for wrong, said in (
-        (steady | {"slow_gain": slow | {"more": "1"}}, "slow_gain.*unknown|slow_gain.*must be known"),
+        (steady | {"slow_gain": slow | {"more": "1"}}, "slow_gain.*unknown|slow_gain.*must be a known key"),
         (steady | {"more": "1"}, "unknown field `more`"),
         (at_once | {"slow_gain": slow}, "unknown field `slow_gain`"),
         (HELD | {"slow_gain": slow}, "friction that depends on the slip alone"),

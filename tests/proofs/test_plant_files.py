@@ -161,7 +161,7 @@ def test_a_load_that_the_law_does_not_hold_is_refused_by_both():
     [
         (("plant", "loads", 0, "shift"), ["1", "0"], "a shift that is not measured"),
         (("plant", "loads", 0, "rate"), "-1", "a rate of 0 or more"),
-        (("plant", "loads", 0, "more"), "1", "plant.loads.0.*must be known"),
+        (("plant", "loads", 0, "more"), "1", "plant.loads.0.*must be a known key"),
         (("plant", "B"), [["0", "1"], ["1"]], "rows and columns of a plant must fit"),
         (("plant", "B"), [[], []], "a control"),
         (("plant", "A", 1), ["1"], "rows and columns of a plant must fit"),

@@ -16,7 +16,7 @@ import msgspec
 from quakedesign.errors import CertificateError
 from quakedesign.exact import exact_text
 from quakedesign.files import write_whole
-from quakedesign.text import shown
+from quakedesign.text import one_line
 
 _Kind = TypeVar("_Kind")
 
@@ -246,7 +246,7 @@ def read_as(kind: type[_Kind], raw: Any, what: str = "the file") -> _Kind:
         reason, _, place = str(error).partition(" - at `$")
         _refuse(f"{place.strip('.`') or what}: {reason[:1].lower()}{reason[1:].rstrip('.')}")
     if place := _difference(raw, written(value)):
-        _refuse(f"{place.strip('. ')} must be known, and must be omitted where it has its default value")
+        _refuse(f"{place.strip('. ')} must be a known key, and omitted where it has its default value")
     return value
 
 
@@ -290,7 +290,7 @@ def _difference(raw: Any, again: Any) -> str:
     if isinstance(raw, dict):
         for key, entry in raw.items():
             if key not in again:
-                return f".{shown(key)}"
+                return f".{one_line(key)[:40]}"
             if place := _difference(entry, again[key]):
                 return f".{key}{place}"
     elif isinstance(raw, list):
