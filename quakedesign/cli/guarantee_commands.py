@@ -172,7 +172,7 @@ def _first(fault: Any, answer: Any) -> Iterator[str]:
         peak = None if fault.friction.state_names else natural_peak(fault)
     except SimulationError:  # whose earthquake cannot be computed
         peak = None
-    yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', answer.found, peak)}.", 80)
+    yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', answer.found, peak, fault.magnitude)}.", 80)
     yield ""
 
 

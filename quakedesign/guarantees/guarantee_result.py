@@ -122,7 +122,7 @@ class LoopAnswer(LoopResult):
             if self.nearest is not None:
                 other = _with_nearest(*self.nearest)
                 if self.factor is not None:
-                    other = f"with the pressure of this law times {shortly(self.factor)}"
+                    other = f"not this law, but the same law with its output times {shortly(self.factor)}"
                 said.append(f"{other}: {self.nearest[1].sentence()}")
             if len(said) == 1 and self.notes is None:
                 said.append("no T_s was found for which a design is proved with this box, disturbance and setup")
@@ -208,8 +208,8 @@ class LoopAnswer(LoopResult):
             return []
         change = UpperBound(self.fault.disturbance_bounds[1])
         return [
-            f"this covers disturbances that jump; the fault's own changes by at most {change:.3g} m/s^3, for which the "
-            "class rate may prove much smaller bounds"
+            "these bounds allow the disturbance to jump; that of the fault file changes by at most "
+            f"{change:.3g} m/s^3: --class rate (rate_limited=True) proves smaller bounds"
         ]
 
     @property

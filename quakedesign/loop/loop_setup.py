@@ -74,8 +74,8 @@ class Pump:
         if self.limits is None or (self.limits[0] <= low and high <= self.limits[1]):
             return ""
         return (
-            f"pressures from {low.quantity('Pa')} to {high.quantity('Pa')} may be commanded, which a pump of "
-            f"{self._range()} cannot all supply"
+            f"pressures from {low.quantity('Pa')} to {high.quantity('Pa')} may be commanded, but the pump "
+            f"supplies only {self._range()}"
         )
 
     def too_slow(self, step: UpperBound | None, time: Fraction) -> str:

@@ -57,7 +57,9 @@ def prove(monkeypatch, call):
     monkeypatch.setattr(saved, lambda found, path: path.write_text(found))
     monkeypatch.setattr("quakedesign.synthesis.guarantee", lambda *_, **__: None)
     sentence = "quakedesign.report.summary.guaranteed_sentence"
-    monkeypatch.setattr(sentence, lambda first, found, peak: f"{first}: {found} beside {peak and round(peak, 4)} m/s")
+    monkeypatch.setattr(
+        sentence, lambda first, found, peak, _: f"{first}: {found} beside {peak and round(peak, 4)} m/s"
+    )
 
     def run(answers, *arguments):
         def found(calls, **more):

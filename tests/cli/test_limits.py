@@ -151,7 +151,7 @@ def test_both_sides_are_of_the_stress_that_the_design_behind_the_well_stands(mon
     assert rates[1] == pytest.approx(rates[0] / 2, rel=1e-3)  # of the linearised fault
     assert none["peak_slip_rate_error"]["proved_up_to"] is None
     assert run("crustal-patch", "--diffusion", "1000 s") == 0
-    assert "proved: nothing of a design" in capsys.readouterr().out
+    assert "proved: no design" in capsys.readouterr().out
 
 
 def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are_told(monkeypatch, capsys):
@@ -168,7 +168,7 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     patch = ("crustal-patch", "--stress", "25 kPa")
     assert run(*patch, "--well", "40 m", "--diffusivity", "2 m^2/s", "--lag", "5 s") == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert f"proved: one design behind rock of L^2/D = {float(known.held.diffusion):.4g} s, of the fault" in told
+    assert f"proved: one design behind rock of L^2/D = {float(known.held.diffusion):.4g} s, for the fault" in told
     assert "D = 2 m^2/s" in told
     assert run(*patch, "--diffusion", "9 s") == run(*patch, "--diffusivity", "2") == 0
     near = {"diffusion": asked[0]["diffusion"]}

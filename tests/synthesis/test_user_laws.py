@@ -246,12 +246,12 @@ def test_a_law_without_a_guarantee_names_a_factor_of_its_pressure_that_has_one()
     half = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], step="0.184"))
     assert not strong.proved
     assert "an eigenvalue of size" in strong.lines()[0]
-    assert strong.lines()[1] == f"with the pressure of this law times 0.5: {half.found.sentence()}"
+    assert strong.lines()[1] == f"not this law, but the same law with its output times 0.5: {half.found.sentence()}"
     near = strong.to_dict()["nearest"]
     assert (near["quantity"], near["value"]) == ("pressure_factor", "1/2")
     assert near["peak_slip_rate"] == half.to_dict()["peak_slip_rate"]
     wrong = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], step="0.184"))
-    assert wrong.lines()[1] == f"with the pressure of this law times -1: {half.found.sentence()}"
+    assert wrong.lines()[1] == f"not this law, but the same law with its output times -1: {half.found.sentence()}"
     standing = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2e8], step="0.184"))
     assert (standing.nearest, len(standing.lines())) == (None, 1)  # no factor adds an integral
 

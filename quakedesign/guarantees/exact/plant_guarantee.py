@@ -120,7 +120,7 @@ class PlantGuarantee:
         said = f"on the uncertain plant of the certificate ({size}){of_plant and f' {of_plant}'}, "
         said += f"from |x_i(0)| <= {_listed(part.start)}" if any(part.start) else "from rest"
         said += f", with zero-order hold over {UpperBound(law.step):.6g} s"
-        said += f", {UpperBound(law.delay):.6g} s late" if law.delay else ""
+        said += f", with a delay of {UpperBound(law.delay):.6g} s" if law.delay else ""
         said += f", for all uncertain terms in {counted(len(part.sectors), 'sector')}" if part.sectors else ""
         regions = [s.within for s in part.sectors if s.within is not None]
         said += f", {len(regions)} of which hold for |y| <= {_listed(regions)}" if regions else ""

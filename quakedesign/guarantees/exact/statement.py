@@ -302,7 +302,7 @@ class Guarantee:
         if held.longest_step:
             shortest, longest = UpperBound(held.step), LowerBound(held.longest_step)
             when = f"with zero-order hold over sampling intervals from {shortest:.6g} s to {longest:.6g} s in any order"
-        when += f", {_seconds(held.delay)} late" if held.delay else ""
+        when += f", with a delay of {_seconds(held.delay)}" if held.delay else ""
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
         when += f", through rock of L^2/D = {_seconds(held.diffusion)} from well to fault" if held.diffusion else ""
         when += ", with the slip alone measured" if held.law.of_slip_alone else ""
@@ -745,7 +745,7 @@ class SlidingGuarantee:
 
 def _path(held: Held) -> str:
     said = f"with zero-order hold over {float(held.step):.6g} s"
-    said += f", {float(held.delay):.6g} s late" if held.delay else ""
+    said += f", with a delay of {float(held.delay):.6g} s" if held.delay else ""
     said += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
     said += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
     noise = LowerBound(held.slip_noise)

@@ -47,7 +47,7 @@ def test_a_claim_may_touch_a_limit_and_not_pass_it(name, off):
     assert stored(pump=narrow).check() is Verdict.UNDECIDED
     found = guarantee(proved.task, replace(proved.held, pump=narrow))
     assert isinstance(found, NoGuarantee)
-    assert found.reason.startswith("pressures from -14.3 MPa to 14.2 MPa may be commanded, which a pump of -14.")
+    assert found.reason.startswith("pressures from -14.3 MPa to 14.2 MPa may be commanded, but the pump supplies")
 
 
 def test_behind_a_lag_the_pressure_at_the_valve_counts():

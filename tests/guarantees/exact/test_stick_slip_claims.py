@@ -381,7 +381,7 @@ def test_healing_counts_the_largest_area_per_mass_and_is_part_of_the_answer(proo
     assert answer.to_dict()["covered_healing"] == float(proof.covered_healing()) <= proof.covered_healing()
     assert (
         answer.lines()[1]
-        == "in place of a disturbance this covers friction at rest up to 6.22e-05 above friction in slip"
+        == "without a disturbance the same bounds hold if friction at rest is up to 6.22e-05 above friction in slip"
     )
 
 
