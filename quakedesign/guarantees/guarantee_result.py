@@ -45,7 +45,7 @@ from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.of_fault import slow_sliding_plant
 from quakedesign.plant.sliding_plant import SlidingPlant
-from quakedesign.sos.exact.strict import texts
+from quakedesign.sos.exact.strict import written
 from quakedesign.text import quantity
 
 # ----------------------------------------------------------------------
@@ -373,9 +373,9 @@ def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
 
 def _law(law: LinearLaw) -> dict[str, Any]:
     root = law.root
-    lines = {} if root is None else {"slopes": texts(root.slopes), "remainder": exact_text(root.remainder)}
-    matrices = {name: [texts(row) for row in getattr(law, name)] for name in ("update", "measured")}
-    rows = {name: texts(getattr(law, name)) for name in ("output", "feedback", "applied")}
+    lines = {} if root is None else {"slopes": written(root.slopes), "remainder": exact_text(root.remainder)}
+    matrices = {name: written(getattr(law, name)) for name in ("update", "measured")}
+    rows = {name: written(getattr(law, name)) for name in ("output", "feedback", "applied")}
     return {**lines, "states": list(law.states), **matrices, **rows}
 
 

@@ -466,7 +466,7 @@ def test_a_polynomial_is_judged(call, monkeypatch, tmp_path, verdict, code, with
     monkeypatch.setattr(
         "quakedesign.sos.read_gram", lambda path: SimpleNamespace(verify=lambda: asked.append(path) or answer)
     )
-    monkeypatch.setattr("quakedesign.sos.exact.polynomial_files.plain_proof", lambda proof: {"plain": proof})
+    monkeypatch.setattr("quakedesign.sos.exact.polynomial_files.proof_entries", lambda proof: {"plain": proof})
     monkeypatch.setattr("quakedesign.sos.exact.words.sentences", lambda _, verbose: [f"verbose {verbose}"])
     assert call("sos", "x^2") == (code, "verbose False\n", "")
     told = json.loads(
