@@ -22,6 +22,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, save_guarantee
 from quakedesign.laws import NominalModel
 from quakedesign.loop import held_loop
+from quakedesign.plant import uncertain_plant
 
 CHECK = Path(__file__).parents[2] / "proofs" / "check.py"
 REAL = qd.load_fault("real-fault")
@@ -254,6 +255,37 @@ def test_a_law_without_a_guarantee_names_a_factor_of_its_pressure_that_has_one()
     assert wrong.lines()[1] == f"with the pressure of this law times -1: {half.found.sentence()}"
     standing = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2e8], step="0.184"))
     assert (standing.nearest, len(standing.lines())) == (None, 1)  # no factor adds an integral
+
+
+def eigenvalue(gains, step, sign=1):
+    """Largest |λ| over a period of p = −k1·e1 − k2·e2 − k3·ξ on the nominal plant, by SciPy alone."""
+    task = uncertain_plant(REAL)
+    s, w, b = (float(sum(ends)) / 2 for ends in (task.slip_chord, task.rate_chord, task.beta))
+    A = np.zeros((4, 4))
+    A[0, 1], A[1] = 1, [s, -w, b * float(task.authority), 0]
+    k1, k2, k3 = gains
+    jump = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [-sign * k1, -sign * k2, 0, -sign * k3], [step, 0, 0, 1]])
+    return np.abs(np.linalg.eigvals(expm(A * step) @ jump)).max()
+
+
+def test_an_unstable_loop_has_its_eigenvalue_and_the_sign_that_is_stable():
+    gains = np.array([3e8, 2e8, 5e7])
+    wrong = qd.assess(REAL, qd.SampledLaw.from_gains(-gains, step="0.012")).guarantee.reason
+    assert f"an eigenvalue of size {eigenvalue(-gains, 0.012):.4g}" in wrong
+    assert eigenvalue(-gains, 0.012, -1) < 1
+    assert wrong.endswith("with the opposite sign of the pressure it is stable")
+    strong = qd.assess(REAL, qd.SampledLaw.from_gains(30 * gains, step="0.184")).guarantee.reason
+    assert eigenvalue(30 * gains, 0.184, -1) > 1
+    assert strong.endswith(f"an eigenvalue of size {eigenvalue(30 * gains, 0.184):.4g}")
+
+
+@few("name", ["slip_rate_error", "slip_rate"], every=2)
+def test_a_law_of_the_slip_rate_alone_leaves_the_slip_to_itself(name):
+    law = qd.SampledLaw.from_statespace(control.ss(1, 0.012, -1e8, -1e8, 0.012), inputs=[name])
+    reason = qd.guarantee(REAL, law=law).reason
+    assert "an eigenvalue of size 1; the law does not use the slip" in reason
+    assert "add slip_error or slip to its inputs" in reason
+    assert "opposite sign" not in reason
 
 
 @pytest.mark.parametrize(
