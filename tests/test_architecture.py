@@ -456,7 +456,7 @@ BUDGETS = {
     "guarantees": 13168,
     "lyapunov": 7000,
     "linear": 2400,
-    "synthesis": 1907,
+    "synthesis": 1909,
     "rocq": 843,
     "simulation": 9737,
     "identification": 4021,

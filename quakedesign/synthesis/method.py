@@ -396,7 +396,9 @@ class Samples(DesignMethod[SampledController]):
 def _times(factor: Fraction | int, law: LinearLaw) -> LinearLaw:
     """A law with its pressure multiplied."""
     output, feedback = (tuple(factor * v for v in row) for row in (law.output, law.feedback))
-    return replace(law, output=output, feedback=feedback)
+    *states, pressure = law.of_reference or ((),)
+    moved = (*states, tuple(factor * v for v in pressure)) if law.of_reference else ()
+    return replace(law, output=output, feedback=feedback, of_reference=moved)
 
 
 _STABLE = 1 - 1e-6  # an eigenvalue that is 1 may be computed as less

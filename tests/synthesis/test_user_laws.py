@@ -253,6 +253,9 @@ def test_a_law_without_a_guarantee_names_a_factor_of_its_pressure_that_has_one()
     assert near["peak_slip_rate"] == half.to_dict()["peak_slip_rate"]
     wrong = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], step="0.184"))
     assert wrong.lines()[1] == f"with the pressure of this law times -1: {half.found.sentence()}"
+    of_slip = {"step": "0.184", "inputs": ("slip", "slip_rate")}
+    turned = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], **of_slip)).nearest[1]
+    assert turned.held.law == qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], **of_slip).law  # what acts on r' turns too
     standing = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2e8], step="0.184"))
     assert (standing.nearest, len(standing.lines())) == (None, 1)  # no factor adds an integral
 
