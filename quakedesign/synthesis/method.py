@@ -28,8 +28,7 @@ from quakedesign.guarantees import (
     StickSlipGuarantee,
     best_guarantee,
 )
-from quakedesign.guarantees.guarantee_result import FACTOR
-from quakedesign.guarantees.search.adversary import worst_found
+from quakedesign.guarantees.guarantee_result import FACTOR, given_answer
 from quakedesign.guarantees.search.estimate import spectral_radius
 from quakedesign.laws import Controller, LinearLaw, SampledController, Signals, SlidingMode, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
@@ -382,8 +381,7 @@ class Samples(DesignMethod[SampledController]):
     def given(self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup) -> LoopAnswer:
         """Guarantee with the worst case found, for a law of the errors alone."""
         found = self.guarantee(fault, task, controller, setup)
-        worst = worst_found(found) if found.proved and not controller.law.of_reference else None
-        answer = LoopAnswer(fault=fault, found=found, worst=worst, notes=controller.notes)
+        answer = given_answer(fault, found, controller.notes)
         if found.proved or found.pressed or found.reason == _STANDING or setup.longest_step:
             return answer
         for factor in _FACTORS:

@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from time import process_time
@@ -19,6 +20,7 @@ import quakedesign as qd
 from quakedesign.checking import check_files
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.guarantees import guarantee_result
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, save_guarantee
 from quakedesign.laws import NominalModel
 from quakedesign.loop import held_loop
@@ -78,6 +80,13 @@ def referred():
     return qd.guarantee(REAL, ABSOLUTE, delay="20 ms", slip_noise="1 um", rate_noise="1 um/s")
 
 
+@pytest.fixture
+def stuck(monkeypatch):
+    """A quick search that finds the same on the stick-slip plant whatever the law."""
+    seen = guarantee_result.WorstFound(slip_error=1e-3, slip_rate_error=2e-5)
+    monkeypatch.setattr(guarantee_result, "worst_found", lambda claim, sticks=False: seen)
+
+
 def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
     began = process_time()
     again = qd.guarantee(REAL, law=LAW, slip_noise="0.1 um")  # nothing of which is remembered
@@ -85,9 +94,34 @@ def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
     assert again.proved
     assert found.proved
     assert found.found.claims.slip_rate_error < Fraction("2.5e-4")
-    assert "an integrator that rounding has moved" in found.lines()[-1]
-    assert "worst case on the stick-slip plant: not searched" in "".join(found.lines())
     assert found.to_dict()["notes"] == list(LAW.notes)
+
+
+def test_the_stick_slip_plant_is_searched_when_its_worst_case_is_read(stuck, found):
+    told = replace(found).lines()
+    assert "an integrator that rounding has moved" in told[-1]
+    assert told[2] == "worst case found on the stick-slip plant: slip error 1 mm, slip-rate error 20 µm/s"
+    assert told[3].startswith("stick-slip plant: no proof and no search of the pressure for a given law: run simulate")
+    assert "a course was found that exceeds the bounds" in "".join(told)
+    assert replace(found).to_dict()["worst_found_with_stick"]["slip_error"] == 1e-3
+
+
+def test_no_search_of_the_stick_slip_plant_is_said_of_laws_that_it_does_not_take(stuck, found, referred, monkeypatch):
+    gap = "stick-slip plant: no proof and no search for a given law: run simulate; slip, slip rate or pressure may"
+    assert referred.stick_slip_gap.startswith(gap)
+    assert referred.to_dict()["worst_found_with_stick"] is None
+    monkeypatch.setattr(guarantee_result, "growth_at_rest", lambda law, step: 0.5)  # e-fold in 0.5 s at rest
+    assert replace(found).stick_slip_gap.startswith(gap)
+    assert replace(found).to_dict()["worst_found_with_stick"] is None
+
+
+@pytest.mark.slow
+def test_independent_runs_that_stick_stay_below_the_worst_case_found(found):
+    rates = [float(found.found.task.reference_rates[0]) * share for share in (1, 0.05)]
+    runs = [worst_course(found.found, LAW, seed, rate, parts=16) for seed in range(6) for rate in rates]
+    seen, reached = found.worst_with_stick, np.max(runs, axis=0)
+    assert reached[0] < seen.slip_error < 2 * reached[0]
+    assert reached[1] < seen.slip_rate_error < 2 * reached[1]
 
 
 @few("name", ["found", "referred"], every=2)
@@ -180,15 +214,18 @@ def test_a_law_of_slip_and_slip_rate_moves_its_errors_as_the_inputs_of_the_loop_
     assert got == pytest.approx(expected, rel=1e-7, abs=1e-12)
 
 
-def worst_course(claim, law, seed):
-    """Largest |e1|, |e2| of random and resonant courses at the ends of all ranges, by SciPy alone."""
+def worst_course(claim, law, seed, rest=np.inf, parts=4):
+    """Largest |e1|, |e2| of random and resonant courses at the ends of all ranges, by SciPy alone.
+
+    The slip rate is never negative along a reference of the rate `rest` [m/s].
+    """
     random, task = np.random.default_rng(seed), claim.task
     b, H = float(task.authority), float(task.amplitude)
     slope, damping = ([float(v) for v in ends] for ends in (task.slip_chord, task.rate_chord))
     F, G, C, D = (
         np.array(part, dtype=float) for part in (law.law.update, law.law.measured, [law.law.output], [law.law.feedback])
     )
-    part = STEP / 4
+    part = STEP / parts
     steps = {}
     for s in slope:
         for w in damping:
@@ -203,10 +240,11 @@ def worst_course(claim, law, seed):
         for k in range(1500):
             p = float((C @ z + D @ x)[0])
             z = F @ z + G @ x
-            for j in range(4):
-                sign = np.sign(np.sin(2 * np.pi * (4 * k + j) / (4 * period))) or 1.0
+            for j in range(parts):
+                sign = np.sign(np.sin(2 * np.pi * (k + j / parts) / period)) or 1.0
                 s = slope[int(x[0] * sign > 0)]  # the slope pushes with the disturbance
                 x = steps[s, random.choice(damping), beta] @ [*x, p, sign * H]
+                x[1] = max(x[1], -rest)
                 largest = np.maximum(largest, np.abs(x))
     return largest
 
@@ -231,7 +269,7 @@ def test_none_names_what_fails():
     assert "an eigenvalue of size" in wild.lines()[0]
 
 
-def test_a_double_integral_is_said_to_wind_up_while_the_fault_is_at_rest():
+def test_a_double_integral_is_said_to_wind_up_while_the_fault_is_at_rest(stuck):
     double = qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7, 1e6], step="0.184")
     assert double.warning_at_rest.startswith("MAY WIND UP on a fault that sticks: the law has a double integral")
     assert double.warning_at_rest in qd.guarantee(REAL, law=double).lines()
@@ -335,7 +373,7 @@ def test_a_law_is_compared_and_assessed_in_its_setup():
     assert entry.guaranteed is None
 
 
-def test_the_command_line_takes_the_file_of_a_law(tmp_path, capsys):
+def test_the_command_line_takes_the_file_of_a_law(stuck, tmp_path, capsys):
     path = tmp_path / "own.json"
     LAW.save(path)
     assert run("guarantee", "real-fault", "--law", path, "--out", tmp_path / "c.json", "--json") == 0
