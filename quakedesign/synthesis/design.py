@@ -347,7 +347,7 @@ def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any,
     return asked
 
 
-def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL) -> Design:
+def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **given: Quantity | None) -> Design:
     """Verdict, certificate and premises of given gains on a fault.
 
     Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's
@@ -360,11 +360,14 @@ def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL) -> De
     controller : Controller
     setup : LoopSetup
         Of a sampled linear law.
+    **given : str, float or Fraction
+        Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
     -------
     Design
     """
+    setup = setup.with_given(**given)
     fault.require_memoryless("a verdict on gains")
     if setup != IDEAL and controller.sampling is None:
         raise ParameterError("a loop setup needs a law of samples. Received a law in continuous time. Omit setup.")

@@ -25,6 +25,9 @@ from quakedesign.guarantees.exact.guarantee_files import guarantee_document, sav
 from quakedesign.laws import NominalModel
 from quakedesign.loop import held_loop
 from quakedesign.plant import uncertain_plant
+from quakedesign.report import comparison_table
+from quakedesign.report.summary import summary
+from quakedesign.synthesis import assess
 
 CHECK = Path(__file__).parents[2] / "proofs" / "check.py"
 REAL = qd.load_fault("real-fault")
@@ -369,8 +372,37 @@ def test_a_law_is_compared_and_assessed_in_its_setup():
     assert designed.guarantee.held.delay == Fraction("0.02")
     seen = qd.compare(qd.load_fault("lab-fault"), [qd.SampledLaw.from_pid(1, 0.1, step=0.01)], with_published=False)
     (entry,) = seen.of("designed")
-    assert entry.label == "PID (designed)"
+    assert entry.label == "PID (given)"
     assert entry.guaranteed is None
+
+
+def test_a_comparison_judges_and_runs_a_given_law_in_its_setup(monkeypatch, stuck):
+    judged, fault = [], replace(REAL, reference=replace(REAL.reference, operation_time=200.0))
+
+    def noted(fault, law, setup):
+        judged.append(setup)
+        return assess(fault, law, setup)
+
+    monkeypatch.setattr(comparison_table, "assess", noted)
+    weak = qd.SampledLaw.from_gains([1e7, 1e7, 1e5], step="0.184", label="weak")
+    setup = qd.LoopSetup(slip_noise="1 um", delay="5 ms")
+    seen = qd.compare(fault, [weak], setup=setup, delay="46 ms")
+    assert judged == [qd.LoopSetup(slip_noise="1 um", delay="46 ms")]
+    (entry,) = seen.entries  # published gains know no delay
+    assert (entry.label, entry.given, entry.design.controller.delay) == ("weak (given)", True, Fraction("0.046"))
+    assert "part=0.25" in str(entry.run.provenance["actuator"])  # 46 of 184 ms
+    assert entry.run.provenance["measurement"] != "exact"
+    assert entry.answer.lines() == [f"none: {entry.design.guarantee.reason}"]
+    assert "no T_s was found" not in repr(seen)
+    assert summary(seen).answer == "real-fault: no guarantee for any given controller"
+
+
+def test_assess_and_compare_take_quantities_of_the_setup_by_name():
+    with pytest.raises(ParameterError, match=r"must be one of .*delay.* Received 'dela'\. Did you mean delay"):
+        qd.assess(REAL, LAW, dela="5 ms")
+    with pytest.raises(ParameterError, match="loop setup of a comparison is that of given laws"):
+        qd.compare(REAL, [], delay="5 ms")
+    assert qd.assess(REAL, LAW, delay="20 ms").guarantee.held.delay == Fraction("0.02")
 
 
 def test_the_command_line_takes_the_file_of_a_law(stuck, tmp_path, capsys):
