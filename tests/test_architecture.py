@@ -460,7 +460,7 @@ BUDGETS = {
     "rocq": 843,
     "simulation": 9737,
     "identification": 4021,
-    "studies": 4177,
+    "studies": 4178,
     "report": 4013,
     "cli": 3490,
 }

@@ -229,7 +229,8 @@ def _answer(fault: Fault, design: Design, *, given: bool) -> LoopAnswer | Slidin
         notes = getattr(design.controller, "notes", None)
         return replace(given_answer(fault, found, notes), compensation=design.compensation)
     tried = str(design.details.get("not_at_rest", ""))
-    return replace(attacked(fault, found), compensation=design.compensation, not_at_rest=tried)
+    answer = replace(attacked(fault, found), compensation=design.compensation, not_at_rest=tried)
+    return answer if found.proved or design.runs else replace(answer, given=True)  # no T_s but the fault's was tried
 
 
 def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, whole: bool) -> Compared:
