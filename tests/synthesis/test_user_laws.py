@@ -30,6 +30,7 @@ from quakedesign.report.summary import summary
 from quakedesign.synthesis import assess
 
 CHECK = Path(__file__).parents[2] / "proofs" / "check.py"
+PAGE = Path(__file__).parents[2] / "docs" / "howto" / "own_controller.md"
 REAL = qd.load_fault("real-fault")
 STEP = 0.184
 ERRORS = ["slip_error", "slip_rate_error"]
@@ -430,13 +431,27 @@ def test_runs_of_a_law_that_is_unstable_at_rest_carry_its_warning(tmp_path, caps
         assert ("NOT for a fault that sticks" in capsys.readouterr().out) == warned
 
 
+def cells():
+    """Code of the page on users' laws."""
+    return re.findall(r"```\{code-cell\} python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("delay", ["0 ms", "20 ms"])
+def test_the_lqg_of_the_page_is_proved_with_a_delay_and_without(stuck, delay):
+    names, (lqg, *_) = {}, cells()
+    assert lqg.count('"20 ms"') == 1
+    exec(lqg.replace('"20 ms"', repr(delay)), names)
+    assert names["answer"].proved
+    assert names["answer"].found.held.delay == Fraction(delay.split()[0]) / 1000
+
+
 @pytest.mark.slow
 def test_every_snippet_of_the_page_runs(tmp_path, monkeypatch, capsys):
-    page = (Path(__file__).parents[2] / "docs" / "howto" / "own_controller.md").read_text(encoding="utf-8")
-    assert len(page.split()) < 600
+    page = PAGE.read_text(encoding="utf-8")
+    assert len(re.sub(r"```.*?```", "", page, flags=re.DOTALL).split()) < 400
     monkeypatch.chdir(tmp_path)
     names = {}
-    for cell in re.findall(r"```\{code-cell\} python\n(.*?)```", page, flags=re.DOTALL):
+    for cell in cells():
         exec(cell, names)
     assert capsys.readouterr().out.count("proved") == 4
     assert names["hinf"].step == Fraction("0.184")
