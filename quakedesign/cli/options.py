@@ -436,10 +436,10 @@ class WellOptions:
 
 
 @Parameter(name="*")
-@of_the_setup(*(name for name in quantities() if name != "step"))
+@of_the_setup(*quantities())
 @dataclass(frozen=True, kw_only=True)
 class SetupOptions(WellOptions):
-    """Loop setup: delay, actuator, diffusion path, noise, jitter and initial errors."""
+    """Loop setup: sampling time, delay, actuator, diffusion path, noise, jitter and initial errors."""
 
 
 # ----------------------------------------------------------------------

@@ -98,7 +98,7 @@ def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, f
         axis.plot(run.time / divisor, run.slip / size, **look)
     axis.plot(runs[0][1].time / divisor, known(runs[0][1].reference) / size, color="black", linestyle=":", linewidth=1)
     axis.legend(loc="lower right", fontsize=SMALL - 1)
-    named(axis, f"{origin} gains")
+    named(axis, f"{' and '.join(dict.fromkeys(entry.kind for entry, _ in runs))} gains")
 
 
 def _rate(axis: Any, entry: "Entry", comparison: "Compared", divisor: float) -> None:

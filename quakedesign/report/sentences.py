@@ -417,7 +417,7 @@ def scheme_sentence(comparison: "Compared") -> str:
     runs: dict[str, list[str]] = {}
     for entry in comparison.entries:
         if entry.run:
-            runs.setdefault(entry.run.provenance["scheme"], []).append(f"{entry.design.title} ({entry.origin})")
+            runs.setdefault(entry.run.provenance["scheme"], []).append(f"{entry.design.title} ({entry.kind})")
     said = "; ".join(f"{scheme}: {', '.join(labels)}" for scheme, labels in runs.items()) or "none"
     return (
         f"Schemes: {said}. Continuous evaluates the law in every Runge–Kutta stage, all others hold p over a "

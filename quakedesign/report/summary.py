@@ -66,7 +66,8 @@ def summary(comparison: "Compared") -> Summary:
 def _answer(comparison: "Compared", best: "Entry | None") -> str:
     natural, name = comparison.uncontrolled, comparison.fault.name
     if best is None or best.guaranteed is None:
-        return f"{name}: no guarantee for any designed controller"
+        kinds = " or ".join(dict.fromkeys(e.kind for e in comparison.of("designed"))) or "designed"
+        return f"{name}: no guarantee for any {kinds} controller"
     earthquake = natural.outcome.peak_slip_rate if natural.outcome.kind == "earthquake" else None
     first = best.design.other_step_first or "guaranteed"
     magnitude = comparison.fault.magnitude
@@ -137,7 +138,7 @@ def _row(entry: "Entry") -> Row:
         pressure = found.valve_pressures
     elif isinstance(found, Guarantee | StickSlipGuarantee):
         pressure = found.claims.pressures[-1]
-    label = entry.label.removesuffix(" (designed)").replace(" (published)", ", published")
+    label = entry.label.removesuffix(" (designed)").removesuffix(" (given)").replace(" (published)", ", published")
     return Row(
         name=label,
         outcome=run.outcome.kind if run else "not run",
@@ -176,7 +177,8 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
         yield "model: one block under a uniform pressure; all assumptions are in the report"
     for entry in designed:
         if (entry.guaranteed is None and best is not None) or ", but " in grade(entry):
-            yield f"{entry.label}: {grade(entry)}"
+            unproved = entry.given and entry.answer is not None and entry.guaranteed is None
+            yield f"{entry.label}: {entry.answer.lines()[0] if unproved and entry.answer else grade(entry)}"
         if assumed := entry.design.details.get("assumed"):
             yield f"{entry.label} assumes {assumed}"
     if others := [
@@ -197,13 +199,15 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
 
 
 def _with_stick(answer: object) -> Iterator[str]:
-    """Worst case found on the stick–slip plant, and the reason why there is no proof on it."""
+    """Worst case found on the stick–slip plant, why there is no proof on it, and what is not searched there."""
     seen, why = getattr(answer, "worst_with_stick", None), getattr(answer, "not_at_rest", "")
     if seen is not None:
         yield (
             f"worst case found on the stick-slip plant: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
             f"{quantity(seen.slip_rate_error, 'm/s')}{f'; no proof there: {why}' if why else ''}"
         )
+    if gap := getattr(answer, "stick_slip_gap", ""):
+        yield gap
 
 
 def _published(said: str) -> str:

@@ -46,6 +46,17 @@ def test_json_has_both_sides(capsys):
     assert found["farthest_well"]["proved_up_to"] is None
 
 
+def test_a_step_takes_the_place_of_the_sampling_time(capsys):
+    """A longer T_s takes as much from the longest delay, which is the reaction time less T_s."""
+    found = {}
+    for step in ("5 ms", "1/250"):
+        assert run("lab-fault", "--step", step, "--json") == 0
+        found[step] = json.loads(capsys.readouterr().out)
+    delays = [Fraction(one["largest_delay"]["impossible_beyond"]) for one in found.values()]
+    assert [one["step"] for one in found.values()] == [0.005, 0.004]
+    assert float(delays[1] - delays[0]) == pytest.approx(0.001, rel=1e-3)
+
+
 def test_a_folder_with_a_figure(tmp_path, capsys):
     folder = tmp_path / "limits"
     assert run("lab-fault", "--out", str(folder), "--format", "pdf", "png") == 0

@@ -81,7 +81,7 @@ def test_without_a_proof_the_scale_is_that_of_the_runs():
     assert summary_lines(made(rows=rows))[2].split() == ["slip", "rate", "[µm/s]", "slip", "error", "[nm]", "pressure"]
 
 
-def entry(label, peak=None, slip=None, *, compensation=None, origin="designed"):
+def entry(label, peak=None, slip=None, *, compensation=None, origin="designed", given=False):
     claims = SimpleNamespace(slip_error=slip and UpperBound(slip))
     task = SimpleNamespace(target_slip=Fraction(1, 20), operation_time=Fraction(432000))
     found = peak and SimpleNamespace(
@@ -107,6 +107,7 @@ def entry(label, peak=None, slip=None, *, compensation=None, origin="designed"):
         details={},
     )
     named = {"label": label, "origin": origin, "guaranteed": found or None, "answer": answer, "run": run}
+    named |= {"given": given, "kind": "given" if given else origin}
     return SimpleNamespace(**named, design=design, held=None, growth_per_step=None, peaks={})
 
 
@@ -237,6 +238,18 @@ def test_without_a_guarantee_each_reason_is_given(monkeypatch):
 def test_a_design_without_a_guarantee_beside_one_that_has_it_is_named(monkeypatch):
     said = summary(compared(monkeypatch, entry("A (designed)", 3e-4, 1e-5), entry("B (designed)")))
     assert "B (designed): undecided" in said.notes
+
+
+def test_a_given_law_without_a_guarantee_has_its_reason_and_is_no_design(monkeypatch):
+    known, other = entry("A (given)", given=True), entry("B (given)", 3e-4, 1e-5, given=True)
+    assert summary(compared(monkeypatch, known)).answer == "mine: no guarantee for any given controller"
+    both = summary(compared(monkeypatch, entry("C (designed)"), known)).answer
+    assert both == "mine: no guarantee for any designed or given controller"
+    other.answer.stick_slip_gap = "nothing is searched there"
+    said = summary(compared(monkeypatch, known, other))
+    assert "A (given): none: the reason of A (given)" in said.notes
+    assert "nothing is searched there" in said.notes
+    assert [row.name for row in said.rows[1:]] == ["A", "B"]
 
 
 def test_what_a_design_and_a_fault_take_for_granted_is_said(monkeypatch):
