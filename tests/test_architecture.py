@@ -458,7 +458,7 @@ BUDGETS = {
     "linear": 2400,
     "synthesis": 1895,
     "rocq": 843,
-    "simulation": 9737,
+    "simulation": 9745,
     "identification": 4021,
     "studies": 4156,
     "report": 3990,

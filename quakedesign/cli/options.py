@@ -310,8 +310,8 @@ class RunOptions:
         with the law in every stage of the integrator. By default continuous in simulate and explicit in campaign.
         Designed laws have their own scheme.
     method
-        Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: cvodes or
-        idas, for single runs without control also radau or dop853.
+        Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: radau (by
+        default), dop853, cvodes or idas without control; cvodes (by default) or idas with control.
     plant
         stick-slip (by default; friction holds the fault at rest) or printed (the paper's, continued to negative slip
         rates). Rate-and-state faults never rest: smooth (by default) or quasi-dynamic (without inertia).
