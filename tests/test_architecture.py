@@ -459,7 +459,7 @@ BUDGETS = {
     "synthesis": 1895,
     "rocq": 843,
     "simulation": 9756,
-    "identification": 4021,
+    "identification": 4037,
     "studies": 4159,
     "report": 3990,
     "cli": 3490,

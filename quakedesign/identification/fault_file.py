@@ -224,6 +224,7 @@ def save_fault(identification: Identification, fault: Fault, path: str | Path) -
             for e in identification.estimates.values()
         ),
         *(f"{said}." for said in [*task_remarks(identification, fault), *filter(None, [poor_fit(identification)])]),
+        *(f"Not passed: {said}." for said in identification.assessment.cautions),
     ]
     write_whole(Path(path), "".join(f"# {line}\n" for line in remarks) + fault_toml(whole))
 
