@@ -6,6 +6,7 @@ it on a fault with N̂s/s₀: with s₀ between the smallest and the largest s, 
 friction, as a fault has, and its box another half-width of N̂.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
@@ -106,7 +107,8 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         shaken = Disturbance() if _gains_a_state(identification, fault) else fault.disturbance
         step = sliding_step(law, fault.reference)
         fault = replace(fault, friction=law, sampling_time=step, disturbance=shaken)
-    name, poor = f"{fault.name[:40].rstrip()}-identified", poor_fit(identification)
+    record = re.sub(r"[^\w.-]+", "-", identification.record.name.partition(",")[0], flags=re.ASCII).strip("-.")
+    name, poor = f"{fault.name[:40].rstrip()}-identified-{record}"[:60].rstrip("-."), poor_fit(identification)
     source = f"friction identified from {identification.record.name}; everything else: {fault.source}"
     return replace(fault, name=name, source=source, friction=law, box=box, assumed=(), poor_fit=poor)
 

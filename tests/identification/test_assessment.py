@@ -213,6 +213,21 @@ def test_a_failed_test_of_an_explained_record_is_said_below_the_verdict_and_in_t
     assert f"# Not passed: {text}.\n" in (tmp_path / "found.toml").read_text()
 
 
+@pytest.mark.parametrize(
+    ("record", "name"),
+    [
+        ("step 7, wet", "crustal-patch-identified-step-7"),
+        ("übung", "crustal-patch-identified-bung"),
+        ("µ", "crustal-patch-identified"),
+        ("a" * 70, f"crustal-patch-identified-{'a' * 35}"),
+    ],
+)
+def test_the_name_of_an_identified_fault_ends_in_that_of_the_record(trended, record, name):
+    patch = load_fault("crustal-patch")
+    found = replace(trended, record=replace(trended.record, name=record), law=patch.friction)
+    assert identified_fault(found, patch).name == name
+
+
 def test_a_poor_fit_is_designed_for_only_if_that_is_accepted(trended):
     patch = load_fault("crustal-patch")
     told = replace(trended.assessment, factor=3.1)
@@ -226,7 +241,7 @@ def test_a_poor_fit_is_designed_for_only_if_that_is_accepted(trended):
         ):
             asked(poor, "elqr")
     accepted = with_accepted_fit(poor, True)
-    assert accepted.name == "crustal-patch-identified-poor-fit"
+    assert accepted.name == "crustal-patch-identified-made-poor-fit"
     assert accepted.source.startswith("poor fit accepted (the fit does not explain the record")
     assert accepted.poor_fit == ""
     assert with_accepted_fit(patch, False) is patch
