@@ -25,6 +25,7 @@ from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.files import write_whole
 from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT
 from quakedesign.identification.identification_result import Identification
+from quakedesign.text import quantity
 
 _DIGITS = 6
 _WIDEST_SPREAD = Fraction(1, 5)  # of a, b and D_c, independent of each other, for which guarantees are found
@@ -138,8 +139,9 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
     assumed = [said for said in fault.assumed if said.startswith(_OF_TASK)]
     told = [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
     if moved is not law and moved.reference_rate != law.reference_rate:
-        at = [f"{each.reference_coefficient:.5g} at {each.reference_rate:.4g} m/s" for each in (law, moved)]
-        told.append(f"reference_coefficient {at[0]} is {at[1]}, as the file says it")
+        old, new = (quantity(each.reference_rate, "m/s", 4) for each in (law, moved))
+        said = f"mu0 = {law.reference_coefficient:.5g} at {old} was converted to {moved.reference_coefficient:.5g}"
+        told.append(f"{said} at {new} for the file")
     beyond = beyond_rates(law, mean_rate(task), source="of the record") if law.state_names else ""
     return [*told, *filter(None, [beyond])]
 

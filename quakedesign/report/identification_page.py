@@ -82,14 +82,13 @@ def _more(found: Identification) -> list[str]:
     """Tests that passed, noise and searches, what was assumed."""
     fit, rate = found.fit, getattr(found.law, "reference_rate", None)
     means, all_ = len(fit.counts), round(float(np.sum(fit.counts)))
-    samples = f"{int(fit.kept.sum())} samples" if all_ == means else f"one of {all_} samples, taken as {means} means"
+    samples = f"{int(fit.kept.sum())} samples" if all_ == means else f"{all_} samples averaged to {means}"
     return [
         *(f"passed: {check.sentence}" for check in found.assessment.checks if check.passed),
-        f"noise {fit.noise:.3g} of friction in {samples}; of {fit.starts} searches from different starts "
-        f"(seed {found.seed}) {fit.agreeing} end in this fit"
-        f"{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
+        f"noise per sample {fit.noise:.3g}; {samples}; {fit.agreeing} of {fit.starts} searches "
+        f"(seed {found.seed}) ended in this fit{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
         *([str(found.rival)] if found.rival else []),
-        *([] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]),
+        *([] if rate is None else [f"reference_coefficient is that of steady sliding at {quantity(rate, 'm/s', 4)}"]),
         f"assumed: {'; '.join(found.notes)}",
     ]
 
