@@ -461,7 +461,7 @@ BUDGETS = {
     "simulation": 9756,
     "identification": 4037,
     "studies": 4159,
-    "report": 3990,
+    "report": 4003,
     "cli": 3490,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
