@@ -460,7 +460,7 @@ BUDGETS = {
     "rocq": 843,
     "simulation": 9756,
     "identification": 4037,
-    "studies": 4159,
+    "studies": 4160,
     "report": 4019,
     "cli": 3490,
 }
