@@ -34,9 +34,11 @@ from quakedesign.guarantees.search.sliding_design import (
     farthest,
     largest_stress,
     proved_sliding,
+    quieter,
     suitable,
     two_digits,
     what_would_do,
+    with_noise,
 )
 from quakedesign.laws import LinearLaw, RestLimit
 from quakedesign.laws.sampled_controller import growth_at_rest, warning_at_rest
@@ -545,6 +547,8 @@ def answer_sliding(
         if remedy and answer.held is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
             answer = replace(answer, found=NoGuarantee(reason=none, small_gain=None))
+    if not answer.found.proved and not remedy:
+        remedy = _with_less_noise(task, held_over, around, prove)
     if not answer.found.proved:
         why = (stress and _beyond(fault, stress, around)) or answer.found.reason
         return replace(answer, found=replace(answer.found, reason="; ".join(filter(None, (why, remedy)))))
@@ -571,6 +575,15 @@ def _under_less(answer: SlidingAnswer) -> str:
         return ""
     most = LowerBound(answer.task.stress).quantity("Pa")
     return f"a proof was found for a stress of at most {most}: give --stress '{most}'; somewhat more may do"
+
+
+def _with_less_noise(task: SlidingPlant, step: Fraction, around: Around, prove: Prove) -> str:
+    """A bound of the slip noise for which a proof was found, all else as it is; empty without one."""
+    for noise in quieter(around):
+        loop: Around = {**around, "slip_noise": noise}
+        if _answer(task, step, LOG_RATES[0], loop, prove).proved:
+            return f"a proof was found {with_noise(noise, around).rstrip()}"
+    return ""
 
 
 def _remedy(

@@ -22,7 +22,7 @@ def limits_lines(limits: Limits) -> list[str]:
     task = limits.fault
     head = [
         f"{task.name}: performance limits, and what designs are proved to reach",
-        f"(box {task.box.name}, {limits.against}, T_s = {task.sampling_time:g} s)",
+        f"({_box(limits)}{limits.against}, T_s = {task.sampling_time:g} s)",
         "",
         f"{'':24}{'infeasible':>20}{'proved':>16}",
     ]
@@ -90,8 +90,21 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
         f"needs no longer stops them; D = {float(limits.diffusivity):g} m^2/s",
         "proved: no design"
         if limits.guarantee is None
-        else f"proved: one design{_path(limits.guarantee)}, for the fault itself with inertia; pressure at the fault",
+        else f"proved: of an e-LQR designed for this table{_path(limits.guarantee)}, {_constants(limits.guarantee)}, "
+        "on the fault itself with inertia; another design has other bounds; pressure at the fault",
     ]
+
+
+def _constants(found: SlidingGuarantee) -> str:
+    """Whether the design is for a spread of a, b and D_c."""
+    low, high = found.task.ranges["direct_effect"]
+    spread = UpperBound((high - low) / (high + low))
+    return f"for a, b and D_c within {spread:.3g} of their values" if spread else "for a, b and D_c as they are given"
+
+
+def _box(limits: Limits) -> str:
+    """The box, which rate-and-state friction does not have."""
+    return "" if isinstance(limits, SlidingLimits) else f"box {limits.fault.box.name}, "
 
 
 def _path(found: SlidingGuarantee) -> str:
@@ -146,7 +159,7 @@ def limits_figure(limits: Limits) -> Any:
     if natural:
         axis.axhline(natural, color=NATURAL, linestyle="--", linewidth=1, label="natural earthquake (slip rate)")
     axis.axvline(limits.fault.sampling_time, color="#777777", linewidth=0.8, linestyle=":", label="T_s of the fault")
-    note = f"{limits.against.replace('^2', '²')}, box {limits.fault.box.name}"
+    note = f"{_box(limits)}{limits.against.replace('^2', '²')}"
     return finish(drawing, f"{limits.fault.name}: limits with zero-order hold", [], note, legend=axis)
 
 

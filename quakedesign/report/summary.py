@@ -12,7 +12,7 @@ from quakedesign.fault.fault_toml import beyond_rates, mean_rate
 from quakedesign.guarantees import Guarantee, SlidingGuarantee, StickSlipGuarantee
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
-from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines
+from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines, steady_start_sentence
 from quakedesign.studies.comparison import pressure_extremes
 from quakedesign.studies.facts import box_sentence
 from quakedesign.studies.runs import StateRun
@@ -96,7 +96,8 @@ def guaranteed_sentence(
     sticks = ", whether the fault slides or sticks" if isinstance(found, StickSlipGuarantee) else ""
     slow, task = "", ""
     if isinstance(found, SlidingGuarantee):
-        slow = f" {found.lasts} and shear stress is disturbed by at most {LowerBound(found.task.stress).quantity('Pa')}"
+        stress = LowerBound(found.task.stress).quantity("Pa")
+        slow = f" {found.lasts}, under every shear stress disturbance of at most {stress}"
     else:
         task = f", {quantity(float(found.task.target_slip), 'm')} within {duration(float(found.task.operation_time))}"
     return (
@@ -168,6 +169,7 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
         yield f"{fault.source}"
     if isinstance(comparison.uncontrolled, StateRun):
         yield cycle_sentence(comparison.uncontrolled)
+        yield steady_start_sentence(comparison.uncontrolled)
     yield from (f"assumed: {said}" for said in fault.assumed)
     if fault.friction.state_names and (beyond := beyond_rates(fault.friction, mean_rate(fault.reference))):
         yield beyond

@@ -669,7 +669,7 @@ class SlidingGuarantee:
     @property
     def lasts(self) -> str:
         """Short statement of the time range."""
-        return f"while the reference goes {float(self.task.distance):.4g} m"
+        return f"during the {LowerBound(self.task.distance):.4g} m of slip of the task"
 
     def __repr__(self) -> str:
         return f"SlidingGuarantee({self.task.name}: |ln(v/V)| <= {self.claims.log_rate:.4g})"
@@ -736,8 +736,9 @@ class SlidingGuarantee:
         return (
             f"{empty}from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, "
             f"{under}, {_along(task)}{_box(task)}: the slip rate never "
-            f"exceeds {ratio:.4g} V = {self.peak_slip_rate.quantity('m/s')} {self.lasts}, the slip stays within "
-            f"{claims.slip_error.quantity('m')} of it, the pressure in the fault between {low.quantity('Pa')} and "
+            f"exceeds {ratio:.4g} V = {self.peak_slip_rate.quantity('m/s')} {self.lasts}, in which the fault slides "
+            f"forward throughout, the slip stays within {claims.slip_error.quantity('m')} of the reference, the "
+            f"pressure in the fault between {low.quantity('Pa')} and "
             f"{high.quantity('Pa')}, at the valve between {least.quantity('Pa')} and {largest.quantity('Pa')} "
             f"({', '.join(['with inertia', *_friction(task)])})"
         )
@@ -749,7 +750,9 @@ def _path(held: Held) -> str:
     said += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
     said += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
     noise = LowerBound(held.slip_noise)
-    return said + (f", with any noise of at most {noise:.6g} m in the measured slip" if held.slip_noise else "")
+    if held.slip_noise:
+        return f"{said}, with any noise of at most {noise:.6g} m in the measured slip"
+    return f"{said}, with exact measurements of slip"
 
 
 def _along(task: SlidingPlant) -> str:
