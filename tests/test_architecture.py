@@ -455,16 +455,16 @@ BUDGETS = {
     "laws": 3226,
     "loop": 4227,
     "plant": 1356,
-    "guarantees": 13143,
+    "guarantees": 13142,
     "lyapunov": 6959,
     "linear": 2390,
     "synthesis": 1914,
     "rocq": 843,
     "simulation": 9756,
     "identification": 4037,
-    "studies": 4182,
-    "report": 4073,
-    "cli": 3498,
+    "studies": 4183,
+    "report": 4075,
+    "cli": 3496,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

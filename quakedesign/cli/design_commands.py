@@ -228,12 +228,10 @@ def positive(comparison: Any) -> bool:
 
     A design that was to run with a guarantee and found none is not.
     """
-    from quakedesign.guarantees import NoGuarantee
-
     needed = {"along_reference", "control_coefficient", "friction_slope", "sampling_time"}
     return all(
         str(entry.design.verdict) == "proved"
-        and not isinstance(entry.design.runs, NoGuarantee)
+        and (entry.design.runs is None or entry.design.runs.proved)
         and all(p.holds for p in entry.design.conditions if p.name in needed)
         and (entry.run is None or entry.run.outcome.harmless)
         for entry in comparison.of("designed")

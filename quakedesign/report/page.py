@@ -184,11 +184,13 @@ def _slowly(entry: "Entry") -> list[str]:
         return []
     cells = "one cell" if len(found.cells) == 1 else f"{len(found.cells)} cells"
     return [
-        "the pressure at the well is p beside what the nominal fault needs along its reference, kV/(μ*A) more a second",
-        "about slow sliding at V, with v = V e^y and θ = (D_c/V) e^z, the loop is linear but for the exponentials, "
-        "which stand in sectors on |y| ≤ Y, for inertia, whose fast mode is bounded, and for modes of the rock that "
-        "the loop leaves out, bounded too; peaks of the responses of the linear loop bound all errors, and claims that "
-        f"follow from themselves hold {found.lasts}; the box of constants falls into {cells}",
+        "The pressure at the well is p plus a plan: what the nominal fault needs along its reference, kV/(μ*A) per "
+        "second.",
+        "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
+        "except for exponentials, inertia and diffusion modes that the model omits. The exponentials lie in sectors "
+        "for |y| ≤ Y; the others are bounded. L1 norms of the linear loop then bound all errors in terms of the "
+        f"claimed bounds, and the claims imply themselves (small gain). They hold {found.lasts}. The box of constants "
+        f"is divided into {cells}.",
     ]
 
 
