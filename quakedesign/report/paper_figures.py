@@ -148,7 +148,7 @@ def friction_coefficient(comparison: "Compared") -> Any:
     axis.set_xlabel(f"time [{unit}]")
     axis.set_ylabel("friction coefficient [-]")
     title = f"{comparison.fault.name}: friction coefficient in closed loop"
-    return finish(drawing, title, [run for _, run in runs], with_diverged(comparison.entries), legend=axis)
+    return finish(drawing, title, runs, with_diverged(comparison.entries), legend=axis)
 
 
 def errors_and_power(comparison: "Compared") -> Any:
@@ -165,7 +165,7 @@ def errors_and_power(comparison: "Compared") -> Any:
     return finish(
         drawing,
         f"{comparison.fault.name}: errors and RMS pressure, over those of the {basis.label}",
-        [run for _, run in runs_of(entry for entry, _ in shown)],
+        runs_of(entry for entry, _ in shown),
         with_diverged(comparison.entries),
     )
 
