@@ -453,7 +453,7 @@ BUDGETS = {
     "laws": 3226,
     "loop": 4240,
     "plant": 1355,
-    "guarantees": 13168,
+    "guarantees": 13171,
     "lyapunov": 7000,
     "linear": 2400,
     "synthesis": 1895,
