@@ -461,7 +461,7 @@ BUDGETS = {
     "simulation": 9737,
     "identification": 4021,
     "studies": 4159,
-    "report": 4007,
+    "report": 4008,
     "cli": 3482,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

@@ -48,7 +48,7 @@ def _meaning(limits: Limits) -> list[str]:
         "infeasible for every controller, linear or not, for some friction of the box and some disturbance of the "
         "class amplitude, which may jump",
         f"slip-rate error: {known} up to the sample, if the slip error stays "
-        f"{within}; slip rates may be negative, as in the guarantees",
+        f"{within}; this limit is for the plant without stick, where slip rates may be negative",
         "proved: of two designs, the one with the smaller slip-rate error; design prefers a smaller slip error unless "
         "its objective is peak",
     ]

@@ -248,12 +248,13 @@ def _range(row: Row) -> str:
 # The summary on a terminal of 80 columns.
 
 
-_LEGEND = "worst: worst error found by falsification; pressure: proved range, or the run's"
+LEGEND = """worst: worst error found by falsification
+pressure: range proved for all friction of the box, or the run's""".splitlines()
 
 
 def summary_lines(said: Summary) -> list[str]:
     """Lines of at most 80 characters."""
-    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), _LEGEND, ""]
+    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), *LEGEND, ""]
     lines += wrap(said.conditions, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     for note in said.notes:
         lines += wrap(note, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
