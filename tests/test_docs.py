@@ -194,3 +194,17 @@ def test_how_it_works_leads_to_the_bounds_of_the_stored_certificates():
         assert micro.removesuffix(" µm") in page, micro
     formulas = r"(?s)\$\$.*?\$\$|\$[^$]*\$"
     assert len(re.sub(formulas, "formula", page).split()) <= 1500
+
+
+def test_files_of_the_source_that_pages_name_exist():
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+    named = {
+        (page.name, name)
+        for page in pages
+        for name in re.findall(
+            r"\b(?:quakedesign|benchmarks|proofs|tests)/[\w/.-]*\.(?:py|toml|json|v|md)\b", page.read_text()
+        )
+        if "quakedesign-" not in name
+    }
+    assert named
+    assert not sorted((page, name) for page, name in named if not (ROOT / name).exists())
