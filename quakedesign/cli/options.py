@@ -310,8 +310,8 @@ class RunOptions:
         with the law in every stage of the integrator. By default continuous in simulate and explicit in campaign.
         Designed laws have their own scheme.
     method
-        Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: cvodes or
-        idas, for single runs without control also radau or dop853.
+        Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: radau (by
+        default), dop853, cvodes or idas without control; cvodes (by default) or idas with control.
     plant
         stick-slip (by default; friction holds the fault at rest) or printed (the paper's, continued to negative slip
         rates). Rate-and-state faults never rest: smooth (by default) or quasi-dynamic (without inertia).
@@ -436,10 +436,10 @@ class WellOptions:
 
 
 @Parameter(name="*")
-@of_the_setup(*(name for name in quantities() if name != "step"))
+@of_the_setup(*quantities())
 @dataclass(frozen=True, kw_only=True)
 class SetupOptions(WellOptions):
-    """Loop setup: delay, actuator, diffusion path, noise, jitter and initial errors."""
+    """Loop setup: sampling time, delay, actuator, diffusion path, noise, jitter and initial errors."""
 
 
 # ----------------------------------------------------------------------
@@ -750,11 +750,19 @@ class SpreadOptions:
                 )
             return law.choose(fault, step, path), {}
         from quakedesign.exact import rational
+        from quakedesign.plant import slow_sliding_plant
         from quakedesign.studies.runs import Choice
         from quakedesign.synthesis import design
 
         period = {} if self.stress_period is None else {"stress_period": self.stress_period}
         if law.certificate is not None and (chosen := law.choose(fault.with_box("paper"))):
+            task: Any = chosen.claim.task  # type: ignore[union-attr]
+            if slow_sliding_plant(fault, task.stress).ramp != task.ramp:
+                raise ParameterError(
+                    "a campaign of slow sliding varies the fault that the certificate is about. Received "
+                    f"{fault.name}, with other constants than {task.name}. Give that fault, or use simulate "
+                    "--certificate."
+                )
             return chosen, _of_proof(chosen.claim, self.spread, self.stress) | period
         _require_designed({"controller": law.controller, "gains": law.gains})
         off = rational(self.spread, "spread")

@@ -222,7 +222,7 @@ def sos(
         Proof file to write (proofs/FORMAT.md).
     """
     from quakedesign.sos import prove, read_gram
-    from quakedesign.sos.exact.polynomial_files import plain_proof
+    from quakedesign.sos.exact.polynomial_files import proof_entries
     from quakedesign.sos.exact.words import sentences
 
     new_file(out, "proof file", force=force)
@@ -245,7 +245,7 @@ def sos(
         "variables": list(answer.statement.variables),
         "degree": answer.statement.degree,
         "blocks": dict(answer.blocks),
-        "witness": plain_proof(answer.proof) if answer.proof is not None else None,
+        "witness": proof_entries(answer.proof) if answer.proof is not None else None,
         "file": str(out) if out is not None and answer.proof is not None else None,
         "remark": answer.remark or None,
         "empty_set": answer.set_is_empty,

@@ -34,9 +34,11 @@ from quakedesign.guarantees.search.sliding_design import (
     farthest,
     largest_stress,
     proved_sliding,
+    quieter,
     suitable,
     two_digits,
     what_would_do,
+    with_noise,
 )
 from quakedesign.laws import LinearLaw, RestLimit
 from quakedesign.laws.sampled_controller import growth_at_rest, warning_at_rest
@@ -45,7 +47,7 @@ from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.of_fault import slow_sliding_plant
 from quakedesign.plant.sliding_plant import SlidingPlant
-from quakedesign.sos.exact.strict import texts
+from quakedesign.sos.exact.strict import written
 from quakedesign.text import quantity
 
 # ----------------------------------------------------------------------
@@ -64,7 +66,7 @@ _TOLD = (
 )
 
 
-@checked_dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True)
 class LoopAnswer(LoopResult):
     """Guarantee of one loop, or the reason why there is none.
 
@@ -72,8 +74,8 @@ class LoopAnswer(LoopResult):
     ----------
     fault : Fault
     found : Guarantee or NoGuarantee
-    worst, worst_with_stick : WorstFound or None
-        Of a search on the same loop; None without a guarantee.
+    worst, stick_search : WorstFound or None
+        Of a search on the same loop, and on the stick–slip plant; None without a guarantee.
     shorter : Guarantee or None
         For a design without a guarantee at its step: one near the longest step that has one.
     asked_step : Fraction or None
@@ -89,12 +91,14 @@ class LoopAnswer(LoopResult):
         Of a user's law: what was changed when its floats became exact numbers; None for others.
     not_at_rest : str
         Why there is no guarantee on the stick–slip plant, where one was searched for.
+    given : bool
+        Whether the law is given, so that no design was searched for.
     """
 
     fault: Fault
     found: Guarantee | NoGuarantee
     worst: WorstFound | None = None
-    worst_with_stick: WorstFound | None = None
+    stick_search: WorstFound | None = None
     shorter: Guarantee | None = None
     asked_step: Fraction | None = None
     nearest: tuple[str, Guarantee] | None = None
@@ -102,6 +106,17 @@ class LoopAnswer(LoopResult):
     compensation: Compensation | None = None
     notes: tuple[str, ...] | None = None
     not_at_rest: str = ""
+    given: bool = False
+
+    @cached_property
+    def worst_with_stick(self) -> WorstFound | None:
+        """Worst case found on the stick–slip plant (lower bound); of a given law searched for here, some seconds.
+
+        None for a law that uses the slip, the slip rate or the reference itself, or that is unstable by itself.
+        """
+        if not (self.given and self.found.proved) or self.found.held.law.of_reference or self.grows_at_rest:
+            return self.stick_search
+        return worst_found(self.found, sticks=True)
 
     def lines(self) -> list[str]:
         """Lines of text: the guarantee first, then the worst case found, then what was changed in the law."""
@@ -122,9 +137,9 @@ class LoopAnswer(LoopResult):
             if self.nearest is not None:
                 other = _with_nearest(*self.nearest)
                 if self.factor is not None:
-                    other = f"with the pressure of this law times {shortly(self.factor)}"
+                    other = f"not this law, but the same law with its output times {shortly(self.factor)}"
                 said.append(f"{other}: {self.nearest[1].sentence()}")
-            if len(said) == 1 and self.notes is None:
+            if len(said) == 1 and not self.given:
                 said.append("no T_s was found for which a design is proved with this box, disturbance and setup")
             return said
         said = [f"proved: {self.found.sentence()}", *self._at_rest()]
@@ -135,17 +150,25 @@ class LoopAnswer(LoopResult):
                     f"worst case found{name}: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
                     f"{quantity(seen.slip_rate_error, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
                 )
-        if self.worst_with_stick is None:
-            said.append(
-                "worst case on the stick-slip plant: not searched, may exceed the bounds; simulate runs this plant"
-            )
-        said += [*self._told(), *self.task_lines()]
+        said += [*filter(None, [self.stick_slip_gap]), *self._told(), *self.task_lines()]
         if self.leaves_with_stick:
             said.append(
                 "on the stick-slip plant a course was found that exceeds the bounds, which are those of the plant "
                 "without stick"
             )
         return said if self.compensation is None else [*said, self.compensation.sentence()]
+
+    @property
+    def stick_slip_gap(self) -> str:
+        """What is neither proved nor searched on the stick–slip plant; empty without a guarantee, and of a design."""
+        seen = self.worst_with_stick
+        if not self.found.proved or (seen is not None and not (self.given and seen.pressures is None)):
+            return ""
+        searched = "no search" if seen is None else "no search of the pressure"
+        return (
+            f"stick-slip plant: no proof and {searched} for a given law: run simulate; slip, slip rate or pressure may "
+            "exceed these bounds"
+        )
 
     @property
     def grows_at_rest(self) -> float | None:
@@ -208,8 +231,8 @@ class LoopAnswer(LoopResult):
             return []
         change = UpperBound(self.fault.disturbance_bounds[1])
         return [
-            f"this covers disturbances that jump; the fault's own changes by at most {change:.3g} m/s^3, for which the "
-            "class rate may prove much smaller bounds"
+            "these bounds allow the disturbance to jump; that of the fault file changes by at most "
+            f"{change:.3g} m/s^3: --class rate (rate_limited=True) proves smaller bounds"
         ]
 
     @property
@@ -342,10 +365,14 @@ def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> LoopAnswer:
     """
     if not found.proved:
         return LoopAnswer(fault=fault, found=found)
-    seen = LoopAnswer(
-        fault=fault, found=found, worst=worst_found(found), worst_with_stick=worst_found(found, sticks=True)
-    )
+    seen = LoopAnswer(fault=fault, found=found, worst=worst_found(found), stick_search=worst_found(found, sticks=True))
     return seen if found.slow_gain is None or not seen.leaves_with_stick else _with_room(seen, found)
+
+
+def given_answer(fault: Fault, found: Guarantee | NoGuarantee, notes: tuple[str, ...] | None = None) -> LoopAnswer:
+    """The guarantee of a given law with the worst case found, for a law of the errors alone."""
+    worst = worst_found(found) if found.proved and not found.held.law.of_reference else None
+    return LoopAnswer(fault=fault, found=found, worst=worst, notes=notes, given=True)
 
 
 def _with_room(seen: LoopAnswer, found: Guarantee) -> LoopAnswer:
@@ -373,9 +400,9 @@ def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
 
 def _law(law: LinearLaw) -> dict[str, Any]:
     root = law.root
-    lines = {} if root is None else {"slopes": texts(root.slopes), "remainder": exact_text(root.remainder)}
-    matrices = {name: [texts(row) for row in getattr(law, name)] for name in ("update", "measured")}
-    rows = {name: texts(getattr(law, name)) for name in ("output", "feedback", "applied")}
+    lines = {} if root is None else {"slopes": written(root.slopes), "remainder": exact_text(root.remainder)}
+    matrices = {name: written(getattr(law, name)) for name in ("update", "measured")}
+    rows = {name: written(getattr(law, name)) for name in ("output", "feedback", "applied")}
     return {**lines, "states": list(law.states), **matrices, **rows}
 
 
@@ -520,6 +547,8 @@ def answer_sliding(
         if remedy and answer.held is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
             answer = replace(answer, found=NoGuarantee(reason=none, small_gain=None))
+    if not answer.found.proved and not remedy:
+        remedy = _with_less_noise(task, held_over, around, prove)
     if not answer.found.proved:
         why = (stress and _beyond(fault, stress, around)) or answer.found.reason
         return replace(answer, found=replace(answer.found, reason="; ".join(filter(None, (why, remedy)))))
@@ -546,6 +575,15 @@ def _under_less(answer: SlidingAnswer) -> str:
         return ""
     most = LowerBound(answer.task.stress).quantity("Pa")
     return f"a proof was found for a stress of at most {most}: give --stress '{most}'; somewhat more may do"
+
+
+def _with_less_noise(task: SlidingPlant, step: Fraction, around: Around, prove: Prove) -> str:
+    """A bound of the slip noise for which a proof was found, all else as it is; empty without one."""
+    for noise in quieter(around):
+        loop: Around = {**around, "slip_noise": noise}
+        if _answer(task, step, LOG_RATES[0], loop, prove).proved:
+            return f"a proof was found {with_noise(noise, around).rstrip()}"
+    return ""
 
 
 def _remedy(

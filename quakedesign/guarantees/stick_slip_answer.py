@@ -65,7 +65,8 @@ class StickSlipAnswer(LoopResult):
         healing = self.found.covered_healing()
         said = [
             f"proved: {self.found.sentence()}",
-            f"in place of a disturbance this covers friction at rest up to {healing:.3g} above friction in slip",
+            f"without a disturbance the same bounds hold if friction at rest is up to {healing:.3g} above friction in "
+            "slip",
         ]
         if self.worst is not None:
             said.append(

@@ -47,6 +47,12 @@ class Assessment:
     experiments: tuple[str, ...] = ()  # which would
 
     @property
+    def cautions(self) -> tuple[str, ...]:
+        """Sentences of failed tests that make intervals too narrow, unless the fit does not explain the record."""
+        failed = (check.sentence for check in self.checks if check.name == "halves" and not check.passed)
+        return () if self.verdict == EXPLAINS_NOT else tuple(failed)
+
+    @property
     def verdict(self) -> str:
         """One of three."""
         if self.factor > SEVERAL:
@@ -84,7 +90,7 @@ def checks_of(
         told = "is explained" if peak <= SEVERAL else "is not explained"
         said = f"what follows changes of rate {told}: residuals there are {peak:.2g} times the noise"
         checks.append(_within("peak", peak, SEVERAL, said))
-        checks.append(_halves(fit, time, float(begins[-1]), record, used))
+        checks.append(_halves(fit, time, begins, record, used))
     return tuple(checks), factor
 
 
@@ -173,19 +179,24 @@ def _after_steps(
     return max((float(np.sqrt(np.mean(some**2))) for some in found), default=0.0)
 
 
-def _halves(fit: Fit, time: ndarray, last: float, record: Record, used: ndarray) -> Check:
+def _halves(fit: Fit, time: ndarray, begins: ndarray, record: Record, used: ndarray) -> Check:
     """Whether the trend is the same before and after the last change of rate, and the noise as large in both halves."""
     assert record.load_point is not None
     path = record.load_point[used]
-    hinge = np.maximum(path - np.interp(last, time, path), 0)
+    hinge = np.maximum(path - np.interp(begins[-1], time, path), 0)
     extra = weighed(fit.weights, hinge)
     across = extra - fit.slopes @ np.linalg.lstsq(fit.slopes, extra, rcond=None)[0]
     size = float(np.linalg.norm(across))
     score = 0.0 if size <= 1e-6 * np.linalg.norm(extra) else float(across @ fit.whitened) / size / fit.noise
     early, late = (float(np.mean(part**2)) for part in np.array_split(fit.whitened, 2))
     ratio = float(np.sqrt(max(late / max(early, 1e-300), early / max(late, 1e-300))))
-    said = (
-        f"early and late residuals differ by a factor {ratio:.2g}; a change of the trend at the last change of rate is "
-        f"{abs(score):.2g} of its deviations"
-    )
-    return _within("halves", max(abs(score) / _DRIFT, ratio / SEVERAL), 1.0, said)
+    value, narrow = max(abs(score) / _DRIFT, ratio / SEVERAL), "so the intervals may be too narrow"
+    change, factor = f"{abs(score):.2g} standard deviations", f"early and late residuals differ by a factor {ratio:.2g}"
+    if abs(score) > _DRIFT:
+        other = ", or use --steps auto" if len(begins) > 1 else ""
+        said = f"the trend changes at the last step ({change}): the drift is not linear, {narrow}. Cut with --to{other}"
+    elif value > 1:
+        said = f"{factor}, {narrow}"
+    else:
+        said = f"the trend does not change at the last step (within {change}), and {factor}"
+    return _within("halves", value, 1.0, said)

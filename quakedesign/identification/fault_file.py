@@ -6,6 +6,7 @@ it on a fault with N̂s/s₀: with s₀ between the smallest and the largest s, 
 friction, as a fault has, and its box another half-width of N̂.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
@@ -24,6 +25,7 @@ from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.files import write_whole
 from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT
 from quakedesign.identification.identification_result import Identification
+from quakedesign.text import quantity
 
 _DIGITS = 6
 _WIDEST_SPREAD = Fraction(1, 5)  # of a, b and D_c, independent of each other, for which guarantees are found
@@ -106,7 +108,8 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         shaken = Disturbance() if _gains_a_state(identification, fault) else fault.disturbance
         step = sliding_step(law, fault.reference)
         fault = replace(fault, friction=law, sampling_time=step, disturbance=shaken)
-    name, poor = f"{fault.name[:40].rstrip()}-identified", poor_fit(identification)
+    record = re.sub(r"[^\w.-]+", "-", identification.record.name.partition(",")[0], flags=re.ASCII).strip("-.")
+    name, poor = f"{fault.name[:40].rstrip()}-identified-{record}"[:60].rstrip("-."), poor_fit(identification)
     source = f"friction identified from {identification.record.name}; everything else: {fault.source}"
     return replace(fault, name=name, source=source, friction=law, box=box, assumed=(), poor_fit=poor)
 
@@ -136,8 +139,9 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
     assumed = [said for said in fault.assumed if said.startswith(_OF_TASK)]
     told = [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
     if moved is not law and moved.reference_rate != law.reference_rate:
-        at = [f"{each.reference_coefficient:.5g} at {each.reference_rate:.4g} m/s" for each in (law, moved)]
-        told.append(f"reference_coefficient {at[0]} is {at[1]}, as the file says it")
+        old, new = (quantity(each.reference_rate, "m/s", 4) for each in (law, moved))
+        said = f"mu0 = {law.reference_coefficient:.5g} at {old} was converted to {moved.reference_coefficient:.5g}"
+        told.append(f"{said} at {new} for the file")
     beyond = beyond_rates(law, mean_rate(task), source="of the record") if law.state_names else ""
     return [*told, *filter(None, [beyond])]
 
@@ -224,6 +228,7 @@ def save_fault(identification: Identification, fault: Fault, path: str | Path) -
             for e in identification.estimates.values()
         ),
         *(f"{said}." for said in [*task_remarks(identification, fault), *filter(None, [poor_fit(identification)])]),
+        *(f"Not passed: {said}." for said in identification.assessment.cautions),
     ]
     write_whole(Path(path), "".join(f"# {line}\n" for line in remarks) + fault_toml(whole))
 

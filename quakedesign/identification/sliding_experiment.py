@@ -124,7 +124,7 @@ class SlidingExperiment(Experiment):
         if not (acceleration > 0 and self.normal_unit):
             return ()
         unit = {"Pa": "kg/m^2", "N": "kg"}[self.normal_unit]
-        return (f"without inertia, which reaches the noise for a block of {noise / acceleration:.2g} {unit}",)
+        return (f"inertia is neglected: it would matter above {noise / acceleration:.2g} {unit}",)
 
     def best_law(self, fitted: ndarray) -> FrictionLaw:
         """The law with a working range, where it has one, about twice as wide as the slip rates of the experiment."""

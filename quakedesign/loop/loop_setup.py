@@ -13,6 +13,9 @@ from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import LowerBound, UpperBound, shortly
 from quakedesign.fault.units import exact_value
 
+if TYPE_CHECKING:
+    from quakedesign.fault import Fault
+
 Quantity = str | float | Fraction
 """Number in the SI unit, decimal or p/q as text, or a text with a unit such as ``"80 ms"``."""
 
@@ -74,8 +77,8 @@ class Pump:
         if self.limits is None or (self.limits[0] <= low and high <= self.limits[1]):
             return ""
         return (
-            f"pressures from {low.quantity('Pa')} to {high.quantity('Pa')} may be commanded, which a pump of "
-            f"{self._range()} cannot all supply"
+            f"pressures from {low.quantity('Pa')} to {high.quantity('Pa')} may be commanded, but the pump "
+            f"supplies only {self._range()}"
         )
 
     def too_slow(self, step: UpperBound | None, time: Fraction) -> str:
@@ -278,6 +281,11 @@ class LoopSetup:
             require_known(name, [part.name for part in fields(self)], "quantity of the loop setup")
         values: Any = {name: value for name, value in given.items() if value is not None}
         return replace(self, **values) if values else self
+
+    def at_step(self, fault: "Fault") -> tuple["Fault", Self]:
+        """The fault with T_s of this setup as its sampling time, and the setup without a step."""
+        timed = fault if self.step is None else replace(fault, sampling_time=float(self.step))
+        return timed, replace(self, step=None)
 
     def to_dict(self) -> dict[str, str]:
         """Fields that differ from their default, exact numbers as texts, in SI units."""

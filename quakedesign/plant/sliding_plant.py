@@ -37,6 +37,7 @@ _SAME = {
     "state_law": "-",
     "regularised": "-",
 }
+_CONSTANTS = dict(zip(AXES, ("a [-]", "b [-]", "D_c [m]", "friction at V [-]", "normal stress [Pa]"), strict=True))
 _WITHIN = {"distance": "m", "swing": "-", "stress": "Pa"}
 
 
@@ -114,9 +115,9 @@ class SlidingPlant:
             if getattr(self, name) < getattr(asked, name)
         ]
         return found + [
-            f"{axis} from {' to '.join(map(_as_told, self.ranges[axis]))} there, "
-            f"{' to '.join(map(_as_told, asked.ranges[axis]))} here"
-            for axis in AXES
+            f"{said} from {' to '.join(map(_as_told, self.ranges[axis]))} there, "
+            f"{' to '.join(dict.fromkeys(map(_as_told, asked.ranges[axis])))} here"
+            for axis, said in _CONSTANTS.items()
             if asked.ranges[axis][0] < self.ranges[axis][0] or asked.ranges[axis][1] > self.ranges[axis][1]
         ]
 

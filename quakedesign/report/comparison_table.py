@@ -3,9 +3,11 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.laws import Controller
 from quakedesign.loop import simulation_scheme
+from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.report.figures import figures
 from quakedesign.report.page import table_html
 from quakedesign.report.sentences import headline, remarks, said
@@ -52,12 +54,14 @@ def compare(
     fault: Fault,
     designs: Sequence[Design | Controller] = (),
     *,
+    setup: LoopSetup = IDEAL,
     with_published: bool = True,
     scheme: str | None = None,
     published_scheme: str | None = None,
     whole_task: bool = False,
     plant: str | None = None,
     progress: Callable[[str, float], None] | None = None,
+    **given: Quantity | None,
 ) -> Comparison:
     """Run all controllers of a fault over the whole task, step T_s; of a slow one with a state over 500 D_c/V.
 
@@ -65,7 +69,9 @@ def compare(
     ----------
     fault : Fault
     designs : sequence of Design, Controller or SampledLaw
-        Designed controllers; one without a controller is reported and not run. Users' laws are assessed first.
+        Designed controllers; one without a controller is reported and not run. Given laws are assessed first.
+    setup : LoopSetup
+        Of the given laws; a design has its own.
     with_published : bool
         Add the paper's gains, where the fault has any, with their verdicts and premises; not beside designs that act
         behind a delay, a lag or rock, which those do not know.
@@ -79,11 +85,23 @@ def compare(
         Of the runs of friction without a state: ``stick-slip`` unless given, or ``printed``, as of `simulate`.
     progress : callable, optional
         Called with what is being done and the fraction done [-].
+    **given : str, float or Fraction
+        Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
     -------
     Comparison
+
+    Raises
+    ------
+    ParameterError
+        For a loop setup without a given law.
     """
+    setup, laws = setup.with_given(**given), [one for one in designs if not isinstance(one, Design)]
+    if setup != IDEAL and not laws:
+        raise ParameterError(
+            f"a loop setup of a comparison is that of given laws. Received {setup!r} without one. Give it to design."
+        )
     schemes = {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}
     tell = progress or (lambda _what, _done: None)
     how: dict[str, Any] = {
@@ -92,8 +110,9 @@ def compare(
         "schemes": schemes,
         "plant": plant,
     }
-    judged = [one if isinstance(one, Design) else assess(fault, one) for one in designs]
-    return Comparison(**vars(compared(fault, judged, tell, **how)))
+    judged = [one if isinstance(one, Design) else assess(fault, one, setup) for one in designs]
+    assessed = [made for made, one in zip(judged, designs, strict=True) if made is not one]
+    return Comparison(**vars(compared(fault, judged, tell, given=assessed, **how)))
 
 
 def designed_comparison(

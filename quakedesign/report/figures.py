@@ -98,7 +98,7 @@ def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, f
         axis.plot(run.time / divisor, run.slip / size, **look)
     axis.plot(runs[0][1].time / divisor, known(runs[0][1].reference) / size, color="black", linestyle=":", linewidth=1)
     axis.legend(loc="lower right", fontsize=SMALL - 1)
-    named(axis, f"{origin} gains")
+    named(axis, f"{' and '.join(dict.fromkeys(entry.kind for entry, _ in runs))} gains")
 
 
 def _rate(axis: Any, entry: "Entry", comparison: "Compared", divisor: float) -> None:
@@ -323,8 +323,22 @@ def overview(comparison: "Compared") -> Any:
         middle, values = _largest(run.time, np.abs(run.slip_rate))
         look = style(entry) | {"linewidth": 1.8 if entry is best else 0.9}
         rate.plot(middle, np.where(values > floor, values, np.nan), **look)
-    for value, text, line, shade in _levels(best):
+    last = max(float(run.time[-1]) for run in (free, own))
+    first = min(float(own.time[1]), max(0.1 * moves, 1e-9 * last))
+    levels = list(_levels(best))
+    over = float(free.time[np.flatnonzero(speed > floor)[-1]]) if speed.max() > floor else last
+    place = over if over < np.sqrt(first * last) else first  # beside the natural earthquake, if there is room
+    top = free.time[int(np.argmax(speed > speed.max() / 2))]  # of the first earthquake
+    left = top > np.sqrt(first * last)
+    look = {"xytext": (-8 if left else 8, -4), "textcoords": "offset points", "fontsize": SMALL}
+    text = f"without control: {quantity(float(speed.max()), 'm/s')}"
+    rate.annotate(text, (top, float(speed.max())), ha="right" if left else "left", **look)
+    for number, (value, text, line, shade) in enumerate(levels):
         rate.axhline(value, color=shade, linestyle=line, linewidth=1.2, label=text)
+        look = {"color": shade, "fontsize": SMALL, "textcoords": "offset points", "va": "top" if number else "bottom"}
+        near = (place, min(level[0] for level in levels) if number else value)
+        rate.annotate(text, near, xytext=(5, 10 - 11 * number if number else 1), **look)
+    rate.tick_params(labelbottom=True)
     size, unit = length(max(float(known(own.reference).max()), float(free.slip.max())))
     slip.plot(free.time, free.slip / size, color=NATURAL)
     slip.plot(own.time, own.slip / size, **(style(best) | {"linewidth": 2.4}))
@@ -332,9 +346,8 @@ def overview(comparison: "Compared") -> Any:
     slip.legend(loc="upper left", fontsize=SMALL)
     rate.set(yscale="log", ylabel="slip rate [m/s]", ylim=(floor, 3 * max(float(speed.max()), floor)))
     slip.set_ylabel(f"slip [{unit}]")
-    last = max(float(run.time[-1]) for run in (free, own))
-    slip.set(xscale="log", xlabel="time [s]", xlim=(min(float(own.time[1]), max(0.1 * moves, 1e-9 * last)), last))
-    note = f"largest of each twenty-fifth of a decade; slip rates below {floor:.1g} m/s are not drawn"
+    slip.set(xscale="log", xlabel="time [s]", xlim=(first, last))
+    note = f"largest value in each of 25 parts of a decade; gaps: slip rate below {floor:.1g} m/s, or at rest"
     title = f"{comparison.fault.name}: with and without control"
     return finish(drawing, title, ran, with_diverged(comparison.entries, note), legend=rate)
 

@@ -47,16 +47,17 @@ def identification_lines(found: Identification | Steps, *, verbose: bool = False
     if sign is not None and not refused and found.difference is not None:
         does, (value, ends, _) = "weakens" if found.difference.value < 0 else "strengthens", _cells(found.difference)
         answer += f" Friction {does} with rate: a - b = {value} ({ends})."
+    but = [f"But {each}." for each in assessment.cautions]
     more = [f"open too: {each}" for each in assessment.open[1:4] if unclear]
     more += [f"would tell: {each}" for each in assessment.experiments if unclear]
     more += [*(f"- {each}" for each in found.untold()), f"try: {'; '.join(found.to_try())}"] if refused else []
     failed = [check.sentence for check in assessment.checks if not check.passed]
-    more += [f"not passed: {sentence}" for sentence in failed if sentence not in assessment.open]
+    more += [f"not passed: {each}" for each in failed if each not in (*assessment.open, *assessment.cautions)]
     shown = [each for each in found.estimates.values() if verbose or not each.name.startswith(DELAY)]
     shown += [found.difference] if found.difference else []
     told = [each for each in found.record.remarks if verbose or " is read as " not in each]
     more += [*_warnings(found), *([f"read: {'; '.join(told)}"] if told else []), *(_more(found) if verbose else [])]
-    return [*_wrapped([answer, ""]), _HEAD, *map(_row, shown), "", *_wrapped(more)]
+    return [*_wrapped([answer, *but, ""]), _HEAD, *map(_row, shown), "", *_wrapped(more)]
 
 
 _HEAD = f"{'parameter':22}{'value':>13}{'95 % interval':>27}  unit"
@@ -81,14 +82,13 @@ def _more(found: Identification) -> list[str]:
     """Tests that passed, noise and searches, what was assumed."""
     fit, rate = found.fit, getattr(found.law, "reference_rate", None)
     means, all_ = len(fit.counts), round(float(np.sum(fit.counts)))
-    samples = f"{int(fit.kept.sum())} samples" if all_ == means else f"one of {all_} samples, taken as {means} means"
+    samples = f"{int(fit.kept.sum())} samples" if all_ == means else f"{all_} samples averaged to {means}"
     return [
         *(f"passed: {check.sentence}" for check in found.assessment.checks if check.passed),
-        f"noise {fit.noise:.3g} of friction in {samples}; of {fit.starts} searches from different starts "
-        f"(seed {found.seed}) {fit.agreeing} end in this fit"
-        f"{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
+        f"noise per sample {fit.noise:.3g}; {samples}; {fit.agreeing} of {fit.starts} searches "
+        f"(seed {found.seed}) ended in this fit{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
         *([str(found.rival)] if found.rival else []),
-        *([] if rate is None else [f"reference_coefficient is that of steady sliding at {rate:.4g} m/s"]),
+        *([] if rate is None else [f"reference_coefficient is that of steady sliding at {quantity(rate, 'm/s', 4)}"]),
         f"assumed: {'; '.join(found.notes)}",
     ]
 

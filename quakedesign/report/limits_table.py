@@ -22,7 +22,7 @@ def limits_lines(limits: Limits) -> list[str]:
     task = limits.fault
     head = [
         f"{task.name}: performance limits, and what designs are proved to reach",
-        f"(box {task.box.name}, {limits.against}, T_s = {task.sampling_time:g} s)",
+        f"({_box(limits)}{limits.against}, T_s = {task.sampling_time:g} s)",
         "",
         f"{'':24}{'infeasible':>20}{'proved':>16}",
     ]
@@ -41,39 +41,39 @@ def _meaning(limits: Limits) -> list[str]:
     if limits.peak_slip_rate_error.impossible_beyond is None:
         return ["without a disturbance no limit is known: give amplitude in [disturbance] of the fault file"]
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
-    known = "even with slip, slip rate and disturbance known"
+    known = "knows slip, slip rate and disturbance"
     if limits.told.noisy:
-        known = f"measuring no more than {limits.told.words()}"
+        known = f"measures {limits.told.words()}"
     told = [
-        "infeasible for every controller, linear or not, for some friction of the box and some disturbance of the "
-        "class amplitude, which may jump",
-        f"slip-rate error: {known} up to the sample, if the slip error stays "
-        f"{within}; this limit is for the plant without stick, where slip rates may be negative",
-        "proved: of two designs, the one with the smaller slip-rate error; design prefers a smaller slip error unless "
-        "its objective is peak",
+        "infeasible: every controller, linear or not, fails for some friction of the box and some disturbance of the "
+        "stated size, which may jump",
+        f"slip-rate error: for controllers that keep the slip error {within}, on the plant without stick; it holds "
+        f"even for one that {known} up to each sample",
+        "proved, slip-rate error: the smaller of the designs for the objectives tracking and peak, on the plant "
+        "without stick",
     ]
     if (least := limits.stick_slip_rate) is not None:
         told.insert(
             2,
-            f"on the stick-slip plant: no controller that makes the fault follow a reference keeps its slip rate below "
-            f"{least.quantity('m/s')} for every disturbance, even with friction that does not change; while the "
-            "reference rests no limit is known",
+            f"on the stick-slip plant: every controller that makes the fault follow a moving reference lets the slip "
+            f"rate reach {least.quantity('m/s')} for some disturbance, even if friction does not change",
         )
     if limits.largest_step.impossible_beyond is None:
-        return [*told, "the others: none is known, since friction's weakening alone does not make this fault unstable"]
+        return [*told, "other rows: no limit is known, as friction's weakening alone does not make this fault unstable"]
     return [
         *told,
-        f"the others: withdrawal of at most {UpperBound(limits.withdrawal).quantity('Pa', 4)}, "
-        f"D = {float(limits.diffusivity):g} m^2/s; a constant disturbance that begins after a sample makes the fault "
-        "slip until its friction is lost, even if the controller knows everything from the next sample on",
+        "other rows: a constant disturbance begins just after a sample; before the next pressure acts, the fault has "
+        f"slipped so far that a withdrawal of {UpperBound(limits.withdrawal).quantity('Pa', 4)} (last row: the stated "
+        f"one) no longer stops it; D = {float(limits.diffusivity):g} m^2/s",
     ]
 
 
 def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
     told = [
-        "infeasible for every controller, linear or not, with the nominal fault linearised about slow sliding along "
-        "its task, without inertia; of the fault itself it is true as far as that is",
-        "slip-rate error: even with slip, slip rate, state and stress known up to the sample; the stress may jump",
+        "infeasible: every controller, linear or not, fails for the nominal fault linearised about slow sliding along "
+        "its task, without inertia; for the fault itself these limits are as good as the linearisation",
+        "slip-rate error: it holds even for a controller that knows slip, slip rate, state and stress up to each "
+        "sample; the stress may jump",
     ]
     if limits.rock:
         holds = "INFEASIBLE for every controller, in the same sense" if limits.beyond else "not shown to be infeasible"
@@ -81,17 +81,30 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
     if limits.largest_step.impossible_beyond is None:
         return [
             *told,
-            "the others: none is known, since errors of this fault oscillate while they grow, or do not grow",
+            "other rows: no limit is known, as errors of this fault oscillate while they grow, or do not grow",
         ]
     return [
         *told,
-        f"the others: pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference needs, "
-        f"D = {float(limits.diffusivity):g} m^2/s; a constant stress that begins after a sample makes errors grow "
-        "without bound, even if the controller knows everything from the next sample on",
-        "proved: nothing of a design"
+        "other rows: a constant stress begins just after a sample; before the next pressure acts, the errors have "
+        f"grown so far that a pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference "
+        f"needs no longer stops them; D = {float(limits.diffusivity):g} m^2/s",
+        "proved: no design"
         if limits.guarantee is None
-        else f"proved: one design{_path(limits.guarantee)}, of the fault itself with inertia; pressure at the fault",
+        else f"proved: of an e-LQR designed for this table{_path(limits.guarantee)}, {_constants(limits.guarantee)}, "
+        "on the fault itself with inertia; another design has other bounds; pressure at the fault",
     ]
+
+
+def _constants(found: SlidingGuarantee) -> str:
+    """Whether the design is for a spread of a, b and D_c."""
+    low, high = found.task.ranges["direct_effect"]
+    spread = UpperBound((high - low) / (high + low))
+    return f"for a, b and D_c within {spread:.3g} of their values" if spread else "for a, b and D_c as they are given"
+
+
+def _box(limits: Limits) -> str:
+    """The box, which rate-and-state friction does not have."""
+    return "" if isinstance(limits, SlidingLimits) else f"box {limits.fault.box.name}, "
 
 
 def _path(found: SlidingGuarantee) -> str:
@@ -146,7 +159,7 @@ def limits_figure(limits: Limits) -> Any:
     if natural:
         axis.axhline(natural, color=NATURAL, linestyle="--", linewidth=1, label="natural earthquake (slip rate)")
     axis.axvline(limits.fault.sampling_time, color="#777777", linewidth=0.8, linestyle=":", label="T_s of the fault")
-    note = f"{limits.against.replace('^2', '²')}, box {limits.fault.box.name}"
+    note = f"{_box(limits)}{limits.against.replace('^2', '²')}"
     return finish(drawing, f"{limits.fault.name}: limits with zero-order hold", [], note, legend=axis)
 
 

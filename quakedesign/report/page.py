@@ -345,9 +345,9 @@ def reproduction(fault: Fault, command: str = "") -> Reproduction:
 # What every figure shows, in words: below it in the report, and for readers who do not see it.
 
 CAPTIONS = {
-    "overview": "How fast does the fault slip? Slip rate and slip over logarithmic time: without control, with "
-    "published gains, and with the designed controller of the smallest proved bound. Horizontal lines: that bound, the "
-    "worst case found, and what no controller can do.",
+    "overview": "How fast does the fault slip? Slip rate and slip over logarithmic time, without control and with the "
+    "controllers of the legend; thick: the designed controller with the smallest proved bound. Horizontal lines are "
+    "for that controller.",
     "uncontrolled": "Without control: slip, with the slip at which the statics let the fault rest, and slip rate of "
     "the natural earthquake.",
     "cycle": "Without control, loaded from afar at the reference rate of the law: slip and slip rate; dotted: the "

@@ -10,7 +10,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational
-from quakedesign.fault import Fault
+from quakedesign.fault import Fault, SlidingReference
 from quakedesign.guarantees import ContinuousPeaks, Guarantee, NoGuarantee
 from quakedesign.laws import control_laws
 from quakedesign.linear.robust_stability import Analysis
@@ -329,7 +329,8 @@ def _verdict(design: Design, run: Trajectory | None) -> list[str]:
     if design.verdict is Verdict.PROVED:
         lasts = "for all t >= 0" if design.runs is None or not design.runs.proved else design.runs.lasts
         plant, proved = "for the loop that ran", getattr(design.runs, "plant", Guarantee.plant)
-        if run is not None and run.provenance["plant"] != proved:
+        slides = bool(design.fault.friction.state_names)  # forward throughout, on either plant
+        if run is not None and run.provenance["plant"] != proved and not slides:
             other = "stick-slip plant" if proved == STICK_SLIP else "plant without stick"
             plant = f"for this sampled loop on the {other}"
         return [f"proved {plant}, {lasts}" if _sampled(design) else "proved in continuous time"]
@@ -417,7 +418,7 @@ def scheme_sentence(comparison: "Compared") -> str:
     runs: dict[str, list[str]] = {}
     for entry in comparison.entries:
         if entry.run:
-            runs.setdefault(entry.run.provenance["scheme"], []).append(f"{entry.design.title} ({entry.origin})")
+            runs.setdefault(entry.run.provenance["scheme"], []).append(f"{entry.design.title} ({entry.kind})")
     said = "; ".join(f"{scheme}: {', '.join(labels)}" for scheme, labels in runs.items()) or "none"
     return (
         f"Schemes: {said}. Continuous evaluates the law in every Runge–Kutta stage, all others hold p over a "
@@ -501,6 +502,19 @@ def cycle_sentence(run: "StateRun") -> str:
     size = "" if cycle["magnitude"] is None else f" of magnitude {cycle['magnitude']:.2f}"
     again = "" if cycle["recurrence_interval"] is None else f" every {lasting(cycle['recurrence_interval'])}"
     return f"Without control: {run.outcome.kind}{size}{again}, {peak}, {_loading(run)}"
+
+
+def steady_start_sentence(run: "StateRun") -> str:
+    """Where run and proof of slow sliding begin, and how much of the slip of an earthquake their task takes."""
+    task = run.fault.reference
+    rate, slip = float(SlidingReference(task=task).first_rate), None if run.failed else run.cycle["slip"]
+    said = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; bringing a locked fault there is not"
+    share = (
+        ""
+        if slip is None
+        else f"; the task uses up {task.target_slip:.3g} m of the {slip:.3g} m of slip of an earthquake"
+    )
+    return f"{said} covered{share}"
 
 
 def _loading(run: "StateRun") -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import exp
+from math import exp, isnan
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -12,11 +12,11 @@ from quakedesign.fault.fault_toml import beyond_rates, mean_rate
 from quakedesign.guarantees import Guarantee, SlidingGuarantee, StickSlipGuarantee
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
-from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines
+from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines, steady_start_sentence
 from quakedesign.studies.comparison import pressure_extremes
 from quakedesign.studies.facts import box_sentence
 from quakedesign.studies.runs import StateRun
-from quakedesign.text import PREFIXES, plain, power_of, quantity
+from quakedesign.text import PREFIXES, duration, plain, power_of, quantity
 
 if TYPE_CHECKING:
     from quakedesign.studies.comparison import Compared, Entry, Run
@@ -66,30 +66,43 @@ def summary(comparison: "Compared") -> Summary:
 def _answer(comparison: "Compared", best: "Entry | None") -> str:
     natural, name = comparison.uncontrolled, comparison.fault.name
     if best is None or best.guaranteed is None:
-        return f"{name}: no guarantee for any designed controller"
+        kinds = " or ".join(dict.fromkeys(e.kind for e in comparison.of("designed"))) or "designed"
+        return f"{name}: no guarantee for any {kinds} controller"
     earthquake = natural.outcome.peak_slip_rate if natural.outcome.kind == "earthquake" else None
     first = best.design.other_step_first or "guaranteed"
-    return guaranteed_sentence(f"{name}: {first}", best.guaranteed, earthquake, f"with the {best.label}")
+    magnitude = comparison.fault.magnitude
+    return guaranteed_sentence(f"{name}: {first}", best.guaranteed, earthquake, magnitude, f"with the {best.label}")
 
 
 def guaranteed_sentence(
-    first: str, found: Guarantee | SlidingGuarantee | StickSlipGuarantee, earthquake: float | None, law: str = ""
+    first: str,
+    found: Guarantee | SlidingGuarantee | StickSlipGuarantee,
+    earthquake: float | None,
+    magnitude: float,
+    law: str = "",
 ) -> str:
-    """The guarantee in a sentence, relative to the slip rate of the natural earthquake [m/s] if there is one."""
+    """The guarantee in a sentence, relative to slip rate [m/s] and magnitude of the natural earthquake if there is one.
+
+    The magnitude is NaN where the fault alone does not determine it.
+    """
     rate, share = found.peak_slip_rate, ""
     if earthquake:
         ratio = UpperBound(100 * Fraction(rate) / Fraction(earthquake))
-        share = f" ({ratio:.2g} % of the natural earthquake's {quantity(earthquake, 'm/s')})"
+        size = "" if isnan(magnitude) else f", magnitude {magnitude:.1f}"
+        share = f" ({ratio:.2g} % of the natural earthquake's {quantity(earthquake, 'm/s')}{size})"
     plant = "on the plant without stick" if isinstance(found, Guarantee) else ""
     under = ", ".join(filter(None, (plant, law)))
     under = f"{under[:1].upper()}{under[1:]}{',' if plant else ''} the" if under else "The"
     sticks = ", whether the fault slides or sticks" if isinstance(found, StickSlipGuarantee) else ""
-    slow = ""
+    slow, task = "", ""
     if isinstance(found, SlidingGuarantee):
-        slow = f" {found.lasts} and shear stress is disturbed by at most {LowerBound(found.task.stress).quantity('Pa')}"
+        stress = LowerBound(found.task.stress).quantity("Pa")
+        slow = f" {found.lasts}, under every shear stress disturbance of at most {stress}"
+    else:
+        task = f", {quantity(float(found.task.target_slip), 'm')} within {duration(float(found.task.operation_time))}"
     return (
         f"{first}. {under} slip rate never exceeds {rate.quantity('m/s')}{share}{sticks}{slow}, and the slip stays "
-        f"within {found.claims.slip_error.quantity('m')} of the reference"
+        f"within {found.claims.slip_error.quantity('m')} of the reference{task}"
     )
 
 
@@ -126,7 +139,7 @@ def _row(entry: "Entry") -> Row:
         pressure = found.valve_pressures
     elif isinstance(found, Guarantee | StickSlipGuarantee):
         pressure = found.claims.pressures[-1]
-    label = entry.label.removesuffix(" (designed)").replace(" (published)", ", published")
+    label = entry.label.removesuffix(" (designed)").removesuffix(" (given)").replace(" (published)", ", published")
     return Row(
         name=label,
         outcome=run.outcome.kind if run else "not run",
@@ -156,14 +169,18 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
         yield f"{fault.source}"
     if isinstance(comparison.uncontrolled, StateRun):
         yield cycle_sentence(comparison.uncontrolled)
+        yield steady_start_sentence(comparison.uncontrolled)
     yield from (f"assumed: {said}" for said in fault.assumed)
     if fault.friction.state_names and (beyond := beyond_rates(fault.friction, mean_rate(fault.reference))):
         yield beyond
     if best is not None and not fault.friction.state_names:
         yield box_sentence(fault)
+    if best is not None:
+        yield "model: one block under a uniform pressure; all assumptions are in the report"
     for entry in designed:
         if (entry.guaranteed is None and best is not None) or ", but " in grade(entry):
-            yield f"{entry.label}: {grade(entry)}"
+            unproved = entry.given and entry.answer is not None and entry.guaranteed is None
+            yield f"{entry.label}: {entry.answer.lines()[0] if unproved and entry.answer else grade(entry)}"
         if assumed := entry.design.details.get("assumed"):
             yield f"{entry.label} assumes {assumed}"
     if others := [
@@ -184,24 +201,28 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
 
 
 def _with_stick(answer: object) -> Iterator[str]:
-    """Worst case found on the stick–slip plant, and the reason why there is no proof on it."""
+    """Worst case found on the stick–slip plant, why there is no proof on it, and what is not searched there."""
     seen, why = getattr(answer, "worst_with_stick", None), getattr(answer, "not_at_rest", "")
     if seen is not None:
         yield (
             f"worst case found on the stick-slip plant: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
             f"{quantity(seen.slip_rate_error, 'm/s')}{f'; no proof there: {why}' if why else ''}"
         )
+    if gap := getattr(answer, "stick_slip_gap", ""):
+        yield gap
 
 
 def _published(said: str) -> str:
-    """The verdict on published gains without the names of the premises that fail, which the report explains."""
+    """The verdict on published gains without the names of the conditions that fail, which the report explains."""
     if not said.startswith("proved, but "):
         return said
     missing = said.removeprefix("proved, but ").split("; ")
     others = [part for part in missing if " fails" not in part]
-    failing = ["under premises that fail here"] if len(others) < len(missing) else []
-    said = "; ".join([*failing, *others]).replace("UNSTABLE if p is held", "UNSTABLE with p held")
-    return f"proved in continuous time only, {said.replace('UNSTABLE with p held', 'unstable with zero-order hold')}"
+    said = "; ".join(["", *others])
+    for way in ("if p is held", "with p held"):
+        said = said.replace(f"UNSTABLE {way}", "unstable with zero-order hold")
+    violated = ", and this task violates its conditions" if len(others) < len(missing) else ""
+    return f"not proved here: the proof is for continuous time{violated}{said}"
 
 
 def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
@@ -211,8 +232,8 @@ def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
     if len(same) > 1 and all(e.guaranteed.claims == same[0].guaranteed.claims for e in same):  # type: ignore[union-attr]
         names = " and ".join(entry.design.title for entry in same)
         yield (
-            f"{names} coincide: with these gains the implicit step of both is deadbeat for all errors that are "
-            "claimed; in continuous time (--continuous) they differ"
+            f"{names} have the same numbers: within the proved errors both laws compute the same pressure; in "
+            "continuous time (--continuous) they differ"
         )
 
 
@@ -248,8 +269,10 @@ def _range(row: Row) -> str:
 # The summary on a terminal of 80 columns.
 
 
-LEGEND = """worst: worst error found by falsification
-pressure: range proved for all friction of the box, or the run's""".splitlines()
+LEGEND = (
+    "worst: worst case found; pressure: proved for every friction of the box, or seen",
+    "tracked: slip within 2 % of the task's, slip rate within 1 % of the natural peak",
+)
 
 
 def summary_lines(said: Summary) -> list[str]:

@@ -65,6 +65,7 @@ def simulate_sliding(
     transducer: Transducer | None = None,
     tide: Tide | None = None,
     variation: SlidingVariation | None = None,
+    pressure_per_slip: float | None = None,
     duration: float | None = None,
     settled_from: float | None = None,
     samples: int | None = None,
@@ -96,6 +97,8 @@ def simulate_sliding(
         True constants other than the nominal ones; the fault slides steadily at V at the start all the same.
     duration : float, optional
         [s]; the operation time unless given.
+    pressure_per_slip : float, optional
+        Of the plan [Pa/m]; k/(μ*A) of the nominal fault unless given.
     settled_from : float, optional
         Time [s] from which errors count; a quarter of the operation time, or of a shorter run.
     samples : int, optional
@@ -122,7 +125,7 @@ def simulate_sliding(
     setting = RunSetting.of(fault, float(step), max(length, float(step)), kept, settled_from)
     path = PressurePath(lag=lag, diffusion=diffusion, stages=tuple(stages))
     varied = variation or SlidingVariation()
-    loop = _Loop.of(fault, path, tide or Tide(), varied, inertia)
+    loop = _Loop.of(fault, path, tide or Tide(), varied, inertia, pressure_per_slip)
     around = Instruments.of(path, transducer, float(step))
     rows, events = _followed(loop, law, around, length, method, progress)
     time, slip, _, log_rate, log_state, asked, pressure = rows.T.copy()
@@ -206,10 +209,18 @@ class _Loop:
     share: "np.ndarray"
 
     @classmethod
-    def of(cls, fault: Fault, path: PressurePath, tide: Tide, variation: SlidingVariation, inertia: bool) -> "_Loop":
+    def of(
+        cls,
+        fault: Fault,
+        path: PressurePath,
+        tide: Tide,
+        variation: SlidingVariation,
+        inertia: bool,
+        planned: float | None,
+    ) -> "_Loop":
         reference = SlidingReference(task=fault.reference)
         steady = float(fault.friction.steady_coefficient(float(reference.first_rate)))
-        needed = fault.stiffness / fault.area / steady
+        needed = fault.stiffness / fault.area / steady if planned is None else planned
         return cls(variation.slider(fault, inertia=inertia), reference, needed, tide, *path.modes)
 
     @property

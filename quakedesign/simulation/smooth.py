@@ -114,6 +114,7 @@ class _Between(DenseOutput):  # type: ignore[misc]
 # ----------------------------------------------------------------------
 # Integration of smooth differential equations to a tolerance, with crossings of one level found on the way.
 
+_FRESH = 1.0  # s; what a clock reads at most that a new one would not help, for it tells 1e-16 s apart
 METHODS = {"dop853": "DOP853", "radau": "Radau"}
 
 
@@ -155,7 +156,8 @@ class SmoothProblem:
     ) -> SmoothSolution:
         """Follow the equations from times[0] to times[-1], with a clock that starts with them.
 
-        After years the steps of an earthquake are shorter than what floats of the absolute time can tell apart.
+        After years the steps of an earthquake are shorter than what floats of the absolute time can tell apart. Where
+        radau stops for this reason it goes on with a new clock.
 
         Parameters
         ----------
@@ -188,38 +190,47 @@ class SmoothProblem:
     def _stepped(
         self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
     ) -> SmoothSolution:
-        field, crossing, solver = (
-            _Bound.of(self.rates, 0, load, np.empty(self.rates.size1_in(0))).at,
-            self._crossing(),
-            self._solver(method, load, rtol),
-        )
-        spans = [times] if every_step or method == "dop853" else [times[i : i + 2] for i in range(len(times) - 1)]
-        pieces: list[tuple[np.ndarray, np.ndarray]] = []
+        whole = every_step or method == "dop853"
+        spans = [times] if whole else [times[i : i + 2] for i in range(len(times) - 1)]
+        clock, crossing, (field, solver) = 0.0, self._crossing(), self._solver(method, load, rtol)
+        pieces: list[tuple[np.ndarray, np.ndarray]] = [(times[:1], start[:, None])]
         crossed: list[np.ndarray] = []
         evaluations, y = 0, start
         for span in spans:
-            part = _solve(
-                field,
-                (span[0], span[-1]),
-                y,
-                t_eval=None if every_step else span,
-                events=crossing,
-                rtol=rtol,
-                atol=rtol * self.scales,
-                **solver,
-            )
-            pieces.append((part.t, part.y) if not pieces else (part.t[1:], part.y[:, 1:]))
-            crossed.append(part.t_events[0])
-            evaluations += part.nfev
-            y = part.y[:, -1]
+            begin, reached = float(span[0]), False
+            while not reached:
+                with np.errstate(over="ignore", invalid="ignore"):  # of trial steps that are too long, and rejected
+                    part = solve_ivp(
+                        field,
+                        (begin - clock, span[-1] - clock),
+                        y,
+                        t_eval=times if whole and not every_step else None,
+                        events=crossing,
+                        rtol=rtol,
+                        atol=rtol * self.scales,
+                        **solver,
+                    )
+                evaluations, reached = evaluations + part.nfev, part.success
+                if not reached and (method != "radau" or part.t[-1] < _FRESH):
+                    raise _stopped(method, sum(len(t) for t, _ in pieces) + len(part.t), part.message)
+                time, y = clock + part.t, part.y[:, -1]
+                crossed.append(clock + part.t_events[0])
+                if whole:
+                    pieces.append((time[1:], part.y[:, 1:]))
+                elif reached:
+                    pieces.append((time[-1:], part.y[:, -1:]))
+                if not reached:
+                    begin = clock = float(time[-1])
+                    field, solver = self._solver(method, replace(load, start=load.start - clock), rtol)
         values = np.concatenate([v for _, v in pieces], axis=1)
         return SmoothSolution(np.concatenate([t for t, _ in pieces]), values, np.concatenate(crossed), evaluations)
 
-    def _solver(self, method: str, load: Ramp, rtol: float) -> dict[str, Any]:
-        """Solver of SciPy, and what it takes beside field, instants and tolerances."""
+    def _solver(self, method: str, load: Ramp, rtol: float) -> tuple[Any, dict[str, Any]]:
+        """Field, solver of SciPy, and what it takes beside instants and tolerances."""
+        field = _Bound.of(self.rates, 0, load, np.empty(self.rates.size1_in(0))).at
         if method not in adaptive_integrators():
             more = {"jac": self._jacobian(load)} if method == "radau" else {}
-            return {"method": METHODS[method], **more}
+            return field, {"method": METHODS[method], **more}
         time, y, size = ca.SX.sym("t"), ca.SX.sym("y", self.rates.size1_in(0)), len(load.value)
         pushed = ca.SX.sym("load", 2 * size + 1)
         now = pushed[:size] + pushed[size : 2 * size] * (time - pushed[2 * size])
@@ -228,7 +239,7 @@ class SmoothProblem:
             adaptive_integrators()[method].flow(rates, self.scales, shares, rtol=rtol) for shares in (SHARES, [1.0])
         )
         told = [*load.value, *load.slope, load.start]
-        return {"method": Resolved, "pieces": pieces, "whole": whole, "parameters": told}
+        return field, {"method": Resolved, "pieces": pieces, "whole": whole, "parameters": told}
 
     def _jacobian(self, load: Ramp) -> Any:
         """Jacobian as a function of (t, y)."""
@@ -274,12 +285,9 @@ class _Bound:
         return self.result.copy()
 
 
-def _solve(*arguments: Any, **options: Any) -> Any:
-    with np.errstate(over="ignore", invalid="ignore"):  # of trial steps that are too long, and rejected for it
-        part = solve_ivp(*arguments, **options)
-    if not part.success:
-        raise SimulationError(
-            f"the integration stopped after {len(part.t)} points: {part.message} "
-            "Check that the slip rate stays finite, or loosen rtol."
-        )
-    return part
+def _stopped(method: str, points: int, reason: str) -> SimulationError:
+    other = "cvodes" if method in METHODS else "radau"
+    return SimulationError(
+        f"the integration with {method} stopped after {points} points: {reason} Check that the slip rate stays finite, "
+        f"or use another method: --method {other}."
+    )

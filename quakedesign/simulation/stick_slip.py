@@ -28,7 +28,7 @@ from quakedesign.symbolic import derive
 
 _ONSET = 10.0
 _SHARE_OF_STRETCH = 1e-3
-_FARTHEST = 1e6  # critical slips that the load point travels: some thousand cycles
+_FARTHEST = 1e7  # critical slips that the load point travels; one earthquake may take a million
 _LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
 _LONGEST_RUN = 1e5 * _LONGEST  # s, three million years: a run is cut into that many spans at most
 

@@ -24,7 +24,7 @@ from quakedesign.guarantees import (
     StickSlipGuarantee,
     attacked,
 )
-from quakedesign.guarantees.guarantee_result import SlidingAnswer
+from quakedesign.guarantees.guarantee_result import SlidingAnswer, given_answer
 from quakedesign.guarantees.stick_slip_answer import attacked_stick_slip
 from quakedesign.laws import Controller, published
 from quakedesign.linear.riccati import vertex_poles
@@ -58,7 +58,7 @@ class Entry:
     ----------
     label : str
     origin : str
-        ``"designed"`` or ``"published"``.
+        ``"published"``, or ``"designed"`` for all others.
     design : Design
         With the premise `on_trajectory` where it applies.
     run : Trajectory or None
@@ -75,8 +75,11 @@ class Entry:
         For a linear law: stability with zero-order hold over T_s, see `Design.held_loop`.
     peaks : mapping of str to ContinuousPeaks
         For a designed linear law that is proved: peaks in continuous time by class; no class without any.
+    given : bool
+        Whether the law is given, not designed.
     answer : LoopAnswer, SlidingAnswer, StickSlipAnswer or None
-        For a designed law: guarantee with zero-order hold over T_s, see `Design.guarantee`, and worst case found.
+        For a designed or given law: guarantee with zero-order hold over T_s, see `Design.guarantee`, and worst case
+        found.
     """
 
     label: str
@@ -88,7 +91,13 @@ class Entry:
     variants: tuple[Variant, ...] = ()
     held: HeldLoop | None = None
     peaks: Mapping[str, ContinuousPeaks] = field(default_factory=dict)
+    given: bool = False
     answer: LoopAnswer | SlidingAnswer | StickSlipAnswer | None = None
+
+    @property
+    def kind(self) -> str:
+        """``"given"``, or the origin."""
+        return "given" if self.given else self.origin
 
     @property
     def guarantee(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee | None:
@@ -161,12 +170,16 @@ def compared(
     designs: Sequence[Design],
     tell: Tell,
     *,
+    given: Sequence[Design] = (),
     with_published: bool = True,
     whole_task: bool = False,
     schemes: Mapping[str, str],
     plant: str | None = None,
 ) -> Compared:
-    """Runs of all controllers of a fault, as `quakedesign.report.compare` shows them; schemes by origin."""
+    """Runs of all controllers of a fault, as `quakedesign.report.compare` shows them; schemes by origin.
+
+    Those of the designs that are `given` are verdicts on given laws.
+    """
     require_fault(fault)
     require_plant(fault, plant)
     for name in schemes.values():
@@ -181,9 +194,10 @@ def compared(
         tell(f"{controller.title} (published): verdict", 0.0)
         entries.append(_entry("published", assess(fault, controller), schemes, tell, plant))
     for designed in designs:
-        entry = _entry("designed", designed, schemes, tell, plant)
+        known = any(designed is one for one in given)
+        entry = _entry("designed", designed, schemes, tell, plant, given=known)
         tell(f"{entry.label}: worst cases", 0.0)
-        entries.append(replace(entry, answer=_answer(fault, designed)))
+        entries.append(replace(entry, answer=_answer(fault, designed, given=known)))
     return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
 
 
@@ -205,14 +219,18 @@ def behind_path(fault: Fault) -> dict[str, str]:
     return {name: why for name in designable(fault) if name != "elqr"}
 
 
-def _answer(fault: Fault, design: Design) -> LoopAnswer | SlidingAnswer | StickSlipAnswer | None:
+def _answer(fault: Fault, design: Design, *, given: bool) -> LoopAnswer | SlidingAnswer | StickSlipAnswer | None:
     found = design.guarantee
     if isinstance(found, SlidingGuarantee):
         return design.sliding
     if isinstance(found, StickSlipGuarantee):
         return attacked_stick_slip(fault, found, design.compensation)
+    if given:
+        notes = getattr(design.controller, "notes", None)
+        return replace(given_answer(fault, found, notes), compensation=design.compensation)
     tried = str(design.details.get("not_at_rest", ""))
-    return replace(attacked(fault, found), compensation=design.compensation, not_at_rest=tried)
+    answer = replace(attacked(fault, found), compensation=design.compensation, not_at_rest=tried)
+    return answer if found.proved or design.runs else replace(answer, given=True)  # no T_s but the fault's was tried
 
 
 def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, whole: bool) -> Compared:
@@ -242,11 +260,14 @@ def designs_of(
     return designs
 
 
-def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell, plant: str | None) -> Entry:
+def _entry(
+    origin: str, design: Design, schemes: Mapping[str, str], tell: Tell, plant: str | None, *, given: bool = False
+) -> Entry:
     sampling = design.controller.sampling if design.controller else None
     scheme = sampling.scheme if sampling else schemes[origin]
     differ = len(set(schemes.values())) > 1
-    label = f"{design.title} ({origin}, {scheme})" if differ else f"{design.title} ({origin})"
+    kind = "given" if given else origin
+    label = f"{design.title} ({kind}, {scheme})" if differ else f"{design.title} ({kind})"
     if design.controller is None:
         return Entry(label=label, origin=origin, design=design, run=None)
     told = design.measurement
@@ -258,7 +279,7 @@ def _entry(origin: str, design: Design, schemes: Mapping[str, str], tell: Tell, 
         plant=plant,
         progress=lambda done: tell(label, done),
     )
-    entry = Entry(label=label, origin=origin, design=design, run=run)
+    entry = Entry(label=label, origin=origin, design=design, run=run, given=given)
     if design.controller.lipschitz_limit is not None:
         return _with_rate(entry, design.controller, float(design.controller.lipschitz_limit), run, tell)
     return entry if sampling else _linear(entry, run, tell)

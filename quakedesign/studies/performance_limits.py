@@ -323,8 +323,8 @@ def limits(
     ----------
     fault : Fault
     setup : LoopSetup
-        What controllers measure, with its noise, and the loop with which designs are proved. In slow sliding a lag or
-        a diffusion path alone; that of a well near the fault without both.
+        T_s in place of the fault's; what controllers measure, with its noise, and the loop with which designs are
+        proved. In slow sliding T_s, a lag or a diffusion path alone; the path of a well near the fault without both.
     pressure : float, optional
         Largest withdrawal [Pa]; the effective normal stress unless given. In slow sliding: largest pressure beside what
         the reference needs, in both directions.
@@ -353,7 +353,8 @@ def limits(
         that is not measured.
     """
     off = rational(spread, "spread")
-    told = Told(setup=setup.with_given(**given))
+    fault, setup = setup.with_given(**given).at_step(fault)
+    told = Told(setup=setup)
     if fault.friction.state_names:
         _require_plain(fault, told)
         return _sliding_limits(fault, pressure, diffusivity, stress, told.setup if prove else None, off)

@@ -327,16 +327,19 @@ def run_held(
     duration, plant, method
         As of `run_state`.
     claim : SlidingGuarantee, optional
-        Its law runs, with its T_s, delay, lag and rock in place of those above, which are not to be given.
+        Its law runs, with its T_s, delay, lag, rock and planned pressure in place of those above, which are not to be
+        given.
     """
     _require_runnable(fault, plant)
     held, path = rational(fault.sampling_time if step is None else step), rational(diffusion)
-    through, model = rational(lag), sliding_model(fault)
+    through, model, plan = rational(lag), sliding_model(fault), None
     if claim is None:
         law = sliding_law(model, held, diffusion=path)
     else:
         law, held, path, through = claim.held.law, claim.held.step, claim.held.diffusion, claim.held.lag
         stages = (*Actuator.meant_for(Sampling(step=held, delay=claim.held.delay)).sampled, *stages)
+        if slow_sliding_plant(fault, claim.task.stress).ramp != claim.task.ramp:  # another fault of the same box
+            plan = float(claim.task.ramp / claim.task.rate)
     run = simulate_sliding(
         fault,
         law,
@@ -349,6 +352,7 @@ def run_held(
         duration=duration,
         inertia=PLANTS[plant],
         method=method,
+        pressure_per_slip=plan,
     )
     assert run.reference is not None
     assert run.reference_rate is not None
@@ -595,9 +599,9 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
 
 
 def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee | StickSlipGuarantee) -> list[str]:
-    """What of a fault a certificate does not cover."""
+    """What of a fault a certificate does not cover; the planned pressure of slow sliding is that of the certificate."""
     if isinstance(claim, SlidingGuarantee):
-        return claim.task.differences(slow_sliding_plant(fault, claim.task.stress))
+        return claim.task.differences(replace(slow_sliding_plant(fault, claim.task.stress), ramp=claim.task.ramp))
     task = uncertain_plant(fault, rate_limited=claim.task.change is not None)
     if isinstance(claim, StickSlipGuarantee) and task.amplitude <= claim.task.amplitude:
         covered = claim.covered_healing(task.amplitude)

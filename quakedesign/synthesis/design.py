@@ -245,8 +245,9 @@ def design(
         ``"cta"``, ``"dia"`` or ``"elqr"``; or a law of your own, also as ``"module:Class"``, which says how it is
         designed or derives from one of these.
     setup : LoopSetup
-        Delay, lag and diffusion path behind which an e-LQR is designed and runs, what it measures, and bounds of the
-        measurement errors. Of rate-and-state friction a diffusion path of a tenth of D_c/V unless given.
+        T_s in place of the fault's, delay, lag and diffusion path behind which an e-LQR is designed and runs, what it
+        measures, and bounds of the measurement errors. Of rate-and-state friction a diffusion path of a tenth of D_c/V
+        unless given.
     feedforward : str
         What a sliding mode adds to ν from what is known of the plant: ``"none"``, ``"nominal"`` or ``"centred"``, see
         `quakedesign.laws.feed_forward`. It enlarges the certified domain in continuous time and has no guarantee
@@ -298,6 +299,7 @@ def design(
             f"a design knows {', '.join(_DESIGNED_FOR)} of the loop setup. Received {', '.join(sorted(unknown))}. "
             "Use guarantee, which designs for all of them."
         )
+    fault, setup = setup.at_step(fault)
     if fault.friction.state_names and given.get("diffusion") is not None and not setup.diffusion:
         raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit it for a well near the fault.")
     sliding = _sliding(fault, law, setup, stress, spread)
@@ -318,7 +320,7 @@ def design(
     return law.design(GainProblem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **told))
 
 
-_DESIGNED_FOR = ("measured", "delay", "lag", "diffusion", "slip_noise", "rate_noise")
+_DESIGNED_FOR = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", "rate_noise")
 
 
 def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any, spread: Any) -> SlowSlidingDesign:
@@ -345,7 +347,7 @@ def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any,
     return asked
 
 
-def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL) -> Design:
+def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **given: Quantity | None) -> Design:
     """Verdict, certificate and premises of given gains on a fault.
 
     Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's
@@ -358,11 +360,14 @@ def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL) -> De
     controller : Controller
     setup : LoopSetup
         Of a sampled linear law.
+    **given : str, float or Fraction
+        Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
     -------
     Design
     """
+    setup = setup.with_given(**given)
     fault.require_memoryless("a verdict on gains")
     if setup != IDEAL and controller.sampling is None:
         raise ParameterError("a loop setup needs a law of samples. Received a law in continuous time. Omit setup.")

@@ -28,10 +28,9 @@ from quakedesign.guarantees import (
     StickSlipGuarantee,
     best_guarantee,
 )
-from quakedesign.guarantees.guarantee_result import FACTOR
-from quakedesign.guarantees.search.adversary import worst_found
+from quakedesign.guarantees.guarantee_result import FACTOR, given_answer
 from quakedesign.guarantees.search.estimate import spectral_radius
-from quakedesign.laws import Controller, SampledController, Signals, SlidingMode, control_laws
+from quakedesign.laws import Controller, LinearLaw, SampledController, Signals, SlidingMode, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.laws.sampled_law import steady_states
 from quakedesign.linear.robust_stability import sector_loop
@@ -368,29 +367,40 @@ class Samples(DesignMethod[SampledController]):
         found = best_guarantee(task, held)
         if found.proved or found.small_gain is not None or held.longest_step:
             return found
-        largest = spectral_radius(held.loop(task))
-        if largest < 1:
+        largest, opposite = (spectral_radius(replace(held, law=_times(f, law)).loop(task)) for f in (1, -1))
+        if largest < _STABLE:
             return found
-        return replace(found, reason=f"{found.reason}: of a period it has an eigenvalue of size {largest:.4g}")
+        said = f"{found.reason}: of a period it has an eigenvalue of size {largest:.4g}"
+        if not any(row[0] for row in (*law.measured, law.feedback)):
+            said += (
+                "; the law does not use the slip, so that any constant slip error remains (eigenvalue 1): add "
+                "slip_error or slip to its inputs"
+            )
+        return replace(found, reason=said + _OPPOSITE * (opposite < _STABLE))
 
     def given(self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup) -> LoopAnswer:
         """Guarantee with the worst case found, for a law of the errors alone."""
         found = self.guarantee(fault, task, controller, setup)
-        worst = worst_found(found) if found.proved and not controller.law.of_reference else None
-        answer = LoopAnswer(fault=fault, found=found, worst=worst, notes=controller.notes)
+        answer = given_answer(fault, found, controller.notes)
         if found.proved or found.pressed or found.reason == _STANDING or setup.longest_step:
             return answer
         for factor in _FACTORS:
-            law = controller.law
-            rows = ([factor * v for v in row] for row in (law.output, law.feedback))
-            output, feedback = map(tuple, rows)
-            scaled = replace(controller, law=replace(law, output=output, feedback=feedback))
-            other = self.guarantee(fault, task, scaled, setup)
+            other = self.guarantee(fault, task, replace(controller, law=_times(factor, controller.law)), setup)
             if isinstance(other, Guarantee):
                 return replace(answer, nearest=(FACTOR, other), factor=factor)
         return answer
 
 
+def _times(factor: Fraction | int, law: LinearLaw) -> LinearLaw:
+    """A law with its pressure multiplied."""
+    output, feedback = (tuple(factor * v for v in row) for row in (law.output, law.feedback))
+    *states, pressure = law.of_reference or ((),)
+    moved = (*states, tuple(factor * v for v in pressure)) if law.of_reference else ()
+    return replace(law, output=output, feedback=feedback, of_reference=moved)
+
+
+_STABLE = 1 - 1e-6  # an eigenvalue that is 1 may be computed as less
+_OPPOSITE = "; with the opposite sign of the pressure it is stable"
 _FACTORS = tuple(map(Fraction, ("1/2", "2", "1/4", "4", "-1", "1/16", "16")))  # tried where a law has no guarantee
 _STANDING = (
     "the law leaves an error under a constant pressure at rest, as it has no integral action: give it an integral of "

@@ -42,6 +42,7 @@ from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.search.search import claims_of, find_certificate, finish, quadratic_margin
 from quakedesign.plant import FaultPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted, method_of
+from quakedesign.text import quantity
 
 
 class StateFeedback(DesignMethod[ExtendedLQR]):
@@ -191,7 +192,10 @@ def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     reason = answer.found.reason if not answer.found.proved else None
     if answer.held is None:
         return problem.undecided(law.name, str(reason), sliding=answer)
-    assumed = None if wanted.diffusion else f"a well near the fault, L^2/D = {float(path):g} s"
+    near = quantity(float(path) ** 0.5, "m")
+    assumed = (
+        None if wanted.diffusion else f"a well near the fault, L^2/D = {float(path):.3g} s ({near} at D = 1 m^2/s)"
+    )
     details = {"step": str(answer.held.step), "diffusion": str(path), "measured": MEASURED[1]}
     details |= {name: said for name, said in {"assumed": assumed, "reason": reason}.items() if said}
     return problem.judged(answer.held.controller, name=law.name, details=details, runs=answer.found, sliding=answer)

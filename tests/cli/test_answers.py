@@ -57,7 +57,9 @@ def prove(monkeypatch, call):
     monkeypatch.setattr(saved, lambda found, path: path.write_text(found))
     monkeypatch.setattr("quakedesign.synthesis.guarantee", lambda *_, **__: None)
     sentence = "quakedesign.report.summary.guaranteed_sentence"
-    monkeypatch.setattr(sentence, lambda first, found, peak: f"{first}: {found} beside {peak and round(peak, 4)} m/s")
+    monkeypatch.setattr(
+        sentence, lambda first, found, peak, _: f"{first}: {found} beside {peak and round(peak, 4)} m/s"
+    )
 
     def run(answers, *arguments):
         def found(calls, **more):
@@ -464,7 +466,7 @@ def test_a_polynomial_is_judged(call, monkeypatch, tmp_path, verdict, code, with
     monkeypatch.setattr(
         "quakedesign.sos.read_gram", lambda path: SimpleNamespace(verify=lambda: asked.append(path) or answer)
     )
-    monkeypatch.setattr("quakedesign.sos.exact.polynomial_files.plain_proof", lambda proof: {"plain": proof})
+    monkeypatch.setattr("quakedesign.sos.exact.polynomial_files.proof_entries", lambda proof: {"plain": proof})
     monkeypatch.setattr("quakedesign.sos.exact.words.sentences", lambda _, verbose: [f"verbose {verbose}"])
     assert call("sos", "x^2") == (code, "verbose False\n", "")
     told = json.loads(

@@ -11,11 +11,12 @@ import pytest
 import quakedesign as qd
 from quakedesign.cli import main
 from quakedesign.cli.options import LawOptions, SpreadOptions
-from quakedesign.errors import ParameterError
+from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.guarantees import save_guarantee
 from quakedesign.loop.sensing import Transducer
 from quakedesign.lyapunov import Verdict
-from quakedesign.simulation.state_plant import TIDE, Tide
+from quakedesign.simulation.slow_sliding import simulate_sliding
+from quakedesign.simulation.state_plant import TIDE, SlidingVariation, Tide
 from quakedesign.studies import runs as state_runs
 from quakedesign.studies.runs import run_held
 
@@ -23,6 +24,13 @@ FILE = Path(__file__).parents[2] / "proofs" / "certificates" / "sliding_crustal-
 CRUSTAL = qd.load_fault("crustal-patch")
 CLAIM = qd.load_guarantee(FILE)
 SHORT = ("--duration", "3 h")
+SAID = {
+    "direct_effect": "a [-]",
+    "evolution_effect": "b [-]",
+    "critical_slip": "D_c [m]",
+    "coefficient": "friction at V [-]",
+    "normal_stress": "normal stress [Pa]",
+}
 
 
 def told(capsys, *arguments):
@@ -125,4 +133,48 @@ def test_constants_of_friction_lie_within_those_of_a_proof():
         assert wide.differences(CLAIM.task) == []
         for ends in ((low * F(9, 10), high), (low, high * F(11, 10))):
             (found,) = CLAIM.task.differences(replace(CLAIM.task, ranges={**CLAIM.task.ranges, axis: ends}))
-            assert found.startswith(f"{axis} from ")
+            assert found.startswith(f"{SAID[axis]} from ")
+
+
+def test_a_fault_within_the_box_of_a_proof_runs_with_the_plan_of_the_proof(capsys, monkeypatch, tmp_path):
+    """The run is that of the nominal fault whose true a is larger; the certificate's point box is widened for it."""
+    wide = {axis: (low * F(99, 100), high * F(101, 100)) for axis, (low, high) in CLAIM.task.ranges.items()}
+    claim = replace(CLAIM, task=replace(CLAIM.task, ranges=wide))
+    file = tmp_path / "wide.json"
+    save_guarantee(claim, file)
+    monkeypatch.setattr(type(CLAIM), "check", lambda claim: Verdict.PROVED)
+    true = replace(CRUSTAL, friction=replace(CRUSTAL.friction, direct_effect=1.005 * CRUSTAL.friction.direct_effect))
+    assert LawOptions(certificate=file).choose(true).claim.task.ranges == wide
+    found = run_held(true, claim=claim, stress=1000.0, duration=3000.0)[0]
+    expected = simulate_sliding(
+        CRUSTAL,
+        CLAIM.held.law,
+        CLAIM.held.step,
+        lag=CLAIM.held.lag,
+        diffusion=CLAIM.held.diffusion,
+        tide=Tide(amplitude=1000.0, period=TIDE),
+        variation=SlidingVariation(direct_effect=1.005),
+        duration=3000.0,
+        inertia=True,
+    )
+    assert found.pressure == pytest.approx(expected.pressure, rel=1e-9, abs=1e-3)
+    assert found.slip == pytest.approx(expected.slip, rel=1e-9)
+    with pytest.raises(ParameterError, match="varies the fault that the certificate is about"):
+        SpreadOptions().choose(true, LawOptions(certificate=file), None, {})
+    far = replace(CRUSTAL, friction=replace(CRUSTAL.friction, critical_slip=1.02 * CRUSTAL.friction.critical_slip))
+    with pytest.raises(CertificateError, match=r": D_c \[m\] from 0\.\d+ to 0\.\d+ there, 0\.\d+ here\. Give"):
+        LawOptions(certificate=file).choose(far)
+
+
+def test_a_sentence_names_the_noise_or_exact_measurements_and_the_slip_rounded_down():
+    noisy = replace(
+        CLAIM, held=replace(CLAIM.held, slip_noise=F(1, 10**6)), task=replace(CLAIM.task, distance=F("0.12345"))
+    )
+    for claim, said, slip in (
+        (CLAIM, "with exact measurements of slip", "1 m"),
+        (noisy, "with any noise of at most 1e-06 m in the measured slip", "0.1234 m"),
+    ):
+        assert f", {said}, for every shear stress" in claim.sentence()
+        assert (
+            f"during the {slip} of slip of the task, in which the fault slides forward throughout" in claim.sentence()
+        )

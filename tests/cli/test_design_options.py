@@ -1,16 +1,18 @@
 """What `design`, `compare` and `figures` ask for, and what their exit code says, without the work between."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 import quakedesign as qd
-from quakedesign.cli import main
+from quakedesign.cli import block_commands, main
 from quakedesign.cli.design_commands import DesignOptions, positive
 from quakedesign.errors import QuakedesignError
 from quakedesign.guarantees import NoGuarantee
 from quakedesign.report import comparison_table
 
+BLOCKS = Path(__file__).parents[1] / "data" / "three_blocks.toml"
 DEFAULTS = {
     "objective": "tracking",
     "continuous": False,
@@ -85,6 +87,36 @@ def test_every_option_reaches_the_design(asked):
     changed = {"objective": "peak", "continuous": True, "disturbance_class": "rate", "spread": "0.1"}
     assert more["options"] == changed
     assert setup == qd.LoopSetup(measured="slip", slip_noise="1 um")
+
+
+@pytest.mark.parametrize("command", ["design", "compare", "figures"])
+def test_a_step_is_the_sampling_time_of_the_fault(monkeypatch, command):
+    seen = []
+
+    def comparison(fault, names, tell, **more):
+        seen.append((fault.sampling_time, more["options"]["setup"]))
+        raise AskedError("asked")
+
+    monkeypatch.setattr(comparison_table, "designed_comparison", comparison)
+    for given in ((), ("--step", "7/2000"), ("--step", "3.5 ms")):
+        with pytest.raises(SystemExit):
+            main([command, "lab-fault", *given])
+    own = qd.load_fault("lab-fault").sampling_time
+    assert seen == [(own, qd.LoopSetup()), *2 * [(0.0035, qd.LoopSetup())]]
+
+
+@pytest.mark.parametrize(
+    ("command", "work"), [("design", "run_chain"), ("compare", "compare_chain"), ("limits", "chain_limits")]
+)
+def test_a_step_is_the_sampling_time_of_several_blocks(monkeypatch, tmp_path, command, work):
+    monkeypatch.chdir(tmp_path)
+    seen = []
+    monkeypatch.setattr(block_commands, work, lambda chain, *_, **__: seen.append(chain.fault.sampling_time) or 0)
+    for given in ((), ("--step", "20 ms")):
+        with pytest.raises(SystemExit) as stop:
+            main([command, str(BLOCKS), *given])
+        assert stop.value.code == 0
+    assert seen == [qd.load_chain(BLOCKS).fault.sampling_time, 0.02]
 
 
 @pytest.mark.parametrize(

@@ -404,7 +404,7 @@ def test_a_pump_is_asked_for_no_more_than_it_can_do(call):
     assert (code, json.loads(out)["pump"]) == (0, {"least": "-15000000", "largest": "15000000"})
     code, out, _ = call(*given, "--withdrawal", "14 MPa")
     assert (code, json.loads(out)["verdict"]) == (1, "undecided")
-    assert "which a pump of -14 MPa to 15 MPa cannot all supply" in json.loads(out)["reason"]
+    assert "but the pump supplies only -14 MPa to 15 MPa" in json.loads(out)["reason"]
     code, _, err = call("real-fault", "--withdrawal", "14 MPa")
     assert (code, "withdrawal needs saturation" in err) == (2, True)
 

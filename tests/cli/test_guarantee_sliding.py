@@ -131,6 +131,21 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
     assert sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found == NONE
 
 
+def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch):
+    def proved(task, design, *, log_rate):
+        quiet = design.slip_noise <= Fraction(1, 10**7)
+        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if quiet else NONE
+
+    design = lambda task, step, **more: replace(HELD, slip_noise=more.get("slip_noise", Fraction(0)))  # noqa: E731
+    monkeypatch.setattr(sliding_answer, "designed_sliding", design)
+    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
+    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
+    around = {"diffusion": Fraction(800), "slip_noise": Fraction(1, 10**6)}
+    for stress in (None, Fraction(10_000)):
+        found = sliding_answer.answer_sliding(load_fault("crustal-patch"), stress=stress, **around).found
+        assert found.reason == "too much; a proof was found with slip noise of at most 100 nm"
+
+
 def test_a_stress_far_beyond_what_a_law_stands_has_no_guarantee():
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     found = proved_sliding(replace(known.task, stress=20 * known.task.stress), known.held)

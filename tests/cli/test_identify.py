@@ -38,7 +38,7 @@ def test_json_holds_what_is_promised(record, tmp_path, capsys):
     assert drop["low"] < 0.17 < drop["high"]
     assert drop["unit"] == ""
     assert answer["box"]["drop"][0] < drop["low"] < drop["value"] < drop["high"] < answer["box"]["drop"][1]
-    assert load_fault(toml).name == "lab-fault-identified"
+    assert load_fault(toml).name == "lab-fault-identified-weakening"
     assert "<svg" in figure.read_text()[:2000]
 
 

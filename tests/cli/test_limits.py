@@ -46,6 +46,17 @@ def test_json_has_both_sides(capsys):
     assert found["farthest_well"]["proved_up_to"] is None
 
 
+def test_a_step_takes_the_place_of_the_sampling_time(capsys):
+    """A longer T_s takes as much from the longest delay, which is the reaction time less T_s."""
+    found = {}
+    for step in ("5 ms", "1/250"):
+        assert run("lab-fault", "--step", step, "--json") == 0
+        found[step] = json.loads(capsys.readouterr().out)
+    delays = [Fraction(one["largest_delay"]["impossible_beyond"]) for one in found.values()]
+    assert [one["step"] for one in found.values()] == [0.005, 0.004]
+    assert float(delays[1] - delays[0]) == pytest.approx(0.001, rel=1e-3)
+
+
 def test_a_folder_with_a_figure(tmp_path, capsys):
     folder = tmp_path / "limits"
     assert run("lab-fault", "--out", str(folder), "--format", "pdf", "png") == 0
@@ -77,7 +88,18 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0
     said = capsys.readouterr().out
-    assert said.splitlines()[1] == "(box paper, any shear stress of at most 25 kPa, T_s = 300 s)"
+    assert said.splitlines()[1] == "(any shear stress of at most 25 kPa, T_s = 300 s)"
+    assert "proved: of an e-LQR designed for this table behind rock of L^2/D = 833 s, for a, b and D_c" in " ".join(
+        said.split()
+    )
+    assert "another design has other bounds" in " ".join(said.split())
+    ranges = {
+        name: (Fraction(95, 100) * low, Fraction(105, 100) * high) for name, (low, high) in known.task.ranges.items()
+    }
+    wide = replace(known, task=replace(known.task, ranges=ranges))
+    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **_: replace(answer, found=wide))
+    assert run("crustal-patch") == 0
+    assert "for a, b and D_c within 0.05 of their values, on" in " ".join(capsys.readouterr().out.split())
     assert "linearised about slow sliding" in said
     found = json.loads((tmp_path / "limits" / "results.json").read_text())
     assert found["stress"] == 25000.0
@@ -151,7 +173,7 @@ def test_both_sides_are_of_the_stress_that_the_design_behind_the_well_stands(mon
     assert rates[1] == pytest.approx(rates[0] / 2, rel=1e-3)  # of the linearised fault
     assert none["peak_slip_rate_error"]["proved_up_to"] is None
     assert run("crustal-patch", "--diffusion", "1000 s") == 0
-    assert "proved: nothing of a design" in capsys.readouterr().out
+    assert "proved: no design" in capsys.readouterr().out
 
 
 def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are_told(monkeypatch, capsys):
@@ -168,7 +190,7 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     patch = ("crustal-patch", "--stress", "25 kPa")
     assert run(*patch, "--well", "40 m", "--diffusivity", "2 m^2/s", "--lag", "5 s") == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert f"proved: one design behind rock of L^2/D = {float(known.held.diffusion):.4g} s, of the fault" in told
+    assert f"table behind rock of L^2/D = {float(known.held.diffusion):.4g} s, for a, b and D_c as they are" in told
     assert "D = 2 m^2/s" in told
     assert run(*patch, "--diffusion", "9 s") == run(*patch, "--diffusivity", "2") == 0
     near = {"diffusion": asked[0]["diffusion"]}
@@ -180,7 +202,7 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     assert asked == [near]  # no design is looked for behind what is impossible
     told = " ".join(capsys.readouterr().out.split())
     assert "L^2/D = 1e+10 s: INFEASIBLE for every controller" in told
-    assert f"proved: one design behind rock of L^2/D = {float(known.held.diffusion):.4g} s" in told
+    assert f"table behind rock of L^2/D = {float(known.held.diffusion):.4g} s, for a, b and D_c as they are" in told
     assert set(spreads) == {0}
     assert run(*patch, "--diffusion", "9 s", "--spread", "0.01") == 0
     assert spreads[-2:] == [Fraction(1, 100)] * 2

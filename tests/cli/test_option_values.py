@@ -126,8 +126,8 @@ def test_a_well_that_is_none_is_refused(given, said):
 
 def test_a_setup_is_made_of_what_is_given():
     assert SetupOptions().setup() == options.IDEAL
-    found = SetupOptions(delay="0.02", well="40", diffusivity="0.5", lag="1/2").setup(step="0.184")
-    assert found == options.IDEAL.with_given(delay="0.02", diffusion="3200", lag="1/2", step="0.184")
+    found = SetupOptions(step="0.184", delay="0.02", well="40", diffusivity="0.5", lag="1/2").setup(measured="slip")
+    assert found == options.IDEAL.with_given(delay="0.02", diffusion="3200", lag="1/2", step="0.184", measured="slip")
 
 
 # Output

@@ -33,6 +33,13 @@ def test_and_weighs_and_releases_as_much_as_all():
     assert ROW.moment_of(0.5) == 30e9 * ROW.area * 0.5
 
 
+def test_density_and_shear_modulus_from_mass_and_stiffness_per_area():
+    """The line of docs/reference/fault_file.md: 5e5 kg/m² and 60 MPa/m with h = 200 m."""
+    patch = replace(SQUARE, density=5e5 / 200, shear_modulus=60e6 * 200, length=300.0, width=200.0)
+    assert (patch.density, patch.shear_modulus) == (2500, 12e9)
+    assert (patch.mass / patch.area, patch.stiffness / patch.area) == pytest.approx((5e5, 60e6), rel=1e-14)
+
+
 def test_the_sides_have_no_order():
     turned = replace(ROW, length=5e3, width=15e3)
     assert plant_values(turned) == plant_values(ROW)

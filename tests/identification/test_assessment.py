@@ -11,8 +11,8 @@ import pytest
 
 from quakedesign.errors import ParameterError, RecordError
 from quakedesign.fault import fault_toml, load_fault, parse_fault, with_accepted_fit
-from quakedesign.identification.assessment import _beginning, in_doubt, sign_check
-from quakedesign.identification.fault_file import identified_fault, next_command, poor_fit
+from quakedesign.identification.assessment import Check, _beginning, in_doubt, sign_check
+from quakedesign.identification.fault_file import identified_fault, next_command, poor_fit, save_fault
 from quakedesign.identification.identification_result import ParameterEstimate
 from quakedesign.identification.identify import AGEING, SLIP, identify
 from quakedesign.identification.record import Record
@@ -198,6 +198,36 @@ def test_a_second_state_is_found_where_there_is_one():
         identify(changed, states=3)
 
 
+def test_a_failed_test_of_an_explained_record_is_said_below_the_verdict_and_in_the_file(trended, tmp_path):
+    text = "the trend changes at the last step (4.2 standard deviations)"
+    late = Check(name="halves", passed=False, value=1.05, limit=1.0, sentence=text)
+    checks = tuple(late if check.name == "halves" else check for check in trended.assessment.checks)
+    assert late in checks
+    found = replace(trended, assessment=replace(trended.assessment, checks=checks))
+    lines = identification_lines(found)
+    assert f"{' '.join(map(str.strip, lines[: lines.index('')]))}".endswith(f" But {text}.")
+    assert not [line for line in lines if line.startswith("not passed")]
+    patch = load_fault("crustal-patch")
+    weakening = replace(found, law=patch.friction)
+    save_fault(weakening, patch, tmp_path / "found.toml")
+    assert f"# Not passed: {text}.\n" in (tmp_path / "found.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("record", "name"),
+    [
+        ("step 7, wet", "crustal-patch-identified-step-7"),
+        ("übung", "crustal-patch-identified-bung"),
+        ("µ", "crustal-patch-identified"),
+        ("a" * 70, f"crustal-patch-identified-{'a' * 35}"),
+    ],
+)
+def test_the_name_of_an_identified_fault_ends_in_that_of_the_record(trended, record, name):
+    patch = load_fault("crustal-patch")
+    found = replace(trended, record=replace(trended.record, name=record), law=patch.friction)
+    assert identified_fault(found, patch).name == name
+
+
 def test_a_poor_fit_is_designed_for_only_if_that_is_accepted(trended):
     patch = load_fault("crustal-patch")
     told = replace(trended.assessment, factor=3.1)
@@ -211,7 +241,7 @@ def test_a_poor_fit_is_designed_for_only_if_that_is_accepted(trended):
         ):
             asked(poor, "elqr")
     accepted = with_accepted_fit(poor, True)
-    assert accepted.name == "crustal-patch-identified-poor-fit"
+    assert accepted.name == "crustal-patch-identified-made-poor-fit"
     assert accepted.source.startswith("poor fit accepted (the fit does not explain the record")
     assert accepted.poor_fit == ""
     assert with_accepted_fit(patch, False) is patch

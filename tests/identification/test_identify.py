@@ -254,10 +254,8 @@ def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(wea
     effects = {"direct_effect": 0.01, "evolution_effect": 0.015}
     slip = friction_law("rate-and-state-slip")(**asdict(patch.friction) | moved | effects)
     found = replace(weak, law=slip, rival=Rival(law=patch.friction.name, squares=2.0, excess=300.0))
-    assert "reference_coefficient 0.6 at 1e-06 m/s is 0.63454 at 1e-09 m/s, as the file says it" in task_remarks(
-        found, patch
-    )
-    assert "that of steady sliding at 1e-06 m/s" in " ".join(identification_lines(found, verbose=True))
+    assert "mu0 = 0.6 at 1 µm/s was converted to 0.63454 at 1 nm/s for the file" in task_remarks(found, patch)
+    assert "that of steady sliding at 1 µm/s" in " ".join(identification_lines(found, verbose=True))
     assert "aging fits worse: squares 2 times as large, AIC higher by 300" in " ".join(
         " ".join(identification_lines(found, verbose=True)).split()
     )

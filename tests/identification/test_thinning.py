@@ -104,7 +104,7 @@ def test_a_long_record_is_fitted_by_its_means_and_says_so():
     assert found.fit.noise == pytest.approx(made.noise, rel=0.1)
     assert found.to_dict()["measurements"] == found.record.counts[found.used].sum()
     told = " ".join(" ".join(identification_lines(found, verbose=True)).split())
-    assert f"of friction in one of {found.fit.counts.sum()} samples, taken as {len(found.fit.counts)} means" in told
+    assert f"; {found.fit.counts.sum()} samples averaged to {len(found.fit.counts)};" in told
 
 
 def test_an_outlier_stays_a_sample_of_its_own():

@@ -1,5 +1,6 @@
 """What decides a verdict, at its thresholds, with fits made by hand: every number follows from the values beside it."""
 
+from dataclasses import replace
 from importlib import import_module
 from itertools import product
 from types import SimpleNamespace
@@ -119,6 +120,10 @@ def test_halves_may_differ_by_a_factor_of_two_in_noise(late, passed):
     found, _ = checks(residuals, begins=[399.0], noise=1e9)
     assert found["halves"].passed == passed
     assert found["halves"].value == pytest.approx(max(late, 1 / late) / 2, rel=1e-12)
+    told = Assessment(checks=tuple(found.values()), factor=1.0)
+    assert told.cautions == (() if passed else (found["halves"].sentence,))
+    assert passed or "residuals differ by a factor 2, so the intervals may be too narrow" in told.cautions[0]
+    assert replace(told, factor=3.0).cautions == ()
 
 
 @pytest.mark.usefixtures("white")
@@ -132,6 +137,11 @@ def test_a_trend_may_change_by_four_of_its_deviations_at_the_last_change_of_rate
     found, _ = checks(-size * across / np.linalg.norm(across), begins=[100.0, 200.0], slopes=slopes, noise=1.0)
     assert found["halves"].value == pytest.approx(size / 4, rel=1e-9)
     assert found["halves"].passed == (size < 4)
+    changes = f"the trend changes at the last step ({size:.2g} standard deviations): the drift is not linear, so the "
+    changes += "intervals may be too narrow. Cut with --to, or use --steps auto"
+    assert (found["halves"].sentence == changes) == (size > 4)
+    one, _ = checks(-5 * across / np.linalg.norm(across), begins=[200.0], slopes=slopes, noise=1.0)
+    assert one["halves"].sentence.endswith("too narrow. Cut with --to")
     told = slopes if size > 4 else np.column_stack([slopes, hinge])
     same, _ = checks(np.ones(COUNT), begins=[200.0], slopes=told)
     assert same["halves"].value == pytest.approx(0.5, abs=1e-6)

@@ -62,7 +62,7 @@ def test_what_is_given_reaches_the_loop_and_the_delay_counts_from_the_middle_of_
 def test_every_quantity_is_an_option_with_its_unit_and_help():
     """Names, units and help texts are stated once: the command line reads them off the fields."""
     options = {part.name for part in fields(SetupOptions)}
-    assert options == {*quantities(), "well", "diffusivity"} - {"step"}
+    assert options == {*quantities(), "well", "diffusivity"}
     assert {part.name for part in fields(LoopSetup)} == {*quantities(), "measured"}
     for name, part in quantities().items():
         assert part["unit"] in ("s", "m", "m/s", "Pa", "Pa/s"), name

@@ -218,7 +218,11 @@ def test_a_largest_step_is_claimed_where_it_counts_alone_and_has_to_be_for_a_pum
     missing = {name: v for name, v in wide.items() if name != "largest_step"}
     for raw, claims, why in (
         (enough, missing, "needs a claim of the largest step"),
-        (HELD, wide, "is claimed of a loop with jitter or a pump of some rate alone"),
+        (
+            HELD,
+            wide,
+            "of a loop with jitter or a pump of some rate alone",
+        ),
     ):
         with pytest.raises(checker.Refused, match=why):
             checker.verify(changed(raw, (("claims",), claims)))
@@ -252,7 +256,7 @@ def test_every_claim_may_be_what_follows_and_no_less(name, monkeypatch):
     assert "valve" not in "".join(checker.verify(BEHIND | {"claims": fewer})[3:])
     with pytest.raises(checker.Refused, match="least_asked, largest_asked"):
         checker.verify(BEHIND | {"claims": fewer | {"least_asked": claims["least_asked"]}})
-    with pytest.raises(checker.Refused, match="must not tell the valve's pressure"):
+    with pytest.raises(checker.Refused, match="without a lag and rock"):
         checker.verify(HELD | {"claims": claims})
 
 
@@ -296,10 +300,10 @@ def test_the_package_reads_claims_about_the_valve_behind_a_lag_alone_and_both_or
     assert (found.least_asked, found.largest_asked) == (-1, 1)
     assert parse_guarantee(json.dumps(BEHIND)).claims.least_asked is None
     for name in both:
-        with pytest.raises(CertificateError, match="exactly the keys"):
+        with pytest.raises(CertificateError, match="both of least_asked and largest_asked, or neither"):
             parse_guarantee(json.dumps(BEHIND | {"claims": HELD["claims"] | {name: both[name]}}))
     for raw in (HELD, CONTINUOUS):
-        with pytest.raises(CertificateError, match="must not tell the valve's pressure"):
+        with pytest.raises(CertificateError, match="without a lag and rock"):
             parse_guarantee(json.dumps(raw | {"claims": HELD["claims"] | both}))
 
 
@@ -506,12 +510,12 @@ def test_a_slow_gain_is_refused_from_a_file_that_breaks_its_rules():
     assert read_guarantee(steady).slow_gain is None
     assert json.loads(guarantee_text(read_guarantee(at_once))) == at_once
     for wrong in ({"parts": "2"}, {"parts": True}, {"parts": 2.0}):
-        with pytest.raises(CertificateError, match="parts must be an integer"):
+        with pytest.raises(CertificateError, match=r"slow_gain.parts: expected `int`"):
             read_guarantee(steady | {"slow_gain": slow | wrong})
     for wrong, said in (
-        (steady | {"slow_gain": slow | {"more": "1"}}, "exactly the keys growth, parts"),
-        (steady | {"more": "1"}, "exactly the keys"),
-        (at_once | {"slow_gain": slow}, "slow_gain is for a law of samples"),
+        (steady | {"slow_gain": slow | {"more": "1"}}, "slow_gain.*unknown|slow_gain.*must be a known key"),
+        (steady | {"more": "1"}, "unknown field `more`"),
+        (at_once | {"slow_gain": slow}, "unknown field `slow_gain`"),
         (HELD | {"slow_gain": slow}, "friction that depends on the slip alone"),
         (steady | {"slow_gain": slow | {"parts": 17}}, "1 to 16 parts"),
         (5, "an object"),

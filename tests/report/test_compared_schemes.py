@@ -10,6 +10,7 @@ import pytest
 from quakedesign.cli.app import console
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Reference, load_fault
+from quakedesign.guarantees import NoGuarantee
 from quakedesign.laws import published
 from quakedesign.lyapunov import Verdict
 from quakedesign.report import compare, headline
@@ -21,6 +22,7 @@ from quakedesign.report.summary import summary
 from quakedesign.report.tables import rows
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate
+from quakedesign.studies import comparison as study
 from quakedesign.synthesis import Design
 
 LAB = load_fault("lab-fault")
@@ -44,6 +46,14 @@ def compared(kept):
         )
         designs = [undecided(SHORT, laws[name]) for name in ("cta", "elqr")]
         yield compare(SHORT, designs, scheme="compensated", published_scheme="explicit", plant="printed")
+
+
+def test_a_search_of_other_sampling_times_is_named_only_where_there_was_one():
+    none = NoGuarantee(reason="the gain is 2", small_gain=None)
+    in_continuous_time = undecided(SHORT, published("lab-fault")["elqr"])
+    lines = [study._answer(SHORT, replace(in_continuous_time, runs=runs), given=False).lines() for runs in (None, none)]
+    assert [len(one) for one in lines] == [1, 2]
+    assert lines[1][1].startswith("no T_s was found for which a design is proved")
 
 
 def test_every_row_says_its_scheme_and_is_the_run_of_it(compared):

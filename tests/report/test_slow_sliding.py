@@ -24,7 +24,13 @@ from quakedesign.guarantees.guarantee_result import SlidingAnswer
 from quakedesign.report.figures import cycle, errors, overviews, slow_sliding
 from quakedesign.report.folder import write_folder
 from quakedesign.report.page import accounts, parameter_rows
-from quakedesign.report.sentences import cycle_sentence, part_of_task, sentences, state_run_lines
+from quakedesign.report.sentences import (
+    cycle_sentence,
+    part_of_task,
+    sentences,
+    state_run_lines,
+    steady_start_sentence,
+)
 from quakedesign.report.summary import summary
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
@@ -99,7 +105,7 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     assert len(lines) <= 40
     assert max(map(len, lines)) <= 80
     said = " ".join(told.getvalue().split())
-    proved = "With the e-LQR (designed) the slip rate never exceeds 1.2 µm/s while the reference goes"
+    proved = "With the e-LQR (designed) the slip rate never exceeds 1.2 µm/s during the 1 m of slip of the task, under"
     assert said.startswith(f"crustal-patch: guaranteed. {proved}")
     assert "the slip stays within 83.3 µm of the reference" in said
     (row,) = (line.split() for line in lines if line.startswith("e-LQR  "))
@@ -109,6 +115,7 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     ends = comparison.entries[0].guarantee.valve_pressures
     assert [row[-3], row[-1]] == [f"{type(end)(Fraction(end) / 10**6):.3g}" for end in ends]
     assert "Without control: the fault creeps" in said
+    assert "Run and proof begin in steady sliding at V = 1 µm/s; bringing a locked fault there is not covered" in said
     assert row[5:7] == [f"{UpperBound(10**6 * Fraction(claims.slip_error)):.3g}", f"{1e6 * worst.slip_error:.3g}"]
     print_comparison(comparison, terminal(file=told, width=200))
     gains = next(line for line in told.getvalue().splitlines() if "gains: " in line)
@@ -153,9 +160,13 @@ def test_the_report_is_the_one_of_all_faults(folder):
     assert "guaranteed as it runs" in page
     assert "Uncertainty box" not in page
     assert not re.search(r"for ever\b", page[: page.index("Glossary")])
-    assert first.index("while the reference goes") < first.index("shear stress is disturbed by at most")
-    assert first.index("for every shear stress disturbance of at most") < first.rindex("while the reference goes")
-    assert "a well near the fault" in page
+    assert first.index("of slip of the task") < first.index("under every shear stress disturbance of at most")
+    assert first.index("for every shear stress disturbance of at most") < first.rindex("of slip of the task")
+    assert "bringing a locked fault there is not covered" in first
+    plain = re.sub("<[^>]+>", "", first)
+    assert "a well near the fault, L2/D = 800 s (28.3 m at D = 1 m2/s)" in plain
+    assert "in which the fault slides forward throughout" in first
+    assert "plant without stick" not in page
     assert "continued to negative slip rates" not in page
 
 
@@ -350,3 +361,12 @@ def test_the_figure_of_a_long_run_has_no_more_bands_than_are_seen(comparison):
     long = replace(run, **arrays | {"time": np.linspace(0, 3e5, many * len(run.time))})
     bands = slow_sliding(entry, long).axes[2].collections[0].get_paths()[0].vertices
     assert len(bands) < 2 * 650 + 8
+
+
+def test_the_slip_that_a_task_takes_stands_beside_that_of_an_earthquake(comparison):
+    """0.3 m at 1 µm/s of a cycle whose last event slipped 0.65 m; nothing of an event that is not known."""
+    run = comparison.uncontrolled
+    whole = SimpleNamespace(fault=SHORT, failed="", cycle={"slip": 0.649})
+    assert steady_start_sentence(whole).endswith("; the task uses up 0.3 m of the 0.649 m of slip of an earthquake")
+    for other in (run, SimpleNamespace(fault=SHORT, failed="stopped", cycle=None)):
+        assert steady_start_sentence(other).endswith("a locked fault there is not covered")

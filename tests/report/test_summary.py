@@ -61,14 +61,15 @@ def made(**changes):
 
 def test_the_table_has_proved_bounds_rounded_up_beside_the_worst_found_and_the_run():
     lines = summary_lines(made())
-    heads, columns, natural, law, name, other, legend = lines[2:9]
+    heads, columns, natural, law, name, other, worst, tracked = lines[2:10]
     assert heads.split() == ["slip", "rate", "[nm/s]", "slip", "error", "[µm]", "pressure"]
     assert columns.split() == ["controller", "outcome", *["proved", "worst", "run"] * 2, "[MPa]"]
     assert natural.split() == ["uncontrolled", "earthquake", "369", "mm/s", "–", "–", "–", "–"]
     assert law.split() == ["e-LQR", "tracked", "14.9", "13.7", "11.7", "3.34", "1.3", "0.64", "-0.119", "…", "1.81"]
     assert name == "a law with a long name"
     assert other.split() == ["slow", "slip", "–", "–", "20", "–", "–", "–", "-0.8", "…", "0"]
-    assert "falsification" in legend
+    assert worst == "worst: worst case found; pressure: proved for every friction of the box, or seen"
+    assert tracked.startswith("tracked: slip within 2 % of the task's")
     assert max(map(len, lines)) <= 80
 
 
@@ -80,10 +81,11 @@ def test_without_a_proof_the_scale_is_that_of_the_runs():
     assert summary_lines(made(rows=rows))[2].split() == ["slip", "rate", "[µm/s]", "slip", "error", "[nm]", "pressure"]
 
 
-def entry(label, peak=None, slip=None, *, compensation=None, origin="designed"):
+def entry(label, peak=None, slip=None, *, compensation=None, origin="designed", given=False):
     claims = SimpleNamespace(slip_error=slip and UpperBound(slip))
+    task = SimpleNamespace(target_slip=Fraction(1, 20), operation_time=Fraction(432000))
     found = peak and SimpleNamespace(
-        peak_slip_rate=UpperBound(peak), claims=claims, sentence=lambda: f"the sentence of {label}"
+        peak_slip_rate=UpperBound(peak), claims=claims, task=task, sentence=lambda: f"the sentence of {label}"
     )
     outcome = SimpleNamespace(kind="tracked", peak_slip_rate=1e-6)
     metrics, provenance = SimpleNamespace(max_slip_error=1e-7), {"scheme": "continuous"}
@@ -105,14 +107,16 @@ def entry(label, peak=None, slip=None, *, compensation=None, origin="designed"):
         details={},
     )
     named = {"label": label, "origin": origin, "guaranteed": found or None, "answer": answer, "run": run}
+    named |= {"given": given, "kind": "given" if given else origin}
     return SimpleNamespace(**named, design=design, held=None, growth_per_step=None, peaks={})
 
 
 def compared(monkeypatch, *entries, natural="earthquake"):
     monkeypatch.setattr("quakedesign.report.summary.pressure_extremes", lambda run: (-1e6, 2e6))
     outcome = SimpleNamespace(kind=natural, peak_slip_rate=0.01)
+    fault = {"name": "mine", "source": "a paper", "assumed": ("a well",), "friction": REAL.friction, "box": REAL.box}
     return SimpleNamespace(
-        fault=SimpleNamespace(name="mine", source="a paper", assumed=("a well",), friction=REAL.friction, box=REAL.box),
+        fault=SimpleNamespace(**fault, magnitude=5.24),
         uncontrolled=SimpleNamespace(outcome=outcome),
         of=lambda origin: tuple(e for e in entries if e.origin == origin),
         left_out={},
@@ -125,10 +129,14 @@ def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthqu
     )
     assert said.answer == (
         "mine: guaranteed. With the B (designed) the slip rate never exceeds 143 µm/s (1.5 % of the natural "
-        "earthquake's 10 mm/s), and the slip stays within 20 µm of the reference"
+        "earthquake's 10 mm/s, magnitude 5.2), and the slip stays within 20 µm of the reference, 50 mm within 5 days"
     )
+    unknown = compared(monkeypatch, entry("B (designed)", "1/7000", "2e-5"))
+    unknown.fault.magnitude = float("nan")
+    assert "(1.5 % of the natural earthquake's 10 mm/s)," in summary(unknown).answer
     assert said.conditions == "B (designed), proved: the sentence of B (designed)"
-    assumed, box, limit = said.notes
+    assumed, box, model, limit = said.notes
+    assert model.startswith("model: one block under a uniform pressure")
     assert (assumed, limit) == ("assumed: a well", "no controller does better")
     assert box.startswith("box paper: every friction from 0.2353 to 0.3353")
     stable = summary(compared(monkeypatch, entry("A (designed)", 3e-4, 1e-5), natural="creep"))
@@ -167,7 +175,7 @@ def test_a_share_is_rounded_up_from_the_numbers_themselves(monkeypatch):
     """0.109/12.4996 = 0.87203 %, which is less over 12.5, the earthquake as it is printed."""
     one = compared(monkeypatch, entry("A (designed)", "0.000109", "1e-5"))
     one.uncontrolled.outcome.peak_slip_rate = 0.0124996
-    assert "(0.88 % of the natural earthquake's 12.5 mm/s)" in summary(one).answer
+    assert "(0.88 % of the natural earthquake's 12.5 mm/s, magnitude 5.2)" in summary(one).answer
 
 
 def test_a_design_for_another_sampling_time_is_not_said_to_be_guaranteed(monkeypatch):
@@ -184,15 +192,15 @@ def test_a_design_for_another_sampling_time_is_not_said_to_be_guaranteed(monkeyp
     ("grade", "said"),
     [
         ("undecided", "undecided"),
-        ("proved, but along_reference fails 295-fold", "under premises that fail here"),
+        ("proved, but along_reference fails 295-fold", ", and this task violates its conditions"),
         (
             "proved, but level_set fails 2-fold; UNSTABLE with p held",
-            "under premises that fail here; unstable with zero-order hold",
+            ", and this task violates its conditions; unstable with zero-order hold",
         ),
-        ("proved, but p is held, and no T_s is proved", "p is held, and no T_s is proved"),
+        ("proved, but p is held, and no T_s is proved", "; p is held, and no T_s is proved"),
         (
             "proved, but level_set fails 2-fold; UNSTABLE if p is held over T_s",
-            "under premises that fail here; unstable with zero-order hold over T_s",
+            ", and this task violates its conditions; unstable with zero-order hold over T_s",
         ),
     ],
 )
@@ -200,7 +208,8 @@ def test_published_gains_keep_what_is_said_of_how_they_run(monkeypatch, grade, s
     one = compared(monkeypatch, entry("A (designed)", "1e-4", "1e-5"), entry("P (published)", origin="published"))
     monkeypatch.setattr("quakedesign.report.summary.grade", lambda _: grade)
     (note,) = (note for note in summary(one).notes if "(published)" in note)
-    assert note == f"P (published): {said if grade == 'undecided' else f'proved in continuous time only, {said}'}"
+    unproved = f"not proved here: the proof is for continuous time{said}"
+    assert note == f"P (published): {said if grade == 'undecided' else unproved}"
     unsampled = "runs of published gains are in continuous time, without zero-order hold"
     assert unsampled in summary(one).notes
     one.of("published")[0].run.provenance["scheme"] = "explicit"
@@ -231,6 +240,18 @@ def test_a_design_without_a_guarantee_beside_one_that_has_it_is_named(monkeypatc
     assert "B (designed): undecided" in said.notes
 
 
+def test_a_given_law_without_a_guarantee_has_its_reason_and_is_no_design(monkeypatch):
+    known, other = entry("A (given)", given=True), entry("B (given)", 3e-4, 1e-5, given=True)
+    assert summary(compared(monkeypatch, known)).answer == "mine: no guarantee for any given controller"
+    both = summary(compared(monkeypatch, entry("C (designed)"), known)).answer
+    assert both == "mine: no guarantee for any designed or given controller"
+    other.answer.stick_slip_gap = "nothing is searched there"
+    said = summary(compared(monkeypatch, known, other))
+    assert "A (given): none: the reason of A (given)" in said.notes
+    assert "nothing is searched there" in said.notes
+    assert [row.name for row in said.rows[1:]] == ["A", "B"]
+
+
 def test_what_a_design_and_a_fault_take_for_granted_is_said(monkeypatch):
     one = compared(monkeypatch, entry("A (designed)", "3e-4", "1e-5"))
     one.of("designed")[0].design.details["assumed"] = "a well near the fault"
@@ -254,9 +275,11 @@ def test_friction_that_is_extrapolated_to_the_rate_of_the_task_is_said(monkeypat
 def test_two_sliding_modes_with_the_same_bounds_say_why(monkeypatch):
     one, other = (entry(f"{name} (designed)", 3e-4, 1e-5, compensation="c") for name in ("2-CTA", "2-DIA"))
     other.guaranteed.claims = one.guaranteed.claims
-    assert any("2-CTA and 2-DIA coincide" in note for note in summary(compared(monkeypatch, one, other)).notes)
+    assert any(
+        "2-CTA and 2-DIA have the same numbers" in note for note in summary(compared(monkeypatch, one, other)).notes
+    )
     other.guaranteed.claims = SimpleNamespace(slip_error=UpperBound(1))
-    assert not any("coincide" in note for note in summary(compared(monkeypatch, one, other)).notes)
+    assert not any("same numbers" in note for note in summary(compared(monkeypatch, one, other)).notes)
 
 
 @pytest.mark.slow

@@ -345,7 +345,7 @@ def test_a_run_can_be_handed_on():
         ({"loading": []}, "at least one pair"),
         (
             {"loading": 1e-5, "duration": 1e13},
-            r"at most 1e\+06 critical slips, .*Received 1e\+08 m. Shorten",
+            r"at most 1e\+07 critical slips, .*Received 1e\+08 m. Shorten",
         ),
         ({"loading": [(1.0, -1e-5)]}, "not negative"),
         ({"loading": [(math.inf, 1e-5)]}, "positive time"),

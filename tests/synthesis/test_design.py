@@ -194,5 +194,19 @@ def test_a_simulation_that_holds_the_pressure_agrees_with_both_guarantees(real, 
 
 
 def test_a_design_refuses_quantities_of_the_setup_that_it_does_not_know():
-    with pytest.raises(ParameterError, match=r"a design knows measured, delay, .* Received jitter, step"):
-        qd.design(qd.load_fault("real-fault"), "elqr", jitter="1 ms", step="100 ms")
+    with pytest.raises(ParameterError, match=r"a design knows step, measured, delay, .* Received jitter, longest_step"):
+        qd.design(qd.load_fault("real-fault"), "elqr", jitter="1 ms", longest_step="100 ms")
+
+
+def test_a_step_of_the_setup_is_the_sampling_time_of_the_fault(real):
+    seen = []
+
+    class Noted(published("real-fault")["elqr"].__class__):
+        @classmethod
+        def design(cls, problem):
+            seen.append((problem.fault, problem.setup))
+
+    qd.design(real, Noted, qd.LoopSetup(step="7/50", delay="1 ms"))
+    qd.design(real, Noted, step="140 ms", delay="1 ms")
+    qd.design(replace(real, sampling_time=0.14), Noted, delay="1 ms")
+    assert seen == 3 * [(replace(real, sampling_time=0.14), qd.LoopSetup(delay="1 ms"))]

@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from time import process_time
@@ -19,11 +20,17 @@ import quakedesign as qd
 from quakedesign.checking import check_files
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError, UnsupportedError
+from quakedesign.guarantees import guarantee_result
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, save_guarantee
 from quakedesign.laws import NominalModel
 from quakedesign.loop import held_loop
+from quakedesign.plant import uncertain_plant
+from quakedesign.report import comparison_table
+from quakedesign.report.summary import summary
+from quakedesign.synthesis import assess
 
 CHECK = Path(__file__).parents[2] / "proofs" / "check.py"
+PAGE = Path(__file__).parents[2] / "docs" / "howto" / "own_controller.md"
 REAL = qd.load_fault("real-fault")
 STEP = 0.184
 ERRORS = ["slip_error", "slip_rate_error"]
@@ -77,6 +84,13 @@ def referred():
     return qd.guarantee(REAL, ABSOLUTE, delay="20 ms", slip_noise="1 um", rate_noise="1 um/s")
 
 
+@pytest.fixture
+def stuck(monkeypatch):
+    """A quick search that finds the same on the stick-slip plant whatever the law."""
+    seen = guarantee_result.WorstFound(slip_error=1e-3, slip_rate_error=2e-5)
+    monkeypatch.setattr(guarantee_result, "worst_found", lambda claim, sticks=False: seen)
+
+
 def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
     began = process_time()
     again = qd.guarantee(REAL, law=LAW, slip_noise="0.1 um")  # nothing of which is remembered
@@ -84,9 +98,34 @@ def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
     assert again.proved
     assert found.proved
     assert found.found.claims.slip_rate_error < Fraction("2.5e-4")
-    assert "an integrator that rounding has moved" in found.lines()[-1]
-    assert "worst case on the stick-slip plant: not searched" in "".join(found.lines())
     assert found.to_dict()["notes"] == list(LAW.notes)
+
+
+def test_the_stick_slip_plant_is_searched_when_its_worst_case_is_read(stuck, found):
+    told = replace(found).lines()
+    assert "an integrator that rounding has moved" in told[-1]
+    assert told[2] == "worst case found on the stick-slip plant: slip error 1 mm, slip-rate error 20 µm/s"
+    assert told[3].startswith("stick-slip plant: no proof and no search of the pressure for a given law: run simulate")
+    assert "a course was found that exceeds the bounds" in "".join(told)
+    assert replace(found).to_dict()["worst_found_with_stick"]["slip_error"] == 1e-3
+
+
+def test_no_search_of_the_stick_slip_plant_is_said_of_laws_that_it_does_not_take(stuck, found, referred, monkeypatch):
+    gap = "stick-slip plant: no proof and no search for a given law: run simulate; slip, slip rate or pressure may"
+    assert referred.stick_slip_gap.startswith(gap)
+    assert referred.to_dict()["worst_found_with_stick"] is None
+    monkeypatch.setattr(guarantee_result, "growth_at_rest", lambda law, step: 0.5)  # e-fold in 0.5 s at rest
+    assert replace(found).stick_slip_gap.startswith(gap)
+    assert replace(found).to_dict()["worst_found_with_stick"] is None
+
+
+@pytest.mark.slow
+def test_independent_runs_that_stick_stay_below_the_worst_case_found(found):
+    rates = [float(found.found.task.reference_rates[0]) * share for share in (1, 0.05)]
+    runs = [worst_course(found.found, LAW, seed, rate, parts=16) for seed in range(6) for rate in rates]
+    seen, reached = found.worst_with_stick, np.max(runs, axis=0)
+    assert reached[0] < seen.slip_error < 2 * reached[0]
+    assert reached[1] < seen.slip_rate_error < 2 * reached[1]
 
 
 @few("name", ["found", "referred"], every=2)
@@ -179,15 +218,18 @@ def test_a_law_of_slip_and_slip_rate_moves_its_errors_as_the_inputs_of_the_loop_
     assert got == pytest.approx(expected, rel=1e-7, abs=1e-12)
 
 
-def worst_course(claim, law, seed):
-    """Largest |e1|, |e2| of random and resonant courses at the ends of all ranges, by SciPy alone."""
+def worst_course(claim, law, seed, rest=np.inf, parts=4):
+    """Largest |e1|, |e2| of random and resonant courses at the ends of all ranges, by SciPy alone.
+
+    The slip rate is never negative along a reference of the rate `rest` [m/s].
+    """
     random, task = np.random.default_rng(seed), claim.task
     b, H = float(task.authority), float(task.amplitude)
     slope, damping = ([float(v) for v in ends] for ends in (task.slip_chord, task.rate_chord))
     F, G, C, D = (
         np.array(part, dtype=float) for part in (law.law.update, law.law.measured, [law.law.output], [law.law.feedback])
     )
-    part = STEP / 4
+    part = STEP / parts
     steps = {}
     for s in slope:
         for w in damping:
@@ -202,10 +244,11 @@ def worst_course(claim, law, seed):
         for k in range(1500):
             p = float((C @ z + D @ x)[0])
             z = F @ z + G @ x
-            for j in range(4):
-                sign = np.sign(np.sin(2 * np.pi * (4 * k + j) / (4 * period))) or 1.0
+            for j in range(parts):
+                sign = np.sign(np.sin(2 * np.pi * (k + j / parts) / period)) or 1.0
                 s = slope[int(x[0] * sign > 0)]  # the slope pushes with the disturbance
                 x = steps[s, random.choice(damping), beta] @ [*x, p, sign * H]
+                x[1] = max(x[1], -rest)
                 largest = np.maximum(largest, np.abs(x))
     return largest
 
@@ -230,7 +273,7 @@ def test_none_names_what_fails():
     assert "an eigenvalue of size" in wild.lines()[0]
 
 
-def test_a_double_integral_is_said_to_wind_up_while_the_fault_is_at_rest():
+def test_a_double_integral_is_said_to_wind_up_while_the_fault_is_at_rest(stuck):
     double = qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7, 1e6], step="0.184")
     assert double.warning_at_rest.startswith("MAY WIND UP on a fault that sticks: the law has a double integral")
     assert double.warning_at_rest in qd.guarantee(REAL, law=double).lines()
@@ -246,14 +289,48 @@ def test_a_law_without_a_guarantee_names_a_factor_of_its_pressure_that_has_one()
     half = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], step="0.184"))
     assert not strong.proved
     assert "an eigenvalue of size" in strong.lines()[0]
-    assert strong.lines()[1] == f"with the pressure of this law times 0.5: {half.found.sentence()}"
+    assert strong.lines()[1] == f"not this law, but the same law with its output times 0.5: {half.found.sentence()}"
     near = strong.to_dict()["nearest"]
     assert (near["quantity"], near["value"]) == ("pressure_factor", "1/2")
     assert near["peak_slip_rate"] == half.to_dict()["peak_slip_rate"]
     wrong = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], step="0.184"))
-    assert wrong.lines()[1] == f"with the pressure of this law times -1: {half.found.sentence()}"
+    assert wrong.lines()[1] == f"not this law, but the same law with its output times -1: {half.found.sentence()}"
+    of_slip = {"step": "0.184", "inputs": ("slip", "slip_rate")}
+    turned = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], **of_slip)).nearest[1]
+    assert turned.held.law == qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], **of_slip).law  # what acts on r' turns too
     standing = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2e8], step="0.184"))
     assert (standing.nearest, len(standing.lines())) == (None, 1)  # no factor adds an integral
+
+
+def eigenvalue(gains, step, sign=1):
+    """Largest |λ| over a period of p = −k1·e1 − k2·e2 − k3·ξ on the nominal plant, by SciPy alone."""
+    task = uncertain_plant(REAL)
+    s, w, b = (float(sum(ends)) / 2 for ends in (task.slip_chord, task.rate_chord, task.beta))
+    A = np.zeros((4, 4))
+    A[0, 1], A[1] = 1, [s, -w, b * float(task.authority), 0]
+    k1, k2, k3 = gains
+    jump = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [-sign * k1, -sign * k2, 0, -sign * k3], [step, 0, 0, 1]])
+    return np.abs(np.linalg.eigvals(expm(A * step) @ jump)).max()
+
+
+def test_an_unstable_loop_has_its_eigenvalue_and_the_sign_that_is_stable():
+    gains = np.array([3e8, 2e8, 5e7])
+    wrong = qd.assess(REAL, qd.SampledLaw.from_gains(-gains, step="0.012")).guarantee.reason
+    assert f"an eigenvalue of size {eigenvalue(-gains, 0.012):.4g}" in wrong
+    assert eigenvalue(-gains, 0.012, -1) < 1
+    assert wrong.endswith("with the opposite sign of the pressure it is stable")
+    strong = qd.assess(REAL, qd.SampledLaw.from_gains(30 * gains, step="0.184")).guarantee.reason
+    assert eigenvalue(30 * gains, 0.184, -1) > 1
+    assert strong.endswith(f"an eigenvalue of size {eigenvalue(30 * gains, 0.184):.4g}")
+
+
+@few("name", ["slip_rate_error", "slip_rate"], every=2)
+def test_a_law_of_the_slip_rate_alone_leaves_the_slip_to_itself(name):
+    law = qd.SampledLaw.from_statespace(control.ss(1, 0.012, -1e8, -1e8, 0.012), inputs=[name])
+    reason = qd.guarantee(REAL, law=law).reason
+    assert "an eigenvalue of size 1; the law does not use the slip" in reason
+    assert "add slip_error or slip to its inputs" in reason
+    assert "opposite sign" not in reason
 
 
 @pytest.mark.parametrize(
@@ -296,11 +373,40 @@ def test_a_law_is_compared_and_assessed_in_its_setup():
     assert designed.guarantee.held.delay == Fraction("0.02")
     seen = qd.compare(qd.load_fault("lab-fault"), [qd.SampledLaw.from_pid(1, 0.1, step=0.01)], with_published=False)
     (entry,) = seen.of("designed")
-    assert entry.label == "PID (designed)"
+    assert entry.label == "PID (given)"
     assert entry.guaranteed is None
 
 
-def test_the_command_line_takes_the_file_of_a_law(tmp_path, capsys):
+def test_a_comparison_judges_and_runs_a_given_law_in_its_setup(monkeypatch, stuck):
+    judged, fault = [], replace(REAL, reference=replace(REAL.reference, operation_time=200.0))
+
+    def noted(fault, law, setup):
+        judged.append(setup)
+        return assess(fault, law, setup)
+
+    monkeypatch.setattr(comparison_table, "assess", noted)
+    weak = qd.SampledLaw.from_gains([1e7, 1e7, 1e5], step="0.184", label="weak")
+    setup = qd.LoopSetup(slip_noise="1 um", delay="5 ms")
+    seen = qd.compare(fault, [weak], setup=setup, delay="46 ms")
+    assert judged == [qd.LoopSetup(slip_noise="1 um", delay="46 ms")]
+    (entry,) = seen.entries  # published gains know no delay
+    assert (entry.label, entry.given, entry.design.controller.delay) == ("weak (given)", True, Fraction("0.046"))
+    assert "part=0.25" in str(entry.run.provenance["actuator"])  # 46 of 184 ms
+    assert entry.run.provenance["measurement"] != "exact"
+    assert entry.answer.lines() == [f"none: {entry.design.guarantee.reason}"]
+    assert "no T_s was found" not in repr(seen)
+    assert summary(seen).answer == "real-fault: no guarantee for any given controller"
+
+
+def test_assess_and_compare_take_quantities_of_the_setup_by_name():
+    with pytest.raises(ParameterError, match=r"must be one of .*delay.* Received 'dela'\. Did you mean delay"):
+        qd.assess(REAL, LAW, dela="5 ms")
+    with pytest.raises(ParameterError, match="loop setup of a comparison is that of given laws"):
+        qd.compare(REAL, [], delay="5 ms")
+    assert qd.assess(REAL, LAW, delay="20 ms").guarantee.held.delay == Fraction("0.02")
+
+
+def test_the_command_line_takes_the_file_of_a_law(stuck, tmp_path, capsys):
     path = tmp_path / "own.json"
     LAW.save(path)
     assert run("guarantee", "real-fault", "--law", path, "--out", tmp_path / "c.json", "--json") == 0
@@ -325,13 +431,27 @@ def test_runs_of_a_law_that_is_unstable_at_rest_carry_its_warning(tmp_path, caps
         assert ("NOT for a fault that sticks" in capsys.readouterr().out) == warned
 
 
+def cells():
+    """Code of the page on users' laws."""
+    return re.findall(r"```\{code-cell\} python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("delay", ["0 ms", "20 ms"])
+def test_the_lqg_of_the_page_is_proved_with_a_delay_and_without(stuck, delay):
+    names, (lqg, *_) = {}, cells()
+    assert lqg.count('"20 ms"') == 1
+    exec(lqg.replace('"20 ms"', repr(delay)), names)
+    assert names["answer"].proved
+    assert names["answer"].found.held.delay == Fraction(delay.split()[0]) / 1000
+
+
 @pytest.mark.slow
 def test_every_snippet_of_the_page_runs(tmp_path, monkeypatch, capsys):
-    page = (Path(__file__).parents[2] / "docs" / "howto" / "own_controller.md").read_text(encoding="utf-8")
-    assert len(page.split()) < 600
+    page = PAGE.read_text(encoding="utf-8")
+    assert len(re.sub(r"```.*?```", "", page, flags=re.DOTALL).split()) < 400
     monkeypatch.chdir(tmp_path)
     names = {}
-    for cell in re.findall(r"```\{code-cell\} python\n(.*?)```", page, flags=re.DOTALL):
+    for cell in cells():
         exec(cell, names)
     assert capsys.readouterr().out.count("proved") == 4
     assert names["hinf"].step == Fraction("0.184")

@@ -16,25 +16,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from quakedesign.errors import CertificateError, ParameterError
+from msgspec import Meta
+
+from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds, response_bounds
-from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad
-from quakedesign.sos.exact.strict import (
-    headed,
-    listed,
-    need,
-    read_ends,
-    read_exactly,
-    read_rational,
-    read_row,
-    texts,
-    with_keys,
-)
+from quakedesign.sos.exact.strict import Entries, made, need, read_as, written
 from quakedesign.text import counted
 
 if TYPE_CHECKING:
@@ -129,7 +120,7 @@ class PlantGuarantee:
         said = f"on the uncertain plant of the certificate ({size}){of_plant and f' {of_plant}'}, "
         said += f"from |x_i(0)| <= {_listed(part.start)}" if any(part.start) else "from rest"
         said += f", with zero-order hold over {UpperBound(law.step):.6g} s"
-        said += f", {UpperBound(law.delay):.6g} s late" if law.delay else ""
+        said += f", with a delay of {UpperBound(law.delay):.6g} s" if law.delay else ""
         said += f", for all uncertain terms in {counted(len(part.sectors), 'sector')}" if part.sectors else ""
         regions = [s.within for s in part.sectors if s.within is not None]
         said += f", {len(regions)} of which hold for |y| <= {_listed(regions)}" if regions else ""
@@ -195,148 +186,114 @@ def row_bounds(part: LinearPart, found: ResponseBounds, inputs: Row) -> Row:
 # ----------------------------------------------------------------------
 # Files of the kind ``uncertain_plant`` (proofs/FORMAT.md).
 
-_PLANT = ("A", "B", "C", "disturbances", "loads", "sectors", "noise", "start", "outputs")
-_LAW = ("step", "delay", "A", "B", "C", "D")
+
+class SizedEntry(Entries):
+    """A disturbance: where it enters, and its bound."""
+
+    entry: Row
+    size: Fraction
 
 
-def plant_document(claim: PlantGuarantee) -> dict[str, Any]:
-    """Content of the file."""
+class PlantEntries(Entries):
+    """A plant in exact numbers, see `LinearPart`."""
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    disturbances: tuple[SizedEntry, ...]
+    loads: tuple[SlowLoad, ...]
+    sectors: tuple[ExactSector, ...]
+    noise: Row
+    start: Row
+    outputs: Matrix
+
+    def part(self) -> LinearPart:
+        """The plant, of sizes that fit."""
+        n, m = len(self.A), len(self.B[0]) if self.B else 0
+        need(1 <= n <= MOST and 1 <= m, f"a plant must have 1 to {MOST} states, and a control")
+        for name in ("C", "disturbances", "loads", "sectors", "outputs"):
+            need(len(getattr(self, name)) <= MOST, f"{name} must have at most {MOST} entries")
+        sizes = (
+            *(len(row) - n for row in (*self.A, *self.C, *self.outputs, self.start)),
+            *(len(row) - m for row in self.B),
+            *(len(one.entry) - n for one in self.disturbances),
+            *(abs(len(one.control) - m) + abs(len(one.shift) - n) for one in self.loads),
+            *(abs(len(one.entry) - n) + abs(len(one.row) - n - m) for one in self.sectors),
+            len(self.B) - n,
+            len(self.noise) - len(self.C),
+        )
+        need(not any(sizes), "rows and columns of a plant must fit")
+        for load in self.loads:
+            seen = any(sum((c * s for c, s in zip(row, load.shift, strict=True)), Fraction(0)) for row in self.C)
+            need(load.rate >= 0 and not seen, "a load must have a rate of 0 or more and a shift that is not measured")
+        for one in self.sectors:
+            need(one.slopes[0] <= one.slopes[1], "slopes must be in order")
+            need(one.within is None or one.within > 0, "a bound of a sector must be positive")
+            need(one.within is None or not any(one.row[n:]), "a sector with a bound must be of the states alone")
+        return made(LinearPart, self, disturbances=tuple((one.entry, one.size) for one in self.disturbances))
+
+
+class PlantLawEntries(Entries):
+    """A sampled law of a plant, see `MatrixLaw`."""
+
+    step: Fraction
+    delay: Fraction
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+
+
+class PlantFile(Entries):
+    """All of a file but its format and kind."""
+
+    plant: PlantEntries
+    law: PlantLawEntries
+    pieces: Annotated[int, Meta(ge=1, le=MOST_PIECES)]
+    inputs: Row
+    claims: dict[str, UpperBound]
+
+
+def plant_entries(claim: PlantGuarantee) -> dict[str, Any]:
+    """Content of the file but its format and kind."""
     part, law = claim.part, claim.law
-    sectors = [
-        {"entry": texts(s.entry), "row": texts(s.row), "slopes": texts(s.slopes)}
-        | ({} if s.within is None else {"within": str(s.within)})
-        for s in part.sectors
-    ]
-    return {
-        "format": 1,
-        "kind": UNCERTAIN_PLANT,
-        "plant": {
-            **{name: [texts(row) for row in getattr(part, name)] for name in "ABC"},
-            "disturbances": [{"entry": texts(entry), "size": str(size)} for entry, size in part.disturbances],
-            "loads": [
-                {"control": texts(one.control), "shift": texts(one.shift), "rate": str(one.rate)} for one in part.loads
-            ],
-            "sectors": sectors,
-            "noise": texts(part.noise),
-            "start": texts(part.start),
-            "outputs": [texts(row) for row in part.outputs],
-        },
-        "law": {
-            "step": str(law.step),
-            "delay": str(law.delay),
-            "A": [texts(row) for row in law.update],
-            "B": [texts(row) for row in law.measured],
-            "C": [texts(row) for row in law.output],
-            "D": [texts(row) for row in law.feedback],
-        },
-        "pieces": claim.pieces,
-        "inputs": texts(claim.inputs),
-        "claims": {
-            f"{name}_{i}": bound.exact
+    disturbances = tuple(SizedEntry(entry=entry, size=size) for entry, size in part.disturbances)
+    file = PlantFile(
+        plant=made(PlantEntries, part, disturbances=disturbances),
+        law=made(PlantLawEntries, law, A=law.update, B=law.measured, C=law.output, D=law.feedback),
+        pieces=claim.pieces,
+        inputs=claim.inputs,
+        claims={
+            f"{name}_{i}": bound
             for name, bounds in (("output", claim.claims.outputs), ("control", claim.claims.controls))
             for i, bound in enumerate(bounds, 1)
         },
-    }
+    )
+    return dict(written(file))
 
 
-def read_plant_guarantee(raw: Any) -> PlantGuarantee:
-    """Claim from a parsed file.
+def read_plant_guarantee(raw: dict[str, Any]) -> PlantGuarantee:
+    """Claim from a parsed file without its format and kind.
 
     Raises
     ------
     CertificateError
         When it breaks a rule of FORMAT.md.
     """
-    headed(raw, {"plant", "law", "pieces", "inputs", "claims"}, UNCERTAIN_PLANT)
-    try:
-        part, law = _read_part(raw["plant"]), _read_law(raw["law"])
-        part.loop(law)  # refuses sizes that do not fit, and a load that the law cannot hold
-    except ParameterError as error:
-        raise CertificateError(str(error)) from None
-    need(type(raw["pieces"]) is int and 1 <= raw["pieces"] <= MOST_PIECES, f"pieces must be 1 to {MOST_PIECES}")
+    file = read_as(PlantFile, raw)
+    part, given = file.plant.part(), file.law
+    need(len(given.A) <= _MOST_LAW_STATES, f"a law must have at most {_MOST_LAW_STATES} states")
+    law = made(MatrixLaw, given, update=given.A, measured=given.B, output=given.C, feedback=given.D)
+    part.loop(law)  # rejects sizes that do not fit, and a load that the law cannot hold
     count = {"output": len(part.outputs), "control": len(part.B[0])}
     names = {kind: [f"{kind}_{i}" for i in range(1, most + 1)] for kind, most in count.items()}
-    given = read_exactly(raw["claims"], [*names["output"], *names["control"]])
-    claims = {f"{kind}s": tuple(UpperBound(given[name]) for name in of) for kind, of in names.items()}
-    inputs = read_row(raw["inputs"], "inputs", length=len(part.sectors))
-    sizes = (*part.noise, *part.start, *(size for _, size in part.disturbances), *inputs)
+    expected = [*names["output"], *names["control"]]
+    need(set(file.claims) == set(expected), f"claims must be {', '.join(expected)}")
+    claims = {f"{kind}s": tuple(file.claims[name] for name in of) for kind, of in names.items()}
+    need(len(file.inputs) == len(part.sectors), "inputs must have an entry for each sector")
+    sizes = (*part.noise, *part.start, *(size for _, size in part.disturbances), *file.inputs)
     need(min(sizes, default=Fraction(0)) >= 0, "noise, start, sizes of disturbances and inputs must be 0 or more")
-    return PlantGuarantee(
-        part=part,
-        law=law,
-        pieces=raw["pieces"],
-        inputs=inputs,
-        claims=PlantClaims(**claims),
-    )
-
-
-def _matrix(raw: Any, name: str, width: int | None = None, height: int | None = None) -> Matrix:
-    rows = listed(raw, name, _MOST_LAW_STATES, height)
-    return tuple(read_row(row, name, _MOST_LAW_STATES, width) for row in rows)
-
-
-def _read_part(raw: Any) -> LinearPart:
-    given = with_keys(raw, set(_PLANT))
-    A = _matrix(given["A"], "A")
-    n = len(A)
-    B = _matrix(given["B"], "B", height=n)
-    need(1 <= n <= MOST and bool(B[0]), f"1 to {MOST} states, and a control")
-    m = len(B[0])
-    need(all(len(row) == n for row in A) and all(len(row) == m for row in B), "A and B must fit")
-    C = _matrix(given["C"], "C", width=n)
-    disturbances = []
-    for one in listed(given["disturbances"], "disturbances", MOST):
-        with_keys(one, {"entry", "size"})
-        disturbances.append((read_row(one["entry"], "entry", length=n), read_rational(one["size"])))
-    loads = []
-    for one in listed(given["loads"], "loads", MOST):
-        with_keys(one, {"control", "shift", "rate"})
-        shift = read_row(one["shift"], "shift", length=n)
-        load = SlowLoad(
-            control=read_row(one["control"], "control", length=m), shift=shift, rate=read_rational(one["rate"])
-        )
-        seen = any(sum((c * s for c, s in zip(row, shift, strict=True)), Fraction(0)) for row in C)
-        need(load.rate >= 0 and not seen, "a load must have a rate of 0 or more and a shift that is not measured")
-        loads.append(load)
-    return LinearPart(
-        A=A,
-        B=B,
-        C=C,
-        disturbances=tuple(disturbances),
-        loads=tuple(loads),
-        sectors=tuple(_read_sector(one, n, m) for one in listed(given["sectors"], "sectors", MOST)),
-        noise=read_row(given["noise"], "noise", length=len(C)),
-        start=read_row(given["start"], "start", length=n),
-        outputs=_matrix(given["outputs"], "outputs", width=n),
-    )
-
-
-def _read_sector(raw: Any, n: int, m: int) -> ExactSector:
-    bounded = {"within"} & set(raw) if isinstance(raw, dict) else set[str]()
-    with_keys(raw, {"entry", "row", "slopes"} | bounded)
-    sector = ExactSector(
-        entry=read_row(raw["entry"], "entry", length=n),
-        row=read_row(raw["row"], "row", length=n + m),
-        slopes=read_ends(raw["slopes"], "slopes"),
-        within=read_rational(raw["within"]) if bounded else None,
-    )
-    need(sector.slopes[0] <= sector.slopes[1], "slopes must be in order")
-    need(not bounded or (sector.within or 0) > 0, "a bound of a sector must be positive")
-    need(not bounded or not any(sector.row[n:]), "a sector that holds up to a bound must be of the states alone")
-    return sector
-
-
-def _read_law(raw: Any) -> MatrixLaw:
-    given = with_keys(raw, set(_LAW))
-    A = _matrix(given["A"], "A of the law")
-    return MatrixLaw(
-        step=read_rational(given["step"]),
-        delay=read_rational(given["delay"]),
-        update=A,
-        measured=_matrix(given["B"], "B of the law", height=len(A)),
-        output=_matrix(given["C"], "C of the law"),
-        feedback=_matrix(given["D"], "D of the law"),
-    )
+    return PlantGuarantee(part=part, law=law, pieces=file.pieces, inputs=file.inputs, claims=PlantClaims(**claims))
 
 
 def named(claim: PlantGuarantee, plant: "UncertainPlant") -> PlantGuarantee:

@@ -302,7 +302,7 @@ class Guarantee:
         if held.longest_step:
             shortest, longest = UpperBound(held.step), LowerBound(held.longest_step)
             when = f"with zero-order hold over sampling intervals from {shortest:.6g} s to {longest:.6g} s in any order"
-        when += f", {_seconds(held.delay)} late" if held.delay else ""
+        when += f", with a delay of {_seconds(held.delay)}" if held.delay else ""
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
         when += f", through rock of L^2/D = {_seconds(held.diffusion)} from well to fault" if held.diffusion else ""
         when += ", with the slip alone measured" if held.law.of_slip_alone else ""
@@ -669,7 +669,7 @@ class SlidingGuarantee:
     @property
     def lasts(self) -> str:
         """Short statement of the time range."""
-        return f"while the reference goes {float(self.task.distance):.4g} m"
+        return f"during the {LowerBound(self.task.distance):.4g} m of slip of the task"
 
     def __repr__(self) -> str:
         return f"SlidingGuarantee({self.task.name}: |ln(v/V)| <= {self.claims.log_rate:.4g})"
@@ -736,8 +736,9 @@ class SlidingGuarantee:
         return (
             f"{empty}from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, "
             f"{under}, {_along(task)}{_box(task)}: the slip rate never "
-            f"exceeds {ratio:.4g} V = {self.peak_slip_rate.quantity('m/s')} {self.lasts}, the slip stays within "
-            f"{claims.slip_error.quantity('m')} of it, the pressure in the fault between {low.quantity('Pa')} and "
+            f"exceeds {ratio:.4g} V = {self.peak_slip_rate.quantity('m/s')} {self.lasts}, in which the fault slides "
+            f"forward throughout, the slip stays within {claims.slip_error.quantity('m')} of the reference, the "
+            f"pressure in the fault between {low.quantity('Pa')} and "
             f"{high.quantity('Pa')}, at the valve between {least.quantity('Pa')} and {largest.quantity('Pa')} "
             f"({', '.join(['with inertia', *_friction(task)])})"
         )
@@ -745,11 +746,13 @@ class SlidingGuarantee:
 
 def _path(held: Held) -> str:
     said = f"with zero-order hold over {float(held.step):.6g} s"
-    said += f", {float(held.delay):.6g} s late" if held.delay else ""
+    said += f", with a delay of {float(held.delay):.6g} s" if held.delay else ""
     said += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
     said += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
     noise = LowerBound(held.slip_noise)
-    return said + (f", with any noise of at most {noise:.6g} m in the measured slip" if held.slip_noise else "")
+    if held.slip_noise:
+        return f"{said}, with any noise of at most {noise:.6g} m in the measured slip"
+    return f"{said}, with exact measurements of slip"
 
 
 def _along(task: SlidingPlant) -> str:

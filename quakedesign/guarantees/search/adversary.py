@@ -77,15 +77,16 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     """Adversarial trajectories: disturbance, friction slope, damping and input gain at the ends of their ranges.
 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64 to 512
-    periods long, as the loop forgets; in continuous time a period is that of the fastest pole, 1/|λ|. A disturbance of
-    bounded rate is the best of all for a costate (`_steepest`). With `sticks` the fault does not slide backward:
-    friction holds it wherever the loop would, along the reference at its largest rate and at a twentieth of that,
-    and courses that switch after random times are tried as well, and courses that rest before a push
-    (`rest_and_push`) for as long as the reference takes to catch up with the slip error that is proved. Noise is at
-    its ends too. An implicit step ends where its equation says, inside its lines or not. A box of starts is left
-    from its corners. With jitter each event is as early or as late as it may be, with aperiodic sampling each
-    interval as short or as long; pressures rise at once, as a pump of any rate may do, and means are of their middle
-    alone.
+    periods long, as the loop forgets. The error to be maximised is that at the end of the last period, and in other
+    courses that at a time between its samples, where it is larger with a delay. In continuous time a period is that of
+    the fastest pole, 1/|λ|. A disturbance of bounded rate is the best of all for a costate (`_steepest`). With
+    `sticks` the fault does not slide backward: friction holds it wherever the loop would, along the reference at its
+    largest rate and at a twentieth of that, and courses that switch after random times are tried as well, and courses
+    that rest before a push (`rest_and_push`) for as long as the reference takes to catch up with the slip error that
+    is proved. Noise is at its ends too. An implicit step ends where its equation says, inside its lines or not. A box
+    of starts is left from its corners. With jitter each event is as early or as late as it may be, with aperiodic
+    sampling each interval as short or as long; pressures rise at once, as a pump of any rate may do, and means are of
+    their middle alone.
     """
     slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     least, largest = pressures or (None, None)
@@ -106,6 +107,10 @@ def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
             if isinstance(claim, Guarantee) and claim.task.reference_rates[0]:
                 searches.append(_resting(claim, searches[0]))
                 searches[3].rest_and_push(_ROUNDS)
+    if claim.loop.segments and not sticks:
+        searches.append(_CourseSearch(claim, sticks, 2 * _COURSES, searches[0].periods))
+        searches[-1].end_between_samples()
+        searches[-1].follow(searches[-1].random(), _SWEEPS)
     for periods in _SOON if claim.loop.start else ():
         searches.append(_CourseSearch(claim, sticks, 2 * _COURSES, periods))
         searches[-1].follow(searches[-1].random(), _SWEEPS)
@@ -326,6 +331,7 @@ class _CourseSearch:
             self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
         self.marks = np.empty((0, courses))
         self.periods, self.steps = periods, periods * len(self.parts) * _PIECES
+        self.ends = np.full(courses, self.steps - 1)
         self.largest = (0.0, 0.0)
 
     def follow(self, costates: np.ndarray, sweeps: int) -> np.ndarray:
@@ -338,6 +344,11 @@ class _CourseSearch:
             if self.limit is not None and left <= sweeps // 2:  # before, by the sign of its costate
                 slopes = self._slopes(costates, chosen, self.limit)
         return last
+
+    def end_between_samples(self) -> None:
+        """Aim at the error in each piece of the last period in turn, not at its end: with a delay it peaks between."""
+        turn = np.array([(self.aim[:i] == row).all(axis=1).sum() for i, row in enumerate(self.aim)])
+        self.ends = self.steps - 1 - turn % (self.steps // self.periods)
 
     def best(self, count: int) -> np.ndarray:
         """Indices of the best trajectories of the last sweep, a quarter of each kind."""
@@ -510,7 +521,7 @@ class _CourseSearch:
         when: np.ndarray | None = None,
     ) -> np.ndarray:
         """Costates of the aim at the end, or of every course after a piece."""
-        last = np.full(len(self.aim), len(chosen) - 1) if when is None else when
+        last = self.ends if when is None else when
         costate, found = np.zeros(self.aim.shape), []
         for number in reversed(range(len(chosen))):
             costate = np.where((last == number)[:, None], self.aim, costate)

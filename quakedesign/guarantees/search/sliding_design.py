@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
 from quakedesign.errors import ParameterError
-from quakedesign.exact import UpperBound, rational
+from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, sliding_step
 from quakedesign.guarantees.exact.loop import Around, Held
@@ -382,6 +382,7 @@ _ENOUGH = 0.5  # of the bound of |ln(v/V)|, by the estimate
 _SLOWER = 1.05  # spare, as damping does not scale with V
 _WELL_DIGITS = 2
 _SUITABLE = 2
+_QUIETER = Fraction(1, 10), Fraction(1, 100), Fraction(0)  # of the slip noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -491,13 +492,34 @@ def what_would_do(
     """
     if reach.held is None or reach.numbers is None:
         return "none was found with a well that is much nearer either: a smaller spread, stress or noise may do"
-    held, proof = reach.held, prove(task, reach.held, reach.log_rate)
-    said = [_slower(fault, task, reach, around, prove, spread)]
-    if isinstance(proof, SlidingGuarantee):
-        path = " and ".join(f"{title} = {float(v):.3g} s" for name, title in PATH.items() if (v := getattr(held, name)))
-        said.append(f"at this V for {path} with T_s = {float(held.step):.3g} s{_under(proof)}")
-    found = ", and ".join(filter(None, said))
-    return f"a proof was found {found}" if found else "a smaller spread, stress or noise may do"
+    for noise in (around.get("slip_noise", Fraction(0)), *quieter(around)):
+        loop = around if noise == around.get("slip_noise", 0) else {**around, "slip_noise": noise}
+        held = replace(reach.held, slip_noise=noise)
+        proof = prove(task, held, reach.log_rate)
+        said = [_slower(fault, task, reach, loop, prove, spread)]
+        if isinstance(proof, SlidingGuarantee):
+            path = (f"{title} = {float(v):.3g} s" for name, title in PATH.items() if (v := getattr(held, name)))
+            said.append(f"at this V for {' and '.join(path)} with T_s = {float(held.step):.3g} s{_under(proof)}")
+        if found := ", and ".join(filter(None, said)):
+            return f"a proof was found {with_noise(noise, around)}{found}"
+    return "a smaller spread, stress or noise may do"
+
+
+def quieter(around: Around) -> tuple[Fraction, ...]:
+    """Smaller bounds of the slip noise [m], down to none, to try where no proof is found; empty without noise."""
+    noise = around.get("slip_noise")
+    return tuple(two_digits(share * noise) if share else Fraction(0) for share in _QUIETER) if noise else ()
+
+
+def with_noise(noise: Fraction, around: Around) -> str:
+    """Words for a proof with a smaller slip noise than required; empty for the same."""
+    if noise == around.get("slip_noise", 0):
+        return ""
+    return (
+        f"with slip noise of at most {LowerBound(noise).quantity('m')} "
+        if noise
+        else "with exact measurements of slip "
+    )
 
 
 def _slower(fault: Fault, task: SlidingPlant, reach: WellReach, around: Around, prove: Prove, spread: Fraction) -> str:

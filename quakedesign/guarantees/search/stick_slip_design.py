@@ -15,7 +15,6 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from quakedesign.cache import search_once
 from quakedesign.errors import ParameterError
 from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.exact.stick_slip_files import read_set, set_document
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import (
     COMBINATIONS,
@@ -38,6 +37,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
 from quakedesign.guarantees.search.estimate import short
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.ranges import FaultPlant
+from quakedesign.sos.exact.strict import read_as, written
 
 Tell = Callable[[str, float], None]
 TUNINGS = {
@@ -709,14 +709,14 @@ def proved(
     def search() -> dict[str, Any]:
         with np.errstate(all="ignore"):  # floats that overflow propose nothing
             fresh.append(_searched(task, held, tell))
-        return {"set": set_document(fresh[0].reach)} if fresh[0].proved else {"reason": fresh[0].reason}
+        return {"set": written(fresh[0].reach)} if fresh[0].proved else {"reason": fresh[0].reason}
 
     kept = search_once(search, "polytope of a stick-slip law", task, held)
     if fresh:
         return fresh[0]
     if "reason" in kept:
         return NoGuarantee(reason=kept["reason"], small_gain=None)
-    return stick_slip_guarantee(task, held, read_set(kept["set"]))
+    return stick_slip_guarantee(task, held, read_as(StickSlipPolytope, kept["set"]))
 
 
 def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlipGuarantee | NoGuarantee:

@@ -4,40 +4,37 @@ The last chapter reads the kind of claim of a file without loading the code that
 """
 
 import json
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta
 
 from quakedesign.errors import CertificateError, UnsupportedError
-from quakedesign.exact import LowerBound, UpperBound, exact_text
+from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.files import read_text
 from quakedesign.lyapunov.exact.claim import Equilibrium, Evidence, Loop, Witness
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.exact.strict import (
     LARGEST_FILE,
     NAME,
+    Entries,
+    PolynomialEntries,
     common_grid,
     headed,
-    listed,
+    made,
     need,
-    objected,
     parse,
-    polynomial_text,
-    read_ends,
-    read_exponents,
-    read_polynomial,
-    read_rational,
-    read_rationals,
-    read_row,
-    with_keys,
+    read_as,
+    require_polynomial,
     write_readable,
+    written,
 )
-from quakedesign.symbolic.terms import Term, plain
+from quakedesign.symbolic.terms import Term
 
 # ----------------------------------------------------------------------
 # Numbers and sums of terms in a certificate file, read and written.
@@ -54,45 +51,149 @@ LIMITS = {
 }
 """Largest number of each in a file."""
 
+Name = Annotated[str, Meta(pattern=rf"\A{NAME.pattern}\Z")]
+Numbers = dict[Name, Fraction]
+Exponents = tuple[Annotated[int, Meta(ge=0, le=999)], ...]
+FactorEntries = tuple[str, Fraction, Literal["s", "a"]]
+TermEntries = tuple[Fraction, Annotated[tuple[str, ...], Meta(max_length=32)], tuple[FactorEntries, ...]]
+Terms = Annotated[tuple[TermEntries, ...], Meta(max_length=LIMITS["terms"])]
 
-def read_terms(raw: Any, loop: Loop, powers: Sequence[str]) -> tuple[Term, ...]:
+
+class LoopEntries(Entries):
+    """A closed loop, see `Loop`."""
+
+    law: Annotated[str, Meta(pattern=r"\A[A-Za-z0-9_-]{1,40}\Z")]
+    gains: Numbers
+    constants: Numbers
+    states: Annotated[dict[Name, int], Meta(min_length=1, max_length=LIMITS["states"])]
+    domain: Literal["cells", "reals"]
+    uncertain: Annotated[dict[Name, tuple[Fraction, Fraction]], Meta(max_length=LIMITS["uncertain"])]
+    roots: Annotated[dict[Name, tuple[str, Fraction, Fraction]], Meta(max_length=LIMITS["roots"])]
+    lifts: Annotated[dict[Name, Terms], Meta(max_length=LIMITS["lifts"])]
+    field: dict[Name, Terms]
+
+    def loop(self) -> Loop:
+        """The loop, of names that differ and terms that name only these."""
+        names = [*self.gains, *self.constants, *self.states, *self.uncertain, *self.roots, *self.lifts]
+        few = len(self.gains) + len(self.constants) <= LIMITS["parameters"]
+        need(len(set(names)) == len(names) and few, f"names must differ, at most {LIMITS['parameters']} parameters")
+        top = 12 if self.domain == "cells" else 1
+        need(all(1 <= w <= top for w in self.states.values()), f"weights must be integers from 1 to {top}")
+        for name, (low, high) in self.uncertain.items():
+            need(low <= high, f"the range of {name} is not ordered")
+        need(all(of in {**self.gains, **self.constants} for of, *_ in self.roots.values()), "a root must be of a gain")
+        roots = {name: (of, (low, high)) for name, (of, low, high) in self.roots.items()}
+        bare = made(Loop, self, field={}, roots=roots, lifts={})
+        powers = (*self.states, *self.lifts)
+        need(self.domain == "cells" or not self.lifts, "lifts belong on cells")
+        lifts = {
+            lift: terms_of(self.lifts[lift], bare, powers[: len(self.states) + i]) for i, lift in enumerate(self.lifts)
+        }
+        need(set(self.field) == set(self.states), "field must have a list of terms for every state")
+        return replace(
+            bare, lifts=lifts, field={state: terms_of(self.field[state], bare, powers) for state in self.states}
+        )
+
+
+def terms_of(entries: tuple[TermEntries, ...], loop: Loop, powers: Sequence[str]) -> tuple[Term, ...]:
     """Sum of terms with powers of the given names; parameters are all others of the loop."""
-    return tuple(_term(entry, loop, powers) for entry in listed(raw, "terms", LIMITS["terms"]))
-
-
-def _term(raw: Any, loop: Loop, powers: Sequence[str]) -> Term:
-    number, names, entries = listed(raw, "a term", length=3)
-    coefficient = read_rational(number)
-    need(coefficient != 0, "a term must not be zero")
     known = {*loop.gains, *loop.constants, *loop.ranges}
-    parameters = tuple(listed(names, "parameters", 32))
-    need(all(isinstance(n, str) and n in known for n in parameters), "a term has an unknown parameter")
-    factors = tuple(_factor(entry, powers) for entry in listed(entries, "factors", len(powers)))
-    need(len({f[0] for f in factors}) == len(factors), "a state occurs twice in a term")
-    scaled = [power * loop.states.get(state, 0) for state, power, _ in factors]
-    need(all(power.denominator == 1 for power in scaled), "an exponent times the weight of its state is no integer")
-    return Term(coefficient, parameters, factors)
+    for coefficient, names, factors in entries:
+        need(coefficient != 0, "a term must not be zero")
+        need(known.issuperset(names), "a term has an unknown parameter")
+        need(len({f[0] for f in factors}) == len(factors), "a state occurs twice in a term")
+        for state, power, kind in factors:
+            need(state in powers, "a factor has an unknown state")
+            need(0 <= power <= 24 and (kind == "s" or power > 0), "a factor has a wrong exponent")
+            whole = (power * loop.states.get(state, 0)).denominator == 1
+            need(whole, "an exponent times the weight of its state is no integer")
+    return tuple(Term(*entry) for entry in entries)
 
 
-def _factor(raw: Any, powers: Sequence[str]) -> tuple[str, Fraction, str]:
-    state, exponent, kind = listed(raw, "a factor", length=3)
-    power = read_rational(exponent)
-    need(state in powers, "a factor has an unknown state")
-    need(
-        kind in ("s", "a") and 0 <= power <= 24 and (kind == "s" or power > 0), "a factor has a wrong kind or exponent"
+def term_entries(terms: Iterable[Term]) -> tuple[TermEntries, ...]:
+    """Entries of a sum of terms."""
+    return tuple((term.coefficient, term.parameters, term.factors) for term in terms)  # type: ignore[misc]
+
+
+class SquareEntries(Entries):
+    """A square, and the variables that it is multiplied by."""
+
+    times: Exponents
+    basis: Annotated[tuple[Exponents, ...], Meta(max_length=LIMITS["basis"])]
+    gram: tuple[Fraction, ...]
+
+
+class WitnessEntries(Entries):
+    """Squares and cofactors of one obligation."""
+
+    obligation: str
+    multiplier: PolynomialEntries
+    squares: tuple[SquareEntries, ...]
+    equalities: Annotated[tuple[PolynomialEntries, ...], Meta(max_length=LIMITS["lifts"] + 1)]
+    inequalities: Annotated[tuple[tuple[SquareEntries, ...], ...], Meta(max_length=LIMITS["lifts"])]
+
+    def witness(self, loop: Loop) -> Witness:
+        """The witness, of sizes that fit the loop."""
+        need(
+            self.multiplier != {} and len(self.multiplier) <= LIMITS["basis"], "a multiplier must not be empty or long"
+        )
+        n, states = len(next(iter(self.multiplier))), len(loop.states)
+        need(states <= n <= states + len(loop.lifts) + 1, "a multiplier has a wrong key")
+        for cofactor in self.equalities:
+            require_polynomial(cofactor, "a cofactor", n, 20_000)
+        squares = _squares(self.squares, n, loop, ())
+        for k, entries in enumerate(self.inequalities):
+            squares += _squares(entries, n, loop, (n + k,))
+        return Witness(
+            multiplier=dict(self.multiplier),
+            squares=squares,
+            cofactors=tuple(dict(q) for q in self.equalities),
+            conditions=len(self.inequalities),
+        )
+
+
+def _squares(
+    entries: tuple[SquareEntries, ...], variables: int, loop: Loop, condition: tuple[int, ...]
+) -> tuple[Square, ...]:
+    need(len(entries) <= 1 << variables, f"squares are more than {1 << variables}")
+    top = 1 if loop.domain == "cells" else 0
+    for entry in entries:
+        need(len(entry.times) == variables and max(entry.times) <= top, f"times must be integers from 0 to {top}")
+        common_grid(entry.gram)
+        size = len(entry.basis)
+        fit = all(len(b) == variables for b in entry.basis) and 0 < size == len(set(entry.basis))
+        need(fit, "a basis must be a list of different exponents")
+        need(len(entry.gram) == size * (size + 1) // 2, "gram must have an entry for each pair of the basis")
+    return tuple(
+        Square(product=(*(i for i, x in enumerate(e.times) if x), *condition), basis=e.basis, gram=e.gram)
+        for e in entries
     )
-    return state, power, kind
 
 
-def texts(values: Mapping[str, Fraction]) -> dict[str, str]:
-    """Numbers by name."""
-    return {name: exact_text(v) for name, v in values.items()}
+class RefutationEntries(Entries):
+    """An equilibrium away from the origin."""
+
+    parameters: Annotated[Numbers, Meta(max_length=LIMITS["uncertain"])]
+    point: Annotated[Numbers, Meta(max_length=LIMITS["states"])]
+    weights: Annotated[dict[str, Fraction], Meta(max_length=64)]
+
+
+class ProofFile(LoopEntries):
+    """All of a proof but its format."""
+
+    V: Terms
+    claims: Annotated[Numbers, Meta(max_length=3 + LIMITS["states"])]
+    witnesses: Annotated[tuple[WitnessEntries, ...], Meta(max_length=LIMITS["witnesses"])]
+
+
+class RefutationFile(LoopEntries):
+    """All of a refutation but its format."""
+
+    refutation: RefutationEntries
 
 
 # ----------------------------------------------------------------------
 # The certificate file (proofs/FORMAT.md): read strictly, written whole.
-
-_LAW = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 
 def read_json(path: str | Path) -> Any:
@@ -122,177 +223,52 @@ def evidence_of(raw: Any) -> Evidence:
             "a file must be a proof, a refutation or of the kind guarantee. Received a bound under inputs, which is no "
             "longer read. Make the new file with certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE."
         )
-    refutes = isinstance(raw, dict) and "refutation" in raw
-    return _evidence(headed(raw, _REFUTATION if refutes else _PROOF))
-
-
-_COMMON = {"law", "gains", "constants", "states", "domain", "uncertain", "roots", "lifts", "field"}
-_WITNESS = {"obligation", "multiplier", "squares", "equalities", "inequalities"}
-_PROOF = _COMMON | {"V", "claims", "witnesses"}
-_REFUTATION = _COMMON | {"refutation"}
-
-
-def _evidence(raw: dict[str, Any]) -> Evidence:
-    loop = _loop(raw)
-    if "refutation" in raw:
-        return Evidence(loop=loop, refutation=_equilibrium(raw["refutation"]))
-    witnesses: dict[str, Witness] = {}
-    for entry in listed(raw["witnesses"], "witnesses", LIMITS["witnesses"]):
-        name = with_keys(entry, _WITNESS)["obligation"]
-        need(isinstance(name, str) and name not in witnesses, "an obligation must be named once, by a text")
-        witnesses[name] = _witness(entry, loop)
+    entries = headed(raw)
+    if "refutation" in entries:
+        refuted = read_as(RefutationFile, entries)
+        return Evidence(loop=refuted.loop(), refutation=made(Equilibrium, refuted.refutation))
+    file = read_as(ProofFile, entries)
+    loop, names = file.loop(), [witness.obligation for witness in file.witnesses]
+    need(len(set(names)) == len(names), "an obligation must be named once, by a text")
     return Evidence(
         loop=loop,
-        lyapunov=read_terms(raw["V"], loop, tuple(loop.states)),
-        claims=read_rationals(raw["claims"], "claims", 3 + LIMITS["states"]),
-        witnesses=witnesses,
-    )
-
-
-def _loop(raw: dict[str, Any]) -> Loop:
-    need(isinstance(raw["law"], str) and _LAW.fullmatch(raw["law"]) is not None, "law must be a short name")
-    need(raw["domain"] in ("cells", "reals"), "domain must be cells or reals")
-    gains = read_rationals(raw["gains"], "gains", LIMITS["parameters"])
-    constants = read_rationals(raw["constants"], "constants", LIMITS["parameters"])
-    states = objected(raw["states"], "states", LIMITS["states"])
-    uncertain = objected(raw["uncertain"], "uncertain", LIMITS["uncertain"])
-    lifts = objected(raw["lifts"], "lifts", LIMITS["lifts"])
-    roots = objected(raw["roots"], "roots", LIMITS["roots"])
-    names = [*gains, *constants, *states, *uncertain, *roots, *lifts]
-    need(len(set(names)) == len(names) and len(gains) + len(constants) <= LIMITS["parameters"], "names must differ")
-    need(all(NAME.fullmatch(n) for n in names) and states != {}, "states and uncertain need names")
-    top = 12 if raw["domain"] == "cells" else 1
-    need(all(type(w) is int and 1 <= w <= top for w in states.values()), f"weights must be integers from 1 to {top}")
-    ranges: dict[str, tuple[Fraction, Fraction]] = {}
-    for name, ends in uncertain.items():
-        low, high = read_ends(ends, "a range")
-        need(low <= high, f"the range of {name} is not ordered")
-        ranges[name] = (low, high)
-    known = {**gains, **constants}
-    bare = Loop(
-        law=raw["law"],
-        gains=gains,
-        constants=constants,
-        states=states,
-        domain=raw["domain"],
-        uncertain=ranges,
-        field={},
-        roots={name: _root(entry, known) for name, entry in roots.items()},
-    )
-    powers = (*states, *lifts)
-    arguments = {lift: read_terms(lifts[lift], bare, powers[: len(states) + i]) for i, lift in enumerate(lifts)}
-    need(bare.domain == "cells" or not lifts, "lifts belong on cells")
-    rates = with_keys(raw["field"], set(states))
-    return replace(bare, lifts=arguments, field={state: read_terms(rates[state], bare, powers) for state in states})
-
-
-def _root(raw: Any, known: dict[str, Fraction]) -> tuple[str, tuple[Fraction, Fraction]]:
-    of, low, high = listed(raw, "a root", length=3)
-    need(isinstance(of, str) and of in known, "a root must be one of a gain or constant")
-    return of, (read_rational(low), read_rational(high))
-
-
-def _witness(raw: dict[str, Any], loop: Loop) -> Witness:
-    multiplier = read_polynomial(raw["multiplier"], "multiplier", None, LIMITS["basis"])
-    need(multiplier != {}, "a multiplier must not be empty")
-    variables = len(next(iter(multiplier)))
-    need(len(loop.states) <= variables <= len(loop.states) + len(loop.lifts) + 1, "a multiplier has a wrong key")
-    squares = _squares(raw["squares"], variables, loop, ())
-    conditions = listed(raw["inequalities"], "inequalities", LIMITS["lifts"])
-    for k, entries in enumerate(conditions):
-        squares += _squares(entries, variables, loop, (variables + k,))
-    cofactors = listed(raw["equalities"], "equalities", LIMITS["lifts"] + 1)
-    return Witness(
-        multiplier=multiplier,
-        squares=tuple(squares),
-        cofactors=tuple(read_polynomial(q, "a cofactor", variables, 20_000) for q in cofactors),
-        conditions=len(conditions),
-    )
-
-
-def _squares(raw: Any, variables: int, loop: Loop, condition: tuple[int, ...]) -> list[Square]:
-    squares = []
-    for entry in listed(raw, "squares", 1 << variables):
-        square = with_keys(entry, {"times", "basis", "gram"})
-        times = read_exponents(square["times"], variables, 1 if loop.domain == "cells" else 0)
-        gram = list(read_row(square["gram"], "gram"))
-        common_grid(gram)
-        basis = tuple(read_exponents(b, variables, 999) for b in listed(square["basis"], "basis", LIMITS["basis"]))
-        size = len(basis)
-        need(0 < size == len(set(basis)), "a basis must be a list of different exponents")
-        squares.append(
-            Square(
-                product=(*(i for i, x in enumerate(times) if x), *condition),
-                basis=basis,
-                gram=tuple(listed(gram, "gram", length=size * (size + 1) // 2)),
-            )
-        )
-    return squares
-
-
-def _equilibrium(raw: Any) -> Equilibrium:
-    entries = with_keys(raw, {"parameters", "point", "weights"})
-    weights = objected(entries["weights"], "weights", 64)
-    return Equilibrium(
-        parameters=read_rationals(entries["parameters"], "parameters", LIMITS["uncertain"]),
-        point=read_rationals(entries["point"], "point", LIMITS["states"]),
-        weights={cell: read_rational(w) for cell, w in weights.items()},
+        lyapunov=terms_of(file.V, loop, tuple(loop.states)),
+        claims=file.claims,
+        witnesses={witness.obligation: witness.witness(loop) for witness in file.witnesses},
     )
 
 
 def certificate_text(certificate: Evidence) -> str:
     """Text of the file, the same for the same certificate."""
-    return json.dumps(_plain(certificate), ensure_ascii=True, separators=(",", ":"), indent=None) + "\n"
-
-
-def _plain(certificate: Evidence) -> dict[str, Any]:
-    loop = certificate.loop
-    document: dict[str, Any] = {
-        "format": 1,
-        "law": loop.law,
-        "gains": texts(loop.gains),
-        "constants": texts(loop.constants),
-        "states": dict(loop.states),
-        "domain": loop.domain,
-        "uncertain": {name: list(map(exact_text, (low, high))) for name, (low, high) in loop.uncertain.items()},
-        "roots": {name: [of, str(low), str(high)] for name, (of, (low, high)) in loop.roots.items()},
-        "lifts": {lift: plain(terms) for lift, terms in loop.lifts.items()},
-        "field": {state: plain(terms) for state, terms in loop.field.items()},
+    loop, found = certificate.loop, certificate.refutation
+    parts: dict[str, Any] = {
+        "roots": {name: (of, *ends) for name, (of, ends) in loop.roots.items()},
+        "lifts": {lift: term_entries(terms) for lift, terms in loop.lifts.items()},
+        "field": {state: term_entries(terms) for state, terms in loop.field.items()},
     }
-    if certificate.refutation is not None:
-        equilibrium = certificate.refutation
-        parts = {"parameters": equilibrium.parameters, "point": equilibrium.point, "weights": equilibrium.weights}
-        return document | {"refutation": {key: texts(values) for key, values in parts.items()}}
-    witnesses = [_plain_witness(name, witness) for name, witness in certificate.witnesses.items()]
-    return document | {
-        "V": plain(certificate.lyapunov),
-        "claims": texts(certificate.claims),
-        "witnesses": witnesses,
-    }
+    if found is not None:
+        file: LoopEntries = made(RefutationFile, loop, refutation=made(RefutationEntries, found), **parts)
+    else:
+        witnesses = tuple(_witness_entries(name, one) for name, one in certificate.witnesses.items())
+        parts |= {"V": term_entries(certificate.lyapunov), "claims": certificate.claims, "witnesses": witnesses}
+        file = made(ProofFile, loop, **parts)
+    return json.dumps({"format": 1} | written(file), ensure_ascii=True, separators=(",", ":")) + "\n"
 
 
-def _plain_witness(name: str, witness: Witness) -> dict[str, Any]:
-    variables = len(next(iter(witness.multiplier)))
+def _witness_entries(name: str, witness: Witness) -> WitnessEntries:
+    n = len(next(iter(witness.multiplier)))
 
-    def squares(condition: int | None) -> list[dict[str, Any]]:
-        return [_plain_square(s, variables) for s in witness.squares if _condition(s, variables) == condition]
+    def squares(condition: int | None) -> tuple[SquareEntries, ...]:
+        chosen = (s for s in witness.squares if next((i - n for i in s.product if i >= n), None) == condition)
+        return tuple(made(SquareEntries, s, times=tuple(int(i in s.product) for i in range(n))) for s in chosen)
 
-    return {
-        "obligation": name,
-        "multiplier": polynomial_text(witness.multiplier),
-        "squares": squares(None),
-        "equalities": [polynomial_text(q) for q in witness.cofactors],
-        "inequalities": [squares(k) for k in range(witness.conditions)],
-    }
-
-
-def _condition(square: Square, variables: int) -> int | None:
-    return next((i - variables for i in square.product if i >= variables), None)
-
-
-def _plain_square(square: Square, variables: int) -> dict[str, Any]:
-    times = [int(i in square.product) for i in range(variables)]
-    return {"times": times, "basis": [list(b) for b in square.basis], "gram": list(map(exact_text, square.gram))}
+    return WitnessEntries(
+        obligation=name,
+        multiplier=PolynomialEntries(witness.multiplier),
+        squares=squares(None),
+        equalities=tuple(map(PolynomialEntries, witness.cofactors)),
+        inequalities=tuple(squares(k) for k in range(witness.conditions)),
+    )
 
 
 def save_certificate(certificate: Evidence, path: str | Path) -> None:

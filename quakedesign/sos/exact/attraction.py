@@ -10,24 +10,30 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import CertificateError, PolynomialError
 from quakedesign.files import parse_toml, read_text
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination, constant, degree, evaluate, product
-from quakedesign.sos.exact.polynomial_files import TERMS, plain_proof, read_proof, variables
+from quakedesign.sos.exact.polynomial_files import TERMS, Names, PointEntries, SosEntries, proof_entries
 from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Point, Square, SumOfSquares, holds
 from quakedesign.sos.exact.strict import (
+    Entries,
+    PolynomialEntries,
     headed,
-    listed,
+    made,
+    need,
     parse,
     polynomial_text,
-    read_polynomial,
-    read_rational,
+    read_as,
+    require_polynomial,
     write_readable,
+    written,
 )
 from quakedesign.sos.exact.work import limited
 
@@ -247,8 +253,38 @@ def _statement(
 # ----------------------------------------------------------------------
 # The file about a region of attraction (proofs/FORMAT.md): read strictly, written whole.
 
-_CLAIM = {"variables", "field", "V", "level"}
-_PROOF = {"multiplier", "positive", "decrease"}
+
+class AttractionEntries(Entries):
+    """A polynomial field with a Lyapunov function and its level, empty for the whole space."""
+
+    variables: Names
+    field: tuple[PolynomialEntries, ...]
+    V: PolynomialEntries
+    level: Annotated[tuple[Fraction, ...], Meta(max_length=1)]
+
+    def claim(self, multiplier: Polynomial) -> Attraction:
+        """The claim, of polynomials of its variables."""
+        size = len(self.variables)
+        need(len(self.field) == size, f"field must have {size} entries")
+        for polynomial in (self.V, multiplier, *self.field):
+            require_polynomial(polynomial, "a polynomial", size, TERMS)
+        level = self.level[0] if self.level else None
+        field = tuple(map(dict, self.field))
+        return made(Attraction, self, field=field, lyapunov=dict(self.V), level=level, multiplier=dict(multiplier))
+
+
+class ProvedFile(AttractionEntries):
+    """All of a file with a proof but its format and kind."""
+
+    multiplier: PolynomialEntries
+    positive: SosEntries
+    decrease: SosEntries
+
+
+class RefutedFile(AttractionEntries):
+    """All of a file with a refutation but its format and kind."""
+
+    negative: PointEntries
 
 
 def read(raw: Any) -> Attraction:
@@ -259,24 +295,18 @@ def read(raw: Any) -> Attraction:
     CertificateError
         When it breaks a rule of FORMAT.md.
     """
-    refuted = isinstance(raw, dict) and "negative" in raw
-    headed(raw, _CLAIM | ({"negative"} if refuted else _PROOF), "attraction")
-    names = variables(raw)
-    size = len(names)
-    field = listed(raw["field"], "field", length=size)
-    level = listed(raw["level"], "level", 1)
+    entries = headed(raw, "attraction")
     try:
-        claim = Attraction(
-            variables=names,
-            field=tuple(read_polynomial(f, "field", size, TERMS) for f in field),
-            lyapunov=read_polynomial(raw["V"], "V", size, TERMS),
-            level=read_rational(level[0]) if level else None,
-            multiplier=constant(size) if refuted else read_polynomial(raw["multiplier"], "multiplier", size, TERMS),
+        if "negative" in entries:
+            refuted = read_as(RefutedFile, entries)
+            size = len(refuted.variables)
+            return replace(refuted.claim(constant(size)), proof=refuted.negative.proof(size))
+        file = read_as(ProvedFile, entries)
+        claim = file.claim(file.multiplier)
+        proof = LyapunovProof(
+            positive=file.positive.proof(claim.positive), decrease=file.decrease.proof(claim.decrease)
         )
-        if refuted:
-            return replace(claim, proof=read_proof(raw["negative"], "negative", claim.positive))
-        found = [read_proof(raw[part], "sos", getattr(claim, part)) for part in ("positive", "decrease")]
-        return replace(claim, proof=LyapunovProof(positive=found[0], decrease=found[1]))
+        return replace(claim, proof=proof)
     except PolynomialError as error:
         raise CertificateError(str(error)) from None
 
@@ -297,19 +327,19 @@ def text(claim: Attraction) -> str:
     proof = claim.proof
     if proof is None:
         raise CertificateError("only a proof can be saved. Received an undecided answer.")
-    plain: dict[str, Any] = {
-        "format": 1,
-        "kind": "attraction",
-        "variables": list(claim.variables),
-        "field": [polynomial_text(f) for f in claim.field],
-        "V": polynomial_text(claim.lyapunov),
-        "level": [] if claim.level is None else [str(claim.level)],
-    }
+    entries = made(
+        AttractionEntries,
+        claim,
+        field=tuple(map(PolynomialEntries, claim.field)),
+        V=PolynomialEntries(claim.lyapunov),
+        level=() if claim.level is None else (claim.level,),
+    )
+    plain: dict[str, Any] = {"format": 1, "kind": "attraction"} | written(entries)
     if isinstance(proof, Point):
-        plain |= plain_proof(proof)
+        plain |= proof_entries(proof)
     else:
         plain["multiplier"] = polynomial_text(claim.multiplier)
-        plain |= {part: plain_proof(getattr(proof, part))["sos"] for part in ("positive", "decrease")}
+        plain |= {part: proof_entries(getattr(proof, part))["sos"] for part in ("positive", "decrease")}
     return json.dumps(plain, ensure_ascii=True, separators=(",", ":")) + "\n"
 
 

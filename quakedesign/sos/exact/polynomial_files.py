@@ -1,31 +1,147 @@
 """The file about one polynomial (proofs/FORMAT.md): read strictly, written whole."""
 
 import json
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
 
 from quakedesign.errors import CertificateError, PolynomialError
 from quakedesign.sos.exact.polynomial_statement import Statement
-from quakedesign.sos.exact.proofs import Element, Functional, Point, Proof, Square, SumOfSquares
+from quakedesign.sos.exact.proofs import Functional, Point, Proof, Square, SumOfSquares
 from quakedesign.sos.exact.strict import (
+    NAME,
+    Entries,
+    PolynomialEntries,
     common_grid,
     headed,
-    listed,
+    made,
     need,
     parse,
     polynomial_text,
-    read_exponents,
-    read_names,
+    read_as,
     read_polynomial,
-    read_row,
-    texts,
-    with_keys,
+    require_polynomial,
     write_readable,
+    written,
 )
 
-_STATEMENT = {"variables", "polynomial", "inequalities", "equalities", "products", "degree", "multiplier"}
-_KINDS = ("sos", "not-sos", "negative")
 TERMS, _VARIABLES, _CONSTRAINTS, _PRODUCTS, _BASIS, _SQUARES = 20_000, 16, 32, 1024, 400, 4096
+Name = Annotated[str, Meta(pattern=rf"\A{NAME.pattern}\Z")]
+Names = Annotated[tuple[Name, ...], Meta(min_length=1, max_length=_VARIABLES)]
+Product = Annotated[tuple[int, ...], Meta(max_length=_CONSTRAINTS)]
+Polynomials = Annotated[tuple[PolynomialEntries, ...], Meta(max_length=_CONSTRAINTS)]
+
+
+class GramEntries(Entries):
+    """A square: its product of inequalities, its basis of monomials or polynomials, and its Gram matrix."""
+
+    product: Product
+    basis: Annotated[tuple[tuple[int, ...] | dict[str, str], ...], Meta(min_length=1, max_length=_BASIS)]
+    gram: tuple[Fraction, ...]
+
+    def square(self, asked: Statement) -> Square:
+        """The square, of sizes that fit a statement."""
+        need(self.product in asked.products, "a square has a product that is not listed")
+        n, size = len(asked.variables), len(self.basis)
+        basis = tuple(entry if isinstance(entry, tuple) else read_polynomial(entry) for entry in self.basis)
+        monomials = [element for element in basis if isinstance(element, tuple)]
+        need(len(set(monomials)) == len(monomials), "a monomial occurs twice in a basis")
+        for element in basis:
+            if isinstance(element, tuple):
+                sound = len(element) == n and all(0 <= power <= 999 for power in element)
+                need(sound, f"a monomial must be {n} exponents from 0 to 999")
+            else:
+                require_polynomial(element, "a basis element", n, TERMS)
+                canonical = element != {} and (len(element) > 1 or 1 not in element.values())
+                need(canonical, "a basis element is not canonical")
+        need(len(self.gram) == size * (size + 1) // 2, "gram must have an entry for each pair of the basis")
+        common_grid(self.gram)
+        return Square(product=self.product, basis=basis, gram=self.gram)
+
+
+Squares = Annotated[tuple[GramEntries, ...], Meta(max_length=_SQUARES)]
+
+
+class SosEntries(Entries):
+    """A sum of squares with cofactors of equalities and a multiplier."""
+
+    squares: Squares
+    cofactors: tuple[PolynomialEntries, ...]
+    multiplier: Squares
+
+    def proof(self, asked: Statement) -> SumOfSquares:
+        """The proof, of sizes that fit a statement."""
+        need(len(self.cofactors) == len(asked.equalities), "there must be a cofactor for each equality")
+        for cofactor in self.cofactors:
+            require_polynomial(cofactor, "a cofactor", len(asked.variables), TERMS)
+        return SumOfSquares(
+            squares=tuple(entry.square(asked) for entry in self.squares),
+            cofactors=tuple(map(dict, self.cofactors)),
+            multiplier=tuple(entry.square(asked) for entry in self.multiplier),
+        )
+
+
+class PointEntries(Entries):
+    """A point."""
+
+    point: tuple[Fraction, ...]
+
+    def proof(self, variables: int) -> Point:
+        """The point, with a coordinate for each variable."""
+        need(len(self.point) == variables, f"point must have {variables} coordinates")
+        return Point(coordinates=self.point)
+
+
+class FunctionalEntries(Entries):
+    """A linear functional on polynomials."""
+
+    functional: PolynomialEntries
+
+
+class StatementEntries(Entries):
+    """What is asked of a polynomial."""
+
+    variables: Names
+    polynomial: PolynomialEntries
+    inequalities: Polynomials
+    equalities: Polynomials
+    products: Annotated[tuple[Product, ...], Meta(max_length=_PRODUCTS)]
+    degree: Annotated[int, Meta(ge=0)]
+    multiplier: PolynomialEntries
+
+    def statement(self) -> Statement:
+        """The statement, of polynomials of its variables."""
+        every = (self.polynomial, self.multiplier, *self.inequalities, *self.equalities)
+        for polynomial in every:
+            require_polynomial(polynomial, "a polynomial", len(self.variables), TERMS)
+        few = len(self.inequalities) + len(self.equalities) <= _CONSTRAINTS
+        need(few, f"there are more than {_CONSTRAINTS} constraints")
+        plain = {name: dict(getattr(self, name)) for name in ("polynomial", "multiplier")}
+        lists = {name: tuple(map(dict, getattr(self, name))) for name in ("inequalities", "equalities")}
+        try:
+            return made(Statement, self, **plain, **lists)
+        except PolynomialError as error:
+            raise CertificateError(str(error)) from None
+
+
+class SosFile(StatementEntries, rename={"proof": "sos"}):
+    """A polynomial with a sum of squares."""
+
+    proof: SosEntries
+
+
+class NoSosFile(StatementEntries, rename={"proof": "not-sos"}):
+    """A polynomial that is no sum of squares of these products."""
+
+    proof: FunctionalEntries
+
+
+class NegativeFile(StatementEntries, rename={"proof": "negative"}):
+    """A polynomial that is negative at a point."""
+
+    proof: PointEntries
 
 
 def read(raw: Any) -> tuple[Statement, Proof]:
@@ -36,17 +152,17 @@ def read(raw: Any) -> tuple[Statement, Proof]:
     CertificateError
         When it breaks a rule of FORMAT.md.
     """
-    kind = next((k for k in _KINDS if isinstance(raw, dict) and k in raw), "sos")
-    headed(raw, _STATEMENT | {kind})
-    asked = _statement(raw, variables(raw))
-    return asked, read_proof(raw[kind], kind, asked)
-
-
-def variables(raw: dict[str, Any]) -> tuple[str, ...]:
-    """Variables of a file."""
-    names = read_names(raw["variables"], "variables", _VARIABLES)
-    need(names != (), "variables must be names")
-    return names
+    entries = headed(raw)
+    if "negative" in entries:
+        negative = read_as(NegativeFile, entries)
+        return negative.statement(), negative.proof.proof(len(negative.variables))
+    if "not-sos" in entries:
+        refuted = read_as(NoSosFile, entries)
+        require_polynomial(refuted.proof.functional, "functional", len(refuted.variables), TERMS)
+        return refuted.statement(), Functional(values=dict(refuted.proof.functional))
+    file = read_as(SosFile, entries)
+    asked = file.statement()
+    return asked, file.proof.proof(asked)
 
 
 def load(text: str) -> tuple[Statement, Proof]:
@@ -54,106 +170,29 @@ def load(text: str) -> tuple[Statement, Proof]:
     return read(parse(text))
 
 
-def _statement(raw: dict[str, Any], names: tuple[str, ...]) -> Statement:
-    size = len(names)
-
-    def polynomials(key: str) -> Any:
-        return tuple(read_polynomial(p, key, size, TERMS) for p in listed(raw[key], key, _CONSTRAINTS))
-
-    products = [listed(s, "a product", _CONSTRAINTS) for s in listed(raw["products"], "products", _PRODUCTS)]
-    need(all(type(i) is int for s in products for i in s), "products must be lists of integers")
-    need(type(raw["degree"]) is int and raw["degree"] >= 0, "degree must be a non-negative integer")
-    inequalities, equalities = polynomials("inequalities"), polynomials("equalities")
-    need(len(inequalities) + len(equalities) <= _CONSTRAINTS, f"there are more than {_CONSTRAINTS} constraints")
-    try:
-        return Statement(
-            variables=names,
-            polynomial=read_polynomial(raw["polynomial"], "polynomial", size, TERMS),
-            inequalities=inequalities,
-            equalities=equalities,
-            products=tuple(tuple(s) for s in products),
-            degree=raw["degree"],
-            multiplier=read_polynomial(raw["multiplier"], "multiplier", size, TERMS),
-        )
-    except PolynomialError as error:
-        raise CertificateError(str(error)) from None
-
-
-def read_proof(raw: Any, kind: str, asked: Statement) -> Any:
-    """Proof of a kind, as it stands under it."""
-    size = len(asked.variables)
-    if kind == "negative":
-        return Point(coordinates=read_row(with_keys(raw, {"point"})["point"], "point", length=size))
-    if kind == "not-sos":
-        values = with_keys(raw, {"functional"})["functional"]
-        return Functional(values=read_polynomial(values, "functional", size, TERMS))
-    with_keys(raw, {"squares", "cofactors", "multiplier"})
-    cofactors = listed(raw["cofactors"], "cofactors", length=len(asked.equalities))
-    return SumOfSquares(
-        squares=_squares(raw["squares"], asked),
-        cofactors=tuple(read_polynomial(q, "a cofactor", size, TERMS) for q in cofactors),
-        multiplier=_squares(raw["multiplier"], asked),
-    )
-
-
-def _squares(raw: Any, asked: Statement) -> tuple[Square, ...]:
-    return tuple(_square(entry, asked) for entry in listed(raw, "squares", _SQUARES))
-
-
-def _square(raw: Any, asked: Statement) -> Square:
-    with_keys(raw, {"product", "basis", "gram"})
-    chosen = tuple(listed(raw["product"], "a product", _CONSTRAINTS))
-    need(all(type(i) is int for i in chosen) and chosen in asked.products, "a square has a product that is not listed")
-    basis = tuple(_element(b, len(asked.variables)) for b in listed(raw["basis"], "basis", _BASIS))
-    need(basis != (), "a basis must not be empty")
-    size = len(basis)
-    gram = read_row(raw["gram"], "gram", length=size * (size + 1) // 2)
-    common_grid(gram)
-    monomials = [b for b in basis if isinstance(b, tuple)]
-    need(len(set(monomials)) == len(monomials), "a monomial occurs twice in a basis")
-    return Square(product=chosen, basis=basis, gram=gram)
-
-
-def _element(raw: Any, variables: int) -> Element:
-    if isinstance(raw, list):
-        return read_exponents(raw, variables, 999)
-    polynomial = read_polynomial(raw, "a basis element", variables, TERMS)
-    need(polynomial != {} and (len(polynomial) > 1 or 1 not in polynomial.values()), "a basis element is not canonical")
-    return polynomial
-
-
 def text(asked: Statement, proof: Proof) -> str:
     """Text of the file, the same for the same proof."""
-    plain = {
-        "format": 1,
-        "variables": list(asked.variables),
-        "polynomial": polynomial_text(asked.polynomial),
-        "inequalities": [polynomial_text(g) for g in asked.inequalities],
-        "equalities": [polynomial_text(h) for h in asked.equalities],
-        "products": [list(s) for s in asked.products],
-        "degree": asked.degree,
-        "multiplier": polynomial_text(asked.multiplier),
-    }
-    return json.dumps(plain | plain_proof(proof), ensure_ascii=True, separators=(",", ":")) + "\n"
+    plain: dict[str, Any] = {name: PolynomialEntries(getattr(asked, name)) for name in ("polynomial", "multiplier")}
+    plain |= {name: tuple(map(PolynomialEntries, getattr(asked, name))) for name in ("inequalities", "equalities")}
+    file = {"format": 1} | written(made(StatementEntries, asked, **plain)) | proof_entries(proof)
+    return json.dumps(file, ensure_ascii=True, separators=(",", ":")) + "\n"
 
 
-def plain_proof(proof: Proof) -> dict[str, Any]:
-    """Proof in the words of the format, under its kind."""
+def proof_entries(proof: Proof) -> dict[str, Any]:
+    """Entries of a proof under its kind."""
     if isinstance(proof, Point):
-        return {"negative": {"point": texts(proof.coordinates)}}
+        return {"negative": written(PointEntries(proof.coordinates))}
     if isinstance(proof, Functional):
-        return {"not-sos": {"functional": polynomial_text(proof.values)}}
-    parts = {
-        "squares": [_plain_square(s) for s in proof.squares],
-        "cofactors": [polynomial_text(q) for q in proof.cofactors],
-        "multiplier": [_plain_square(s) for s in proof.multiplier],
-    }
-    return {"sos": parts}
-
-
-def _plain_square(square: Square) -> dict[str, Any]:
-    basis = [list(b) if isinstance(b, tuple) else polynomial_text(b) for b in square.basis]
-    return {"product": list(square.product), "basis": basis, "gram": texts(square.gram)}
+        return {"not-sos": written(FunctionalEntries(PolynomialEntries(proof.values)))}
+    squares, multiplier = (
+        tuple(
+            made(GramEntries, one, basis=tuple(b if isinstance(b, tuple) else polynomial_text(b) for b in one.basis))
+            for one in part
+        )
+        for part in (proof.squares, proof.multiplier)
+    )
+    cofactors = tuple(map(PolynomialEntries, proof.cofactors))
+    return {"sos": written(SosEntries(squares=squares, cofactors=cofactors, multiplier=multiplier))}
 
 
 def save(asked: Statement, proof: Proof | None, path: str | Path) -> None:

@@ -401,7 +401,8 @@ def test_a_sentence_names_every_size_that_it_covers_rounded_inward():
     found = qd.guarantee(plant, law=law, delay="0.05")
     assert found.sentence().startswith(
         "on the uncertain plant of the certificate (2 states, 1 control), from |x_i(0)| <= 0.6666, 0, with zero-"
-        "order hold over 0.1 s, 0.05 s late, for all uncertain terms in 1 sector, 1 of which hold for |y| <= 2.333, "
+        "order hold over 0.1 s, with a delay of 0.05 s, for all uncertain terms in 1 sector, 1 of which hold for "
+        "|y| <= 2.333, "
         "disturbances of at most 0.06666, loads of rates of at most 0.01666, measurement noise of at most 0.0006666, 0"
         ", for all t >= 0: |y1| <= "
     )

@@ -47,7 +47,7 @@ def test_a_claim_may_touch_a_limit_and_not_pass_it(name, off):
     assert stored(pump=narrow).check() is Verdict.UNDECIDED
     found = guarantee(proved.task, replace(proved.held, pump=narrow))
     assert isinstance(found, NoGuarantee)
-    assert found.reason.startswith("pressures from -14.3 MPa to 14.2 MPa may be commanded, which a pump of -14.")
+    assert found.reason.startswith("pressures from -14.3 MPa to 14.2 MPa may be commanded, but the pump supplies")
 
 
 def test_behind_a_lag_the_pressure_at_the_valve_counts():
@@ -68,7 +68,7 @@ def test_behind_a_lag_the_pressure_at_the_valve_counts():
     assert parse_guarantee(json.dumps(raw)) == pumped
     for name in ("least_asked", "largest_asked"):
         del raw["claims"][name]
-    with pytest.raises(CertificateError, match="a pump behind which there is a lag or rock needs claims of it"):
+    with pytest.raises(CertificateError, match="a pump before a lag or rock needs claims of its range"):
         parse_guarantee(json.dumps(raw))
 
 

@@ -150,7 +150,7 @@ def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     held = Held(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
     said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
     where = "on the plant without stick, from rest, with zero-order hold over 0.1 s"
-    assert said.startswith(f"{where}, 0.02 s late, through a lag of 0.03 s, for every disturbance")
+    assert said.startswith(f"{where}, with a delay of 0.02 s, through a lag of 0.03 s, for every disturbance")
     assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith(f"{where}, for every")
     assert "never exceeds 286 mm/s, the slip stays within 334 mm of the reference" in said
     assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa, commanded" in said

@@ -175,7 +175,7 @@ HUGE = "1" + "0" * 399
         (lambda s: {"sliding": [[[0, 1]], *s["sliding"][1:]]}, "3"),
         (lambda s: {"sliding": [[[0, 1, -1]], *s["sliding"][1:]]}, "by numbers from 0"),
         (lambda s: {"resting": [[], *s["resting"][1:]]}, "bases for 3 slices and 7 combinations"),
-        (lambda s: {"resting": [[["0", "1", "2", "3"]], *s["resting"][1:]]}, "must be integers"),
+        (lambda s: {"resting": [[["0", "1", "2", "3"]], *s["resting"][1:]]}, "expected `int`"),
         (lambda s: {"resting": [s["resting"][0][:1] * 40_000, *s["resting"][1:]]}, "at most 40000 bases"),
     ],
 )
@@ -381,7 +381,7 @@ def test_healing_counts_the_largest_area_per_mass_and_is_part_of_the_answer(proo
     assert answer.to_dict()["covered_healing"] == float(proof.covered_healing()) <= proof.covered_healing()
     assert (
         answer.lines()[1]
-        == "in place of a disturbance this covers friction at rest up to 6.22e-05 above friction in slip"
+        == "without a disturbance the same bounds hold if friction at rest is up to 6.22e-05 above friction in slip"
     )
 
 

@@ -124,9 +124,9 @@ def test_courses_along_the_nominal_response_come_close_and_stay_below(row):
 def test_where_stick_leaves_the_bounds_the_answer_says_so():
     claim = designed("real peak")
     beyond = WorstFound(slip_error=1.01 * float(claim.claims.slip_error), slip_rate_error=0.0)
-    found = LoopAnswer(fault=load_fault("real-fault"), found=claim, worst_with_stick=beyond)
+    found = LoopAnswer(fault=load_fault("real-fault"), found=claim, stick_search=beyond)
     assert found.lines()[-1].startswith("on the stick-slip plant a course was found that exceeds the bounds")
-    within = replace(found, worst_with_stick=replace(beyond, slip_error=0.99 * float(claim.claims.slip_error)))
+    within = replace(found, stick_search=replace(beyond, slip_error=0.99 * float(claim.claims.slip_error)))
     assert not within.leaves_with_stick
 
 

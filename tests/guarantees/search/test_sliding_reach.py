@@ -3,13 +3,23 @@
 from dataclasses import replace
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault, Reference, friction_law
-from quakedesign.guarantees import NoGuarantee, SlidingClaims, SlidingGuarantee
+from quakedesign.guarantees import Held, NoGuarantee, SlidingClaims, SlidingGuarantee
 from quakedesign.guarantees.guarantee_result import _beyond
-from quakedesign.guarantees.search.sliding_design import LOG_RATES, farthest, searched_sliding, suitable, what_would_do
+from quakedesign.guarantees.search import sliding_design
+from quakedesign.guarantees.search.sliding_design import (
+    LOG_RATES,
+    WellReach,
+    farthest,
+    searched_sliding,
+    suitable,
+    what_would_do,
+)
+from quakedesign.laws import LinearLaw
 from quakedesign.plant import WHOLE, slow_sliding_plant
 from quakedesign.studies.performance_limits import limits
 
@@ -36,6 +46,11 @@ FAULT = Fault(
 )
 TASK, STEP = slow_sliding_plant(FAULT, Fraction(1)), Fraction(33)
 CLAIMS = SlidingClaims(**{name: UpperBound(Fraction(1)) for name in SlidingClaims.__dataclass_fields__})
+
+
+def held(noise):
+    law = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(Fraction(1), Fraction(0)))
+    return Held(law=law, step=STEP, diffusion=Fraction(500), slip_noise=noise)
 
 
 def proved(task, held, log_rate):
@@ -70,6 +85,27 @@ def test_where_a_well_is_too_far_a_slower_task_and_a_nearer_well_are_named():
         return NoGuarantee(reason="", small_gain=None)
 
     assert what_would_do(FAULT, TASK, reach, around, unproved, spread=Fraction(0)).startswith("a smaller spread")
+
+
+def test_where_the_slip_noise_is_too_large_a_smaller_one_is_named(monkeypatch):
+    """Found at a hundredth: a tenth is tried before, and none after that."""
+    reach = WellReach(share=Fraction(1, 40), held=held(Fraction(1, 10**7)), numbers=np.zeros(9))
+    monkeypatch.setattr(sliding_design, "searched_sliding", lambda *_, **__: (None, np.zeros(9)))
+    around = {"diffusion": Fraction(20000), "slip_noise": Fraction(1, 10**7)}
+    for most, said in (
+        (Fraction(1, 10**7), "a proof was found at this V for L^2/D = 500 s"),
+        (Fraction(1, 10**9), "a proof was found with slip noise of at most 1 nm at this V for L^2/D = 500 s"),
+        (Fraction(0), "a proof was found with exact measurements of slip at this V for L^2/D = 500 s"),
+        (Fraction(-1), "a smaller spread, stress or noise may do"),
+    ):
+        tried = []
+
+        def up_to(task, held, log_rate, most=most, tried=tried):
+            tried.append(held.slip_noise)
+            return proved(task, held, log_rate) if held.slip_noise <= most else NoGuarantee(reason="", small_gain=None)
+
+        assert what_would_do(FAULT, TASK, reach, around, up_to, spread=Fraction(0)).startswith(said)
+        assert tried[0] == Fraction(1, 10**7)
 
 
 def test_where_no_law_is_found_near_the_fault_nothing_is_promised():

@@ -8,10 +8,11 @@ from stick_slip_attack import end_of_step
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError
-from quakedesign.guarantees.exact.implicit_root_files import sum_document
+from quakedesign.guarantees.exact.file_entries import power_entries
 from quakedesign.guarantees.search.compensated_search import recovered
 from quakedesign.loop import simulation_scheme
 from quakedesign.simulation.export import controller_step
+from quakedesign.sos.exact.strict import written
 
 REAL = qd.load_fault("real-fault")
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "stick_slip_cta_real-fault.json"
@@ -24,7 +25,7 @@ def claim():
 
 def recursion(law, step, seen, reference):
     """Pressures of FORMAT.md, section "A guarantee on the stick-slip plant", with v = r' + w."""
-    pull, level, predicted, last_rate, last_slip = sum_document(law.pull), 0.0, 0.0, 0.0, 0.0
+    pull, level, predicted, last_rate, last_slip = written(power_entries(law.pull)), 0.0, 0.0, 0.0, 0.0
     for (x, y), (r, r_rate) in zip(seen, reference, strict=True):
         innovation = x - last_slip - step * (last_rate + predicted) / 2
         if y == 0:
@@ -52,7 +53,7 @@ def test_exported_c_computes_the_pressures_of_the_recursion(claim, size):
         said.append(float(pressure))
     assert said == pytest.approx(list(recursion(law, step, seen, reference)), rel=1e-7, abs=1.0)
     errors = seen[:, 0] - reference[:, 0], seen[:, 1] - reference[:, 1]
-    ends = end_of_step(sum_document(law.pull), step, *errors)
+    ends = end_of_step(written(power_entries(law.pull)), step, *errors)
     assert np.allclose(ends, -errors[0] / step, rtol=1e-6, atol=1e-12) == (size == 1)
 
 

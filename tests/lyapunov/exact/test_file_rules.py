@@ -31,10 +31,10 @@ def twelve(count):
 
 
 CASES = {
-    "an array": (lambda: ["refutation"], "must have exactly the keys"),
-    "domain": (lambda: hand.relay() | {"domain": "complex"}, "domain must be"),
-    "names that are none": (lambda: hand.relay() | {"lifts": {"n m": hand.X1}}, "need names"),
-    "no states": (lambda: hand.relay() | twelve(0), "need names"),
+    "an array": (lambda: ["refutation"], "the file must be an object"),
+    "domain": (lambda: hand.relay() | {"domain": "complex"}, "domain: invalid enum value"),
+    "names that are none": (lambda: hand.relay() | {"lifts": {"n m": hand.X1}}, "key in lifts: expected a name"),
+    "no states": (lambda: hand.relay() | twelve(0), "states: expected `object` of length >= 1"),
     "65 gains and constants": (
         lambda: (
             hand.relay() | {"gains": {f"k{i}": "1" for i in range(60)}, "constants": {f"c{i}": "1" for i in range(5)}}
@@ -88,9 +88,9 @@ CASES = {
     ),
     "an obligation without a name": (
         lambda: hand.edited(hand.relay(), ("witnesses", 0, "obligation", 7)),
-        "named once",
+        "expected `str`",
     ),
-    "a number": (lambda: 5, "must have exactly the keys"),
+    "a number": (lambda: 5, "the file must be an object"),
     "a state twice in a term": (
         lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "1", "s"], ["x", "1", "a"]])),
         "longer|twice in a term",
@@ -99,10 +99,16 @@ CASES = {
         lambda: hand.edited(hand.nested_sum(), ("field", "x", 0, 2, [["x", "1", "s"], ["x", "1", "a"]])),
         "twice in a term",
     ),
-    "an unknown kind": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "1", "b"]])), "wrong kind"),
-    "an even power zero": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "0", "a"]])), "wrong kind"),
-    "a power 25": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "25", "s"]])), "wrong kind"),
-    "33 parameters": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 1, ["k"] * 33)), "longer than 32"),
+    "an unknown kind": (
+        lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "1", "b"]])),
+        "invalid enum value",
+    ),
+    "an even power zero": (
+        lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "0", "a"]])),
+        "wrong exponent",
+    ),
+    "a power 25": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "25", "s"]])), "wrong exponent"),
+    "33 parameters": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 1, ["k"] * 33)), "length <= 32"),
     "an exponent off the weight": (
         lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "1/2", "s"]])),
         "is no integer",
