@@ -283,7 +283,7 @@ def compare(
 
         print_comparison(comparison, console(), whole=verbose)
         if verbose:
-            print_lines(printed_lines(printed(comparison)))
+            print_lines(printed_lines(printed(comparison), loaded.name))
     return 0 if positive(comparison) else 1
 
 
@@ -331,6 +331,6 @@ def figures(
     print_lines(f"{label}: {said}" for label, said in runs)
     files = [(drawn["file"], drawn["paper"]) for drawn in results["figures"].values()]
     print_lines(f"{folder}/{file}" + (f": {paper} of the paper" if paper else "") for file, paper in files)
-    print_lines(printed_lines(results["printed"]))
+    print_lines(printed_lines(results["printed"], loaded.name))
     print_lines(["", f"written: {folder}/ (also results.json, numbers.csv, report.html, certificates)"])
     return 0

@@ -269,7 +269,7 @@ def _range(row: Row) -> str:
 # The summary on a terminal of 80 columns.
 
 
-_LEGEND = (
+LEGEND = (
     "worst: worst case found; pressure: proved for every friction of the box, or seen",
     "tracked: slip within 2 % of the task's, slip rate within 1 % of the natural peak",
 )
@@ -277,7 +277,7 @@ _LEGEND = (
 
 def summary_lines(said: Summary) -> list[str]:
     """Lines of at most 80 characters."""
-    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), *_LEGEND, ""]
+    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), *LEGEND, ""]
     lines += wrap(said.conditions, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     for note in said.notes:
         lines += wrap(note, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)

@@ -237,7 +237,10 @@ def deadbeat(task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...] = 
 
 def _why_none(task: FaultPlant, law: type[SlidingMode], scheme: str, step: Fraction) -> str:
     if scheme == "continuous":
-        return f"a pressure that follows {law.title} at every instant is run by no sampled controller{_REMEDY}"
+        return (
+            f"{law.title} is designed in continuous time, and a sampled controller cannot change the pressure at every "
+            "instant. Design the law for the sampled loop: without --continuous, and in the scheme stick-slip"
+        )
     if scheme == STICK_SLIP:
         return f"the estimate of the scheme {STICK_SLIP} is cut off at rest, so that no linear loop covers it{_REMEDY}"
     if scheme == "implicit":
