@@ -196,11 +196,11 @@ class Compensation:
             return ""
         low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
         if low == high == 1 and not root.remainder:
-            deadbeat = "; its implicit step is deadbeat, e1 + T_s·w = 0, for all errors that are claimed"
-            return f"{deadbeat}, so it coincides with every law that has a deadbeat step"
+            deadbeat = "; within the proved errors its implicit step is deadbeat, e1 + T_s·w = 0"
+            return f"{deadbeat}: its pressures are those of every law with a deadbeat step"
         return (
             f"; its implicit step ends at w = -γ·e1/T_s with γ from {low:.3g} to {high:.3g}, up to "
-            f"{UpperBound(root.remainder):.2g} m/s, for all errors that are claimed"
+            f"{UpperBound(root.remainder):.2g} m/s, within the proved errors"
         )
 
     def to_dict(self) -> dict[str, Any]:
