@@ -6,7 +6,7 @@ sliding and its poles.
 """
 
 from cmath import sqrt
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import exp, log10
@@ -21,8 +21,8 @@ from quakedesign.exact import fraction_of, rational, shortly, to_sympy
 from quakedesign.fault import Fault
 from quakedesign.guarantees.exact.loop import Around
 from quakedesign.guarantees.search.estimate import rounded, short
-from quakedesign.laws import ErrorModel, LinearLaw, NominalModel, disturbance_estimate, slip_observer
-from quakedesign.laws.sampled_law import Matrix, Row
+from quakedesign.laws import ErrorModel, LinearLaw, NominalModel, compensator, disturbance_estimate, slip_observer
+from quakedesign.laws.sampled_law import Matrix, Row, unit_row
 from quakedesign.loop import SHORTEST, Layer, SlidingModel
 from quakedesign.loop.layer import MODES
 from quakedesign.loop.loop_setup import MEASURED
@@ -319,9 +319,8 @@ class DelayFeedback:
 # An e-LQR that holds slow sliding: LQ on the sampled plant through its path, fed by a Kalman observer of the slip.
 #
 # The model is scaled: slip error in D, pressures and stresses in N, time in 1/ρ = D/V; the law carries the slow modes
-# of the layer of rock and a level of everything that it does not know. Whatever the numbers, its states rest where it
-# asks for a constant pressure without errors: the gain of the level, and how the level moves the slip, follow from
-# that.
+# of the diffusion path and a level of all disturbances. For any numbers a constant pressure without errors is a steady
+# state of the law: the gain of the level, and its effect on the slip, follow from this condition.
 
 SLIDING_MODES = 4
 _DIGITS = 9
@@ -331,14 +330,14 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
-    """What LQ and observer trade, in the scaled model.
+    """Weights of regulator and filter in the scaled model.
 
     Attributes
     ----------
     slip, state, pressure : float
-        LQ weights of x², z² and u² beside y².
+        LQ weights of x², z² and u²; that of y² is 1.
     slip_noise, state_noise, level_noise : float
-        Variances of what moves x, z and the level from sample to sample, beside that of the measured x.
+        Variances of the process noise of x, z and the level per sample; that of the measured x is 1.
     """
 
     slip: float
@@ -356,104 +355,63 @@ FAVOURED = Weights(slip=4.4e-3, state=5.5e-3, pressure=344.0, slip_noise=5.9e3, 
 def sliding_law(
     model: SlidingModel, step: Fraction, *, diffusion: Fraction = _ZERO, weights: Weights = FAVOURED
 ) -> LinearLaw:
-    """Law of samples of the slip error, its pressure held over a step [s] and brought through rock of L²/D [s].
+    """LQG compensator of the sampled slip error, with a zero-order hold of `step` [s] and a diffusion path of L²/D [s].
 
-    The pressure is what the law adds to that which the reference needs. States: predicted x, z, the modes of the layer
-    and the level; all scaled.
+    The pressure is relative to that which the reference needs. States: predicted x, z, the modes of the path and the
+    level, all scaled.
 
     Raises
     ------
     ParameterError
-        When no gains are found: the step, or the way through the rock, is too long for the instability.
+        When the Riccati equations have no solution: the step or the diffusion time is too long for the instability.
     """
     layer = Layer(time=diffusion * model.state_rate) if diffusion else None
-    modes = SLIDING_MODES if layer else 0
-    shares = [layer.share(i) for i in range(modes)] if layer else []
-    scaled_step = step * model.state_rate
-    fades = [short(exp(-float(layer.rate(i) * scaled_step)), _DIGITS) for i in range(modes)] if layer else []
-    seen = _reading(model, shares)
-    moved = expm(_sliding_flow(seen, layer, modes) * float(scaled_step))
-    size = 2 + modes
-    own = [[short(v, _DIGITS) for v in row[: size + 2]] for row in moved[:2]]
-    for row in own:  # (x, z, modes, level, pressure): a level that the pressure balances moves nothing
-        row[size] = (sum(row[2:size], _ZERO) + row[size + 1]) / model.coefficient
-    update = [
-        *own,
-        *([*[_ZERO] * (2 + i), fade, *[_ZERO] * (size - 1 - i - 1), 1 - fade] for i, fade in enumerate(fades)),
-        [*[_ZERO] * size, _ONE, _ZERO],
-    ]
-    gains, corrections = _gains(update, seen, weights)
-    gains.append((1 + sum(gains[2:], _ZERO)) / model.coefficient)
+    shares = [layer.share(i) for i in range(SLIDING_MODES)] if layer else []
+    rates = [layer.rate(i) for i in range(SLIDING_MODES)] if layer else []
+    scaled_step, size = step * model.state_rate, 2 + len(shares)
     stress, length = model.weakening / model.evolution, model.rate / model.state_rate
-    return _law(update, gains, corrections, length=length, stress=stress)
-
-
-def _reading(model: SlidingModel, shares: Sequence[Fraction]) -> Any:
-    """y of (x, z, modes, level, pressure), scaled."""
-    normal, length = model.weakening / model.evolution, model.rate / model.state_rate
-    pressure = [*shares, _ZERO, 1 - sum(shares, _ZERO)]
-    row = [-model.stiffness * length / normal, -model.evolution, *(model.coefficient * c for c in pressure)]
-    row[-2] = _ONE
-    return np.array([float(v * normal / model.strength) for v in row])
-
-
-def _sliding_flow(seen: Any, layer: Layer | None, modes: int) -> Any:
-    """Generator of (x, z, modes, level, pressure): x′ = y, z′ = −y − z."""
-    flow = np.zeros((4 + modes, 4 + modes))
-    flow[0], flow[1] = seen, -seen
+    # Flow of (x, z, modes, level, pressure), and their coefficients in y: x′ = y, z′ = −y − z.
+    *by_mode, at_once = (model.coefficient * share for share in (*shares, 1 - sum(shares, _ZERO)))
+    by_state = (-model.stiffness * length / stress, -model.evolution)
+    log_rate = np.array([float(v * stress / model.strength) for v in (*by_state, *by_mode, _ONE, at_once)])
+    flow = np.zeros((size + 2, size + 2))
+    flow[0], flow[1] = log_rate, -log_rate
     flow[1, 1] -= 1
-    for i in range(modes):
-        speed = float(layer.rate(i)) if layer else 0.0
-        flow[2 + i, 2 + i], flow[2 + i, -1] = -speed, speed
-    return flow
+    for i, rate in enumerate(map(float, rates), start=2):
+        flow[i, i], flow[i, -1] = -rate, rate
+    errors = [[short(v, _DIGITS) for v in row] for row in expm(flow * float(scaled_step))[:2]]
+    for row in errors:  # a level that a constant pressure balances has no effect
+        row[size] = (sum(row[2:size], _ZERO) + row[-1]) / model.coefficient
+    fades = enumerate((short(exp(-float(rate * scaled_step)), _DIGITS) for rate in rates), start=2)
+    path = (unit_row(size + 2, {i: fade, size + 1: 1 - fade}) for i, fade in fades)
+    update = (*map(tuple, errors), *path, unit_row(size + 2, {size: _ONE}))
 
-
-def _gains(update: list[list[Fraction]], seen: Any, w: Weights) -> tuple[list[Fraction], list[Fraction]]:
-    """LQ gains on (x, z, modes), and how the observer corrects x, z and the level."""
-    moved = np.array(update, dtype=float)
-    size = len(moved) - 1
-    cost = np.outer(seen[:size], seen[:size]) + np.diag([w.slip, w.state, *[0.0] * (size - 2)]) + _LEAST * np.eye(size)
-    of_state, of_pressure, held = moved[:size, :size], moved[:size, -1:], [0, 1, size]
-    own, told = moved[np.ix_(held, held)], np.array([[1.0, 0.0, 0.0]])
+    plant = np.array(update, dtype=float)
+    of_state, of_pressure, corrected = plant[:size, :size], plant[:size, -1:], [0, 1, size]
+    cost = np.outer(log_rate[:size], log_rate[:size]) + _LEAST * np.eye(size)
+    cost[[0, 1], [0, 1]] += weights.slip, weights.state
+    process = np.diag([weights.slip_noise, weights.state_noise, weights.level_noise])
     try:
-        value = solve_discrete_are(of_state, of_pressure, cost, np.array([[w.pressure]]))
-        spread = solve_discrete_are(own.T, told.T, np.diag([w.slip_noise, w.state_noise, w.level_noise]), np.eye(1))
+        value = solve_discrete_are(of_state, of_pressure, cost, np.array([[weights.pressure]]))
+        covariance = solve_discrete_are(plant[np.ix_(corrected, corrected)].T, np.eye(3)[:, :1], process, np.eye(1))
     except (LinAlgError, ValueError):
         raise ParameterError(
             "step, delay and diffusion time must be short compared with the growth of the instability of slow sliding. "
             "Received values for which the Riccati equation has no solution. Shorten the step or the diffusion path."
         ) from None
-    gains = of_pressure.T @ value @ of_state / (w.pressure + of_pressure.T @ value @ of_pressure)
-    corrections = spread[:, 0] / (spread[0, 0] + 1)
-    return [short(v, _DIGITS) for v in gains[0]], [short(v, _DIGITS) for v in corrections]
-
-
-def _law(
-    update: list[list[Fraction]],
-    gains: list[Fraction],
-    corrections: list[Fraction],
-    *,
-    length: Fraction,
-    stress: Fraction,
-) -> LinearLaw:
-    """u = −K(π + l(x − π_x)), π⁺ = A(π + l(x − π_x)) + Bu, with the slip in m and the pressure in Pa outside."""
-    size = len(gains)
-    spread = [corrections[0], corrections[1], *[_ZERO] * (size - 3), corrections[2]]
-    closed = [[row[j] - row[size] * gains[j] for j in range(size)] for row in update]
-
-    def of_measured(row: Sequence[Fraction]) -> Fraction:
-        return sum((v * c for v, c in zip(row, spread, strict=True)), _ZERO)
-
-    def of_predicted(row: Sequence[Fraction]) -> list[Fraction]:
-        return [v - of_measured(row) * (j == 0) for j, v in enumerate(row)]
-
-    return LinearLaw(
-        states=("slip", "state", *(f"mode{i}" for i in range(size - 3)), "level"),
-        update=tuple(tuple(of_predicted(row)) for row in closed),
-        measured=tuple((of_measured(row) / length, _ZERO) for row in closed),
-        output=tuple(-stress * v for v in of_predicted(gains)),
-        feedback=(-stress * of_measured(gains) / length, _ZERO),
+    gains = of_pressure.T @ value @ of_state / (weights.pressure + of_pressure.T @ value @ of_pressure)
+    feedback = [short(v, _DIGITS) for v in gains[0]]
+    feedback.append((1 + sum(feedback[2:], _ZERO)) / model.coefficient)
+    corrections = dict(zip(corrected, covariance[:, 0] / (covariance[0, 0] + 1), strict=True))
+    law = compensator(
+        states=("slip", "state", *(f"mode{i}" for i in range(size - 2)), "level"),
+        update=tuple(row[:-1] for row in update),
+        command=tuple(row[-1] / stress for row in update),
+        measured=(unit_row(size + 1, {0: length}), unit_row(size + 1, {})),
+        estimator=tuple((short(corrections.get(i, 0.0), _DIGITS) / length, _ZERO) for i in range(size + 1)),
+        feedback=tuple(stress * k for k in feedback),
     )
+    return replace(law, applied=())  # without a pressure limit, hence without anti-windup
 
 
 # ----------------------------------------------------------------------

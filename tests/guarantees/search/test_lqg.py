@@ -9,12 +9,15 @@ from scipy.linalg import expm
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees.search.lqg import (
+    FAVOURED,
     DelayFeedback,
     PathFeedback,
     _Kalman,
     family_of,
+    sliding_law,
 )
 from quakedesign.laws import NominalModel
+from quakedesign.loop import SlidingModel
 from quakedesign.plant import uncertain_plant
 
 MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
@@ -133,3 +136,53 @@ def test_a_family_admits_weights_from_0_to_1_and_exponents_below_12(path):
             assert both(x[:3]) is observed(x) is (not path or size == 11.9)
             x = x[::-1]
             assert observed(x) is (size == 11.9)
+
+
+SLIDING = SlidingModel(
+    rate=F("1.2e-6"), state_rate=F("1.2e-3"), slope=F(1), state_slope=F(1), strength=F(500024), weakening=F(750000),
+    direct=F("0.01"), evolution=F("0.015"), stiffness=F(6 * 10**6), coefficient=F("0.6"),
+)  # fmt: skip
+
+
+def sliding_plant(step, diffusion):
+    """A and B of (x, z, four slow modes, a stress), and y of these; x in D_c, pressure and stress in N."""
+    modes = 4 if diffusion else 0
+    strength, weakening, stiffness = 500024.0, 750000.0, 6e6
+    n = np.arange(modes)
+    shares, rates = 4 / np.pi * (-1.0) ** n / (2 * n + 1), ((2 * n + 1) * np.pi / 2) ** 2 / max(diffusion, 1.0)
+    y = np.array([-stiffness * 1e-3, -weakening, *0.6 * 50e6 * shares, 50e6, 0.6 * 50e6 * (1 - shares.sum())])
+    y /= strength
+    flow = np.zeros((4 + modes, 4 + modes))
+    flow[0], flow[1] = 1.2e-3 * y, -1.2e-3 * y
+    flow[1, 1] -= 1.2e-3
+    flow[2 : 2 + modes, 2 : 2 + modes], flow[2 : 2 + modes, -1] = -np.diag(rates), rates
+    moved = expm(flow * step)
+    return moved[:-1, :-1], moved[:-1, -1], y[:-2]
+
+
+@pytest.mark.parametrize("diffusion", [0, 833])
+def test_the_law_of_slow_sliding_is_filter_and_regulator(diffusion):
+    """K and L by iteration of the Riccati difference equations, and the recursion of the compensator."""
+    a, b, y = sliding_plant(50.0, diffusion)
+    size, w = len(a) - 1, FAVOURED
+    k = regulator(
+        a[:size, :size], b[:size], np.outer(y, y) + np.diag([w.slip, w.state, *[0.0] * (size - 2)]), w.pressure
+    )
+    followed = a[np.ix_([0, 1, size], [0, 1, size])]
+    noise, covariance = np.diag([w.slip_noise, w.state_noise, w.level_noise]), np.eye(3)
+    for _ in range(2000):
+        correction = covariance[:, 0] / (covariance[0, 0] + 1)
+        covariance = followed @ (covariance - np.outer(correction, covariance[0])) @ followed.T + noise
+    gains = np.array([*k, (1 + k[2:].sum()) / 0.6])
+    spread = np.zeros(size + 1)
+    spread[[0, 1, size]] = correction
+    law, z, predicted = sliding_law(SLIDING, F(50), diffusion=F(diffusion)), np.zeros(size + 1), np.zeros(size + 1)
+    f, g, output, d = (np.array(m, float) for m in (law.update, law.measured, law.output, law.feedback))
+    for error in np.random.default_rng(2).normal(size=25) * 1e-4:
+        x = predicted + spread * (error / 1e-3 - predicted[0])
+        assert output @ z + d[0] * error == pytest.approx(-50e6 * (gains @ x), rel=1e-5)
+        predicted = a @ x - b * (gains @ x)
+        z = f @ z + g[:, 0] * error
+        assert z == pytest.approx(predicted, rel=1e-5, abs=1e-8)
+    assert law.states == ("slip", "state", *(f"mode{i}" for i in range(size - 2)), "level")
+    assert (law.applied, law.of_slip_alone) == ((), True)
