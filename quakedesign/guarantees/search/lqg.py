@@ -296,18 +296,15 @@ class DelayFeedback:
             """Errors after a unit acceleration for some time."""
             return np.array(expm(flow * duration))[:2, 2]
 
-        whole, part = int(delay // step), float(delay % step)
-        ages = whole + (1 if part else 0)
-        pushes = [np.zeros(2)] * (ages + 1)
-        pushes[whole] = pushed(period - part)
-        if part:
-            pushes[whole + 1] = pushed(period) - pushes[whole]
-        arriving = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in range(1, ages + 1)]
-        gain = short(float(model.gain))
-        known = ErrorModel.delayed(rounded(expm(flow * period)[:2, :2]), rounded(pushes), gain)
+        moved, first = _sampled(model, step, {"delay": delay}, 0)
+        ages = range(1, len(moved) - 1)
+        arriving = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in ages]
+        gain = float(model.gain)
+        of_commands = rounded(v / gain for v in (first[:2], *moved[:2, 2:].T))
+        known = ErrorModel.delayed(rounded(moved[:2, :2]), of_commands, short(gain))
         free, forced = rounded(expm(flow * late)[:2, :2]), rounded(arriving)
-        arrival = tuple((*row, *(gain * v[i] for v in forced)) for i, row in enumerate(free))
-        return cls(known, arrival, float(model.gain), period)
+        arrival = tuple((*row, *(known.gain * v[i] for v in forced)) for i, row in enumerate(free))
+        return cls(known, arrival, gain, period)
 
     def gains(self, slip: float, rate: float) -> Row:
         """For k1·β·b·T_s² and k2·β·b·T_s of the errors at the arrival."""
