@@ -455,7 +455,7 @@ BUDGETS = {
     "laws": 3104,
     "loop": 4227,
     "plant": 1356,
-    "guarantees": 13056,
+    "guarantees": 13063,
     "lyapunov": 6958,
     "linear": 2390,
     "synthesis": 1914,

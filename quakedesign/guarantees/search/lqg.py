@@ -90,14 +90,24 @@ class PathFeedback:
         weights = np.zeros(self.flow.shape)
         weights[0, 0], weights[1, 1] = exp(slip) / self.unit**2, 1
         cost = exp(pressure) * self.push**2
-        riccati = solve_discrete_are(self.flow, self.first[:, None], weights, np.array([[cost]]))
-        found = self.first @ riccati @ self.flow / (cost + self.first @ riccati @ self.first)
-        of_slip, of_rate, *of_path = (short(float(v)) for v in found)
+        of_slip, of_rate, *of_path = map(short, _regulator(self.flow, self.first, weights, cost))
         return of_slip, of_rate, *(v / self.model.gain for v in of_path)
 
 
+def _regulator(update: np.ndarray, command: np.ndarray, weights: np.ndarray, of_command: float) -> np.ndarray:
+    """K of p = −Kx that minimises Σ xᵀQx + R·p² of x⁺ = Ax + Bp."""
+    value = solve_discrete_are(update, command[:, None], weights, np.array([[of_command]]))
+    return np.array(command @ value @ update / (of_command + command @ value @ command))
+
+
+def _filter(update: np.ndarray, process: np.ndarray) -> np.ndarray:
+    """Corrections per innovation of the first state, whose measurement noise has the variance 1."""
+    covariance = solve_discrete_are(update.T, np.eye(len(update))[:, :1], process, np.eye(1))
+    return np.array(covariance[:, 0] / (covariance[0, 0] + 1))
+
+
 def _sampled(model: NominalModel, step: Fraction, around: Around, modes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Over one period: what becomes of e1, e2, the path's pressures and those asked for before, and of p [Pa]."""
+    """A and B over one period, of e1, e2, the pressures of the path and the commands that wait [Pa]."""
     delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
     whole, late = int(delay // step), float(delay % step)
     ages = whole + (late > 0)
@@ -259,9 +269,8 @@ class _Kalman:
         """Per innovation of the slip, whose noise has the variance 1, by the Riccati equation of the filter."""
         pushed = self.follows[:, 2] * [1, 1, 0]
         process = 10**acceleration * np.outer(pushed, pushed) + np.diag([0, 0, 10**level]) + _FAINT * np.eye(3)
-        covariance = solve_discrete_are(self.follows.T, np.eye(3)[:, :1], process, np.eye(1))
-        first, second, third = self.units @ covariance[:, 0] / (covariance[0, 0] + 1)
-        return short(float(first)), short(float(second)), short(float(third))
+        first, second, third = map(short, self.units @ _filter(self.follows, process))
+        return first, second, third
 
 
 def _flow(model: NominalModel) -> np.ndarray:
@@ -384,22 +393,20 @@ def sliding_law(
     update = (*map(tuple, errors), *path, unit_row(size + 2, {size: _ONE}))
 
     plant = np.array(update, dtype=float)
-    of_state, of_pressure, corrected = plant[:size, :size], plant[:size, -1:], [0, 1, size]
+    corrected = [0, 1, size]
     cost = np.outer(log_rate[:size], log_rate[:size]) + _LEAST * np.eye(size)
     cost[[0, 1], [0, 1]] += weights.slip, weights.state
     process = np.diag([weights.slip_noise, weights.state_noise, weights.level_noise])
     try:
-        value = solve_discrete_are(of_state, of_pressure, cost, np.array([[weights.pressure]]))
-        covariance = solve_discrete_are(plant[np.ix_(corrected, corrected)].T, np.eye(3)[:, :1], process, np.eye(1))
+        gains = _regulator(plant[:size, :size], plant[:size, -1], cost, weights.pressure)
+        corrections = dict(zip(corrected, _filter(plant[np.ix_(corrected, corrected)], process), strict=True))
     except (LinAlgError, ValueError):
         raise ParameterError(
             "step, delay and diffusion time must be short compared with the growth of the instability of slow sliding. "
             "Received values for which the Riccati equation has no solution. Shorten the step or the diffusion path."
         ) from None
-    gains = of_pressure.T @ value @ of_state / (weights.pressure + of_pressure.T @ value @ of_pressure)
-    feedback = [short(v, _DIGITS) for v in gains[0]]
+    feedback = [short(v, _DIGITS) for v in gains]
     feedback.append((1 + sum(feedback[2:], _ZERO)) / model.coefficient)
-    corrections = dict(zip(corrected, covariance[:, 0] / (covariance[0, 0] + 1), strict=True))
     law = compensator(
         states=("slip", "state", *(f"mode{i}" for i in range(size - 2)), "level"),
         update=tuple(row[:-1] for row in update),
