@@ -232,7 +232,7 @@ class LoopAnswer(LoopResult):
         change = UpperBound(self.fault.disturbance_bounds[1])
         return [
             "these bounds allow the disturbance to jump; that of the fault file changes by at most "
-            f"{change:.3g} m/s^3: --class rate (rate_limited=True) proves smaller bounds"
+            f"{change:.3g} m/s^3: --class rate (disturbance_class='rate') proves smaller bounds"
         ]
 
     @property

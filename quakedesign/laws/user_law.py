@@ -294,7 +294,8 @@ class SampledLaw(SampledController):
         if set(given) - {"output"} != {"A", "B", "C", "D", "inputs"}:
             keys = ", ".join(sorted(map(str, given)))[:100] or "none"
             raise ScenarioError(
-                f"law {path} must have the keys A, B, C, D and inputs, or gains, or pid, and step. Received {keys}."
+                f"law {path} must have the key step and, besides label, either A, B, C, D and inputs, or gains, or "
+                f"pid. Received besides step: {keys}. Omit keys of other names."
             )
         parts, inputs = [given[name] for name in "ABCD"], given["inputs"]
         if not isinstance(inputs, list) or not all(isinstance(name, str) for name in inputs):

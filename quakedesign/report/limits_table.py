@@ -13,6 +13,7 @@ from quakedesign.guarantees import SlidingGuarantee
 from quakedesign.report.drawing import NATURAL, figure, finish, write_figures, write_results
 from quakedesign.studies import Limits
 from quakedesign.studies.performance_limits import SlidingLimits
+from quakedesign.text import quantity
 
 _FORBIDDEN, _HIDDEN, _PROVED = "#F3C6B2", "#F9E4DA", "#0072B2"
 
@@ -22,7 +23,7 @@ def limits_lines(limits: Limits) -> list[str]:
     task = limits.fault
     head = [
         f"{task.name}: performance limits, and what designs are proved to reach",
-        f"({_box(limits)}{limits.against}, T_s = {task.sampling_time:g} s)",
+        f"({_box(limits)}{limits.against}, T_s = {task.sampling_time:g} s{_delay(limits)})",
         "",
         f"{'':24}{'infeasible':>20}{'proved':>16}",
     ]
@@ -33,6 +34,12 @@ def limits_lines(limits: Limits) -> list[str]:
     ]
     lines = [*_meaning(limits), *_undecided(limits)]
     return [*head, *rows, "", *(line for said in lines for line in wrap(said, 80, subsequent_indent="  "))]
+
+
+def _delay(limits: Limits) -> str:
+    """Delay of the loop; limits of slow sliding have none."""
+    late = 0 if isinstance(limits, SlidingLimits) else limits.told.around.get("delay", 0)
+    return f", delay {quantity(float(late), 's')}" if late else ""
 
 
 def _meaning(limits: Limits) -> list[str]:
@@ -55,8 +62,9 @@ def _meaning(limits: Limits) -> list[str]:
     if (least := limits.stick_slip_rate) is not None:
         lines.insert(
             2,
-            f"on the stick-slip plant: every controller that makes the fault follow a moving reference lets the slip "
-            f"rate reach {least.quantity('m/s')} for some disturbance, even if friction does not change",
+            f"on the stick-slip plant, even without a delay, every controller that makes the fault follow a moving "
+            f"reference lets the slip rate reach {least.quantity('m/s')} for some disturbance, even if friction does "
+            "not change",
         )
     if limits.largest_step.impossible_beyond is None:
         return [

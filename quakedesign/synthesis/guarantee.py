@@ -199,12 +199,19 @@ def guarantee(
     elif law is not None and controller != "elqr":
         raise ParameterError("law and controller are the same argument. Received both. Omit controller.")
     if law is not None:
-        usual = plant in (None, PRINTED) and (objective, tuple(gains), scheme) == (OBJECTIVES[0], (), None)
-        if not usual or exact_value(spread, "", "spread") or stress is not None or fault.friction.state_names:
+        wrong = {
+            f"{fault.friction.name} friction": fault.friction.state_names,
+            f"plant {plant!r}": plant not in (None, PRINTED),
+            f"objective {objective!r}": objective != OBJECTIVES[0],
+            "gains": len(gains),
+            "scheme": scheme is not None,
+            "stress": stress is not None,
+            "spread": exact_value(spread, "", "spread"),
+        }
+        if any(wrong.values()):
             raise ParameterError(
-                "a user's law is guaranteed as it is, for friction without a state and the plant printed. Received "
-                f"it with {fault.friction.name} friction, or with plant, objective, gains, scheme, stress or spread. "
-                "Omit these."
+                "a given law has guarantees on the plant without stick, for friction without a state. Received "
+                f"{', '.join(name for name, is_wrong in wrong.items() if is_wrong)}. Omit this."
             )
         require_known(disturbance_class, CLASSES, "class")
         task = uncertain_plant(fault, rate_limited=disturbance_class == "rate")

@@ -370,7 +370,8 @@ class Samples(DesignMethod[SampledController]):
         largest, opposite = (spectral_radius(replace(held, law=_times(f, law)).loop(task)) for f in (1, -1))
         if largest < _STABLE:
             return found
-        text = f"{found.reason}: of a period it has an eigenvalue of size {largest:.4g}"
+        text = "the nominal closed loop is not asymptotically stable: its largest eigenvalue over a period has modulus "
+        text += f"{largest:.4g}"
         if not any(row[0] for row in (*law.measured, law.feedback)):
             text += (
                 "; the law does not use the slip, so that any constant slip error remains (eigenvalue 1): add "
@@ -388,6 +389,10 @@ class Samples(DesignMethod[SampledController]):
             other = self.guarantee(fault, task, replace(controller, law=_times(factor, controller.law)), setup)
             if other.proved:
                 return replace(answer, nearest=(FACTOR, other), factor=factor)
+        for share in _DELAYS if setup.delay else ():
+            other = self.guarantee(fault, task, controller, setup.with_given(delay=share * setup.delay))
+            if other.proved:
+                return replace(answer, nearest=("delay", other))
         return answer
 
 
@@ -402,6 +407,8 @@ def _times(factor: Fraction | int, law: LinearLaw) -> LinearLaw:
 _STABLE = 1 - 1e-6  # an eigenvalue that is 1 may be computed as less
 _OPPOSITE = "; with the opposite sign of the pressure it is stable"
 _FACTORS = tuple(map(Fraction, ("1/2", "2", "1/4", "4", "-1", "1/16", "16")))  # tried where a law has no guarantee
+_DELAYS = Fraction(3, 4), Fraction(1, 2), Fraction(1, 4)
+"""Shares of a delay for which a given law is tried where it has no guarantee."""
 _STANDING = (
     "the law leaves an error under a constant pressure at rest, as it has no integral action: give it an integral of "
     "the slip error or an estimate of the disturbance"

@@ -12,17 +12,21 @@ radius of M is below 1 (Collatz and Wielandt), W(t) is finite, and W(t) ≤ (1 �
 P_s, those with a bound strictly within it; as they are continuous and within it at first, they never leave it. ∎
 """
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import zip_longest
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
+from quakedesign.files import write_whole
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds, response_bounds
+from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad
 from quakedesign.sos.exact.strict import Entries, made, need, read_as, written
@@ -107,6 +111,17 @@ class PlantGuarantee:
         claimed = (*self.claims.outputs, *self.claims.controls)
         holds = found is not None and all(a <= b for a, b in zip(found, claimed, strict=True))
         return Verdict.PROVED if holds else Verdict.UNDECIDED
+
+    def save(self, path: str | Path) -> None:
+        """Write the certificate for `load_guarantee`, ``quakedesign check`` and ``proofs/check.py``.
+
+        Raises
+        ------
+        OutputError
+            When the folder cannot be written.
+        """
+        content = {"format": 1, "kind": UNCERTAIN_PLANT} | plant_entries(self)
+        write_whole(Path(path), json.dumps(content, indent=1) + "\n")
 
     def lines(self) -> list[str]:
         """What is printed."""

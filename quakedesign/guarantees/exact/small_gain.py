@@ -326,7 +326,7 @@ def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoGuara
     (name, share), whole = max(alone.items(), key=lambda item: item[1]), UpperBound(small_gain)
     what = _WORDS.get(name, _LEFT_OUT)
     return NoGuarantee(
-        reason=f"small gain {whole:.3g}, which must be below 1: the {what} alone makes {LowerBound(share):.3g}",
+        reason=f"small gain {whole:.3g}, which must be below 1: the {what} contributes {LowerBound(share):.3g}",
         small_gain=whole,
     )
 

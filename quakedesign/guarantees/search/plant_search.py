@@ -58,6 +58,11 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
     free = list(bounds)
     for _ in range(_TURNS):
         part = linear_part(plant, bounds)
+        if not (part.disturbances or part.loads or any(part.noise) or any(part.start)):
+            raise ParameterError(
+                "an uncertain plant needs disturbances, loads, noise or start. Received none of them: from rest every "
+                "output stays 0. Give one."
+            )
         loop = part.loop(law)
         if reason := _unstable(part, loop):
             return NoGuarantee(reason=reason, small_gain=None)
@@ -124,8 +129,8 @@ def _numbers(plant: UncertainPlant, part: LinearPart, found: ResponseBounds) -> 
     if radius * _ROOM >= 1:
         alone = int(np.argmax(np.diag(matrix)))
         return NoGuarantee(
-            reason=f"small gain {radius:.3g}, which must be below 1: {names[alone]} alone makes "
-            f"{matrix[alone, alone]:.3g}",
+            reason=f"small gain {radius:.3g}, which must be below 1: {names[alone]} contributes "
+            f"{matrix[alone, alone]:.3g} by itself",
             small_gain=UpperBound(rational(f"{radius:.6g}")),
         )
     none = tuple(Fraction(0) for _ in halves)

@@ -113,7 +113,7 @@ def test_a_loop_through_the_implicit_step_can_fail_by_itself():
     assert isinstance(found, NoGuarantee)
     assert found.small_gain >= 1
     assert found.reason.startswith("small gain")
-    assert found.reason.endswith("the range of the implicit step's slope alone makes 1.08")  # 0.4/2/0.184
+    assert found.reason.endswith("the range of the implicit step's slope contributes 1.08")  # 0.4/2/0.184
 
 
 @pytest.mark.parametrize("share", ["4129/10", "1001/1000", "4126/10", "98765"])
@@ -141,7 +141,7 @@ def test_the_reason_is_the_largest_share_in_the_worst_part_of_the_period():
     parts["slip_error", "acceleration"] = (F(0), 3 / share)
     found = bounds_from(TASK, parts, None, STEP)
     assert isinstance(found, NoGuarantee)
-    assert found.reason.endswith("the range of friction's slope in slip alone makes 3")
+    assert found.reason.endswith("the range of friction's slope in slip contributes 3")
     assert 3 + 2 * TASK.half_ranges["push"] <= found.small_gain <= F(1001, 1000) * (3 + 2 * TASK.half_ranges["push"])
 
 
