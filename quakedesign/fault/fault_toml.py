@@ -90,9 +90,9 @@ class Table:
                 )
         return spelt[0] if len(spelt) == 1 else name
 
-    def text(self, key: str) -> str | None:
+    def text(self, key: str, *, optional: bool = False) -> str | None:
         """Text of an entry; None for one that is wrong or not given."""
-        return self._of_type(key, str, "a text") if self._given(key) else None
+        return self._of_type(key, str, "a text") if self._given(key, optional) else None
 
     def table(self, key: str, *, optional: bool = False) -> "Table | None":
         """Table inside this one; None for one that is wrong or not given."""
@@ -423,10 +423,9 @@ def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
 def fault_of_tables(table: Table, problems: Problems, allow_code: bool) -> Any:
     """Fault of a whole file; there are problems where it is None."""
     parts: dict[str, Any] = {"name": table.text("name"), "source": _NO_SOURCE}
-    if "source" in table.entries:
-        parts["source"] = table.text("source")
-    if "poor_fit" in table.entries:
-        parts["poor_fit"] = table.text("poor_fit")
+    for key in ("source", "poor_fit"):
+        text = table.text(key, optional=True)
+        parts |= {key: text} if key in table.entries else {}
     for key, unit in PLANT.items():
         parts |= table.quantities({key: unit}, optional=key in OPTIONAL)
     parts["friction"] = read_friction(table.table("friction"), problems, allow_code)
@@ -465,8 +464,9 @@ def read_friction(table: Table | None, problems: Problems, allow_code: bool) -> 
                 read |= dict.fromkeys([field.name] if value else [], value.get(key))
             elif "unit" in field.metadata:
                 read |= table.quantities({field.name: field.metadata["unit"]}, optional=field.name in optional)
-            elif field.name not in optional or field.name in table.entries:
-                read[field.name] = table.text(field.name)
+            else:
+                text = table.text(field.name, optional=field.name in optional)
+                read |= {field.name: text} if field.name not in optional or field.name in table.entries else {}
         table.close()
         return None if None in read.values() else law(**read)
     return None
@@ -693,7 +693,8 @@ def _asked(units: Mapping[str, str], said: Mapping[str, str], optional: Any) -> 
     for key in units:
         left = f"; {_LEFT_OUT[key]}" if key in _LEFT_OUT and key in optional else ""
         mark = "# " if key in optional else ""
-        yield f"{mark}{key} = {_written(_example(key, units[key]))}  # {said[key].split('; ')[0].rstrip('.')}{left}"
+        comment = f"{said.get(key, '').split('; ')[0].rstrip('.')}{left}"
+        yield f"{mark}{key} = {_written(_example(key, units[key]))}{comment and f'  # {comment}'}"
 
 
 def _example(key: str, unit: str) -> str | float:
@@ -727,7 +728,10 @@ def _described(kind: type) -> dict[str, str]:
 def fault_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of fault files, for editors that complete and check TOML."""
     said = _described(Fault)
-    widths = {key: {"type": "number", "description": said} for key, said in _WIDTHS_SAID.items()}
+    widths = {
+        key: {"type": ["number", "string"], "description": said, "examples": [0.1]}
+        for key, said in _WIDTHS_SAID.items()
+    }
     properties = {
         "name": {"type": "string", "description": "letters, digits, spaces and _ . -"},
         "source": {"type": "string", "description": said["source"]},
@@ -774,7 +778,7 @@ def _quantities(units: Mapping[str, str], said: Mapping[str, str]) -> dict[str, 
     return {
         key: {
             "type": "string" if unit else ["number", "string"],
-            "description": said[key],
+            "description": said.get(key, ""),
             "examples": [_example(key, unit)],
         }
         for key, unit in units.items()

@@ -1,6 +1,7 @@
 """The file to start from can be read as it is, and the schema of editors accepts what the program accepts."""
 
 import tomllib
+from fractions import Fraction
 from importlib.resources import files
 
 import jsonschema
@@ -94,3 +95,18 @@ def test_the_schema_knows_symbols():
     assert "\na = 0.01" in text
     assert VALIDATOR.is_valid(tomllib.loads(text))
     assert parse_fault(text, "x").friction.direct_effect == 0.01
+
+
+@pytest.mark.parametrize("width", ["0.3", '"0.3"'])
+def test_a_half_width_is_a_number_or_a_text_for_the_schema_and_the_program(width):
+    text = fault_toml(load_fault("real-fault")).replace('uncertainty = "paper"\n', "")
+    text += f"\n[uncertainty]\nstiffness = {width}\n"
+    assert VALIDATOR.is_valid(tomllib.loads(text))
+    assert parse_fault(text, "own.toml").box.stiffness == Fraction(3, 10)
+
+
+def test_a_law_without_descriptions_has_a_file_to_start_from():
+    text = template("tests.data.own_parts:Hyperbolic")
+    drop = next(line for line in text.splitlines() if line.startswith("drop = "))
+    assert "#" not in drop
+    assert parse_fault(text, "own.toml", allow_code=True).friction.drop == float(drop.split()[-1])
