@@ -253,6 +253,11 @@ def test_everything_that_is_wrong_is_said_at_once():
     assert said.count("errors.") == 1
 
 
+def test_all_half_widths_that_are_wrong_are_named():
+    with pytest.raises(ParameterError, match=r"2 errors. \(1\) uncertainty.stiffness .*\(2\) uncertainty.authority"):
+        parse_fault(edited(BOX, "uncertainty = { stiffness = nan, authority = inf }"), "own.toml")
+
+
 def test_an_empty_file_lacks_every_key_in_one_sentence():
     with pytest.raises(
         ScenarioError, match=r"name, density, shear_modulus, length, effective_normal_stress, friction must"

@@ -8,7 +8,11 @@ import jsonschema
 import pytest
 
 from quakedesign.fault import Fault, fault_toml, friction_laws, load_fault, parse_fault, presets
-from quakedesign.fault.fault_toml import fault_schema, template
+from quakedesign.fault.block_chain import BLOCK, DIFFUSION, WELL
+from quakedesign.fault.entries import entries_of
+from quakedesign.fault.fault_template import fault_schema, template
+from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, TEXTS, WIDTHS
+from quakedesign.fault.units import si_value
 
 VALIDATOR = jsonschema.Draft202012Validator(fault_schema())
 
@@ -110,3 +114,24 @@ def test_a_law_without_descriptions_has_a_file_to_start_from():
     drop = next(line for line in text.splitlines() if line.startswith("drop = "))
     assert "#" not in drop
     assert parse_fault(text, "own.toml", allow_code=True).friction.drop == float(drop.split()[-1])
+
+
+TABLES = {"top": TEXTS | PLANT, "task": TASK, "disturbance": DISTURBANCE, "uncertainty": WIDTHS, "block": BLOCK}
+TABLES |= {"well": WELL, "diffusion": DIFFUSION} | {name: entries_of(law) for name, law in friction_laws().items()}
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_every_entry_has_a_description_and_an_example_in_its_unit(table):
+    for name, entry in TABLES[table].items():
+        assert (entry.name, bool(entry.description)) == (name, True)
+        if entry.unit is not None:
+            assert si_value(entry.example, entry.unit, name) >= 0
+
+
+def test_an_entry_is_declared_once_for_reading_writing_template_and_schema():
+    """A declared default and example appear in the template and the schema; the unit in the written file."""
+    entry = PLANT["damping"]
+    assert (entry.unit, entry.required) == ("kg/s", False)
+    assert f'# damping = "{entry.example}"  # η [kg/s], not negative; {entry.default_text}, if left out' in template()
+    assert fault_schema()["properties"]["damping"]["examples"] == [entry.example]
+    assert '\ndamping = "500000000000000.0 kg/s"\n' in fault_toml(load_fault("real-fault"))
