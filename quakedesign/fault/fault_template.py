@@ -99,11 +99,7 @@ def fault_schema() -> dict[str, Any]:
         diffusivity=_property(DIFFUSION["diffusivity"]),
     )
     schema["required"].append("friction")
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "fault of quakedesign",
-        **schema,
-    }
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "fault of quakedesign"} | schema
 
 
 def _table(entries: Mapping[str, FileEntry], **tables: Any) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from quakedesign.fault.model import (
     UncertaintyBox,
     acceleration,
     is_ordinary,
+    require_all,
     require_name,
     require_plant,
     require_positive,
@@ -316,14 +317,13 @@ def fault_of_tables(table: Table, allow_code: bool) -> Fault | None:
     parts["box"] = _box(table)
     table.close()
     given = {key: value for key, value in parts.items() if value is not None}
-    whole = task if given == parts else None
     with table.problems.collected():
-        if whole is not None:
-            return completed(parts, whole, _assumed(parts, table))
-        require_plant(**{key: given[key] for key in PLANT if key in given})
-    with table.problems.collected():
-        if whole is None and "name" in given:
-            require_name(given["name"])
+        if task is not None and given == parts:
+            return completed(parts, task, _assumed(parts, table))
+        require_all(
+            lambda: require_plant(**{key: given[key] for key in PLANT if key in given}),
+            lambda: require_name(given.get("name", "not given")),
+        )
     return None
 
 

@@ -161,11 +161,11 @@ class Problems:
             return
         kinds = {type(error) for error in self.found}
         kind = kinds.pop() if len(kinds) == 1 else ScenarioError
-        told = [str(error) for error in self.found]
-        if len(told) > 1:
-            told = [f"{len(told)} errors.", *(f"({i}) {text}" for i, text in enumerate(told, start=1))]
-        error = kind(f"{where}: {' '.join(told)}" if where else " ".join(told))
-        error.parts = tuple(self.found) if len(told) > 1 else ()
+        messages = [str(error) for error in self.found]
+        if len(messages) > 1:
+            messages = [f"{len(messages)} errors.", *(f"({i}) {text}" for i, text in enumerate(messages, start=1))]
+        error = kind(f"{where}: {' '.join(messages)}" if where else " ".join(messages))
+        error.parts = tuple(self.found) if len(messages) > 1 else ()
         raise error from None
 
     def resolved(self, value: _Value | None, where: str = "") -> _Value:
@@ -555,7 +555,7 @@ class Fault:
         with problems.collected():
             require_name(self.name)
         with problems.collected():
-            require_plant(**{name: getattr(self, name) for name in _PLANT}, **self._other_side)
+            require_plant(**{name: value for name in _UNITS if (value := getattr(self, name)) is not None})
         with problems.collected():
             require_ordinary(**{name: getattr(self.friction, name) for name in self.friction.quantities()})
         problems.refuse()
@@ -593,13 +593,9 @@ class Fault:
         return replace(self, disturbance=disturbance)
 
     @property
-    def _other_side(self) -> dict[str, float]:
-        return {} if self.width is None else {"width": self.width}
-
-    @property
     def side(self) -> float:
         """h [m], the shorter side of the patch; L of a square one."""
-        return min((self.length, *self._other_side.values()))
+        return min(self.length, self.width or self.length)
 
     @cached_property
     def squares(self) -> Fraction:
@@ -693,14 +689,7 @@ class Fault:
         return rest_slip(self.friction, self.effective_normal_stress * self.area, self.stiffness)
 
 
-_PLANT = {
-    "density": "kg/m^3",
-    "shear_modulus": "Pa",
-    "length": "m",
-    "damping": "kg/s",
-    "effective_normal_stress": "Pa",
-    "sampling_time": "s",
-}
+_UNITS = {each.name: each.metadata["unit"] for each in fields(Fault) if "unit" in each.metadata}
 
 
 def require_plant(**numbers: float) -> None:
@@ -712,7 +701,7 @@ def require_plant(**numbers: float) -> None:
             if name == "damping":
                 require_nonnegative(damping=value)
             else:
-                usual = f"It is in {_PLANT[name]} here; check sign and unit." if name in _PLANT else ""
+                usual = f"It is in {_UNITS[name]} here; check sign and unit."
                 require_positive(compression if name == "effective_normal_stress" else usual, **{name: value})
             require_ordinary(**{name: value})
     problems.refuse()
