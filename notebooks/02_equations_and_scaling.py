@@ -20,19 +20,20 @@
 import dataclasses
 
 import sympy as sp
+from IPython.display import display
 
 # %matplotlib inline
 import quakedesign as qd
 from quakedesign.symbolic import homogeneous, plant, weights_for
 from quakedesign.symbolic import critical_stiffness, nucleation_length, stability
 
-plant.force_balance()
+display(plant.force_balance())
 
 # %% [markdown]
 # Measured from the equilibrium without pressure and disturbance, per unit mass, with $x_1$ the slip [m] and $x_2$ the slip rate [m/s]:
 
 # %%
-plant.shifted_acceleration()
+display(plant.shifted_acceleration())
 
 # %% [markdown]
 # The Jacobian keeps the pressure $p$, because withdrawal ($p<0$) raises the softening. The origin is unstable if **either** inequality holds.
@@ -40,7 +41,7 @@ plant.shifted_acceleration()
 # %%
 fault = qd.load_fault("real-fault")
 model = qd.derive(fault)
-model
+display(model)
 
 # %% [markdown]
 # ## A verdict with a margin
@@ -56,7 +57,7 @@ print(f"critical stiffness {critical_stiffness(fault):.4g} N/m, nucleation lengt
 # %%
 from quakedesign.report import stability_map
 
-stability_map(fault)
+display(stability_map(fault))
 
 # %% [markdown]
 # ## Friction of one's own
@@ -68,7 +69,7 @@ from own.hyperbolic_friction import HyperbolicWeakening
 mine = dataclasses.replace(fault, friction=HyperbolicWeakening(residual=0.2353, drop=0.1, length=0.5))
 print(qd.derive(mine).reasons[0])
 print(stability(mine).outcome.name.lower())
-qd.derive(mine).acceleration
+display(qd.derive(mine).acceleration)
 
 # %% [markdown]
 # ## A control law of one's own
@@ -82,7 +83,7 @@ weights = weights_for(law.field, -1)
 found = homogeneous(law.field, weights)
 print({str(s): w for s, w in weights.items()}, found.verdict, found.degree)
 print(homogeneous(law.field, {law.x1: 1, law.x2: 1, law.x3: 1}).verdict)
-found
+display(found)
 
 # %% [markdown]
 # ## Scaling

@@ -26,6 +26,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import sympy as sp
+from IPython.display import display
 
 import quakedesign as qd
 from quakedesign.lyapunov import certificate_text
@@ -79,7 +80,7 @@ def verdicts(file: Path) -> tuple[str, str]:
 
 
 both = verdicts(path)
-both
+display(both)
 
 # %% [markdown]
 # ## Break it
@@ -126,7 +127,7 @@ def edit_range(copy):
 
 
 broken = {edit.__name__: changed(edit) for edit in (edit_gram, edit_gain, edit_function, edit_claim, edit_range)}
-broken
+display(broken)
 
 # %% [markdown]
 # ## A law of one's own, with a nested power

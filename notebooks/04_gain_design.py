@@ -19,6 +19,7 @@
 
 # %%
 import pandas as pd
+from IPython.display import display
 
 # %matplotlib inline
 from quakedesign.report import gain_map_figure
@@ -35,7 +36,7 @@ from quakedesign.lyapunov import largest_lipschitz
 small = synthesise("cta", "norm", lipschitz=1, degrees=(5, 6), starts=1)
 print({name: float(k) for name, k in small.gains.items()}, "norm", round(small.value, 3))
 print("checked again:", small.certificate.check())
-pd.DataFrame([{**{n: float(k) for n, k in c.gains.items()}, "norm": c.norm, "times larger": c.ratio} for c in small.compared])
+display(pd.DataFrame([{**{n: float(k) for n, k in c.gains.items()}, "norm": c.norm, "times larger": c.ratio} for c in small.compared]))
 
 # %% [markdown]
 # Small is not everything: how far do these gains reach beyond $\bar L = 1$, against the limit $k_3-k_4$ that no Lyapunov function can pass?
@@ -60,7 +61,7 @@ for name, found in reach.items():
 # %%
 wide = synthesise("cta", "beta", degrees=(5,), starts=1)
 print({name: float(k) for name, k in wide.gains.items()}, "rho", round(wide.value, 3), "norm", round(wide.norm, 2))
-pd.DataFrame([{**{n: float(k) for n, k in c.gains.items()}, "norm": c.norm, "rho": c.value} for c in wide.compared])
+display(pd.DataFrame([{**{n: float(k) for n, k in c.gains.items()}, "norm": c.norm, "rho": c.value} for c in wide.compared]))
 
 # %% [markdown]
 # ## A map
@@ -73,7 +74,7 @@ drawn = gain_map(
 )
 counts = {level: drawn.counts(i + 1) for i, level in enumerate(("0.5", "1"))}
 print(counts)
-gain_map_figure(drawn)
+display(gain_map_figure(drawn))
 
 # %% [markdown]
 # The command line asks the same questions: `quakedesign synthesise cta --objective decay --out gains.json`, or, for the smallest measured error of a

@@ -28,7 +28,6 @@ from fractions import Fraction
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
-from IPython.display import Markdown
 from scipy.linalg import expm
 
 # %matplotlib inline
@@ -53,7 +52,7 @@ from own import printed_examples as examples  # beside this notebook
 missing = examples.printed_bound_example()
 accepted, repaired = examples.printed_design(missing), examples.corrected_design(missing)
 judged = both_tests(missing.problem, accepted.gains, missing.printed)
-Markdown(judged.table())
+print(judged.table())
 
 
 # %%
@@ -85,7 +84,7 @@ plt.show()
 row = examples.printed_row_example()
 accepted_row, repaired_row = examples.printed_design(row), examples.corrected_design(row)
 judged_row = both_tests(row.problem, accepted_row.gains, row.printed, row.switching)
-Markdown(judged_row.table())
+print(judged_row.table())
 
 # %%
 turns = 15
@@ -104,7 +103,7 @@ plt.show()
 
 # %%
 fault = qd.load_fault("real-fault")
-Markdown(uncertainty_bounds(fault).table())
+print(uncertainty_bounds(fault).table())
 
 # %% [markdown]
 # Turned round: with a given $Q$ the guarantee holds for every $R$ that leaves $Q - R\,W$ positive definite for some $w$. With $s_1 = R/w$ and $s_2 = R/(1-w)$ that

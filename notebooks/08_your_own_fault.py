@@ -31,6 +31,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from IPython.display import display
 
 # %matplotlib inline
 import quakedesign as qd
@@ -62,7 +63,7 @@ for name, estimate in found.estimates.items():
     print(f"{name:21} {estimate.value:.4g} ({estimate.low:.4g} to {estimate.high:.4g}) {estimate.unit}")
 residuals = identification_figure(found)
 residuals.savefig(folder / "record.pdf")
-residuals
+display(residuals)
 
 # %% [markdown]
 # ## A fault file, its stability, and what the fault does if nobody acts

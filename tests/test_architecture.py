@@ -449,22 +449,22 @@ def test_the_name_of_a_class_and_of_a_file_occurs_once():
 
 
 BUDGETS = {
-    "fault": 3143,
-    "symbolic": 3109,
+    "fault": 3141,
+    "symbolic": 3112,
     "sos": 6334,
     "laws": 3226,
     "loop": 4227,
     "plant": 1356,
-    "guarantees": 13143,
-    "lyapunov": 6959,
+    "guarantees": 13145,
+    "lyapunov": 6958,
     "linear": 2390,
     "synthesis": 1914,
     "rocq": 843,
     "simulation": 9756,
     "identification": 4037,
-    "studies": 4182,
-    "report": 4073,
-    "cli": 3498,
+    "studies": 4186,
+    "report": 4092,
+    "cli": 3496,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

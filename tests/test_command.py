@@ -102,6 +102,7 @@ def test_a_certificate_is_said_in_lines():
         claims={"positive": F(1, 2), "decrease": F(2, 3)},
     )  # fmt: skip
     head = [
+        "in continuous time, for the equations below: sampling with zero-order hold is not covered",
         "law cta, field equal to the law's own",
         "k = 3",
         "domain: cells; states with weights: x = 2",

@@ -2,10 +2,12 @@
 
 import inspect
 import json
+import math
 import os
 import re
 import subprocess
 import sys
+from fractions import Fraction
 from html.parser import HTMLParser
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -175,3 +177,34 @@ def test_the_lines_of_the_gallery_draw_curves_with_labelled_axes(draw):
     axes = draw().axes
     assert all(each.lines and each.get_xlabel() + each.get_ylabel() for each in axes)
     plt.close("all")
+
+
+def test_how_it_works_leads_to_the_bounds_of_the_stored_certificates():
+    """One chain of numbers for each plant: the bounds are those of the files, rounded up."""
+    page = (ROOT / "docs/explanation/how_it_works.md").read_text(encoding="utf-8")
+    proofs = ROOT / "proofs" / "certificates"
+    sticks, without = (
+        json.loads((proofs / name).read_text(encoding="utf-8"))["claims"]
+        for name in ("stick_slip_real-fault.json", "guarantee_real-fault.json")
+    )
+    shown = [(sticks["peak_slip_rate"], 0), (sticks["slip_behind"], 1), (sticks["slip_ahead"], 1)]
+    for value, places in [*shown, (without["peak_slip_rate"], 0)]:
+        scale = 10**places
+        micro = f"{math.ceil(Fraction(value) * 10**6 * scale) / scale:.{places}f} µm"
+        assert micro.removesuffix(" µm") in page, micro
+    formulas = r"(?s)\$\$.*?\$\$|\$[^$]*\$"
+    assert len(re.sub(formulas, "formula", page).split()) <= 1500
+
+
+def test_files_of_the_source_that_pages_name_exist():
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+    named = {
+        (page.name, name)
+        for page in pages
+        for name in re.findall(
+            r"\b(?:quakedesign|benchmarks|proofs|tests)/[\w/.-]*\.(?:py|toml|json|v|md)\b", page.read_text()
+        )
+        if "quakedesign-" not in name
+    }
+    assert named
+    assert not sorted((page, name) for page, name in named if not (ROOT / name).exists())

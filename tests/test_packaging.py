@@ -42,3 +42,11 @@ def test_every_library_that_is_needed_is_imported():
     files = {"h5netcdf", "h5py"}  # by xarray, to which NetCDF's engine is named
     for wanted in {Requirement(line).name for line in PROJECT["dependencies"]} - files:
         assert re.search(rf"^\s*(from|import) {modules.get(wanted, wanted)}\b", source, re.MULTILINE), wanted
+
+
+def test_the_extras_that_the_documentation_installs_have_what_its_commands_need():
+    extras = PROJECT["optional-dependencies"]
+    pages = [path.read_text(encoding="utf-8") for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]]
+    assert {name for text in pages for name in re.findall(r"'\.\[(\w+)\]'", text)} <= set(extras)
+    assert any("jupyter lab notebooks" in text for text in pages)
+    assert {"jupyterlab", "nbconvert"} <= {Requirement(line).name for line in extras["notebook"]}

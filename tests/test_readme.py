@@ -6,10 +6,13 @@ from pathlib import Path
 
 import pytest
 
+import quakedesign
 from quakedesign.cli import main
 from quakedesign.cli.app import app
+from quakedesign.report.summary import LEGEND
 from quakedesign.simulation import Metrics
 from quakedesign.simulation.recorder import ActuatorMetrics
+from quakedesign.studies.facts import box_sentence
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "proofs/FORMAT.md")
@@ -39,8 +42,6 @@ def test_links_lead_somewhere(document):
 
 
 def test_python_in_it_compiles_and_uses_public_names():
-    import quakedesign
-
     blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
     assert blocks
     for block in blocks:
@@ -72,3 +73,22 @@ def test_every_verdict_on_a_polynomial_in_it_is_the_one_given():
     found = [(str(eval(question, setting).verdict), verdict) for question, verdict in questions]
     assert len(found) == 3
     assert all(given == verdict for given, verdict in found)
+
+
+MAIN_JOB = (ROOT / "docs" / "explanation" / "main_job.md").read_text(encoding="utf-8")
+PRINTED = re.search(r"It prints\n\n```\n(.*?)```", MAIN_JOB, flags=re.DOTALL)[1]
+
+
+def test_the_page_of_the_main_job_prints_the_box_and_what_its_columns_are():
+    said = " ".join(PRINTED.split())
+    assert all(line in PRINTED.splitlines() for line in LEGEND)
+    assert box_sentence(quakedesign.load_fault("real-fault")) in said
+
+
+@pytest.mark.slow  # the main job itself
+def test_the_page_of_the_main_job_prints_what_the_command_prints(capsys, tmp_path):
+    with pytest.raises(SystemExit) as end:
+        main(["design", "real-fault", "--out", str(tmp_path / "out")])
+    out, _ = capsys.readouterr()
+    assert end.value.code == 0
+    assert out.startswith(PRINTED.rstrip("\n") + "\n\nwritten: ")

@@ -3,18 +3,20 @@
 from pathlib import Path
 
 import numpy as np
+import sympy as sp
 from scipy.linalg import expm
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 import quakedesign as qd
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.laws.stick_slip_controller import StickSlipController
+from quakedesign.laws.stick_slip_law import GAIN_UNITS
 from quakedesign.report.drawing import SMALL, figure, finish, named
 
 HERE = Path(__file__).parent
 PROOFS = HERE.parents[1] / "proofs" / "certificates"
 FAULT = qd.load_fault("real-fault")
-FINE = 40  # parts of a period
+FINE = 160  # parts of a period
 BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#777777"
 
 
@@ -47,18 +49,59 @@ def forces():
     save(drawing, "forces", "Force balance of real-fault", legend=left)
 
 
+def stuck_and_sliding(law, step, start, periods):
+    """Slip rate [m/s] in `FINE` parts a period and pressures [Pa]: true friction, stick, and a sine of the amplitude.
+
+    The course begins at rest on the reference, at the pressure that balances friction there.
+    """
+    x, t = sp.symbols("x t")
+    mu = sp.lambdify(x, FAULT.friction.coefficient(x, sp.Integer(0)), "math")
+    follow = sp.lambdify(t, [FAULT.reference.slip(t), sp.diff(FAULT.reference.slip(t), t)], "math")
+    push = sp.lambdify(t, FAULT.disturbance.explicit(t), "math")
+    normal, authority, stiff = FAULT.effective_normal_stress, FAULT.authority, FAULT.specific_stiffness
+    gain = {name: float(getattr(law, name)) for name in GAIN_UNITS}
+    time, (slip, _), rate = start, follow(start), 0.0
+    balance = normal + (stiff * slip / authority - mu(0.0) * normal) / mu(slip)
+    level, expected, last = -balance, 0.0, (slip, 0.0)
+    rates, pressures, fine = [], [], step / FINE
+    for _ in range(periods):
+        target, wanted = follow(time)
+        change = slip - last[0] - step * (last[1] + expected) / 2
+        change = max(change, -step * expected / 2) if rate == 0 else change
+        level += gain["level_gain"] * (rate - expected) + gain["slip_gain"] * change
+        wish = wanted - gain["return_rate"] * (slip - target)
+        expected, last = max(wish, 0.0), (slip, rate)
+        pressure = -gain["rate_gain"] * rate + gain["target_gain"] * wish - level
+        pressures.append(pressure)
+        for _ in range(FINE):
+            rates.append(rate)
+            force = authority * (mu(0.0) * normal - mu(slip) * (normal - pressure)) - stiff * slip + push(time)
+            rate = max(rate + fine * (force - FAULT.specific_damping * rate), 0.0)
+            slip, time = slip + fine * rate, time + fine
+    return np.array(rates), np.array(pressures)
+
+
 def sampled(claim):
-    """Pressure, slip rate and measurements over some periods of the loop from an initial slip rate."""
-    time, states, pressure, _ = course(claim, np.zeros(FINE * 14), start=(0.0, 4e-5))
-    drawing, ((rate,), (push,)) = figure(2, 3.6)
-    step = float(claim.held.step)
-    rate.plot(time, 1e6 * states[:, 1], color=BLUE, label="slip-rate error of the fault")
-    rate.plot(time[::FINE], 1e6 * states[::FINE, 1], "o", color=ORANGE, markersize=4, label="measured")
-    push.plot(time, pressure / 1e3, color=GREY, drawstyle="steps-post", label="pressure (zero-order hold)")
-    rate.set_ylabel("slip-rate error [µm/s]")
-    push.set(ylabel="pressure [kPa]", xlabel="time [s]", xlim=(0, 14 * step))
-    push.legend(fontsize=SMALL)
-    save(drawing, "sampled-loop", "The loop as it runs: measured, computed and held every 0.184 s", legend=rate)
+    """Slip rate, its measurements and the pressure over a cycle of rest and slip, in the middle of the task."""
+    step, shown, before = float(claim.held.step), 50, 450
+    rates, pressures = stuck_and_sliding(claim.held.law, step, 3.3e5, before + shown)
+    rates, pressures = rates[FINE * before :], pressures[before:]
+    time = step / FINE * np.arange(len(rates))
+    drawing, ((rate,), (pressure,)) = figure(2, 3.6)
+    rate.plot(time, 1e6 * rates, color=BLUE, label="slip rate of the fault")
+    rate.plot(time[::FINE], 1e6 * rates[::FINE], "o", color=ORANGE, markersize=4, label="measured")
+    pressure.step(
+        step * np.arange(shown),
+        (pressures - pressures[0]) / 1e3,
+        where="post",
+        color=GREY,
+        label="pressure (zero-order hold)",
+    )
+    rate.set_ylabel("slip rate [µm/s]")
+    pressure.set(ylabel="change of pressure [kPa]", xlabel="time [s]", xlim=(0, shown * step))
+    pressure.legend(fontsize=SMALL)
+    title = "The loop as it runs on the stick–slip plant: measured, computed and held every 0.184 s"
+    save(drawing, "sampled-loop", title, legend=rate)
 
 
 def matrices(claim):
@@ -105,10 +148,11 @@ def small_gain(claim):
         fine * np.arange(ages.size),
         1e6 * amplitude * np.cumsum(np.abs(ages)),
         color=BLUE,
-        label="L1 norm up to this age, times amplitude",
+        label=f"L1 norm up to this age, times the amplitude: {np.ceil(1e6 * amplitude * np.abs(ages).sum()):.0f} µm/s",
     )
     proved = 1e6 * float(claim.claims.slip_rate_error)
-    norm.axhline(proved, color=ORANGE, linestyle="--", label="proved for all friction of the box, and between samples")
+    text = f"proved for all friction of the box, and between samples: {np.ceil(proved):.0f} µm/s"
+    norm.axhline(proved, color=ORANGE, linestyle="--", label=text)
     norm.set(xlabel="age of the disturbance [s]", ylabel="slip-rate error [µm/s]", xlim=(0, 8), ylim=(0, 1.15 * proved))
     norm.legend(fontsize=SMALL, loc="lower right")
     worst = amplitude * np.sign(ages[::-1])
@@ -117,13 +161,13 @@ def small_gain(claim):
     seen.fill_between(
         time[:-1], 40 * np.sign(worst), color=GREY, alpha=0.3, linewidth=0, label="sign of that disturbance"
     )
-    seen.set(xlabel="time [s]", ylabel="slip-rate error [µm/s]", xlim=(time[-1] - 8, time[-1]))
+    seen.set(xlabel="time [s]", ylabel="slip-rate error [µm/s]", xlim=(time[-1] - 8, time[-1]), ylim=(-230, 160))
     seen.legend(fontsize=SMALL, loc="lower left")
-    save(drawing, "small-gain", "Peak of the nominal loop: the L1 norm of its impulse response")
+    save(drawing, "small-gain", "Plant without stick: largest slip-rate error of the nominal loop")
 
 
 def invariant_set(claim):
-    """Projection of the polytope on slip error and slip rate, and a course under random pushes inside of it."""
+    """Projection of the polytope on slip error and slip rate, and the run of the task inside of it."""
     facets = np.array([[float(v) for v in row] for row in claim.reach.facets] + [[0.0, -1.0, 0.0]])
     scale = 1 / np.abs(facets).max(axis=0)
     bounds = np.append(-np.ones(len(facets) - 1), 0.0)
@@ -138,18 +182,23 @@ def invariant_set(claim):
     label = "run of the task"
     axis.plot(1e6 * run.slip_error, 1e6 * run.slip_rate, ".", markersize=1, color=ORANGE, label=label)
     axis.axvline(
-        1e6 * float(claim.claims.slip_ahead), color="black", linestyle="--", linewidth=0.8, label="proved bounds"
+        1e6 * float(claim.claims.slip_ahead),
+        color="black",
+        linestyle="--",
+        linewidth=0.8,
+        label="proved bounds, between samples too",
     )
     axis.axvline(-1e6 * float(claim.claims.slip_behind), color="black", linestyle="--", linewidth=0.8)
     axis.axhline(1e6 * float(claim.claims.peak_slip_rate), color="black", linestyle="--", linewidth=0.8)
     axis.set(xlabel="slip ahead of the reference [µm]", ylabel="slip rate [µm/s]")
-    named(axis, "no period leaves it, whether the fault slides or rests")
+    named(axis, "a period that begins in the polytope ends in it, whether the fault slides or rests")
     save(drawing, "invariant-set", "States at the samples on the stick–slip plant", legend=axis)
 
 
 if __name__ == "__main__":
     loop = proof("guarantee_real-fault.json")
     forces()
-    sampled(loop)
+    sticks = proof("stick_slip_real-fault.json")
+    sampled(sticks)
+    invariant_set(sticks)
     small_gain(loop)
-    invariant_set(proof("stick_slip_real-fault.json"))

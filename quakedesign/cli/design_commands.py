@@ -228,12 +228,10 @@ def positive(comparison: Any) -> bool:
 
     A design that was to run with a guarantee and found none is not.
     """
-    from quakedesign.guarantees import NoGuarantee
-
     needed = {"along_reference", "control_coefficient", "friction_slope", "sampling_time"}
     return all(
         str(entry.design.verdict) == "proved"
-        and not isinstance(entry.design.runs, NoGuarantee)
+        and (entry.design.runs is None or entry.design.runs.proved)
         and all(p.holds for p in entry.design.conditions if p.name in needed)
         and (entry.run is None or entry.run.outcome.harmless)
         for entry in comparison.of("designed")
@@ -285,7 +283,7 @@ def compare(
 
         print_comparison(comparison, console(), whole=verbose)
         if verbose:
-            print_lines(printed_lines(printed(comparison)))
+            print_lines(printed_lines(printed(comparison), loaded.name))
     return 0 if positive(comparison) else 1
 
 
@@ -333,6 +331,6 @@ def figures(
     print_lines(f"{label}: {said}" for label, said in runs)
     files = [(drawn["file"], drawn["paper"]) for drawn in results["figures"].values()]
     print_lines(f"{folder}/{file}" + (f": {paper} of the paper" if paper else "") for file, paper in files)
-    print_lines(printed_lines(results["printed"]))
+    print_lines(printed_lines(results["printed"], loaded.name))
     print_lines(["", f"written: {folder}/ (also results.json, numbers.csv, report.html, certificates)"])
     return 0

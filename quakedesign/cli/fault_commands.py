@@ -209,7 +209,7 @@ def identify(
     """Identify friction parameters, with confidence regions, from a laboratory record.
 
     Velocity steps and slide-hold-slide tests give rate-and-state parameters; slip or a test with a stiff machine gives
-    slip-weakening parameters. The first line is the verdict: the fit explains the record, does not, or cannot tell.
+    slip-weakening parameters. The first line is the verdict: explains the record, does not, or cannot tell.
     Exit code 0 only if the fit explains the record and every parameter is determined.
 
     Parameters

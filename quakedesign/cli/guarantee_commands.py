@@ -284,8 +284,8 @@ def limits(
 ) -> int:
     """Give performance limits of every controller on a fault, with the proved bounds of a designed controller.
 
-    The limits are the smallest slip-rate error, the longest T_s, delay and diffusion time, the farthest well and the
-    smallest withdrawal, for any disturbance bounded by the fault's amplitude.
+    The limits are the smallest slip-rate error (plant without stick) and slip rate (stick-slip plant), the longest T_s,
+    delay and diffusion time, the farthest well and the smallest withdrawal, for any disturbance of the given amplitude.
 
     Parameters
     ----------

@@ -232,7 +232,7 @@ class LawOptions:
     Parameters
     ----------
     controller
-        cta, dia or elqr, or your own law as module:Class; none for a run without control, where the command has one.
+        cta, dia or elqr, or your own law as module:Class; none (not for export): a run without control.
     gains
         published, designed (for the T_s, delay, lag and diffusion of the command), continuous (designed in continuous
         time), or the numbers of the gains (λ = 1, divisor μ_res·N̂_min). Rate-and-state faults: designed.

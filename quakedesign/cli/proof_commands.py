@@ -279,8 +279,8 @@ def attraction(
     ----------
     field
         TOML file: in [field] the rate of every state, such as x = "-y" and y = "x + (x^2 - 1)*y", polynomials that
-        vanish at the origin; before it V = "..." if V is given. Unless it is, V = x'Px with A'P + PA = -1 for the
-        linearised field, or one of degree 2 or 4 that is searched (--everywhere).
+        vanish at the origin; above it V = "...", optional. By default V = x'Px with A'P + PA = -1 for the linearised
+        field; with --everywhere a V of degree 2 or 4 is searched.
     everywhere
         Prove global convergence, or refute V (without V, every V) by a point.
     relative

@@ -273,8 +273,8 @@ class Reference:
     operation_time : float
         t_op [s], positive.
     ramp : float, optional
-        Of friction with a state, which slides all the time: share of the slip that follows the smooth ramp, above 0 and
-        below 1; the rest comes at a constant rate. None: all of it at a constant rate.
+        Rate-and-state friction: fraction of the slip that follows a smooth ramp, above 0 and below 1. The rest is
+        released at a constant rate. None: a constant rate for all of it.
     """
 
     target_slip: float = field(metadata=quantity("m", "5 cm", "the next rest slip", symbol="d_{max}"))
@@ -424,9 +424,9 @@ class Disturbance:
     frequency : float
         Angular frequency [rad/s], not negative.
     slip_growth : float
-        [1/s²].
+        Slope of the disturbance in slip [1/s²]; known, and not part of the bound of a guarantee.
     rate_growth : float
-        [1/s].
+        Slope of the disturbance in slip rate [1/s]; known, and not part of that bound.
     stresses : tuple of str
         Which of ``constant`` and ``amplitude`` were given as a shear stress: proofs cover it for every area per mass of
         the fault's box, while the number itself is for the nominal one.
@@ -497,7 +497,7 @@ class Fault:
     length : float
         L_ac, length of the activated fault [m].
     width : float, optional
-        The side of the patch beside its length [m]; None for a square one, the paper's.
+        Second side of the patch [m]; None for a square patch, as in the paper.
     damping : float
         η [kg/s], not negative.
     effective_normal_stress : float
@@ -512,7 +512,7 @@ class Fault:
     assumed : tuple of str
         What a file left to physics or to the paper's example, each in a sentence.
     poor_fit : str
-        Why the friction, identified from a record, must not be relied on; nothing where there is no reason.
+        Reason why the friction identified from a record is not reliable; empty if it is.
 
     Notes
     -----

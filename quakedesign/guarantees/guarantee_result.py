@@ -278,7 +278,7 @@ class LoopAnswer(LoopResult):
                 **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             }
         bounds, held = self.found.bounds(), self.found.held
-        small = None if isinstance(bounds, NoGuarantee) else float_above(bounds.small_gain)
+        small = None if not bounds.proved else float_above(bounds.small_gain)
         return {
             "verdict": "proved",
             "sentence": self.found.sentence(),
@@ -604,7 +604,7 @@ def _proof(pump: Pump | None, tell: Tell, *, given: bool) -> Prove:
         under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
         tell(f"{under}: proof", _SEARCHED)
         found = _held_by(pump, proved_sliding(task, held, log_rate=log_rate))
-        tell(f"{under}: {'proved' if isinstance(found, SlidingGuarantee) else 'not proved'}", _SEARCHED)
+        tell(f"{under}: {'proved' if found.proved else 'not proved'}", _SEARCHED)
         return found
 
     def about_the_largest(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
@@ -612,7 +612,7 @@ def _proof(pump: Pump | None, tell: Tell, *, given: bool) -> Prove:
         found: SlidingGuarantee | NoGuarantee
         for share in _SHARES if most else _SHARES[:1]:
             found = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), held, log_rate)
-            if isinstance(found, SlidingGuarantee):
+            if found.proved:
                 break
         return found
 
@@ -632,7 +632,7 @@ def _answer(
     if isinstance(design, NoGuarantee):
         return SlidingAnswer(found=design, task=task, held=None)
     proved = prove(task, design, log_rate)
-    return SlidingAnswer(found=proved, task=proved.task if isinstance(proved, SlidingGuarantee) else task, held=design)
+    return SlidingAnswer(found=proved, task=proved.task if proved.proved else task, held=design)
 
 
 def _held_by(pump: Pump | None, found: SlidingGuarantee | NoGuarantee) -> SlidingGuarantee | NoGuarantee:

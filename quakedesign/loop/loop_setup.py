@@ -176,7 +176,7 @@ class LoopSetup:
     rate_noise: Fraction = quantity("m/s", "Bound of the measurement error of the slip rate at any time.")
     initial_slip: Fraction = quantity(
         "m",
-        "Bound of the initial slip, of either sign, such as '0.01 mm'; the law starts as if at rest.",
+        "Bound of the initial slip, of either sign, such as '0.01 mm'; the law starts in its state at rest.",
     )
     initial_slip_rate: Fraction = quantity(
         "m/s",
@@ -186,10 +186,10 @@ class LoopSetup:
         "s",
         "Largest time by which a measurement and its pressure are early or late, such as '2 ms'.",
     )
-    delay_jitter: Fraction = quantity("s", "Largest time by which the pressure is early or late besides.")
+    delay_jitter: Fraction = quantity("s", "Largest additional time by which the pressure is early or late.")
     averaging_time: Fraction = quantity(
         "s",
-        "The law measures means of slip and slip rate over this time before each sample; the delay starts there.",
+        "The law measures means of slip and slip rate over this time before each sample, from which --delay counts.",
     )
     longest_step: Fraction = quantity(
         "s",

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from markupsafe import Markup, escape
@@ -19,6 +19,8 @@ from quakedesign.laws import control_laws
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Entry, Run
+
+    Shown: TypeAlias = Run | tuple[Entry, Run]
 
 
 # ----------------------------------------------------------------------
@@ -88,7 +90,7 @@ def figure(
     return drawing, axes
 
 
-def finish(drawing: Any, title: str, runs: Sequence["Run"], note: str = "", *, legend: Any = None) -> Any:
+def finish(drawing: Any, title: str, runs: Sequence["Shown"], note: str = "", *, legend: Any = None) -> Any:
     """Give a figure its title above, and below the legend of one axis (three columns) and how the runs were made."""
     drawing.suptitle(title, fontsize=SMALL + 2)
     whole = "; ".join(part for part in (note, made(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
@@ -111,13 +113,20 @@ def named(axis: Any, title: str) -> None:
     axis.set_title(title, fontsize=SMALL)
 
 
-def made(runs: Iterable["Run"]) -> str:
-    """Scheme, step, method and plant of runs, every distinct combination once."""
-    told = [
-        f"scheme {p['scheme']}, step {p['step']:.4g} s, method {p['method']}, {p['plant']} plant"
-        for p in (run.provenance for run in runs)
-    ]
-    return "; ".join(dict.fromkeys(told))
+def made(runs: Iterable["Shown"]) -> str:
+    """Scheme, step, method and plant of runs; what differs between entries after their labels, what all share last."""
+    ways: dict[tuple[str, ...], list[str]] = {}
+    for shown in runs:
+        label, run = (shown[0].label, shown[1]) if isinstance(shown, tuple) else ("", shown)
+        p = run.provenance
+        way = (f"scheme {p['scheme']}", f"step {p['step']:.4g} s", f"method {p['method']}", f"{p['plant']} plant")
+        ways.setdefault(way, []).append(label)
+    if len(ways) < 2:
+        return "".join(", ".join(way) for way in ways)
+    shared = [part for part in next(iter(ways)) if all(part in way for way in ways)]
+    own = [(", ".join(filter(None, dict.fromkeys(who))), way) for way, who in ways.items()]
+    told = [": ".join(filter(None, (who, ", ".join(p for p in way if p not in shared)))) for who, way in own]
+    return "; ".join([*told, *(["all runs: " + ", ".join(shared)] if shared else [])])
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:

@@ -64,9 +64,9 @@ def states(comparison: "Compared") -> Any:
     laws, origins, found = grid(comparison)
     rows = 1 + len(laws)
     drawing, axes = figure(rows, 0.95 + 1.1 * rows, len(origins), sharex=True, sharey="row")
-    runs = [run for _, run in runs_of(comparison.entries)]
-    divisor, unit = clock(max(float(run.time[-1]) for run in runs))
-    size, name = length(float(known(runs[0].reference).max()))
+    runs = runs_of(comparison.entries)
+    divisor, unit = clock(max(float(run.time[-1]) for _, run in runs))
+    size, name = length(float(known(runs[0][1].reference).max()))
     for column, origin in enumerate(origins):
         _slips(axes[0, column], comparison, origin, (divisor, size))
         axes[0, column].set_ylabel(f"slip [{name}]")
@@ -152,8 +152,8 @@ def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None
     drawing, axes = figure(
         len(laws), 0.9 + (2.1 if close_ups else 1.15) * len(laws), len(origins), sharex=True, sharey=True
     )
-    runs = [run for _, run in runs_of(comparison.entries)]
-    divisor, unit = clock(max(float(run.time[-1]) for run in runs))
+    runs = runs_of(comparison.entries)
+    divisor, unit = clock(max(float(run.time[-1]) for _, run in runs))
     size, name = scaled(comparison.fault.effective_normal_stress / 10, "Pa")
     for column, origin in enumerate(origins):
         for row, law in enumerate(laws):
@@ -318,7 +318,8 @@ def overview(comparison: "Compared") -> Any:
     speed = np.abs(free.slip_rate)
     moves = free.time[int(np.argmax(speed > 2 * max(floor, float(speed[0]))))]
     rate.plot(free.time, np.where(speed > floor, speed, np.nan), color=NATURAL, label="without control")
-    for entry, run in [*runs_of(comparison.of("published")), (best, own)]:
+    ran = [*runs_of(comparison.of("published")), (best, own)]
+    for entry, run in ran:
         middle, values = _largest(run.time, np.abs(run.slip_rate))
         look = style(entry) | {"linewidth": 1.8 if entry is best else 0.9}
         rate.plot(middle, np.where(values > floor, values, np.nan), **look)
@@ -348,7 +349,7 @@ def overview(comparison: "Compared") -> Any:
     slip.set(xscale="log", xlabel="time [s]", xlim=(first, last))
     note = f"largest value in each of 25 parts of a decade; gaps: slip rate below {floor:.1g} m/s, or at rest"
     title = f"{comparison.fault.name}: with and without control"
-    return finish(drawing, title, [own], with_diverged(comparison.entries, note), legend=rate)
+    return finish(drawing, title, ran, with_diverged(comparison.entries, note), legend=rate)
 
 
 def _peak(entry: "Entry") -> float:
@@ -416,9 +417,8 @@ def error_figure(comparison: "Compared") -> Any:
         axis.set_yscale("log")
         axis.set_ylabel(label)
     rate.set_xlabel(f"time [{unit}]")
-    made = [run for _, run in runs]
     title = f"{comparison.fault.name}: tracking errors"
-    return finish(drawing, title, made, with_diverged(comparison.entries, "largest of 40 kept samples"), legend=slip)
+    return finish(drawing, title, runs, with_diverged(comparison.entries, "largest of 40 kept samples"), legend=slip)
 
 
 def _proved_bounds(slip: Any, rate: Any, entries: "Sequence[Entry]") -> None:
@@ -469,7 +469,7 @@ def metrics(comparison: "Compared") -> Any:
             axis.set_xlim(right=max(values, default=1) * 1.3 or 1)
     axes[0, 0].invert_yaxis()
     title = f"{comparison.fault.name}: comparison after a quarter of the task"
-    return finish(drawing, title, [run for _, run in settled], with_diverged(comparison.entries))
+    return finish(drawing, title, settled, with_diverged(comparison.entries))
 
 
 # ----------------------------------------------------------------------

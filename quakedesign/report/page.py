@@ -184,11 +184,13 @@ def _slowly(entry: "Entry") -> list[str]:
         return []
     cells = "one cell" if len(found.cells) == 1 else f"{len(found.cells)} cells"
     return [
-        "the pressure at the well is p beside what the nominal fault needs along its reference, kV/(μ*A) more a second",
-        "about slow sliding at V, with v = V e^y and θ = (D_c/V) e^z, the loop is linear but for the exponentials, "
-        "which stand in sectors on |y| ≤ Y, for inertia, whose fast mode is bounded, and for modes of the rock that "
-        "the loop leaves out, bounded too; peaks of the responses of the linear loop bound all errors, and claims that "
-        f"follow from themselves hold {found.lasts}; the box of constants falls into {cells}",
+        "The pressure at the well is p plus a plan: what the nominal fault needs along its reference, kV/(μ*A) per "
+        "second.",
+        "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
+        "except for exponentials, inertia and diffusion modes that the model omits. The exponentials lie in sectors "
+        "for |y| ≤ Y; the others are bounded. L1 norms of the linear loop then bound all errors in terms of the "
+        f"claimed bounds, and the claims imply themselves (small gain). They hold {found.lasts}. The box of constants "
+        f"is divided into {cells}.",
     ]
 
 
@@ -377,15 +379,15 @@ CAPTIONS = {
 # The report as one HTML page that holds its figures and equations and loads nothing.
 
 MODEL_LIMITS = (
-    "the model is a block with one degree of freedom: it says nothing of where an earthquake ends, of rupture speed, "
-    "of heating, or of seismicity around the fault",
-    "a guarantee is about what it names, such as every friction law, parameter and disturbance of a box; whether the "
-    "fault is in it is a question of geology",
-    "in these runs the pressure has no limit and is even over the patch",
+    "the model is one block: it does not describe where an earthquake stops, rupture speed, heating, or seismicity "
+    "around the fault",
+    "a guarantee covers the friction laws, parameters and disturbances that it names; whether those of the real fault "
+    "are among them must be decided from data",
+    "the pressure in the runs has no limits and is uniform over the patch",
 )
 REST_LIMITS = (
-    "a guarantee that begins 'on the plant without stick' is about friction continued linearly to negative slip rates; "
-    "the worst case found on the stick–slip plant is then a lower bound by falsification",
+    "a guarantee that begins 'on the plant without stick' is for friction continued linearly to negative slip rates; "
+    "for the stick–slip plant the worst case found is then reported, which is no proof",
 )
 _WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "rock of L^2/D ="}
 SLIDING_LIMITS = (
@@ -477,7 +479,7 @@ def _way(comparison: "Compared") -> str:
     """What the pressure of the runs goes through."""
     paths = (e.design.setup.path.items() for e in comparison.of("designed"))
     told = dict.fromkeys(f"{_WAYS[name]} {float(time):.4g} s" for path in paths for name, time in path if time)
-    return f"in these runs the pressure {'comes behind ' + ', '.join(told) if told else 'acts at once'}"
+    return f"the pressure in the runs acts {'through ' + ', '.join(told) if told else 'at once'}"
 
 
 def _tables(comparison: "Compared") -> dict[str, Any]:

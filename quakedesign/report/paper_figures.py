@@ -40,15 +40,15 @@ if TYPE_CHECKING:
 # of the laboratory show experiments; here the laboratory fault is simulated like any other.
 
 PAPER = {
-    "friction-law": "fig:mu",
-    "earthquakes": "fig:sim",
-    "uncontrolled": "fig:earthquakesim, fig:earthquakelab",
-    "states": "fig:x1, fig:xe",
-    "pressure": "fig:p1, fig:pe",
-    "friction-coefficient": "fig:pe",
-    "errors-and-power": "fig:simindex, fig:labindex",
+    "friction-law": "figure 4",
+    "earthquakes": "figure 3",
+    "uncontrolled": "figures 5 and 9",
+    "states": "figures 6 and 10",
+    "pressure": "figures 7 and 11",
+    "friction-coefficient": "figure 11",
+    "errors-and-power": "figures 8 and 12",
 }
-"""Label of the figure of the paper, in its source, that each of ours is about."""
+"""Figures of the paper, by number, that each of ours is about."""
 
 
 def paper_figures(study: "PaperRuns") -> dict[str, Any]:
@@ -148,7 +148,7 @@ def friction_coefficient(comparison: "Compared") -> Any:
     axis.set_xlabel(f"time [{unit}]")
     axis.set_ylabel("friction coefficient [-]")
     title = f"{comparison.fault.name}: friction coefficient in closed loop"
-    return finish(drawing, title, [run for _, run in runs], with_diverged(comparison.entries), legend=axis)
+    return finish(drawing, title, runs, with_diverged(comparison.entries), legend=axis)
 
 
 def errors_and_power(comparison: "Compared") -> Any:
@@ -165,7 +165,7 @@ def errors_and_power(comparison: "Compared") -> Any:
     return finish(
         drawing,
         f"{comparison.fault.name}: errors and RMS pressure, over those of the {basis.label}",
-        [run for _, run in runs_of(entry for entry, _ in shown)],
+        runs_of(entry for entry, _ in shown),
         with_diverged(comparison.entries),
     )
 

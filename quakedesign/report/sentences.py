@@ -48,7 +48,7 @@ def grade(entry: "Entry") -> str:
         return str(entry.design.verdict)
     missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _held(entry)
     reach = f"proved, but {'; '.join(missing)}" if missing else "proved for this loop and task"
-    return f"{reach}; UNSTABLE if p is held over T_s" if _unstable_if_held(entry) else reach
+    return f"{reach}; UNSTABLE with zero-order hold over T_s" if _unstable_if_held(entry) else reach
 
 
 def _guaranteed(found: "Guarantee | SlidingGuarantee | StickSlipGuarantee") -> str:
@@ -87,16 +87,16 @@ def _held(entry: "Entry") -> list[str]:
         unstable = entry.growth_per_step is not None and entry.growth_per_step >= 1
         return ["UNSTABLE at the step used"] if unstable else []
     if entry.held is None or scheme != "explicit":
-        return [f"p is held ({scheme}), which is not covered"]
+        return [f"zero-order hold (scheme {scheme}) is not covered"]
     if entry.held.runs.verdict is Verdict.REFUTED:
-        return ["UNSTABLE with p held"]
+        return ["UNSTABLE with zero-order hold"]
     used, longest = rational(step), entry.held.largest_step
     if longest is None:
-        return ["p is held, and no T_s is proved"]
+        return ["zero-order hold is proved for no T_s"]
     proved = used <= longest or (used == entry.held.step and entry.held.runs.verdict is Verdict.PROVED)
     if not proved:
         return [f"T_s is {UpperBound(used / longest):.3g} times the largest proved"]
-    return ["p is held: stability proved, errors without a bound"]
+    return ["with zero-order hold stability is proved, but no bound of the errors"]
 
 
 # ----------------------------------------------------------------------
@@ -163,8 +163,8 @@ def _percent(share: float) -> str:
 
 
 def held_sentences(held: HeldLoop) -> list[str]:
-    """Whether the law that runs is stable when p is held over every step, and up to which step it is."""
-    over = f"if p is held over T_s = {float(held.step):.12g} s"
+    """Whether the law that runs is stable with zero-order hold, and up to which T_s."""
+    over = f"with zero-order hold over T_s = {float(held.step):.12g} s"
     if held.runs.verdict is Verdict.REFUTED and held.runs.witness is not None:
         return [f"UNSTABLE {over} ({_near(held.runs.witness)})", _proved_up_to(held)]
     if held.runs.verdict is Verdict.UNDECIDED:
@@ -176,8 +176,8 @@ def held_sentences(held: HeldLoop) -> list[str]:
 def _proved_up_to(held: HeldLoop) -> str:
     if held.largest_step is None:
         return "no T_s is proved"
-    said = f"every T_s up to {held.largest_step:.4g} s is proved"
-    return said if held.refuted_step is None else f"{said}, {held.refuted_step:.15g} s is refuted, open in between"
+    proved = f"stability is proved for every T_s up to {held.largest_step:.4g} s"
+    return proved if held.refuted_step is None else f"{proved} and refuted for {held.refuted_step:.15g} s"
 
 
 def peaks_sentence(peaks: Mapping[str, ContinuousPeaks | NoGuarantee]) -> str:
@@ -369,7 +369,9 @@ def _premises(entry: "Entry") -> list[str]:
         told += ["its base gains are proved in continuous time too"] if design.certificate is not None else []
     else:
         scheme = entry.run.provenance["scheme"] if entry.run else AS_IN_THE_PAPER
-        told += [] if scheme == AS_IN_THE_PAPER else [f"in this run p is held over every step, scheme {scheme}"]
+        told += (
+            [] if scheme == AS_IN_THE_PAPER else [f"in this run has zero-order hold over every step, scheme {scheme}"]
+        )
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
         told.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
     return told
@@ -439,15 +441,15 @@ def _holds(premises: Iterable[Any], name: str) -> bool:
 
 
 _SAID = {
-    "along_reference": "the reference and the disturbance alone leave the premise on |h'| {:.3g}-fold",
-    "level_set": "a start at an unknown phase of the disturbance is not certified ({:.3g}-fold)",
-    "on_trajectory": "this run leaves the premise on |h'| {:.3g}-fold",
-    "control_coefficient": "β leaves its certified range {:.3g}-fold",
-    "friction_slope": "the friction slope exceeds the certified sector {:.3g}-fold",
+    "along_reference": "reference and disturbance alone make |h'| {:.3g} times as large as the proof allows",
+    "level_set": "not covered: a start at an unknown phase of the disturbance (|h'| {:.3g} times too large)",
+    "on_trajectory": "in this run |h'| is {:.3g} times as large as the proof allows",
+    "control_coefficient": "β is {:.3g} times as large as the proof allows",
+    "friction_slope": "the friction slope is {:.3g} times as large as the proof allows",
     "sampling_time": (
         "T_s of the fault is {:.3g} times the longest for which a guarantee was found, and this design samples faster"
     ),
-    "constant_reference": "the reference moves, the certificate is about constant ones",
+    "constant_reference": "the certificate is for a constant reference, but the reference moves",
     "vanishing_disturbance": "the disturbance does not vanish at the equilibrium, so a bounded error remains",
 }
 

@@ -176,7 +176,7 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
     if best is not None and not fault.friction.state_names:
         yield box_sentence(fault)
     if best is not None:
-        yield "model: one block under a uniform pressure; all assumptions are in the report"
+        yield "model: one block under a uniform pressure"
     for entry in designed:
         if (entry.guaranteed is None and best is not None) or ", but " in grade(entry):
             unproved = entry.given and entry.answer is not None and entry.guaranteed is None
@@ -218,9 +218,7 @@ def _published(said: str) -> str:
         return said
     missing = said.removeprefix("proved, but ").split("; ")
     others = [part for part in missing if " fails" not in part]
-    said = "; ".join(["", *others])
-    for way in ("if p is held", "with p held"):
-        said = said.replace(f"UNSTABLE {way}", "unstable with zero-order hold")
+    said = "; ".join(["", *others]).replace("UNSTABLE", "unstable")
     violated = ", and this task violates its conditions" if len(others) < len(missing) else ""
     return f"not proved here: the proof is for continuous time{violated}{said}"
 
@@ -269,7 +267,7 @@ def _range(row: Row) -> str:
 # The summary on a terminal of 80 columns.
 
 
-_LEGEND = (
+LEGEND = (
     "worst: worst case found; pressure: proved for every friction of the box, or seen",
     "tracked: slip within 2 % of the task's, slip rate within 1 % of the natural peak",
 )
@@ -277,7 +275,7 @@ _LEGEND = (
 
 def summary_lines(said: Summary) -> list[str]:
     """Lines of at most 80 characters."""
-    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), *_LEGEND, ""]
+    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), *LEGEND, ""]
     lines += wrap(said.conditions, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     for note in said.notes:
         lines += wrap(note, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)

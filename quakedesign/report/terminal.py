@@ -137,11 +137,19 @@ def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", 
         console.print(f"  {_line(premise)}")
 
 
-def printed_lines(rows: list[dict[str, Any]]) -> list[str]:
-    """Printed numbers beside ours, for people; nothing where the paper says nothing of the fault."""
+LABORATORY = (
+    "no comparison with printed numbers: the paper has simulations of real-fault only;",
+    "  its figures 9 to 12 show experiments on the laboratory fault",
+)
+
+
+def printed_lines(rows: list[dict[str, Any]], fault: str = "") -> list[str]:
+    """Printed numbers beside ours, with the plant of ours; nothing where the paper says nothing of the fault."""
     if not rows:
-        return []
-    return ["", "printed in the paper, and found here:"] + [
+        return ["", *LABORATORY] if fault == "lab-fault" else []
+    sticks = any(row["plant"] == "stick-slip" for row in rows)
+    plant = " on the stick–slip plant (--plant printed simulates the paper's plant)" if sticks else ""
+    return ["", f"printed in the paper, and found here{plant}:"] + [
         f"  {row['run']}, {row['metric']}: {row['printed']:.3g} {row['unit']} printed ({row['place']}), "
         f"{row['found']:.3g} found, ratio {row['ratio']:.3g}. {row['note']}"
         if row["ratio"] is not None

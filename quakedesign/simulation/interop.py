@@ -257,7 +257,7 @@ def to_statespace(
     disturbance: bool = False,
     **given: Quantity | None,
 ) -> Any:
-    """Return the fault linearised about rest at a slip, held there by pressure; with what lies before it, if wanted.
+    """State space of a fault linearised about rest at a slip, in series with the loop setup if one is given.
 
     Parameters
     ----------
@@ -404,7 +404,7 @@ class LoopMargins:
 
 
 def loop_margins(loop: Any) -> LoopMargins:
-    """Return the margins of a loop as `loop_transfer` gives it, to either side.
+    """Upper and lower gain margins, phase margin and modulus margin of a loop of `loop_transfer`.
 
     Stability of a loop in discrete time may be lost at half the sampling frequency, z = −1, where
     ``control.stability_margins`` does not look. Factors from 1e-4 to 1e4 are tried.

@@ -47,7 +47,7 @@ class BlocksAnswer:
         ]
         for blocks, one in self.found.items():
             ends = self.peaks(blocks)
-            if isinstance(one, NoGuarantee) or ends is None:
+            if not one.proved or ends is None:
                 said.append(f"{blocks:3} blocks: {one.sentence()}")
                 continue
             about = "its balance" if self.wells == "one" else "the reference"

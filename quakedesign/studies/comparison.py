@@ -107,7 +107,8 @@ class Entry:
     @property
     def guaranteed(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | None:
         """The guarantee, if there is one."""
-        return None if isinstance(self.guarantee, NoGuarantee) else self.guarantee
+        found = self.guarantee
+        return found if found is not None and found.proved else None
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None for what a report adds."""

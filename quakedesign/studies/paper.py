@@ -31,7 +31,7 @@ BARS = {
     "max_slip_rate_error": "max |slip-rate error|",
     "rms_pressure": "RMS pressure",
 }
-"""Metrics of the paper's bar charts (fig:simindex, fig:labindex), MISE being the mean of the squared error."""
+"""Metrics of the paper's bar charts (figures 8 and 12), MISE being the mean of the squared error."""
 BASIS = "elqr"
 """Law whose numbers the paper divides by."""
 _MADE = ("scheme", "step", "method", "plant")
@@ -84,7 +84,7 @@ def _outcome(run: Run) -> dict[str, Any]:
 
 
 def printed(comparison: Compared) -> list[dict[str, Any]]:
-    """Numbers that the paper prints about these runs beside ours, their ratio, and why they differ."""
+    """Numbers that the paper prints about these runs beside ours, their ratio, our plant, and why they differ."""
     data = tomllib.loads((files(__package__) / "printed.toml").read_text(encoding="utf-8"))
     runs: dict[str, Run | None] = {"uncontrolled": comparison.uncontrolled}
     runs |= {f"{e.origin} {e.design.name}": e.run for e in comparison.entries}
@@ -93,7 +93,10 @@ def printed(comparison: Compared) -> list[dict[str, Any]]:
         run = runs.get(said["run"])
         value = getattr(run.metrics, said["metric"]) if run else None
         ratio = value / said["printed"] if value is not None else None
-        rows.append({**said, "unit": run.metrics.unit(said["metric"]) if run else None, "found": value, "ratio": ratio})
+        plant, more = run.provenance["plant"] if run else None, said.pop("note_without_stick", "")
+        said["note"] += f" {more}" if more and plant == "printed" else ""
+        unit = run.metrics.unit(said["metric"]) if run else None
+        rows.append({**said, "plant": plant, "unit": unit, "found": value, "ratio": ratio})
     return rows
 
 

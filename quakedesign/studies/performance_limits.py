@@ -500,14 +500,14 @@ def _sliding_limits(
 
 
 def _why(answer: SlidingAnswer | None) -> str:
-    return f": {answer.found.reason}" if answer is not None and isinstance(answer.found, NoGuarantee) else ""
+    return f": {answer.found.reason}" if answer is not None and not answer.found.proved else ""
 
 
 def _proved_steps(task: FaultPlant, step: Fraction, told: Told) -> tuple[tuple[Guarantee, ...], Guarantee | None]:
     """Guarantees at growing T_s up to nearly the longest, and that at the fault's own, if there is one."""
     own: Guarantee | NoGuarantee | None = design_held(task, step, objective="peak", **told.around)
     longest = longest_step(task, **told.around)
-    if isinstance(own, Guarantee):
+    if own is not None and own.proved:
         own = _best_at(own, told)
     else:
         own = continued(task, step, longest, **told.around)

@@ -364,6 +364,9 @@ class Model:
             roots = mpmath.polyroots(numbers, maxsteps=500, extraprec=400)
         return tuple(sorted((complex(z) for z in roots), key=lambda z: (-z.real, -z.imag)))
 
+    def __str__(self) -> str:
+        return f"x1'' = {self.acceleration}\nunstable without control if {self.instability}"
+
     def _repr_latex_(self) -> str:
         acceleration = state_plant.sliding_acceleration(self._names) if self._names else plant.shifted_acceleration()
         rows = [

@@ -261,7 +261,7 @@ def guarantee(
     if plant is None and usual and may_stick(family, setup, disturbance_class):
         mode = method_of(family).base_law(task, family, wanted.gains)
         sticking = answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
-        if isinstance(sticking.found, StickSlipGuarantee):
+        if sticking.found.proved:
             return sticking
         without = sticking.found.reason
     answer = _sampled(fault, task, family, wanted)

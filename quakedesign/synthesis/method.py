@@ -386,7 +386,7 @@ class Samples(DesignMethod[SampledController]):
             return answer
         for factor in _FACTORS:
             other = self.guarantee(fault, task, replace(controller, law=_times(factor, controller.law)), setup)
-            if isinstance(other, Guarantee):
+            if other.proved:
                 return replace(answer, nearest=(FACTOR, other), factor=factor)
         return answer
 

@@ -59,7 +59,7 @@ def guarantee_plant(
             small_gain=None,
         )
     found = plant_guarantee(around, exact)
-    return replace(found, notes=notes) if isinstance(found, PlantGuarantee) else found
+    return replace(found, notes=notes) if found.proved else found
 
 
 def _shown(plant: UncertainPlant) -> int:

@@ -126,7 +126,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         made = sliding_mode(task, law, step, **options, **around)
         if isinstance(made, NoGuarantee):
             return LoopAnswer(fault=fault, found=made)
-        if isinstance(made.found, NoGuarantee):
+        if not made.found.proved:
             laws, none = deadbeat(task, law, wanted.gains), made.found
             longest = longest_step(task, kind=laws, **around)
             again = laws.continued(task, step, longest, **around)

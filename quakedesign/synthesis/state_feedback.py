@@ -153,7 +153,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     without: dict[str, Any] = {}
     if problem.plant != Guarantee.plant and may_stick(law, setup, problem.disturbance_class):
         sticking = design_stick_slip(task, step, **sticking_options(problem))
-        if isinstance(sticking, StickSlipGuarantee):
+        if sticking.proved:
             details = {"objective": problem.objective, "step": str(step), "reason": None, "measured": setup.measured}
             details |= {name: str(value) for name, value in sticking.held.noise.items()}
             return problem.judged(sticking.controller, name=law.name, details=details, runs=sticking)

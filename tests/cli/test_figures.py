@@ -66,7 +66,7 @@ def test_figures_writes_one_folder_and_says_what_is_in_it(short, capsys, tmp_pat
     folder = tmp_path / "drawn"
     code, out, err = run(capsys, "figures", str(short), "--controller", "elqr", "--out", str(folder))
     assert (code, err) == (0, "")
-    assert f"{folder}/figures/earthquakes.svg: fig:sim of the paper" in out
+    assert f"{folder}/figures/earthquakes.svg: figure 3 of the paper" in out
     written = [line.split(":")[0] for line in out.splitlines() if line.startswith(f"{folder}/figures/")]
     assert sorted(written) == sorted(str(path) for path in (folder / "figures").iterdir())
     assert json.loads((folder / "results.json").read_text())["numbers"][-1]["mise_slip_over_elqr"] == 1

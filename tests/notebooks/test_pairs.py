@@ -42,3 +42,18 @@ def test_notebook_ends_in_an_assertion(path):
     kind, source = cells(path)[-1]
     assert kind == "code"
     assert isinstance(ast.parse(source).body[-1], ast.Assert)
+
+
+WITHOUT_VALUE = {"print", "display", "plt.show", "plt.tight_layout", "np.savetxt"}
+"""Calls that a cell may end in: a script shows the value of no other."""
+
+
+@each
+def test_a_script_shows_what_the_notebook_shows(path):
+    """The value of an expression at the end of a cell is shown by a notebook alone, so `display` or `print` it."""
+    for kind, source in cells(path):
+        last = ast.parse(re.sub(r"(?m)^%.*$", "", source)).body[-1:] if kind == "code" else []
+        for statement in last:
+            if isinstance(statement, ast.Expr):
+                assert isinstance(statement.value, ast.Call), ast.unparse(statement)
+                assert ast.unparse(statement.value.func) in WITHOUT_VALUE, ast.unparse(statement)

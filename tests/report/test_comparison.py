@@ -140,7 +140,7 @@ def test_a_broken_premise_is_said_with_its_factor():
     chatter = Premise(name="on_trajectory", required=5.75, certified=1.0, unit="m/s^3", measured=True)
     said = headline(entry(Verdict.PROVED, chatter, largest_step=0.012))
     assert said == (
-        "proved in continuous time; this run leaves the premise on |h'| 5.75-fold; "
+        "proved in continuous time; in this run |h'| is 5.75 times as large as the proof allows; "
         "it would stay inside for T_s up to about 0.012 s"
     )
 

@@ -26,11 +26,11 @@ def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
 @pytest.mark.parametrize(
     ("loop", "said"),
     [
-        (held(Verdict.PROVED, step="0.1"), "stable if p is held over T_s = 0.1 s, proved for any course"),
-        (held(Verdict.PROVED, step="0.1"), "T_s up to 0.1576 s is proved, 0.15822 s is refuted, open in between"),
-        (held(Verdict.REFUTED, witness=(F("1.4"), F(-1, 2), F(2))), "UNSTABLE if p is held over T_s = 0.184 s (near β"),
-        (held(Verdict.UNDECIDED, step="0.158"), "undecided if p is held over T_s = 0.158 s; every T_s up to 0.1576"),
-        (held(Verdict.UNDECIDED, longest=None), "undecided if p is held over T_s = 0.184 s; no T_s is proved"),
+        (held(Verdict.PROVED, step="0.1"), "stable with zero-order hold over T_s = 0.1 s, proved for any course"),
+        (held(Verdict.PROVED, step="0.1"), "T_s up to 0.1576 s and refuted for 0.15822 s"),
+        (held(Verdict.REFUTED, witness=(F("1.4"), F(-1, 2), F(2))), "UNSTABLE with zero-order hold over T_s = 0.184 s"),
+        (held(Verdict.UNDECIDED, step="0.158"), "undecided with zero-order hold over T_s = 0.158 s; stability is"),
+        (held(Verdict.UNDECIDED, longest=None), "undecided with zero-order hold over T_s = 0.184 s; no T_s is proved"),
     ],
 )  # fmt: skip
 def test_a_held_pressure(loop, said):

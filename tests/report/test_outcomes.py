@@ -120,10 +120,13 @@ def test_verdicts_are_graded_by_what_the_proof_leaves_out(slow):
 
 def test_a_held_pressure_is_not_what_is_proved(slow):
     held = simulate(FAULT, LAW, duration=1.0, scheme="implicit")
-    assert grade(entry(held, FINE)) == "proved, but p is held (implicit), which is not covered"
+    assert grade(entry(held, FINE)) == "proved, but zero-order hold (scheme implicit) is not covered"
     runs = SimpleNamespace(verdict=Verdict.REFUTED)
     unstable = HeldLoop(runs=runs, longest=None, radius=1.1)
-    assert grade(entry(slow, FINE, held=unstable)) == "proved for this loop and task; UNSTABLE if p is held over T_s"
+    assert (
+        grade(entry(slow, FINE, held=unstable))
+        == "proved for this loop and task; UNSTABLE with zero-order hold over T_s"
+    )
 
 
 @pytest.mark.parametrize(

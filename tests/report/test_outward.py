@@ -49,7 +49,7 @@ def test_every_certified_number_in_the_lines_about_a_linear_law(linear):
         "decay rate # 1/s certified": (found.decay.certified,),
         "margin # certified; unstable from # on": (found.slope.certified, found.slope.limit),
         r"beta down to # \(unstable from # on\) or up to # is": (found.span.low, found.span.low_limit, found.span.high),
-        "every T_s up to # s is proved": (held.largest_step,),
+        "stability is proved for every T_s up to # s": (held.largest_step,),
         r"slip rate below # m/s \(slip error # m\)": (peaks.claims.peak_slip_rate, peaks.claims.slip_error),
     }
     for pattern, bounds in expected.items():
@@ -103,7 +103,7 @@ def test_equal_sides_of_a_premise_are_not_said_to_differ():
 def test_sentences_and_domain_of_a_sliding_mode(sliding):
     said = "; ".join(sentences(Entry(label="x", origin="designed", design=sliding, run=None)))
     failing = [p for p in sliding.premises if not p.holds]
-    shown = re.findall(rf"{NUMBER}-fold", said)
+    shown = re.findall(rf"{NUMBER} times", said)
     assert len(shown) == len(failing)
     assert all(F(text) >= F(p.required) / F(p.certified) for text, p in zip(shown, failing, strict=True))
     domain = sliding.domain

@@ -241,9 +241,21 @@ def test_units_suit_the_values():
 def test_every_way_in_which_runs_were_made_is_named_once(study):
     run = study.comparison.entries[0].run
     other = replace(run, provenance={**run.provenance, "scheme": "implicit"})
+    assert made([run, run]) == "scheme continuous, step 0.001 s, method dormand-prince, stick-slip plant"
     assert made([run, run, other]).split("; ") == [
-        "scheme continuous, step 0.001 s, method dormand-prince, stick-slip plant",
-        "scheme implicit, step 0.001 s, method dormand-prince, stick-slip plant",
+        "scheme continuous",
+        "scheme implicit",
+        "all runs: step 0.001 s, method dormand-prince, stick-slip plant",
+    ]
+
+
+def test_a_caption_says_which_controller_ran_in_which_scheme(study):
+    first, second, third = study.comparison.entries
+    other = replace(third.run, provenance={**third.run.provenance, "scheme": "implicit", "step": 0.002})
+    assert made([(first, first.run), (second, second.run), (third, other)]).split("; ") == [
+        "2-CTA (published), e-LQR (published): scheme continuous, step 0.001 s",
+        "2-CTA (designed): scheme implicit, step 0.002 s",
+        "all runs: method dormand-prince, stick-slip plant",
     ]
 
 
@@ -276,6 +288,32 @@ def test_numbers_of_the_paper_are_set_beside_those_found(study):
     assert "no run" in printed_lines(missing)[-1]
 
 
+def on_plant(study, plant):
+    """The same runs as if they were on this plant, under the name of the real fault."""
+    comparison = study.comparison
+
+    def moved(run):
+        return replace(run, provenance={**run.provenance, "plant": plant})
+
+    entries = tuple(replace(e, run=moved(e.run)) for e in comparison.entries)
+    fault = replace(comparison.fault, name="real-fault")
+    return replace(comparison, fault=fault, entries=entries, uncontrolled=moved(comparison.uncontrolled))
+
+
+def test_a_note_about_runs_on_the_plant_without_stick_is_told_for_such_runs_alone(study):
+    """The published 2-CTA chatters through zero on the paper's plant alone, which 5.8e-3 m/s was counted on."""
+    told = {p: "\n".join(printed_lines(printed(on_plant(study, p)))) for p in ("stick-slip", "printed")}
+    assert "5.8e-3" in told["printed"]
+    assert "5.8e-3" not in told["stick-slip"]
+    assert "--plant printed" in told["stick-slip"]
+    assert "--plant printed" not in told["printed"]
+
+
+def test_the_laboratory_fault_has_no_printed_numbers_for_a_reason():
+    assert "figures 9 to 12 show experiments" in "\n".join(printed_lines([], "lab-fault"))
+    assert printed_lines([], "my-fault") == []
+
+
 @pytest.mark.slow
 def test_the_folder_holds_figures_and_numbers_and_appears_whole(study, tmp_path, monkeypatch):
     out = tmp_path / "results"
@@ -290,7 +328,7 @@ def test_the_folder_holds_figures_and_numbers_and_appears_whole(study, tmp_path,
         "report.html",
         "results.json",
     }
-    assert found["figures"]["earthquakes"] == {"file": "figures/earthquakes.svg", "paper": "fig:sim"}
+    assert found["figures"]["earthquakes"] == {"file": "figures/earthquakes.svg", "paper": "figure 3"}
     with pytest.raises(OutputError, match="--force"):
         write_folder(study.comparison, out, force=False, study=study)
     monkeypatch.setattr("quakedesign.report.folder.csv_text", lambda _rows: 1 / 0)

@@ -66,3 +66,12 @@ def test_equations_are_shown_in_the_papers_symbols():
     assert all(part in text for part in (r"\hat{k}", r"\hat{N}", r"\mu^{*}", r"\hat{\varphi}_e", "iff"))
     assert derive(REAL).acceleration.has(sp.exp)
     assert derive(REAL).error_dynamics == plant.error_dynamics()
+
+
+def test_a_model_is_printed_as_its_equation_and_its_condition():
+    """In a terminal and in a script, which show no LaTeX."""
+    acceleration, unstable = str(derive(REAL)).splitlines()
+    assert acceleration.startswith("x1'' = ")
+    assert acceleration.count("\\hat{k}") == 1
+    assert unstable.startswith("unstable without control if ")
+    assert "<" in unstable

@@ -268,8 +268,6 @@ class RegularisedRateAndState(RateAndState):
 
     Attributes
     ----------
-    reference_coefficient, direct_effect, evolution_effect, critical_slip, reference_rate, slowest_rate, fastest_rate
-        As in `RateAndState`.
     evolution : str
         ``"aging"`` (Dieterich) or ``"slip"`` (Ruina).
 

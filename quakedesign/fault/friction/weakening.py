@@ -28,8 +28,8 @@ class Weakening(FrictionLaw):
     drop : float
         Static minus kinetic friction coefficient Δμ [-], not negative; the paper's Δμ has the opposite sign.
     healing : float
-        What friction that holds the fault at rest may exceed that in slip by, Δμ_h [-]; 0 unless given. After a rest of
-        any length all of it is there, and a release loses it.
+        Largest excess of friction at rest over friction in slip, Δμ_h [-]; 0 by default. All of it acts after a rest of
+        any length, and vanishes at the release.
 
     Raises
     ------
@@ -120,7 +120,7 @@ class LinearSlipWeakening(SlipWeakening):
     Attributes
     ----------
     critical_slip : float
-        Slip at which friction is kinetic d_c [m], positive.
+        Slip d_c from which on friction is kinetic [m], positive.
     """
 
     name: ClassVar[str] = "linear-slip-weakening"

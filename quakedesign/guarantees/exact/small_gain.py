@@ -143,6 +143,7 @@ class Bounds:
         Spectral radius of M [-] from above, below 1.
     """
 
+    proved: ClassVar[Literal[True]] = True
     slip_error: Fraction
     slip_rate_error: Fraction
     push: Fraction
@@ -216,7 +217,7 @@ def best_bounds(
     """Bounds of the theorem from the gains; of a disturbance of bounded rate, the better of both classes."""
     classes = [task] if task.change is None else [task, replace(task, change=None)]
     answers = [bounds_from(one, gains, root, step, noise, spread, jitter) for one in classes]
-    proved = [bounds for bounds in answers if isinstance(bounds, Bounds)]
+    proved = [bounds for bounds in answers if bounds.proved]
     if not proved:
         return answers[0]
     every = {part.name: [getattr(bounds, part.name) for bounds in proved] for part in fields(Bounds)}

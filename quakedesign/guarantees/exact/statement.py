@@ -287,7 +287,7 @@ class Guarantee:
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         bounds = self.bounds()
-        if isinstance(bounds, NoGuarantee) or not _root_within(self.task, self.held, self.claims):
+        if not bounds.proved or not _root_within(self.task, self.held, self.claims):
             return Verdict.UNDECIDED
         if _beyond_the_pump(self.held, self.claims):
             return Verdict.UNDECIDED
@@ -350,15 +350,13 @@ def guarantee(
     """
     if reach is not None:
         bounds = _bounds(task, held, held.loop(task), reach)
-        return (
-            bounds if isinstance(bounds, NoGuarantee) else _of_claims(task, held, _rounded(task, bounds), reach=reach)
-        )
+        return bounds if not bounds.proved else _of_claims(task, held, _rounded(task, bounds), reach=reach)
     if held.pump is None or held.pump.rate is None or held.ramp:
         return _proved(task, held, slow_gain)
     ramp, longest = _FIRST * held.step, held.longest_ramp
     found = _proved(task, replace(held, ramp=ramp), slow_gain)
     for _ in range(_RAMPS):
-        if isinstance(found, Guarantee) or found.needs is None or ramp == longest:
+        if found.proved or found.needs is None or ramp == longest:
             break
         if slow := held.pump.too_slow(UpperBound(found.needs), longest):
             return replace(found, reason=slow)
@@ -393,7 +391,7 @@ def _of_claims(
 
 def _claims(task: FaultPlant, held: Held) -> Claims | NoGuarantee:
     bounds = _bounds(task, held, held.loop(task))
-    return bounds if isinstance(bounds, NoGuarantee) else _rounded(task, bounds)
+    return bounds if not bounds.proved else _rounded(task, bounds)
 
 
 def _rounded(task: FaultPlant, bounds: Bounds) -> Claims:
@@ -407,7 +405,7 @@ def _slow_claims(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Claims | 
         return gains
     for turn in range(_TURNS + _LEAPS):
         bounds = _slow_bounds(task, held, slow_gain, gains, slip_error)
-        if isinstance(bounds, NoGuarantee):
+        if not bounds.proved:
             return bounds
         claims = _rounded(task, bounds)
         if claims.slip_error <= slip_error:
@@ -527,7 +525,7 @@ class ContinuousPeaks:
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         bounds = self.bounds()
-        return self.claims.verdict(self.task, bounds) if isinstance(bounds, Bounds) else Verdict.UNDECIDED
+        return self.claims.verdict(self.task, bounds) if bounds.proved else Verdict.UNDECIDED
 
     def to_dict(self) -> dict[str, Any]:
         """Exact claims as texts, SI, and their assumptions."""
@@ -548,7 +546,7 @@ def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousPeaks | 
         For a law that leaves an error under a constant pressure at rest.
     """
     bounds = _continuous_bounds(task, law)
-    if isinstance(bounds, NoGuarantee):
+    if not bounds.proved:
         return bounds
     claims = Claims.of(task, bounds).rounded()
     if reason := claims.opens(task):

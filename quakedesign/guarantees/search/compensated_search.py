@@ -196,11 +196,11 @@ class Compensation:
             return ""
         low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
         if low == high == 1 and not root.remainder:
-            deadbeat = "; its implicit step is deadbeat, e1 + T_s·w = 0, for all errors that are claimed"
-            return f"{deadbeat}, so it coincides with every law that has a deadbeat step"
+            deadbeat = "; within the proved errors its implicit step is deadbeat, e1 + T_s·w = 0"
+            return f"{deadbeat}: its pressures are those of every law with a deadbeat step"
         return (
             f"; its implicit step ends at w = -γ·e1/T_s with γ from {low:.3g} to {high:.3g}, up to "
-            f"{UpperBound(root.remainder):.2g} m/s, for all errors that are claimed"
+            f"{UpperBound(root.remainder):.2g} m/s, within the proved errors"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -219,7 +219,7 @@ def _root(found: Guarantee | StickSlipGuarantee | NoGuarantee) -> ImplicitRoot |
     """Implicit step of a proved sliding mode."""
     if isinstance(found, StickSlipGuarantee):
         return ImplicitRoot(pull=found.held.law.pull) if found.held.law.pull else None
-    return None if isinstance(found, NoGuarantee) else found.held.law.root
+    return None if not found.proved else found.held.law.root
 
 
 def compensated(
@@ -246,14 +246,14 @@ def compensated(
     if isinstance(first, Guarantee):
         return first
     deadbeat = estimated(task, held)
-    if deadbeat is None or isinstance(deadbeat.bounds, NoGuarantee):
+    if deadbeat is None or not deadbeat.bounds.proved:
         return best_guarantee(task, held)
     size = deadbeat.bounds.slip_rate_error
     for share, slope in product(_REMAINDERS, _SLOPES):
         root = ImplicitRoot(pull=pull, slopes=(slope, Fraction(1)), remainder=share * size)
         wider = replace(held, law=replace(held.law, root=root))
         near = estimated(task, wider)
-        if near is None or isinstance(near.bounds, NoGuarantee):
+        if near is None or not near.bounds.proved:
             continue
         errors = near.bounds.slip_error + held.slip_noise, near.bounds.slip_rate_error + held.rate_noise
         within = holds(root, step, *errors)
@@ -561,7 +561,7 @@ def _deadbeat_search(
     for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
         found = estimated(task, _held(_DEADBEAT, *choice, step, around))
-        if found is not None and isinstance(found.bounds, Bounds):
+        if found is not None and found.bounds.proved:
             seen[choice] = found
     if not seen:
         return [str(weights[0]), str(_short(task.model.gain))]
@@ -607,7 +607,7 @@ def _held(root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fract
 
 
 def _bounds(estimate: BoundsEstimate) -> Bounds:
-    assert isinstance(estimate.bounds, Bounds)
+    assert estimate.bounds.proved
     return estimate.bounds
 
 

@@ -108,12 +108,12 @@ def sampled_design(
     told: Any = {"measured": measured, **around}
     found = design_held(task, step, objective=objective, **told)
     longest = longest_step(task, **told)
-    if isinstance(found, NoGuarantee):
+    if not found.proved:
         found = continued(task, step, longest, **told) or found
-    reason = found.reason if isinstance(found, NoGuarantee) else ""
-    if isinstance(found, NoGuarantee) and longest is not None:
+    reason = found.reason if not found.proved else ""
+    if not found.proved and longest is not None:
         found = design_at(task, longest)
-    if isinstance(found, NoGuarantee):
+    if not found.proved:
         return SampledDesign(step=step, runs=None, reason=reason)
     delayed, own = longest_delay(task, found.held.step, **told), found.held.delay
     return SampledDesign(
@@ -140,12 +140,12 @@ def sampled_sliding_mode(
     laws = Deadbeat(law)
     made = design_compensated(task, law, step, objective=objective, **noise)
     longest = longest_step(task, kind=laws, **noise)
-    if isinstance(made.found, NoGuarantee):
+    if not made.found.proved:
         made = laws.continued(task, step, longest, **noise) or made
-    reason = made.found.reason if isinstance(made.found, NoGuarantee) else ""
+    reason = made.found.reason if not made.found.proved else ""
     if reason and longest is not None:
         made = laws.at(task, longest, objective)
-    if isinstance(made.without_stick, NoGuarantee):
+    if not made.without_stick.proved:
         return made, SampledDesign(step=step, runs=None, reason=reason)
     runs = tightened(made.without_stick)
     held = runs.held
@@ -237,7 +237,10 @@ def deadbeat(task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...] = 
 
 def _why_none(task: FaultPlant, law: type[SlidingMode], scheme: str, step: Fraction) -> str:
     if scheme == "continuous":
-        return f"a pressure that follows {law.title} at every instant is run by no sampled controller{_REMEDY}"
+        return (
+            f"{law.title} is designed in continuous time, and a sampled controller cannot change the pressure at every "
+            "instant. Design the law for the sampled loop: without --continuous, and in the scheme stick-slip"
+        )
     if scheme == STICK_SLIP:
         return f"the estimate of the scheme {STICK_SLIP} is cut off at rest, so that no linear loop covers it{_REMEDY}"
     if scheme == "implicit":

@@ -90,7 +90,7 @@ def closeness(task: FaultPlant, held: Held) -> tuple[float, Bounds | None]:
         spread = replace(_PARTS.spread(task, Fraction(slip_error)), aged=Fraction(0))
         bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
         least = min(least, _small(bounds))
-        if isinstance(bounds, NoGuarantee) or bounds.slip_error <= slip_error:
+        if not bounds.proved or bounds.slip_error <= slip_error:
             return _closeness(bounds, least)
         slip_error = max(1.01 * float(bounds.slip_error), _LEAP * slip_error * (turn >= _FEW))
     return _closeness(None, least)
@@ -106,7 +106,7 @@ def _small(bounds: Bounds | NoGuarantee) -> float:
 
 
 def _closeness(bounds: Bounds | NoGuarantee | None, least: float) -> tuple[float, Bounds | None]:
-    return (_small(bounds), bounds) if isinstance(bounds, Bounds) else (1 + least, None)
+    return (_small(bounds), bounds) if bounds is not None and bounds.proved else (1 + least, None)
 
 
 @dataclass(frozen=True, slots=True)

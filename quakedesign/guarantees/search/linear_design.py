@@ -176,7 +176,7 @@ def nearby(
     if isinstance(laws, NoGuarantee):
         return laws
     found = best_guarantee(task, laws.held(laws.least_peak_near(near)))
-    return found if isinstance(found, Guarantee) else best_guarantee(task, laws.held(near))
+    return found if found.proved else best_guarantee(task, laws.held(near))
 
 
 def design_held(
@@ -235,13 +235,13 @@ def design_held(
     if behind_rock and (none := laws.without_bounds(x)) is not None and _hopeless(least):
         return none  # a proof of that takes a minute
     seen = laws.seen(x)
-    if objective == "tracking" and seen is not None and isinstance(seen.bounds, Bounds):
+    if objective == "tracking" and seen is not None and seen.bounds.proved:
         limit = (room or laws.room) * float(seen.bounds.slip_rate_error)
         _, x = min((laws.least_drift(start, limit) for start in (x, starts[1])), key=lambda reached: reached[0])
     found = best_guarantee(task, laws.held(x))
-    if isinstance(found, NoGuarantee) and seen is not None and isinstance(seen.bounds, Bounds) and found.pressed:
+    if not found.proved and seen is not None and seen.bounds.proved and found.pressed:
         leaner = best_guarantee(task, laws.held(laws.least_pressure(x)[1]))
-        found = leaner if isinstance(leaner, Guarantee) else found
+        found = leaner if leaner.proved else found
     noise = {name: v for name, v in laws.template.noise.items() if v}
     if found.proved or not noise:
         return found
@@ -333,7 +333,7 @@ class _Laws:
     def without_bounds(self, x: np.ndarray) -> NoGuarantee | None:
         """Why a law has no bounds; None where it has, or is none."""
         seen = self.seen(x)
-        return seen.bounds if seen is not None and isinstance(seen.bounds, NoGuarantee) else None
+        return seen.bounds if seen is not None and not seen.bounds.proved else None
 
     def least_peak(self, start: Sequence[float] | np.ndarray, **settings: Any) -> tuple[float, np.ndarray]:
         """Smallest cost of a peak near a start, and where; given up where it stays far from a guarantee.
@@ -353,7 +353,7 @@ class _Laws:
 
         def cost(x: np.ndarray) -> float:
             seen = self.seen(x)
-            if seen is None or isinstance(seen.bounds, NoGuarantee):
+            if seen is None or not seen.bounds.proved:
                 return 10 * _FAILED
             most = seen.bounds.push if seen.bounds.asked is None else seen.bounds.asked
             return self.quiet(x, 10 * log10(float(most)))
@@ -452,7 +452,7 @@ def _peak_cost(found: BoundsEstimate | None, period: Fraction) -> float:
     """Decibels of the slip-rate error; where there is no bound, how far from one."""
     if found is None:
         return 10 * _FAILED
-    if isinstance(found.bounds, NoGuarantee):
+    if not found.bounds.proved:
         return _FAILED * min(float(found.bounds.small_gain or 9), 9.0)
     return _decibels(found.bounds, period)
 
@@ -462,7 +462,7 @@ def _decibels(bounds: Bounds, period: Fraction) -> float:
 
 
 def _drift_cost(found: BoundsEstimate | None, limit: float) -> float:
-    if found is None or isinstance(found.bounds, NoGuarantee):
+    if found is None or not found.bounds.proved:
         return 10 * _FAILED
     over = max(0.0, float(found.bounds.slip_rate_error) / limit - 1)
     return 10 * log10(found.drift_gain) + 1000 * over

@@ -72,7 +72,7 @@ def sliding_block_guarantee(
         if plant is None or rate is None:
             break
         found = plant_guarantee(plant, law, _PIECES)
-        if isinstance(found, PlantGuarantee) and max(found.claims.controls) * MPA < claims.push:
+        if found.proved and max(found.claims.controls) * MPA < claims.push:
             return replace(found, notes=(_slip_rates(blocks, rate),))
     return NoGuarantee(reason="the bounds that an estimate finds are not proved", small_gain=None)
 

@@ -497,7 +497,7 @@ def what_would_do(
         held = replace(reach.held, slip_noise=noise)
         proof = prove(task, held, reach.log_rate)
         said = [_slower(fault, task, reach, loop, prove, spread)]
-        if isinstance(proof, SlidingGuarantee):
+        if proof.proved:
             path = (f"{title} = {float(v):.3g} s" for name, title in PATH.items() if (v := getattr(held, name)))
             said.append(f"at this V for {' and '.join(path)} with T_s = {float(held.step):.3g} s{_under(proof)}")
         if found := ", and ".join(filter(None, said)):
@@ -530,7 +530,7 @@ def _slower(fault: Fault, task: SlidingPlant, reach: WellReach, around: Around, 
     asked, step = slow_sliding_plant(slow, task.stress, spread), rational(slow.sampling_time)
     held, _ = searched_sliding(asked, step, reach.log_rate, around, near=reach.numbers, enough=_ENOUGH, most=_LAWS)
     proof = None if held is None else prove(asked, held, reach.log_rate)
-    if not isinstance(proof, SlidingGuarantee):
+    if proof is None or not proof.proved:
         return ""
     return (
         f"with this path for V = {float(asked.rate):.3g} m/s{_under(proof)}: in [task] target_slip = "

@@ -27,7 +27,7 @@ Range = tuple[Fraction, Fraction]
 
 
 class Verdict(Enum):
-    """Outcome of a question about a closed loop."""
+    """Outcome of a proof about a closed loop: proved, refuted or undecided."""
 
     PROVED = "the witness checks in exact arithmetic"
     REFUTED = "a counterexample checks in exact arithmetic"

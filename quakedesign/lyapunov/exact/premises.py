@@ -261,8 +261,7 @@ def _level_set(question: DomainProblem) -> Premise:
         required=share,
         certified=1.0,
         unit="-",
-        note=start
-        + "; share of the decrease of V that the errors' part of h takes, along_reference holding"
+        note=f"{start}; required: fraction of the decrease of V that the error-dependent part of h can cancel"
         + _with(law),
     )
 

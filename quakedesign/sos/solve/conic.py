@@ -18,7 +18,7 @@ _handed: ContextVar[dict[int, Any] | None] = ContextVar("handed", default=None)
 
 @contextmanager
 def stated_problems() -> Iterator[list[Any]]:
-    """Hand back the cvxpy problems that are solved within, each once, in the order in which they are first solved.
+    """Collect the cvxpy problems solved within a block, each once, in the order of their first solution.
 
     Parameters, variables and multipliers have the values of the last solve. To be handed over, all is solved in this
     process, whatever `workers` says. The fastest backend to compile them is `canon_backend="COO"`. A statement about

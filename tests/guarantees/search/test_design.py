@@ -231,7 +231,8 @@ def test_designs_say_what_is_guaranteed_of_them_as_they_run():
     assert held.check() is Verdict.PROVED
     assert unstable.check() is sliding.check() is Verdict.UNDECIDED
     assert unstable.sentence().startswith("none: with zero-order hold over 0.184 s even the nominal loop is not stable")
-    assert sliding.sentence().startswith("none: a pressure that follows 2-CTA at every instant is run by no sampled")
+    assert sliding.sentence().startswith("none: 2-CTA is designed in continuous time, and a sampled controller cannot")
+    assert sliding.sentence().endswith("without --continuous, and in the scheme stick-slip")
 
 
 @pytest.mark.slow

@@ -317,5 +317,5 @@ def test_the_closer_one_of_two_methods_counts_on_a_level_set(
     assert (found.name, found.required, found.certified) == ("level_set", required, certified)
     assert found.note.startswith("rigorous on the level set of V that holds the start: |e1| <= 1 m, |e2| <= 2 m/s")
     assert found.note.endswith("; with nominal feed-forward")
-    assert ("share of the decrease" in found.note) is (required == F(3, 8))
+    assert ("fraction of the decrease of V" in found.note) is (required == F(3, 8))
     assert found.holds is (required <= 1)
