@@ -204,9 +204,9 @@ def _digest(name: str, content: bytes) -> bytes:
 @cache
 def _here() -> bytes:
     """Digest of everything that an answer depends on beside its question."""
-    told = [sys.version, platform.platform(), platform.node(), _features(), os.environ.get(_KERNEL, "")]
-    told += [f"{name} {_version(name)}" for name in _LIBRARIES]
-    here, package = sha256(repr(told).encode()), Path(__file__).parent
+    lines = [sys.version, platform.platform(), platform.node(), _features(), os.environ.get(_KERNEL, "")]
+    lines += [f"{name} {_version(name)}" for name in _LIBRARIES]
+    here, package = sha256(repr(lines).encode()), Path(__file__).parent
     for file in sorted(path for path in package.rglob("*") if path.is_file() and path.suffix not in (".pyc", ".pyo")):
         here.update(sha256(str(file.relative_to(package)).encode()).digest() + sha256(file.read_bytes()).digest())
     return here.digest()

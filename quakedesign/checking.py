@@ -147,10 +147,10 @@ def _other_step(claim: "Claim", fault: "Fault") -> str:
     """The box, and that a loop is not sampled as the fault is, where it is so."""
     if isinstance(claim, guarantees.SlidingGuarantee):
         return ""
-    said = f", box {fault.box.name}"
+    text = f", box {fault.box.name}"
     if isinstance(claim, guarantees.ContinuousPeaks) or float(claim.held.step) == fault.sampling_time:
-        return said
-    return f"{said}; NOT at its T_s = {fault.sampling_time:g} s, but at {float(claim.held.step):.4g} s"
+        return text
+    return f"{text}; NOT at its T_s = {fault.sampling_time:g} s, but at {float(claim.held.step):.4g} s"
 
 
 def _polynomial(raw: Any) -> tuple[str, list[str]]:

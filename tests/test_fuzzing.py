@@ -46,7 +46,7 @@ from quakedesign.guarantees import Held, farthest_rock, guarantee, longest_delay
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.laws import summed_integrals
-from quakedesign.laws.sampled_law import PathModel, RestLimit
+from quakedesign.laws.sampled_law import ErrorModel, RestLimit
 from quakedesign.parallel import SIGNALS
 from quakedesign.plant import uncertain_plant
 from quakedesign.report import Comparison, scale_lines
@@ -669,12 +669,13 @@ FOUND = [
     (partial(SlowGain, parts=10**400, growth=Fraction(1)), ()),
     (partial(SlowGain, parts=-1, growth=Fraction(10**400)), ()),
     (partial(RestLimit, width=3, per_slip=10**400, resolution=0, least=1, largest=10**400), ()),
-    (PathModel, {"of_errors": (), "of_pressures": (), "of_asked": (), "kept": ()}),
+    (ErrorModel, {"update": (), "command": (), "gain": 1}),
+    (ErrorModel.delayed, (EYE, (), 1)),
     (longest_delay, (uncertain_plant(qd.load_fault("real-fault")), Fraction(0))),
     (longest_delay, (uncertain_plant(qd.load_fault("real-fault")), Fraction(10**400))),
     (farthest_rock, (uncertain_plant(qd.load_fault("real-fault")), Fraction(1, 10**20))),
-    (PathModel, {"of_errors": EYE, "of_pressures": (*EYE, (1, 1)), "of_asked": (1, 1), "kept": ((1, 0),)}),
-    (PathModel, {"of_errors": EYE, "of_pressures": EYE, "of_asked": (1, 1, 1), "kept": EYE}),
+    (ErrorModel, {"update": EYE, "command": (1, 1), "gain": 1, "pressures": ("q",)}),
+    (ErrorModel, {"update": EYE, "command": (1, 1, 1), "gain": 1}),
     (partial(stability, FAULT, loading_rate=Fraction(10**400)), ()),
     (partial(stability, qd.load_fault("crustal-patch"), loading_rate=Fraction(10**400)), ()),
     (partial(stability, FAULT, pressure=(Fraction(10**400), Fraction(1))), ()),

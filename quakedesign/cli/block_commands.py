@@ -196,7 +196,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
         meant = ["(largest slip rate, slip from the reference, pressure beside the plan)"]
         stress = LowerBound(sliding["stress"]).quantity("Pa")
         last = f"proved for any shear stress of up to {stress}; run without inertia under a sine"
-    said = [
+    lines = [
         f"{chain.name}: largest errors of {len(chain.blocks)} blocks under {counted(len(chain.wells), 'well')}",
         *meant,
         "",
@@ -205,7 +205,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
         "",
         last,
     ]
-    output.show({one.controller: _run_facts(one) for one in runs}, said)
+    output.show({one.controller: _run_facts(one) for one in runs}, lines)
     return 0 if all(one.safe for one in runs) else 1
 
 

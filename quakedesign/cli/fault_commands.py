@@ -137,8 +137,8 @@ def errata(*rows: int, output: Output = PLAIN) -> int:
 
 def _row_lines(row: dict[str, Any]) -> list[str]:
     held = "holds" if row["holds"] else "DOES NOT HOLD"
-    told = f"{row['row']}. {held} ({row['kind']}): {row['evidence']}"
-    return [told, f"    printed: {row['printed']}", f"    correct: {row['correct']}"]
+    text = f"{row['row']}. {held} ({row['kind']}): {row['evidence']}"
+    return [text, f"    printed: {row['printed']}", f"    correct: {row['correct']}"]
 
 
 @app.command
@@ -178,8 +178,8 @@ def init(
     if beside is not None:
         write_whole(beside, json.dumps(fault_schema(), indent=1, ensure_ascii=False) + "\n")
     written = [str(path) for path in (file, beside) if path is not None]
-    facts = {"file": str(file), "schema": str(beside) if beside else None}
-    output.show(facts, [f"written: {', '.join(written)}", f"next: edit it, then quakedesign fault {file}"])
+    entries = {"file": str(file), "schema": str(beside) if beside else None}
+    output.show(entries, [f"written: {', '.join(written)}", f"next: edit it, then quakedesign fault {file}"])
     return 0
 
 
@@ -299,9 +299,9 @@ def identify(
     told = [line for each in told for line in wrap(each, 80, subsequent_indent="  ", break_long_words=False)]
     usable = file is not None or (out is None and identification.explained)
     told += [f"next: {next_command(identification, file)}"] if usable else []
-    facts = found.to_dict() | {"figure": figure and str(figure), "file": file and str(file)}
+    entries = found.to_dict() | {"figure": figure and str(figure), "file": file and str(file)}
     told += [] if verbose else ["tests, noise and assumptions: --verbose"]
-    output.show(facts, [*identification_lines(found, verbose=verbose), *told])
+    output.show(entries, [*identification_lines(found, verbose=verbose), *told])
     return 0 if identification.explained else 1
 
 

@@ -137,19 +137,19 @@ def guarantee(
         if not more and scheduler is None and workers == 1:
             calls = [partial(calls[0], progress=tell)]
         found: Any = answers(calls, workers=workers, scheduler=scheduler, tell=tell if more else None)
-    said = {"class": disturbance_class, "seconds": perf_counter() - began}
+    entries = {"class": disturbance_class, "seconds": perf_counter() - began}
     if not more:
         if isinstance(found[0], QuakedesignError):
             raise found[0]
         written = f"written: {files[0]}" if _proved(found[0]) else f"{files[0]} is not written, as nothing is proved"
         box_of = [box_sentence(faults[0])] if _proved(found[0]) and not faults[0].friction.state_names else []
         lines = [*found[0].lines(), *box_of, *([written] if files[0] else [])]
-        output.show(_facts(found[0], files[0]) | said, chain(_first(faults[0], found[0]), lines))
+        output.show(_facts(found[0], files[0]) | entries, chain(_first(faults[0], found[0]), lines))
     else:
         each = zip(faults, found, files, strict=True)
-        facts = [{"fault": one.name} | _facts(proof, path) for one, proof, path in each]
+        parts = [{"fault": one.name} | _facts(proof, path) for one, proof, path in each]
         lines = [f'"{one.name}": {line}' for one, proof in zip(faults, found, strict=True) for line in _lines(proof)]
-        output.show({"guarantees": facts, **said}, lines)
+        output.show({"guarantees": parts, **entries}, lines)
     return 0 if all(_proved(one) for one in found) else 1
 
 

@@ -99,9 +99,9 @@ def rock(diffusion: str | None, well: str | None, diffusivity: str | None) -> st
         return diffusion
     if well is None or diffusivity is None or diffusion not in (None, "0"):
         units = {"well": "m", "diffusivity": "m^2/s", "diffusion": "s"}
-        told = {"well": well, "diffusivity": diffusivity, "diffusion": diffusion}
+        entries = {"well": well, "diffusivity": diffusivity, "diffusion": diffusion}
         received = " and ".join(
-            f"--{name} of {value} {units[name]}" for name, value in told.items() if value not in (None, "0")
+            f"--{name} of {value} {units[name]}" for name, value in entries.items() if value not in (None, "0")
         )
         alone = " alone" if " and " not in received else ""
         raise ParameterError(
@@ -265,7 +265,7 @@ class LawOptions:
         from quakedesign.laws import SampledLaw
         from quakedesign.studies.runs import Choice, certified_choice, optional_choice
 
-        told = {"scale": self.scale, "feedforward": self.feedforward}
+        entries = {"scale": self.scale, "feedforward": self.feedforward}
         if self.law is not None:
             if self != replace(type(self)(), law=self.law):
                 raise ParameterError(
@@ -274,9 +274,9 @@ class LawOptions:
                 )
             return Choice(controller=SampledLaw.load(self.law))
         if self.certificate is None:
-            return optional_choice(fault, self.controller, self.gains, **told, step=step, path=path)
+            return optional_choice(fault, self.controller, self.gains, **entries, step=step, path=path)
         usual, own = type(self)(), {"gains": " ".join(self.gains)}
-        given = {"controller": self.controller, **own, **told}
+        given = {"controller": self.controller, **own, **entries}
         unlike = [
             f"--{name} {value}"
             for name, value in given.items()
@@ -370,8 +370,8 @@ class StartOptions:
 
     def state(self) -> dict[str, float]:
         """Slip and slip rate at the start, where they are given."""
-        told = {"initial_slip": self.initial_slip, "initial_slip_rate": self.initial_slip_rate}
-        return {name: value for name, value in told.items() if value}
+        entries = {"initial_slip": self.initial_slip, "initial_slip_rate": self.initial_slip_rate}
+        return {name: value for name, value in entries.items() if value}
 
     def task(self, fault: "Fault") -> "Fault":
         """The fault with the target that is given."""
@@ -430,9 +430,9 @@ class WellOptions:
     def setup(self, **more: Any) -> LoopSetup:
         """Loop setup of the options, with further fields of `LoopSetup`."""
         known = quantities()
-        told = {name: value for name, value in vars(self).items() if name in known}
-        told["diffusion"] = rock(told["diffusion"], self.well, self.diffusivity)
-        return IDEAL.with_given(**told, **more)
+        entries = {name: value for name, value in vars(self).items() if name in known}
+        entries["diffusion"] = rock(entries["diffusion"], self.well, self.diffusivity)
+        return IDEAL.with_given(**entries, **more)
 
 
 @Parameter(name="*")
@@ -771,8 +771,8 @@ class SpreadOptions:
         if designed.controller is None or designed.sliding is None:
             reason = designed.details["reason"]
             raise ParameterError(f"a campaign needs a law. Received a design without one: {reason}.")
-        told = {"spread": off, "stress": float(designed.sliding.task.stress)}
-        return Choice(controller=designed.controller), told | period
+        entries = {"spread": off, "stress": float(designed.sliding.task.stress)}
+        return Choice(controller=designed.controller), entries | period
 
 
 def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
@@ -805,11 +805,11 @@ def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], optio
 
     claim = options["law"].choose(fault).claim
     refuse({name: changed.get(name) for name in _OF_LAW}, f"{certificate}, whose law has its own")
-    told = {"stress": float(claim.task.stress)} | options["state"].of_control()
-    told |= _instruments(fault, {**changed, "step": float(claim.held.step)}, options)
-    if told["transducer"] is None and claim.held.slip_noise:
-        told["transducer"] = Transducer(quantum=2 * float(claim.held.slip_noise))
-    return {**told, "step": None, "claim": claim}
+    entries = {"stress": float(claim.task.stress)} | options["state"].of_control()
+    entries |= _instruments(fault, {**changed, "step": float(claim.held.step)}, options)
+    if entries["transducer"] is None and claim.held.slip_noise:
+        entries["transducer"] = Transducer(quantum=2 * float(claim.held.slip_noise))
+    return {**entries, "step": None, "claim": claim}
 
 
 def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:

@@ -108,14 +108,14 @@ def _certify_on_fault(
     controller = ExtendedLQR.from_values(gains, feedback=feedback)
     judged = judge(load_fault(fault, box=box), controller, step=step, peaks=peaks)
     files = judged.save(out, force=force) if out is not None else {}
-    facts = {
+    entries = {
         **judged.to_dict(),
         "certificate": files.get("stability"),
         "certificates": files,
         "seconds": perf_counter() - began,
     }
-    output.show(facts, verdict_lines(judged))
-    return 0 if facts["verdict"] == "proved" and (peaks is None or facts["peaks"] is not None) else 1
+    output.show(entries, verdict_lines(judged))
+    return 0 if entries["verdict"] == "proved" and (peaks is None or entries["peaks"] is not None) else 1
 
 
 @app.command
@@ -157,11 +157,11 @@ def check(
         for path, (verdict, statement) in verdicts.items()
         for line in (f"{path}: {verdict}", *(f"    {line}" for line in (*statement, *written.get(path, ())[1:])))
     )
-    facts: dict[str, Any] = {"files": {path: verdict for path, (verdict, _) in verdicts.items()}}
+    entries: dict[str, Any] = {"files": {path: verdict for path, (verdict, _) in verdicts.items()}}
     if rocq:
-        facts["rocq"] = {path: written[path][0] if path in written else None for path in verdicts}
-    output.show(facts, said)
-    complete = not rocq or None not in facts["rocq"].values()
+        entries["rocq"] = {path: written[path][0] if path in written else None for path in verdicts}
+    output.show(entries, said)
+    complete = not rocq or None not in entries["rocq"].values()
     return 0 if complete and all(verdict == "proved" for verdict, _ in verdicts.values()) else 1
 
 
@@ -240,7 +240,7 @@ def sos(
         answer = prove(polynomial, on=on, multiplier=multiplier, margin=margin, degree_bound=degree, products=products)
     if out is not None and answer.proof is not None:
         answer.save(out)
-    facts: dict[str, Any] = {
+    entries: dict[str, Any] = {
         "verdict": str(answer.verdict),
         "variables": list(answer.statement.variables),
         "degree": answer.statement.degree,
@@ -252,8 +252,8 @@ def sos(
         "seconds": answer.seconds,
         "versions": dict(answer.versions),
     }
-    output.show(facts, sentences(answer, verbose=verbose))
-    return 0 if facts["verdict"] == "sos" else 1
+    output.show(entries, sentences(answer, verbose=verbose))
+    return 0 if entries["verdict"] == "sos" else 1
 
 
 @app.command

@@ -443,8 +443,8 @@ def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
         return {}
     run = done.trajectory(int(index) if index.isdecimal() else index)
     path = run.save(folder / f"sample-{index}.nc")
-    told = {"outcome": run.outcome.to_dict(), "metrics": run.metrics.to_dict(), "events": dict(run.events)}
-    return {"rerun": {"index": index, "file": str(path), **told}}
+    entries = {"outcome": run.outcome.to_dict(), "metrics": run.metrics.to_dict(), "events": dict(run.events)}
+    return {"rerun": {"index": index, "file": str(path), **entries}}
 
 
 def _print(problem: "CampaignProblem", done: "Campaign", answer: dict[str, Any], written: str) -> None:

@@ -129,34 +129,34 @@ class LoopAnswer(LoopResult):
 
     def _lines(self) -> list[str]:
         if not self.found.proved:
-            said = [self.found.sentence()]
+            lines = [self.found.sentence()]
             if self.asked_step is not None:
-                said = [f"not guaranteed at T_s = {float(self.asked_step):g} s: {self.found.reason}"]
+                lines = [f"not guaranteed at T_s = {float(self.asked_step):g} s: {self.found.reason}"]
             if self.shorter is not None:
-                said.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
+                lines.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             if self.nearest is not None:
                 other = _with_nearest(*self.nearest)
                 if self.factor is not None:
                     other = f"not this law, but the same law with its output times {shortly(self.factor)}"
-                said.append(f"{other}: {self.nearest[1].sentence()}")
-            if len(said) == 1 and not self.given:
-                said.append("no T_s was found for which a design is proved with this box, disturbance and setup")
-            return said
-        said = [f"proved: {self.found.sentence()}", *self._at_rest()]
+                lines.append(f"{other}: {self.nearest[1].sentence()}")
+            if len(lines) == 1 and not self.given:
+                lines.append("no T_s was found for which a design is proved with this box, disturbance and setup")
+            return lines
+        lines = [f"proved: {self.found.sentence()}", *self._at_rest()]
         for name, seen in (("", self.worst), (" on the stick-slip plant", self.worst_with_stick)):
             if seen is not None:
                 ends = [quantity(end, "Pa", 4) for end in seen.pressures or ()]
-                said.append(
+                lines.append(
                     f"worst case found{name}: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
                     f"{quantity(seen.slip_rate_error, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
                 )
-        said += [*filter(None, [self.stick_slip_gap]), *self._told(), *self.task_lines()]
+        lines += [*filter(None, [self.stick_slip_gap]), *self._told(), *self.task_lines()]
         if self.leaves_with_stick:
-            said.append(
+            lines.append(
                 "on the stick-slip plant a course was found that exceeds the bounds, which are those of the plant "
                 "without stick"
             )
-        return said if self.compensation is None else [*said, self.compensation.sentence()]
+        return lines if self.compensation is None else [*lines, self.compensation.sentence()]
 
     @property
     def stick_slip_gap(self) -> str:

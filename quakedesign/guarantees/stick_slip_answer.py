@@ -63,19 +63,19 @@ class StickSlipAnswer(LoopResult):
         if not self.found.proved:
             return [self.found.sentence(), "the plant without stick may have a guarantee: use --plant printed"]
         healing = self.found.covered_healing()
-        said = [
+        parts = [
             f"proved: {self.found.sentence()}",
             f"without a disturbance the same bounds hold if friction at rest is up to {healing:.3g} above friction in "
             "slip",
         ]
         if self.worst is not None:
-            said.append(
+            parts.append(
                 f"worst case found: slip rate {quantity(self.worst.peak_slip_rate, 'm/s')}, slip "
                 f"{quantity(self.worst.slip_behind, 'm')} behind and {quantity(self.worst.slip_ahead, 'm')} ahead of "
                 "the reference"
             )
-        said += self.limit_lines()
-        return said if self.compensation is None else [*said, self.compensation.sentence()]
+        parts += self.limit_lines()
+        return parts if self.compensation is None else [*parts, self.compensation.sentence()]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""

@@ -87,9 +87,9 @@ def checks_of(
     if len(begins):
         peak = _after_steps(fit, time, begins, record, used, values)
         factor = max(factor, peak)
-        told = "is explained" if peak <= SEVERAL else "is not explained"
-        said = f"what follows changes of rate {told}: residuals there are {peak:.2g} times the noise"
-        checks.append(_within("peak", peak, SEVERAL, said))
+        text = "is explained" if peak <= SEVERAL else "is not explained"
+        sentence = f"what follows changes of rate {text}: residuals there are {peak:.2g} times the noise"
+        checks.append(_within("peak", peak, SEVERAL, sentence))
         checks.append(_halves(fit, time, begins, record, used))
     return tuple(checks), factor
 
@@ -110,21 +110,21 @@ def sign_check(
     """
     if difference is None:
         return None
-    told = [difference, *(other for other, _ in others.values())]
-    low = min(each.low for each in told) + min(shift or 0.0, 0.0)
-    high = max(each.high for each in told) + max(shift or 0.0, 0.0)
+    lines = [difference, *(other for other, _ in others.values())]
+    low = min(each.low for each in lines) + min(shift or 0.0, 0.0)
+    high = max(each.high for each in lines) + max(shift or 0.0, 0.0)
     passed = bool(low > 0 or high < 0) and not unsteady
     if passed:
         trends = "".join(f", also {what} (AIC {excess:+.3g})" for what, (_, excess) in others.items())
         sign = "negative: friction weakens with rate" if high < 0 else "positive: friction strengthens with rate"
-        said = f"a - b is {sign}{trends}"
+        text = f"a - b is {sign}{trends}"
     else:
         late = ": the trend may begin with the change of rate, as slow evolution does"
         spans = {f" {what} (AIC {excess:+.3g})": other for what, (other, excess) in others.items()}
         spans = {" in the fit that is taken" if others else "": difference, **spans}
         between = ": " + ", ".join(f"from {each.low:.2g} to {each.high:.2g}{what}" for what, each in spans.items())
-        said = f"the sign of a - b is open{unsteady or (late if shift is not None else between)}"
-    return Check(name="sign", passed=passed, value=difference.value, limit=0.0, sentence=said)
+        text = f"the sign of a - b is open{unsteady or (late if shift is not None else between)}"
+    return Check(name="sign", passed=passed, value=difference.value, limit=0.0, sentence=text)
 
 
 def unsteady_beginning(difference: Any, values: Mapping[str, float], loading: Loading) -> str:
@@ -158,12 +158,12 @@ def _noise(raw: Record, first: float) -> tuple[float, str]:
 
 def _beginning(values: Mapping[str, float], loading: Loading) -> Check:
     off = abs(values.get(START_STATE, 0.0))
-    told = f"begins in steady sliding at {loading.first_rate:.3g} m/s"
+    text = f"begins in steady sliding at {loading.first_rate:.3g} m/s"
     if off:
         older = float(np.exp(values[START_STATE]))
-        told = f"does not begin in steady sliding: the state is {older:.3g} times as old, which is fitted"
-    told += "".join(f", on a trend of {values[n]:.3g} {u}" for n, u in _TREND_UNITS.items() if n in values)
-    return _within("beginning", off, 0.0, f"the record {told}")
+        text = f"does not begin in steady sliding: the state is {older:.3g} times as old, which is fitted"
+    text += "".join(f", on a trend of {values[n]:.3g} {u}" for n, u in _TREND_UNITS.items() if n in values)
+    return _within("beginning", off, 0.0, f"the record {text}")
 
 
 def _after_steps(
@@ -194,9 +194,9 @@ def _halves(fit: Fit, time: ndarray, begins: ndarray, record: Record, used: ndar
     change, factor = f"{abs(score):.2g} standard deviations", f"early and late residuals differ by a factor {ratio:.2g}"
     if abs(score) > _DRIFT:
         other = ", or use --steps auto" if len(begins) > 1 else ""
-        said = f"the trend changes at the last step ({change}): the drift is not linear, {narrow}. Cut with --to{other}"
+        text = f"the trend changes at the last step ({change}): the drift is not linear, {narrow}. Cut with --to{other}"
     elif value > 1:
-        said = f"{factor}, {narrow}"
+        text = f"{factor}, {narrow}"
     else:
-        said = f"the trend does not change at the last step (within {change}), and {factor}"
-    return _within("halves", value, 1.0, said)
+        text = f"the trend does not change at the last step (within {change}), and {factor}"
+    return _within("halves", value, 1.0, text)

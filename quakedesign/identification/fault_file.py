@@ -90,13 +90,13 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     RecordError
         When the record does not tell every parameter, or tells a friction that no fault file holds.
     """
-    told = ""
+    text = ""
     if getattr(identification.law, "evolution_effect", 1.0) <= 0:
-        told = "an evolution effect that is not positive. It strengthens with rate: there is nothing to control."
+        text = "an evolution effect that is not positive. It strengthens with rate: there is nothing to control."
     if len(identification.law.state_names) > 1:
-        told = "two states. Omit --states for a file."
-    if told:
-        raise RecordError(f"a fault file holds friction with one state whose effect is positive. Received {told}")
+        text = "two states. Omit --states for a file."
+    if text:
+        raise RecordError(f"a fault file holds friction with one state whose effect is positive. Received {text}")
     if not identification.determined:
         raise RecordError(
             f"a fault file needs every parameter. Received {identification.record.name}: {identification.untold()[0]}."
@@ -137,13 +137,15 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
     law: Any = identification.law
     task, moved = fault.reference, _at_rate_of(fault, law)
     assumed = [said for said in fault.assumed if said.startswith(_OF_TASK)]
-    told = [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
+    lines = (
+        [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
+    )
     if moved is not law and moved.reference_rate != law.reference_rate:
         old, new = (quantity(each.reference_rate, "m/s", 4) for each in (law, moved))
-        said = f"mu0 = {law.reference_coefficient:.5g} at {old} was converted to {moved.reference_coefficient:.5g}"
-        told.append(f"{said} at {new} for the file")
+        text = f"mu0 = {law.reference_coefficient:.5g} at {old} was converted to {moved.reference_coefficient:.5g}"
+        lines.append(f"{text} at {new} for the file")
     beyond = beyond_rates(law, mean_rate(task), source="of the record") if law.state_names else ""
-    return [*told, *filter(None, [beyond])]
+    return [*lines, *filter(None, [beyond])]
 
 
 def law_remarks(identification: Identification, fault: Fault) -> list[str]:
@@ -214,15 +216,15 @@ def save_fault(identification: Identification, fault: Fault, path: str | Path) -
     """
     whole, law = identified_fault(identification, fault), identification.law
     if covers(law):
-        said = "friction and uncertainty below hold every law of the boxes"
+        text = "friction and uncertainty below hold every law of the boxes"
     else:
-        said = "friction below is the best fit: a fault file holds no ranges of this law; "
+        text = "friction below is the best fit: a fault file holds no ranges of this law; "
         spread = _spread(identification)
-        said += _too_wide(identification) or f"design --spread {spread} covers a, b and D_c of the box"
+        text += _too_wide(identification) or f"design --spread {spread} covers a, b and D_c of the box"
     remarks = [
         f"Friction identified from {identification.record.name!r} as {law.name}; "
         f"from {fault.name}: {other_parts(identification, fault)}.",
-        f"Best fit (95 % alone; box of all together); {said}.",
+        f"Best fit (95 % alone; box of all together); {text}.",
         *(
             f"  {e.name} = {e.value:.6g} ({e.low:.6g} to {e.high:.6g}; {e.least:.6g} to {e.most:.6g}) {e.unit}".rstrip()
             for e in identification.estimates.values()
@@ -239,9 +241,9 @@ def _too_wide(identification: Identification) -> str:
     if not wide:
         return ""
     number = ceil((max(wide.values()) / _WIDEST_SPREAD) ** 2)  # as deviations fall with the root of it
-    told = ", ".join(f"{name} within {float(share):.0%}" for name, share in wide.items())
+    text = ", ".join(f"{name} within {float(share):.0%}" for name, share in wide.items())
     return (
-        f"the box is too wide for a guarantee: {told}; about {float(_WIDEST_SPREAD):.0%} is the most. Fit about "
+        f"the box is too wide for a guarantee: {text}; about {float(_WIDEST_SPREAD):.0%} is the most. Fit about "
         f"{number} such steps together, or steps to ten times the rate with more samples within D_c after them"
     )
 

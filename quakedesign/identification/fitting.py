@@ -191,8 +191,8 @@ def fit(
         minima.append(minimised(experiment, measured, roots, start, steps=_COARSE))
         fitted, best = min(minima, key=lambda pair: pair[1])
         agreeing = sum(squares <= best * (1 + _AGREEMENT) for _, squares in minima)
-        told: dict[str, Any] = {"measured": measured, "counts": counts, "kept": every}
-        fit = Fit(experiment=experiment, fitted=fitted, agreeing=agreeing, starts=number, **told)
+        entries: dict[str, Any] = {"measured": measured, "counts": counts, "kept": every}
+        fit = Fit(experiment=experiment, fitted=fitted, agreeing=agreeing, starts=number, **entries)
         if number >= least and agreeing > 1 and np.all(fit.deviations < high - low):
             break
     return settled(fit)

@@ -130,8 +130,8 @@ class Identification:
 
     def __repr__(self) -> str:
         ends = {e.name: f"{e.value:.4g} ({e.low:.4g} to {e.high:.4g}) {e.unit}" for e in self.estimates.values()}
-        told = ", ".join(f"{name} {text}".strip() for name, text in ends.items())
-        return f"Identification({self.record.name!r}, {self.law.name}: {told})"
+        sentence = ", ".join(f"{name} {text}".strip() for name, text in ends.items())
+        return f"Identification({self.record.name!r}, {self.law.name}: {sentence})"
 
     @property
     def determined(self) -> bool:

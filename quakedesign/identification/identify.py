@@ -532,8 +532,8 @@ def profiled(
         ends: dict[str, Any] = {"low": -math.inf, "high": math.inf, "least": -math.inf, "most": math.inf}
         estimates |= {name: replace(estimates[name], **ends) for name in pair}
     law, notes = best.experiment.best_law(best.fitted), best.experiment.remarks(best.fitted, best.noise)
-    told: dict[str, Any] = {"record": record, "used": setup.used, "notes": (*setup.notes, *notes), "seed": seed}
-    return Identification(fit=best, law=law, estimates=estimates, difference=difference, **told)
+    entries: dict[str, Any] = {"record": record, "used": setup.used, "notes": (*setup.notes, *notes), "seed": seed}
+    return Identification(fit=best, law=law, estimates=estimates, difference=difference, **entries)
 
 
 def needed(best: Fit, squares: float, fewer: int = 1) -> bool:

@@ -112,8 +112,8 @@ def _numbers(line: str) -> bool:
     if not line.strip() or line.strip()[0] in _COMMENTS:
         return False
     cells = [cell.strip() for cell in _cells(line, _sign(line))]
-    told = [_CELL.fullmatch(cell) is not None for cell in cells if cell.lower() not in _MISSING]
-    return sum(told) > 1 and told[0]
+    lines = [_CELL.fullmatch(cell) is not None for cell in cells if cell.lower() not in _MISSING]
+    return sum(lines) > 1 and lines[0]
 
 
 def _sign(line: str) -> str:
@@ -131,9 +131,9 @@ def _headings(before: list[str], count: int, sign: str) -> list[Column]:
 
     A line of units may stand between headings and numbers, and headings may be a remark, as NumPy writes them.
     """
-    told = [line.strip() for line in before if line.strip()]
-    plain = [line for line in told if line[0] not in _COMMENTS]
-    lines = plain or [line.lstrip("".join(_COMMENTS)) for line in told[-1:]]
+    parts = [line.strip() for line in before if line.strip()]
+    plain = [line for line in parts if line[0] not in _COMMENTS]
+    lines = plain or [line.lstrip("".join(_COMMENTS)) for line in parts[-1:]]
     split = [_heading_cells(line, sign) for line in lines[-2:]]
     if not split or (not plain and len(split[-1]) != count):
         return [Column(heading=str(i), name=str(i), unit=None, values=np.empty(0)) for i in range(1, count + 1)]
@@ -201,16 +201,16 @@ def _values(cells: pd.Series, column: Column, text: str, first: int) -> ndarray:
         values: ndarray = cells.to_numpy(dtype=float, copy=True)
         values[~np.isfinite(values)] = np.nan
         return values
-    told = cells.astype(str).str.strip()
-    told = told.where(~told.str.lower().isin(_MISSING), "nan")
-    if _is_date(told.iloc[0]):
-        dates = pd.to_datetime(told, format="ISO8601", errors="coerce")
+    sentence = cells.astype(str).str.strip()
+    sentence = sentence.where(~sentence.str.lower().isin(_MISSING), "nan")
+    if _is_date(sentence.iloc[0]):
+        dates = pd.to_datetime(sentence, format="ISO8601", errors="coerce")
         if dates.notna().all():
             return np.asarray((dates - dates.iloc[0]).dt.total_seconds().to_numpy(dtype=float))
-    numbers = pd.to_numeric(told.str.replace(r"(?<=[\d.])[dD](?=[+-]?\d)", "e", regex=True), errors="coerce")
-    wrong = (numbers.isna() & (told != "nan")).to_numpy().nonzero()[0]
+    numbers = pd.to_numeric(sentence.str.replace(r"(?<=[\d.])[dD](?=[+-]?\d)", "e", regex=True), errors="coerce")
+    wrong = (numbers.isna() & (sentence != "nan")).to_numpy().nonzero()[0]
     if len(wrong):
-        cell, lines = told.iloc[int(wrong[0])], enumerate(text.splitlines(), start=1)
+        cell, lines = sentence.iloc[int(wrong[0])], enumerate(text.splitlines(), start=1)
         rows = [i for i, line in lines if i > first and line.strip() and line.strip()[0] != "#"]
         raise RecordError(
             f"line {rows[int(wrong[0])]} must hold a number in column {column.name}. Received {shown(cell)}."
@@ -271,8 +271,8 @@ def _xlook_binary(data: bytes, size: int, channels: int, kind: str) -> list[Colu
             "that ends in _r) in xlook and write the record as text, or as binary again."
         )
     words = [data[36 + 84 * i : 36 + 84 * i + 26] for i in range(channels)]
-    told = [[part.split(b"\0")[0].decode("latin-1").strip() for part in (word[:13], word[13:])] for word in words]
-    return [replace(heading(f"{name} [{unit}]"), values=row) for (name, unit), row in zip(told, table, strict=True)]
+    lines = [[part.split(b"\0")[0].decode("latin-1").strip() for part in (word[:13], word[13:])] for word in words]
+    return [replace(heading(f"{name} [{unit}]"), values=row) for (name, unit), row in zip(lines, table, strict=True)]
 
 
 def _matlab(data: bytes, path: str | Path) -> list[Column]:

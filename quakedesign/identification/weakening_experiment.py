@@ -68,8 +68,8 @@ class MeasuredSlip(_Weakening):
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
         """Whether the noise of the slip, which the fit leaves out, is felt in friction."""
         felt = float(np.max(np.abs(self.strength(self.slip, fitted)[1]))) * self.slip_noise
-        told = f"the slip is known exactly, although its noise of {self.slip_noise:.2g} m moves friction by {felt:.2g}"
-        return (told,) if felt > _SMALL_SHARE * noise else ()
+        text = f"the slip is known exactly, although its noise of {self.slip_noise:.2g} m moves friction by {felt:.2g}"
+        return (text,) if felt > _SMALL_SHARE * noise else ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,15 +17,12 @@ from .loop_field import LoopField as LoopField
 from .sampled_controller import SampledController as SampledController
 from .sampled_controller import compensated as compensated
 from .sampled_law import NOISES as NOISES
-from .sampled_law import ErrorPrediction as ErrorPrediction
+from .sampled_law import ErrorModel as ErrorModel
 from .sampled_law import LinearLaw as LinearLaw
 from .sampled_law import NominalModel as NominalModel
-from .sampled_law import PathModel as PathModel
-from .sampled_law import Prediction as Prediction
 from .sampled_law import RestLimit as RestLimit
+from .sampled_law import compensator as compensator
 from .sampled_law import disturbance_estimate as disturbance_estimate
-from .sampled_law import estimate_through_path as estimate_through_path
-from .sampled_law import observer_through_path as observer_through_path
 from .sampled_law import slip_observer as slip_observer
 from .sampled_law import summed_integrals as summed_integrals
 from .sliding_mode import SlidingMode as SlidingMode

@@ -1,10 +1,10 @@
 """Sampled linear control laws as exact matrices: p = Cz + Dy, z⁺ = Fz + Gy.
 
-Chapters: feedback with a disturbance estimate and the sampled e-LQR; slip-only feedback with an observer;
-laws with a model of the diffusion path between well and fault; a pressure limit at rest that prevents
-integrator windup.
+Chapters: sizes, steady states and the sampled e-LQR; LQG compensators with an estimate of the disturbance,
+behind a delay, a lag or a diffusion path; a pressure limit at rest that prevents integrator windup.
 """
 
+from collections.abc import Sequence
 from dataclasses import field
 from fractions import Fraction
 from typing import ClassVar
@@ -21,7 +21,6 @@ from quakedesign.laws.implicit_root import ImplicitRoot
 
 Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
-Estimated = tuple[tuple[str, ...], tuple[Row, Row], Row]
 
 MEASURED = ("slip_error", "slip_rate_error")
 NOISES = ("slip_noise", "rate_noise")
@@ -108,11 +107,15 @@ def require_sizes(
             f"a linear law needs at most {MOST_STATES} states with different names. "
             f"Received {n}: {', '.join(states[: MOST_STATES + 1])}."
         )
-    rows = {"F": (own, n, n), "G": (measured, n, seen), "C": ((output,), 1, n), "D": ((feedback,), 1, seen)}
-    for name, (matrix, height, width) in rows.items():
+    matrices = {"F": (own, n, n), "G": (measured, n, seen), "C": ((output,), 1, n), "D": ((feedback,), 1, seen)}
+    _require_shapes(f"a linear law with {n} states", matrices)
+
+
+def _require_shapes(owner: str, matrices: dict[str, tuple[Matrix, int, int]]) -> None:
+    for name, (matrix, height, width) in matrices.items():
         if [len(row) for row in matrix] != [width] * height:
             raise ParameterError(
-                f"matrix {name} of a linear law with {n} states must be {height} × {width}. Received "
+                f"matrix {name} of {owner} must be {height} × {width}. Received "
                 f"{len(matrix)} rows of {', '.join(str(len(row)) for row in matrix) or 'no'} entries."
             )
 
@@ -134,42 +137,6 @@ class NominalModel:
     slip: Fraction
     rate: Fraction
     gain: Fraction
-
-
-@checked_dataclass(frozen=True, slots=True, kw_only=True)
-class Prediction:
-    """Prediction of the slip-rate error by the model of a law; any coefficients define a law.
-
-    Attributes
-    ----------
-    of_slip, of_rate : Fraction
-        Coefficients of the present e1 and e2 for e2 at the next sample.
-    of_pushes : tuple of Fraction
-        γ_j [s]: coefficients of βb·p + d for it, p being the pressure commanded j samples ago, from j = 0 on.
-    ahead : tuple of rows
-        Coefficients of the present e1 and e2 for both when the present command arrives; the unit matrix without delay.
-    ahead_of_pushes : tuple of (Fraction, Fraction)
-        Coefficients of βb·p + d for these [s², s], p being the pressure commanded j samples ago, from j = 1 on.
-
-    Raises
-    ------
-    ParameterError
-        When the pushes of both do not fit, or those of the next sample add up to zero.
-    """
-
-    of_slip: Fraction
-    of_rate: Fraction
-    of_pushes: Row
-    ahead: Matrix = ((Fraction(1), Fraction(0)), (Fraction(0), Fraction(1)))
-    ahead_of_pushes: Matrix = ()
-
-    def __post_init__(self) -> None:
-        if len(self.of_pushes) != len(self.ahead_of_pushes) + 1 or not sum(self.of_pushes):
-            raise ParameterError(
-                "of_pushes of a prediction must have one entry more than ahead_of_pushes, with a sum other than 0. "
-                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)} entries, and the sum "
-                f"{shortly(sum(self.of_pushes))}."
-            )
 
 
 def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
@@ -204,90 +171,10 @@ def summed_integrals(gains: tuple[Fraction, ...], step: Fraction) -> LinearLaw:
     )
 
 
-def disturbance_estimate(
-    gains: tuple[Fraction, Fraction], weight: Fraction, prediction: Prediction, gain: Fraction
-) -> LinearLaw:
-    """Feedback of slip and slip rate, with an estimate d of the disturbance over the last period.
-
-    d ← d + a(e2 − π)/Σγ_j, p = −k1ê1 − k2ê2 − d/(βb) with ê the prediction of e when p arrives, and
-    π ← of_slip·e1 + of_rate·e2 + Σγ_j(βb·p_j + d). The estimate follows the innovation of the slip rate and has no
-    trend, so that it does not wind up while the fault is at rest. States: π [m/s], d [m/s²], and the earlier commands
-    p_1, p_2 … [Pa].
-
-    Parameters
-    ----------
-    gains : (Fraction, Fraction)
-        k1, k2 [Pa/m, Pa·s/m].
-    weight : Fraction
-        a [-].
-    prediction : Prediction
-    gain : Fraction
-        β·b of the model [m²/kg], positive.
-    """
-    names, errors, level = _estimated(weight / sum(prediction.of_pushes), len(prediction.ahead_of_pushes))
-    of_errors, of_pushes = ((prediction.of_slip, prediction.of_rate),), tuple((push,) for push in prediction.of_pushes)
-    return _delayed(names, gains, gain, errors, level, of_errors, of_pushes, prediction)
-
-
 def require_gain(gain: Fraction) -> None:
     """Reject a model whose input gain is not positive."""
     if gain <= 0:
         raise ParameterError(f"the input gain of a model must be positive. Received {shortly(gain)} m²/kg.")
-
-
-def _estimated(share: Fraction, behind: int) -> Estimated:
-    """Names of the first states, and rows for errors and disturbance that act on (π, d, `behind` others, e1, e2)."""
-    size, one = 4 + behind, Fraction(1)
-    level = unit_row(size, {0: -share, 1: one, size - 1: share})
-    errors = unit_row(size, {size - 2: one}), unit_row(size, {size - 1: one})
-    return ("predicted_rate", "disturbance"), errors, level
-
-
-def _observed(corrections: tuple[Fraction, Fraction, Fraction], behind: int) -> Estimated:
-    """As `_estimated`, acting on (π1, π2, d, `behind` others, e1, e2)."""
-    size, one = 5 + behind, Fraction(1)
-    innovation = unit_row(size, {0: -one, size - 2: one})
-    slip, rate, level = (combined((one, unit_row(size, {i: one})), (v, innovation)) for i, v in enumerate(corrections))
-    return ("predicted_slip", "predicted_rate", "disturbance"), (slip, rate), level
-
-
-def _delayed(
-    names: tuple[str, ...],
-    gains: tuple[Fraction, Fraction],
-    gain: Fraction,
-    errors: tuple[Row, Row],
-    level: Row,
-    of_errors: Matrix,
-    of_pushes: Matrix,
-    prediction: "Prediction | ErrorPrediction",
-) -> LinearLaw:
-    """Law from rows for its states, then e1 and e2; the delay line shifts by one place."""
-    require_gain(gain)
-    one, late = Fraction(1), len(prediction.ahead_of_pushes)
-    waiting = [unit_row(len(level), {len(names) + j: one}) for j in range(late)]
-    before = [combined((gain, row), (one, level)) for row in waiting]
-    slip, rate = (
-        combined(
-            *zip(row, errors, strict=True),
-            *((v[i], p) for v, p in zip(prediction.ahead_of_pushes, before, strict=True)),
-        )
-        for i, row in enumerate(prediction.ahead)
-    )
-    asked = combined((-gains[0], slip), (-gains[1], rate), (-1 / gain, level))
-    pushes = [combined((gain, asked), (one, level)), *before]
-    predicted = [
-        combined(*zip(row, errors, strict=True), *((v[i], push) for v, push in zip(of_pushes, pushes, strict=True)))
-        for i, row in enumerate(of_errors)
-    ]
-    rows = [*predicted, level, *[asked, *waiting][:late]]
-    return LinearLaw(
-        states=(*names, *(f"asked_{j + 1}_ago" for j in range(late))),
-        update=tuple(row[:-2] for row in rows),
-        measured=tuple(row[-2:] for row in rows),
-        output=asked[:-2],
-        feedback=asked[-2:],
-        applied=(*(gain * v for v in of_pushes[0]), Fraction(0), *[one, *[Fraction(0)] * late][:late]),
-    )
 
 
 def unit_row(size: int, entries: dict[int, Fraction]) -> Row:
@@ -295,13 +182,11 @@ def unit_row(size: int, entries: dict[int, Fraction]) -> Row:
     return tuple(entries.get(i, Fraction(0)) for i in range(size))
 
 
-def combined(*parts: tuple[Fraction, Row]) -> Row:
-    """Combination of rows."""
-    scaled = ([factor * v for v in row] for factor, row in parts)
-    return tuple(sum(column, Fraction(0)) for column in zip(*scaled, strict=True))
+def _exact(rows: Sequence[Sequence[Fraction]]) -> fmpq_mat:
+    return fmpq_mat([[fmpq(*v.as_integer_ratio()) for v in row] for row in rows])
 
 
-def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
+def steady_states(own: Matrix, output: Row, rates: Row, pressure: Fraction) -> Row:
     """Steady states z of a law with zero errors: Mz = v and Cz = p; free components are 0.
 
     Raises
@@ -309,212 +194,205 @@ def steady_states(own: Matrix, output: Row, rates: Row, asked: Fraction) -> Row:
     ParameterError
         When there are none.
     """
-    rows = [*([*row, rate] for row, rate in zip(own, rates, strict=True)), [*output, asked]]
-    reduced, rank = fmpq_mat([[fmpq(*v.as_integer_ratio()) for v in row] for row in rows]).rref()
-    found = [Fraction(0)] * (len(output) + 1)
+    rows = [*([*row, rate] for row, rate in zip(own, rates, strict=True)), [*output, pressure]]
+    reduced, rank = _exact(rows).rref()
+    solution = [Fraction(0)] * (len(output) + 1)
     for i in range(rank):
-        pivot = next(j for j in range(len(found)) if reduced[i, j] != 0)
-        found[pivot] = fraction_of(reduced[i, len(output)])
-    if found.pop():
+        pivot = next(j for j in range(len(solution)) if reduced[i, j] != 0)
+        solution[pivot] = fraction_of(reduced[i, len(output)])
+    if solution.pop():
         raise ParameterError(
             "a law must have a steady state with zero errors and a constant pressure. Received a law without "
             "integral action. Add an integral of the slip error, or an estimate of the disturbance."
         )
-    return tuple(found)
+    return tuple(solution)
 
 
 # ----------------------------------------------------------------------
-# Sampled law that measures the slip alone: observer of both errors and of the disturbance.
+# LQG compensators: a filter of a sampled model, and feedback of its estimate.
 
 
-@checked_dataclass(frozen=True, slots=True, kw_only=True)
-class ErrorPrediction:
-    """Prediction of both errors by the model of an observer; any coefficients define a law.
-
-    Attributes
-    ----------
-    of_errors : tuple of rows
-        Φ: of e1 and e2 now, for both at the next sample.
-    of_pushes : tuple of (Fraction, Fraction)
-        γ_j [s², s]: what βb·p + d adds to that, p being what was asked for j samples ago, from 0 on.
-    ahead, ahead_of_pushes : tuple of rows
-        As those of `Prediction`.
-
-    Raises
-    ------
-    ParameterError
-        When the pushes of both do not fit.
-    """
-
-    of_errors: Matrix
-    of_pushes: Matrix
-    ahead: Matrix = ((Fraction(1), Fraction(0)), (Fraction(0), Fraction(1)))
-    ahead_of_pushes: Matrix = ()
-
-    def __post_init__(self) -> None:
-        if len(self.of_pushes) != len(self.ahead_of_pushes) + 1:
-            raise ParameterError(
-                "of_pushes of a prediction must have one entry more than ahead_of_pushes. "
-                f"Received {len(self.of_pushes)} and {len(self.ahead_of_pushes)} entries."
-            )
-
-
-def slip_observer(
-    gains: tuple[Fraction, Fraction],
-    corrections: tuple[Fraction, Fraction, Fraction],
-    prediction: ErrorPrediction,
-    gain: Fraction,
+def compensator(
+    states: tuple[str, ...], update: Matrix, command: Row, measured: Matrix, estimator: Matrix, feedback: Row
 ) -> LinearLaw:
-    """Feedback of the slip alone: observer of slip error, slip-rate error and disturbance d.
+    """Linear quadratic Gaussian (LQG) compensator of a sampled model x⁺ = Ax + Bp, y = Cx.
 
-    ê ← π + l·(e1 − π1) and d ← d + l3(e1 − π1), p = −k1ê1 − k2ê2 − d/(βb) with ê as expected when p arrives, and π ←
-    Φê + Σγ_j(βb·p_j + d). The level has no trend. States: π [m, m/s], d [m/s²], and the pressures p_1, p_2 … asked for
-    before [Pa].
+    x̂ = π + L(y − Cπ), p = −Kx̂ and π⁺ = Ax̂ + Bp, so that π⁺ = (A − BK)((I − LC)π + Ly). The states of the law are π. A
+    prediction that the measurement replaces, which has a column of zeros in I − LC, is no state.
 
     Parameters
     ----------
-    gains : (Fraction, Fraction)
-        k1, k2 [Pa/m, Pa·s/m].
-    corrections : (Fraction, Fraction, Fraction)
-        l1, l2, l3 [-, 1/s, 1/s²].
-    prediction : ErrorPrediction
-    gain : Fraction
-        β·b of the model [m²/kg], positive.
-    """
-    names, errors, level = _observed(corrections, len(prediction.ahead_of_pushes))
-    return _delayed(names, gains, gain, errors, level, prediction.of_errors, prediction.of_pushes, prediction)
-
-
-# ----------------------------------------------------------------------
-# Laws with a model of the path between their pressure and the fault.
-
-
-@checked_dataclass(frozen=True, slots=True, kw_only=True)
-class PathModel:
-    """Model of fault and diffusion path in a law; any coefficients define a law.
-
-    Attributes
-    ----------
-    of_errors : tuple of rows
-        Φ: of e1 and e2 now, for both at the next sample.
-    of_pressures : tuple of rows
-        m_i [s², s]: coefficients of βb·q_i for either, q_i being the pressures of the path.
-    of_asked : tuple of Fraction
-        n [s², s]: coefficients of βb·p for either, p being the present command.
-    kept : tuple of rows
-        R with q⁺ = Rq + (1 − R1)p, so that q = p where p is constant.
+    states : tuple of str
+        Names of x.
+    update, command : tuple of rows, tuple of Fraction
+        A; B, per Pa.
+    measured : tuple of rows
+        C, two rows: of e1 [m] and e2 [m/s].
+    estimator : tuple of rows
+        L, two columns, per m and per m/s.
+    feedback : tuple of Fraction
+        K [Pa per unit of x].
 
     Raises
     ------
     ParameterError
-        When sizes do not fit, or the pressure has no effect on the fault.
+        When the sizes do not fit, or more than 12 states are left.
+    """
+    n, seen = len(states), len(MEASURED)
+    shapes = {"A": (update, n, n), "B": ((command,), 1, n), "C": (measured, seen, n), "L": (estimator, n, seen)}
+    _require_shapes(f"a compensator with {n} states", shapes | {"K": ((feedback,), 1, n)})
+    gains, corrections = _exact([feedback]), _exact(estimator)
+    closed = _exact(update) - _exact([command]).transpose() * gains
+    of_prediction = fmpq_mat([[fmpq(i == j) for j in range(n)] for i in range(n)]) - corrections * _exact(measured)
+    kept = [j for j in range(n) if any(of_prediction[i, j] != 0 for i in range(n))]
+
+    def rows(matrix: fmpq_mat, lines: Sequence[int], columns: Sequence[int] = range(seen)) -> Matrix:
+        return tuple(tuple(fraction_of(matrix[i, j]) for j in columns) for i in lines)
+
+    return LinearLaw(
+        states=tuple(states[j] for j in kept),
+        update=rows(closed * of_prediction, kept, kept),
+        measured=rows(closed * corrections, kept),
+        output=rows(-gains * of_prediction, [0], kept)[0],
+        feedback=rows(-gains * corrections, [0])[0],
+        applied=tuple(command[j] for j in kept),
+    )
+
+
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorModel:
+    """Sampled model of both errors and of the pressures on their way, under a constant disturbance d [m/s²].
+
+    x⁺ = Ax + Bp + (As + B − s)d/b, x = (e1, e2, q), s = (0, 0, σ, …, σ). The constant pressure p = −d/b balances d: x =
+    sp is then a steady state. Any coefficients define a law, and its steady state without errors is the same.
+
+    Attributes
+    ----------
+    update : tuple of rows
+        A.
+    command : tuple of Fraction
+        B, per Pa.
+    gain : Fraction
+        b [m²/kg], positive: β·b of the model.
+    pressures : tuple of str
+        Names of q.
+    unit : Fraction
+        σ: value of every q at a constant pressure of 1 Pa.
+
+    Raises
+    ------
+    ParameterError
+        When the sizes do not fit, the gain is not positive, or a constant pressure has no effect on the slip rate.
     """
 
-    of_errors: Matrix
-    of_pressures: Matrix
-    of_asked: Row
-    kept: Matrix
+    update: Matrix
+    command: Row
+    gain: Fraction
+    pressures: tuple[str, ...] = ()
+    unit: Fraction = Fraction(1)
 
     def __post_init__(self) -> None:
-        n = max(map(len, self.of_pressures), default=0)
-        sizes = [len(row) for row in (*self.kept, *self.of_pressures)]
-        if sizes != [n] * (n + 2) or len(self.of_pressures) != 2 or len(self.of_asked) != 2:
+        n = 2 + len(self.pressures)
+        _require_shapes(f"an error model with {n} states", {"A": (self.update, n, n), "B": ((self.command,), 1, n)})
+        require_gain(self.gain)
+        if not self.of_disturbance[1]:
             raise ParameterError(
-                f"a path model with {n} pressures needs kept of {n} × {n}, of_pressures of 2 × {n} and of_asked of 2 "
-                f"entries. Received {len(self.kept)} and {len(self.of_pressures)} rows of "
-                f"{', '.join(map(str, sizes)) or 'no'} entries, and {len(self.of_asked)} entries of of_asked."
+                "the effect of a constant pressure on the slip rate of an error model must not be 0. Received 0. "
+                "Correct update or command."
             )
-        if not self.of_constant[1]:
-            raise ParameterError(
-                "the gain of a path model from a constant pressure to the slip rate must not be 0. Received 0. "
-                "Correct of_asked or of_pressures."
-            )
+
+    @classmethod
+    def delayed(cls, of_errors: Matrix, of_commands: Matrix, gain: Fraction) -> "ErrorModel":
+        """Model e⁺ = Φe + Σ_j γ_j(b·p_j + d), p_j [Pa] being the pressure commanded j samples ago, from j = 0 on.
+
+        Parameters
+        ----------
+        of_errors : tuple of rows
+            Φ.
+        of_commands : tuple of (Fraction, Fraction)
+            γ_j [s², s], at least one.
+        gain : Fraction
+            b [m²/kg], positive.
+        """
+        late = max(len(of_commands), 1) - 1
+        _require_shapes("a delayed error model", {"Φ": (of_errors, 2, 2), "γ": (of_commands, late + 1, 2)})
+        now, *before = (tuple(gain * v for v in row) for row in of_commands)
+        errors = ((*row, *(v[i] for v in before)) for i, row in enumerate(of_errors))
+        shifted = (unit_row(2 + late, {1 + j: Fraction(1)} if j else {}) for j in range(late))
+        return cls(
+            update=(*errors, *shifted),
+            command=(*now, *(Fraction(j == 0) for j in range(late))),
+            gain=gain,
+            pressures=tuple(f"asked_{j + 1}_ago" for j in range(late)),
+        )
 
     @property
-    def of_constant(self) -> Row:
-        """Γ [s², s]: coefficients of βb·p for constant p."""
-        return tuple(sum(row, own) for row, own in zip(self.of_pressures, self.of_asked, strict=True))
+    def of_disturbance(self) -> Row:
+        """(As + B − s)/b: coefficients of d."""
+        steady = (Fraction(0),) * 2 + (self.unit,) * len(self.pressures)
+        rows = zip(self.update, self.command, steady, strict=True)
+        return tuple((self.unit * sum(row[2:]) + own - rest) / self.gain for row, own, rest in rows)
+
+    def compensator(self, gains: Row, corrections: Matrix) -> LinearLaw:
+        """Compensator of e1, e2, d and q: p = −k(ê, q) − (1 + ks)d/b; q is computed, not corrected.
+
+        Parameters
+        ----------
+        gains : tuple of Fraction
+            k [Pa/m, Pa·s/m, and Pa per unit of q].
+        corrections : tuple of rows
+            Of e1, e2 and d for the innovations of e1 [m] and e2 [m/s].
+        """
+        n, zero = 2 + len(self.pressures), Fraction(0)
+        _require_shapes(f"an error model with {n} states", {"k": ((gains,), 1, n), "l": (corrections, 3, 2)})
+
+        def inserted(row: Row, level: Fraction) -> Row:
+            return (*row[:2], level, *row[2:])
+
+        rows = [inserted(row, level) for row, level in zip(self.update, self.of_disturbance, strict=True)]
+        return compensator(
+            states=("predicted_slip", "predicted_rate", "disturbance", *self.pressures),
+            update=(*rows[:2], unit_row(n + 1, {2: Fraction(1)}), *rows[2:]),
+            command=inserted(self.command, zero),
+            measured=tuple(unit_row(n + 1, {i: Fraction(1)}) for i in range(2)),
+            estimator=(*corrections, *[(zero, zero)] * len(self.pressures)),
+            feedback=inserted(gains, (1 + self.unit * sum(gains[2:])) / self.gain),
+        )
 
 
-def estimate_through_path(gains: Row, weight: Fraction, model: PathModel, gain: Fraction) -> LinearLaw:
-    """Feedback of slip, slip rate and path pressures, with an estimate d of the disturbance.
+def disturbance_estimate(gains: Row, weight: Fraction, model: ErrorModel) -> LinearLaw:
+    """Feedback of slip and slip rate, with an estimate d of the disturbance over the last period.
 
-    d ← d + a(e2 − π)/Γ2, p = −k1e1 − k2e2 − Σ k_i(q_i + d/(βb)) − d/(βb), π ← Φ2e + βb(Σ m_2iq_i + n2p) + Γ2d, and q ←
-    Rq + (1 − R1)p, which is computed, not measured. States: π [m/s], d and βb·q [m/s²], of similar magnitude.
+    The measured errors replace the predicted ones, and d ← d + a(e2 − π2)/Γ2, where Γ2 is the effect of d on e2. The
+    estimate follows the innovation of the slip rate and has no trend, so that it does not wind up while the fault is at
+    rest. States: π2 [m/s], d [m/s²] and q.
 
     Parameters
     ----------
     gains : tuple of Fraction
-        k1 [Pa/m], k2 [Pa·s/m] and k_i [-] of every pressure.
+        As those of `ErrorModel.compensator`.
     weight : Fraction
         a [-].
-    model : PathModel
-    gain : Fraction
-        β·b of the model [m²/kg], positive.
-
-    Raises
-    ------
-    ParameterError
-        When the gains do not fit, or the model's is not positive.
+    model : ErrorModel
     """
-    return _through(*_estimated(weight / model.of_constant[1], len(model.kept)), gains, model, gain)
+    zero, one = Fraction(0), Fraction(1)
+    return model.compensator(gains, ((one, zero), (zero, one), (zero, weight / model.of_disturbance[1])))
 
 
-def observer_through_path(
-    gains: Row, corrections: tuple[Fraction, Fraction, Fraction], model: PathModel, gain: Fraction
-) -> LinearLaw:
-    """Feedback of the slip alone through a path: observer of both errors and disturbance d.
+def slip_observer(gains: Row, corrections: tuple[Fraction, Fraction, Fraction], model: ErrorModel) -> LinearLaw:
+    """Feedback of the slip alone: observer of slip error, slip-rate error and disturbance d.
 
-    ê ← π + l(e1 − π1) and d ← d + l3(e1 − π1), p of ê as that of `estimate_through_path` of e, and π ← Φê + βb(Σ m_iq_i
-    + np) + Γd. States: π [m, m/s], d and βb·q [m/s²].
+    States: π [m, m/s], d [m/s²] and q. The estimate of d has no trend.
 
     Parameters
     ----------
     gains : tuple of Fraction
-        k1 [Pa/m], k2 [Pa·s/m] and k_i [-] of every pressure.
+        As those of `ErrorModel.compensator`.
     corrections : (Fraction, Fraction, Fraction)
-        l1, l2, l3 [-, 1/s, 1/s²].
-    model : PathModel
-    gain : Fraction
-        β·b of the model [m²/kg], positive.
-
-    Raises
-    ------
-    ParameterError
-        As `estimate_through_path`.
+        l1, l2, l3 [-, 1/s, 1/s²], for the innovation e1 − π1.
+    model : ErrorModel
     """
-    return _through(*_observed(corrections, len(model.kept)), gains, model, gain)
-
-
-def _through(
-    names: tuple[str, ...], errors: tuple[Row, Row], level: Row, gains: Row, model: PathModel, gain: Fraction
-) -> LinearLaw:
-    """Law of the last so many predictions, the level and the path, from rows for the errors and the level."""
-    count, own = len(model.kept), len(names)
-    if len(gains) != 2 + count or gain <= 0:
-        raise ParameterError(
-            f"a law with a path model of {count} pressures needs {2 + count} gains and a positive input gain of the "
-            f"model. Received {len(gains)} gains and the input gain {shortly(gain)} m²/kg."
-        )
-    path = [unit_row(len(level), {own + i: Fraction(1)}) for i in range(count)]
-    away = [combined((1 / gain, q), (1 / gain, level)) for q in path]
-    asked = combined(*((-k, row) for k, row in zip(gains, (*errors, *away), strict=True)), (-1 / gain, level))
-    expected = zip(model.of_errors, model.of_pressures, model.of_asked, model.of_constant, strict=True)
-    predicted = [
-        combined(*zip(now, errors, strict=True), *zip(pushed, path, strict=True), (gain * n, asked), (constant, level))
-        for now, pushed, n, constant in expected
-    ]
-    fresh = [gain * (1 - sum(row)) for row in model.kept]
-    kept = [combined(*zip(row, path, strict=True), (new, asked)) for row, new in zip(model.kept, fresh, strict=True)]
-    rows = [*predicted[1 - own :], level, *kept]
-    return LinearLaw(
-        states=(*names, *(f"path{i}" for i in range(count))),
-        update=tuple(row[:-2] for row in rows),
-        measured=tuple(row[-2:] for row in rows),
-        output=asked[:-2],
-        feedback=asked[-2:],
-        applied=(*[gain * n for n in model.of_asked[1 - own :]], Fraction(0), *fresh),
-    )
+    return model.compensator(gains, tuple((correction, Fraction(0)) for correction in corrections))
 
 
 # ----------------------------------------------------------------------

@@ -125,8 +125,8 @@ def made(runs: Iterable["Shown"]) -> str:
         return "".join(", ".join(way) for way in ways)
     shared = [part for part in next(iter(ways)) if all(part in way for way in ways)]
     own = [(", ".join(filter(None, dict.fromkeys(who))), way) for way, who in ways.items()]
-    told = [": ".join(filter(None, (who, ", ".join(p for p in way if p not in shared)))) for who, way in own]
-    return "; ".join([*told, *(["all runs: " + ", ".join(shared)] if shared else [])])
+    lines = [": ".join(filter(None, (who, ", ".join(p for p in way if p not in shared)))) for who, way in own]
+    return "; ".join([*lines, *(["all runs: " + ", ".join(shared)] if shared else [])])
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:
@@ -161,8 +161,8 @@ def runs_of(entries: Iterable["Entry"]) -> "list[tuple[Entry, Trajectory]]":
 def with_diverged(entries: "Iterable[Entry]", note: str = "") -> str:
     """Note that also names the runs which diverged: their last values would leave no room for all others."""
     found = [(e.label, e.run.events["diverged"]) for e in entries if e.run and "diverged" in e.run.events]
-    told = [f"{label} diverges at {time:.3g} s and is not drawn" for label, time in found]
-    return "; ".join([*([note] if note else []), *told])
+    lines = [f"{label} diverges at {time:.3g} s and is not drawn" for label, time in found]
+    return "; ".join([*([note] if note else []), *lines])
 
 
 def known(values: np.ndarray | None) -> np.ndarray:

@@ -38,8 +38,8 @@ def identification_lines(found: Identification | Steps, *, verbose: bool = False
         table += [f"and {left} more: --verbose"] * (left > 0)
         common = identification_lines(found.common)
         head = common.index(_HEAD) - 1
-        said = f"All together: {found.common.assessment.checks[0].sentence}."
-        return [*common[:head], "", *table, "", *_wrapped([said]), *common[head:], *(each if verbose else [])]
+        text = f"All together: {found.common.assessment.checks[0].sentence}."
+        return [*common[:head], "", *table, "", *_wrapped([text]), *common[head:], *(each if verbose else [])]
     assessment, answer = found.assessment, f"{found.record.name}: {found.law.name}"
     unclear, refused = (assessment.verdict == each for each in (CANNOT_TELL, EXPLAINS_NOT))
     answer += f", {assessment}: {assessment.open[0]}." if unclear else f" {assessment}."
@@ -55,8 +55,8 @@ def identification_lines(found: Identification | Steps, *, verbose: bool = False
     more += [f"not passed: {each}" for each in failed if each not in (*assessment.open, *assessment.cautions)]
     shown = [each for each in found.estimates.values() if verbose or not each.name.startswith(DELAY)]
     shown += [found.difference] if found.difference else []
-    told = [each for each in found.record.remarks if verbose or " is read as " not in each]
-    more += [*_warnings(found), *([f"read: {'; '.join(told)}"] if told else []), *(_more(found) if verbose else [])]
+    lines = [each for each in found.record.remarks if verbose or " is read as " not in each]
+    more += [*_warnings(found), *([f"read: {'; '.join(lines)}"] if lines else []), *(_more(found) if verbose else [])]
     return [*_wrapped([answer, *but, ""]), _HEAD, *map(_row, shown), "", *_wrapped(more)]
 
 
@@ -69,10 +69,10 @@ _COLUMNS = {"direct_effect": 10, "evolution_effect": 10, "difference": 10, "crit
 
 def _step_row(number: int, step: Identification) -> str:
     """Values of a step; a question mark behind those without an interval."""
-    told = {**step.estimates, "difference": step.difference}
+    entries = {**step.estimates, "difference": step.difference}
     cells = []
     for name, width in _COLUMNS.items():
-        one = told.get(name)
+        one = entries.get(name)
         value = "" if one is None else quantity(one.value, one.unit) if one.unit else f"{one.value:.3g}"
         cells.append(f"{value}{'' if one is None or one.identified else '?'}".rjust(width))
     return f"{number:<5}{''.join(cells)}  {step.assessment.verdict.replace(' the record', '')}"

@@ -31,8 +31,8 @@ def limits_lines(limits: Limits) -> list[str]:
         f"{_shown(limit.proved_up_to, limit.unit):>16}"
         for limit in limits.named().values()
     ]
-    told = [*_meaning(limits), *_undecided(limits)]
-    return [*head, *rows, "", *(line for said in told for line in wrap(said, 80, subsequent_indent="  "))]
+    lines = [*_meaning(limits), *_undecided(limits)]
+    return [*head, *rows, "", *(line for said in lines for line in wrap(said, 80, subsequent_indent="  "))]
 
 
 def _meaning(limits: Limits) -> list[str]:
@@ -44,7 +44,7 @@ def _meaning(limits: Limits) -> list[str]:
     known = "knows slip, slip rate and disturbance"
     if limits.told.noisy:
         known = f"measures {limits.told.words()}"
-    told = [
+    lines = [
         "infeasible: every controller, linear or not, fails for some friction of the box and some disturbance of the "
         "stated size, which may jump",
         f"slip-rate error: for controllers that keep the slip error {within}, on the plant without stick; it holds "
@@ -53,15 +53,18 @@ def _meaning(limits: Limits) -> list[str]:
         "without stick",
     ]
     if (least := limits.stick_slip_rate) is not None:
-        told.insert(
+        lines.insert(
             2,
             f"on the stick-slip plant: every controller that makes the fault follow a moving reference lets the slip "
             f"rate reach {least.quantity('m/s')} for some disturbance, even if friction does not change",
         )
     if limits.largest_step.impossible_beyond is None:
-        return [*told, "other rows: no limit is known, as friction's weakening alone does not make this fault unstable"]
+        return [
+            *lines,
+            "other rows: no limit is known, as friction's weakening alone does not make this fault unstable",
+        ]
     return [
-        *told,
+        *lines,
         "other rows: a constant disturbance begins just after a sample; before the next pressure acts, the fault has "
         f"slipped so far that a withdrawal of {UpperBound(limits.withdrawal).quantity('Pa', 4)} (last row: the stated "
         f"one) no longer stops it; D = {float(limits.diffusivity):g} m^2/s",
@@ -69,7 +72,7 @@ def _meaning(limits: Limits) -> list[str]:
 
 
 def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
-    told = [
+    lines = [
         "infeasible: every controller, linear or not, fails for the nominal fault linearised about slow sliding along "
         "its task, without inertia; for the fault itself these limits are as good as the linearisation",
         "slip-rate error: it holds even for a controller that knows slip, slip rate, state and stress up to each "
@@ -77,14 +80,14 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
     ]
     if limits.rock:
         holds = "INFEASIBLE for every controller, in the same sense" if limits.beyond else "not shown to be infeasible"
-        told.append(f"the given well, L^2/D = {float(limits.rock):.4g} s: {holds}")
+        lines.append(f"the given well, L^2/D = {float(limits.rock):.4g} s: {holds}")
     if limits.largest_step.impossible_beyond is None:
         return [
-            *told,
+            *lines,
             "other rows: no limit is known, as errors of this fault oscillate while they grow, or do not grow",
         ]
     return [
-        *told,
+        *lines,
         "other rows: a constant stress begins just after a sample; before the next pressure acts, the errors have "
         f"grown so far that a pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference "
         f"needs no longer stops them; D = {float(limits.diffusivity):g} m^2/s",
@@ -110,8 +113,8 @@ def _box(limits: Limits) -> str:
 def _path(found: SlidingGuarantee) -> str:
     """What the design that is proved stands behind."""
     ways = {"a lag of": found.held.lag, "rock of L^2/D =": found.held.diffusion}
-    told = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]
-    return f" behind {' and '.join(told)}" if told else ""
+    lines = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]
+    return f" behind {' and '.join(lines)}" if lines else ""
 
 
 def _undecided(limits: Limits) -> list[str]:

@@ -64,12 +64,12 @@ def typeset(text: object) -> object:
 
 
 def _set(text: str) -> Markup:
-    said = str(escape(visible(text)))
+    sentence = str(escape(visible(text)))
     for written, shown in _SIGNS:
-        said = said.replace(written, shown)
-    said = re.sub(r"\^(?:\(([-\d/]+)\)|(-?\d+))", lambda power: f"<sup>{power[1] or power[2]}</sup>", said)
-    said = re.sub(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([-+]\d+)\b", _power_of_ten, said)
-    return Markup(re.sub(r"(?<![\w<>./^;])-(?=\d)", "−", said))
+        sentence = sentence.replace(written, shown)
+    sentence = re.sub(r"\^(?:\(([-\d/]+)\)|(-?\d+))", lambda power: f"<sup>{power[1] or power[2]}</sup>", sentence)
+    sentence = re.sub(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([-+]\d+)\b", _power_of_ten, sentence)
+    return Markup(re.sub(r"(?<![\w<>./^;])-(?=\d)", "−", sentence))
 
 
 def _power_of_ten(number: re.Match[str]) -> str:

@@ -129,10 +129,10 @@ def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
     event = waiting(run, fault)
     if event is None:
         return None
-    said = f"the fault is unstable, but its event has not begun at {run.time[-1]:.4g} s"
+    text = f"the fault is unstable, but its event has not begun at {run.time[-1]:.4g} s"
     if event.onset is None:
-        return f"{said}: nothing has pushed it forward; without --duration it is nudged"
-    return f"{said}: growing by {event.growth:.3g} 1/s it would at about {event.onset:.3g} s"
+        return f"{text}: nothing has pushed it forward; without --duration it is nudged"
+    return f"{text}: growing by {event.growth:.3g} 1/s it would at about {event.onset:.3g} s"
 
 
 def pressure_sentence(least: float, largest: float) -> str:
@@ -182,16 +182,16 @@ def _proved_up_to(held: HeldLoop) -> str:
 
 def peaks_sentence(peaks: Mapping[str, ContinuousPeaks | NoGuarantee]) -> str:
     """How fast the fault can slip at most in continuous time, for every class of disturbances that was asked for."""
-    said = [
+    lines = [
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
         + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
         for name, proved in peaks.items()
         if proved.proved
     ]
-    if not said:
+    if not lines:
         reasons = {proved.reason for proved in peaks.values() if not proved.proved}
         return "; ".join(["no bound on the slip rate is certified", *sorted(reasons)])
-    return "certified from rest, p acting at once: slip rate below " + ", ".join(said)
+    return "certified from rest, p acting at once: slip rate below " + ", ".join(lines)
 
 
 def verdict_lines(judged: LinearVerdict) -> list[str]:
@@ -303,7 +303,7 @@ def sentences(entry: "Entry") -> list[str]:
         return _because(Verdict.UNDECIDED, design.details.get("reason", "no gains with a proof were found"))
     outcome, *of_run = run_sentences(entry.run, design.fault) if entry.run else ("",)
     assumed = [f"assumed: {what}" for what in filter(None, [design.details.get("assumed")])]
-    told = [
+    lines = [
         outcome,
         *_verdict(design, entry.run),
         *_step_verdict(entry),
@@ -312,8 +312,8 @@ def sentences(entry: "Entry") -> list[str]:
         *_bounds(entry),
         *assumed,
     ]
-    told += [part_of_task(entry.run, design.fault)] if entry.run else []
-    return [sentence for sentence in (*told, *_reversed(entry.run)) if sentence]
+    lines += [part_of_task(entry.run, design.fault)] if entry.run else []
+    return [sentence for sentence in (*lines, *_reversed(entry.run)) if sentence]
 
 
 def part_of_task(run: Trajectory, fault: Fault) -> str:
@@ -340,20 +340,20 @@ def _verdict(design: Design, run: Trajectory | None) -> list[str]:
 
 def _because(verdict: Verdict, reason: str) -> list[str]:
     """In one sentence where that leaves half of the headline to others."""
-    told = f"{verdict}: {reason}"
-    return [told] if len(told) <= HEADLINE // 2 else [str(verdict), reason]
+    text = f"{verdict}: {reason}"
+    return [text] if len(text) <= HEADLINE // 2 else [str(verdict), reason]
 
 
 def _step_verdict(entry: "Entry") -> list[str]:
     """Whether the step that ran, or that of the fault, is stable."""
-    told = []
+    lines = []
     if entry.growth_per_step is not None:
-        told.append(f"{'stable' if entry.growth_per_step < 1 else 'UNSTABLE'} at the step used")
+        lines.append(f"{'stable' if entry.growth_per_step < 1 else 'UNSTABLE'} at the step used")
     if entry.held is not None:
         own = entry.run is None or entry.run.provenance["scheme"] in (AS_IN_THE_PAPER, "explicit")
         first, *others = held_sentences(entry.held)
-        told += [first if own else f"with scheme explicit {first}", *others]
-    return told
+        lines += [first if own else f"with scheme explicit {first}", *others]
+    return lines
 
 
 def _premises(entry: "Entry") -> list[str]:
@@ -510,13 +510,13 @@ def steady_start_sentence(run: "StateRun") -> str:
     """Where run and proof of slow sliding begin, and how much of the slip of an earthquake their task takes."""
     task = run.fault.reference
     rate, slip = float(SlidingReference(task=task).first_rate), None if run.failed else run.cycle["slip"]
-    said = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; bringing a locked fault there is not"
+    text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; bringing a locked fault there is not"
     share = (
         ""
         if slip is None
         else f"; the task uses up {task.target_slip:.3g} m of the {slip:.3g} m of slip of an earthquake"
     )
-    return f"{said} covered{share}"
+    return f"{text} covered{share}"
 
 
 def _loading(run: "StateRun") -> str:

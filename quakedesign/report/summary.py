@@ -113,8 +113,8 @@ def _without_stick(entry: "Entry") -> bool:
 def _conditions(designed: Sequence["Entry"], best: "Entry | None") -> str:
     if best is not None and best.guaranteed is not None:
         return f"{best.label}, proved: {best.guaranteed.sentence()}"
-    told = [(e.label, e.answer.lines()[0] if e.answer else str(e.design.details.get("reason", ""))) for e in designed]
-    return "; ".join(f"{label}: {reason or 'undecided'}" for label, reason in told)
+    parts = [(e.label, e.answer.lines()[0] if e.answer else str(e.design.details.get("reason", ""))) for e in designed]
+    return "; ".join(f"{label}: {reason or 'undecided'}" for label, reason in parts)
 
 
 def _uncontrolled(run: "Run") -> Row:

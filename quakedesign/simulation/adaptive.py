@@ -24,16 +24,16 @@ _FEWER = 16
 def require_smooth(recorder: Recorder, method: str) -> None:
     """Refuse a loop whose field jumps or has an infinite slope, where a tolerance means nothing."""
     loop, remedy = recorder.loop, "Use a fixed step: method dormand-prince or rk4."
-    said = f"method {method} follows smooth loops only. Received"
+    text = f"method {method} follows smooth loops only. Received"
     if loop.sticks:
         raise ParameterError(
-            f"{said} the plant {loop.plant_name}, whose friction is set-valued. Use the plant printed, or method "
+            f"{text} the plant {loop.plant_name}, whose friction is set-valued. Use the plant printed, or method "
             "dormand-prince or rk4."
         )
     if type(recorder.scheme).rates is Scheme.rates:
-        raise ParameterError(f"{said} the scheme {recorder.scheme.name}, which holds the pressure in steps. {remedy}")
+        raise ParameterError(f"{text} the scheme {recorder.scheme.name}, which holds the pressure in steps. {remedy}")
     if loop.controller is not None and not _lipschitz(loop):
-        raise ParameterError(f"{said} the discontinuous law {loop.controller.name}. {remedy}")
+        raise ParameterError(f"{text} the discontinuous law {loop.controller.name}. {remedy}")
 
 
 def _lipschitz(loop: ClosedLoop) -> bool:

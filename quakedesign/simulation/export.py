@@ -120,11 +120,11 @@ def header_text(exported: ControllerStep) -> str:
     measured = (f"measurement[{i}]: {name} [{unit}]" for i, (name, unit) in enumerate(exported.measurement.items()))
     kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(exported.start.items()))
     facts = (f"{name}: {value}" for name, value in exported.facts.items())
-    said = [part for remark in exported.remarks for part in (*_wrapped(remark), "")]
+    parts = [part for remark in exported.remarks for part in (*_wrapped(remark), "")]
     own = {"beside": "", "plan": ""} if _PLAN not in exported.facts else {"beside": " beside the plan", "plan": _ADDED}
     of_wells = {name: text.format(**own) for name, text in _USE_OF_WELLS.items()}
     lines = [
-        *said,
+        *parts,
         "A sampled controller for a fault, in SI units.",
         "",
         *_wrapped(_USE.format(**(_USE_OF_ONE if exported.limited else of_wells))),
@@ -136,11 +136,11 @@ def header_text(exported: ControllerStep) -> str:
     ]
     comment = _comment([*lines, "", "Where it comes from:", *facts])
     sizes = {"step": repr(exported.step), "measurements": len(exported.measurement), "memory": len(exported.start)}
-    told = dict.fromkeys(("applied", "told", "about"), "")
+    entries = dict.fromkeys(("applied", "told", "about"), "")
     if exported.limited:
-        told = {"applied": "const double* applied, ", "told": _TOLD_TO_IT, "about": _APPLIED}
+        entries = {"applied": "const double* applied, ", "told": _TOLD_TO_IT, "about": _APPLIED}
     return comment + c_file(
-        "controller.h", **sizes, pressures=len(exported.pressures), limited=int(exported.limited), **told
+        "controller.h", **sizes, pressures=len(exported.pressures), limited=int(exported.limited), **entries
     )
 
 
@@ -149,11 +149,11 @@ def source_text(exported: ControllerStep, header: str) -> str:
     generator = ca.CodeGenerator("sampled_step.c", {"with_export": False})
     generator.add(exported.function)
     start = ",\n".join(f"    {value!r}" for value in exported.start.values())
-    told = {"applied": "", "given": ""}
+    entries = {"applied": "", "given": ""}
     if exported.limited:
         held = list(exported.start).index(HELD)
-        told = {"applied": "const double* applied, ", "given": f"applied ? applied : &memory[{held}], "}
-    return generator.dump() + c_file("controller.c", header=header, start=start, **told, **_sizes(exported.function))
+        entries = {"applied": "const double* applied, ", "given": f"applied ? applied : &memory[{held}], "}
+    return generator.dump() + c_file("controller.c", header=header, start=start, **entries, **_sizes(exported.function))
 
 
 def _sizes(function: Any) -> dict[str, int]:
@@ -227,9 +227,9 @@ def _binary(sources: dict[str, str]) -> tuple[dict[str, bytes], str]:
 
 def _description(exported: ControllerStep, guid: str) -> bytes:
     """``modelDescription.xml``."""
-    told = "; ".join(f"{name}: {value}" for name, value in exported.facts.items())
+    text = "; ".join(f"{name}: {value}" for name, value in exported.facts.items())
     root = ET.Element("fmiModelDescription", fmiVersion="2.0", modelName="controller", guid=guid)
-    root.attrib |= {"description": told, "generationTool": f"quakedesign {exported.facts['version_quakedesign']}"}
+    root.attrib |= {"description": text, "generationTool": f"quakedesign {exported.facts['version_quakedesign']}"}
     kind = {"modelIdentifier": "controller", "canHandleVariableCommunicationStepSize": "true"}
     kind |= {"canGetAndSetFMUstate": "true", "canNotUseMemoryManagementFunctions": "true"}
     listed = ET.SubElement(ET.SubElement(root, "CoSimulation", kind), "SourceFiles")
@@ -497,9 +497,9 @@ def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
 def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, str]:
     gains = {f"gain {n}": f"{v} {controller.gain_units[n]}" for n, v in controller.gains.items()}
     rest = {f.name: _text(getattr(controller, f.name)) for f in fields(controller) if f.name not in _TOLD}
-    facts = {"fault": fault.name, "law": controller.title, "source": controller.source, **gains, **rest}
-    facts |= {"scheme": scheme.name} | {name: str(value) for name, value in scheme.settings.items()}
-    return facts | library_versions("quakedesign", "casadi")
+    entries = {"fault": fault.name, "law": controller.title, "source": controller.source, **gains, **rest}
+    entries |= {"scheme": scheme.name} | {name: str(value) for name, value in scheme.settings.items()}
+    return entries | library_versions("quakedesign", "casadi")
 
 
 def _text(value: Any) -> str:

@@ -271,8 +271,8 @@ def run_adaptive(
     began = perf_counter()
     start, wanted = recorder.start(setting.settled_from), instants(setting.steps, setting.samples)
     kept = smooth_march(recorder, method, rtol, start, wanted, progress)
-    told = {"backend": "sundials", "rtol": rtol, "floor": FLOOR}
-    return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | told, (began, began))
+    entries = {"backend": "sundials", "rtol": rtol, "floor": FLOOR}
+    return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | entries, (began, began))
 
 
 def _step(recorder: Recorder, method: type[Integrator]) -> Any:

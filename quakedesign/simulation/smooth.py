@@ -238,8 +238,8 @@ class SmoothProblem:
         pieces, whole = (
             adaptive_integrators()[method].flow(rates, self.scales, shares, rtol=rtol) for shares in (SHARES, [1.0])
         )
-        told = [*load.value, *load.slope, load.start]
-        return field, {"method": Resolved, "pieces": pieces, "whole": whole, "parameters": told}
+        lines = [*load.value, *load.slope, load.start]
+        return field, {"method": Resolved, "pieces": pieces, "whole": whole, "parameters": lines}
 
     def _jacobian(self, load: Ramp) -> Any:
         """Jacobian as a function of (t, y)."""

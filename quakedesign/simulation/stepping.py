@@ -220,8 +220,8 @@ def recall_run(question: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str
     if not question or (content := cache.recall("run", *question)) is None:
         return None
     with np.load(BytesIO(content), allow_pickle=False) as kept:
-        told = {name: str(kept[name]) for name in kept.files if name != "vectors"}
-        return kept["vectors"], told | {"backend_reason": f"{told['backend_reason']}; from the cache"}
+        entries = {name: str(kept[name]) for name in kept.files if name != "vectors"}
+        return kept["vectors"], entries | {"backend_reason": f"{entries['backend_reason']}; from the cache"}
 
 
 def keep_run(question: tuple[bytes, ...], vectors: "np.ndarray", told: dict[str, str]) -> None:

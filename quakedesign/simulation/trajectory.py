@@ -481,13 +481,13 @@ class Trajectory(Recording):
 
     def attributes(self) -> dict[str, Any]:
         """Provenance, and outcome, metrics, events and energy as JSON text."""
-        told = {
+        entries = {
             "outcome": self.outcome.to_dict(),
             "metrics": self.metrics.to_dict(),
             "events": dict(self.events),
             "energy": self.energy and self.energy.to_dict(),
         }
-        return dict(self.provenance) | {name: json.dumps(value, allow_nan=False) for name, value in told.items()}
+        return dict(self.provenance) | {name: json.dumps(value, allow_nan=False) for name, value in entries.items()}
 
     @property
     def response(self) -> Any:

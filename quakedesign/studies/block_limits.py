@@ -91,7 +91,7 @@ class ChainLimits:
             assumed[-1] = assumed[-1].replace(")", ";")
             assumed += [f"for stress of {quantity(self.stress, 'Pa')} on every block, pressures within"]
             assumed += [f"{quantity(self.largest_pressure, 'Pa')} of the plan, rock of {self.diffusivity:g} m^2/s)"]
-        said = [
+        parts = [
             f"{chain.name}: limits of every controller, {len(chain.blocks)} blocks, "
             f"{counted(len(chain.wells), 'well')}",
             *assumed,
@@ -102,18 +102,18 @@ class ChainLimits:
             *(f"{place:4}{mode.row()}" for place, mode in enumerate(self.modes, 1)),
         ]
         if chain.ages and self.stress is None:
-            said += ["", "--stress gives the pressure, T_s and distance of wells that every controller needs"]
+            parts += ["", "--stress gives the pressure, T_s and distance of wells that every controller needs"]
         if self.slip_rate_error:
             rates = ", ".join(quantity(v, "m/s") for v in self.slip_rate_error)
-            said += ["", f"infeasible: slip-rate errors below {rates}"]
+            parts += ["", f"infeasible: slip-rate errors below {rates}"]
         escaping = sum(not mode.reached for mode in self.modes)
         if escaping:
-            said += ["", f"infeasible for every controller: {counted(escaping, 'unstable mode')} out of reach"]
+            parts += ["", f"infeasible for every controller: {counted(escaping, 'unstable mode')} out of reach"]
         most, needs = max(b.effective_normal_stress for b in chain.blocks), [m.pressure or 0 for m in self.modes]
         if chain.diffusivity and max(needs, default=0) > most:
-            said += ["", f"a mode needs more than the effective normal stress, {quantity(most, 'Pa')}: move the wells"]
-            said += [f"closer to the blocks; the pressure diffuses along the fault with {chain.diffusivity:g} m^2/s"]
-        return said if self.modes else [*said, "", "no mode is unstable"]
+            parts += ["", f"a mode needs more than the effective normal stress, {quantity(most, 'Pa')}: move the wells"]
+            parts += [f"closer to the blocks; the pressure diffuses along the fault with {chain.diffusivity:g} m^2/s"]
+        return parts if self.modes else [*parts, "", "no mode is unstable"]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; null where no well reaches a mode, where it oscillates, and where no stress is given."""

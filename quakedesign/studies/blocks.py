@@ -39,7 +39,7 @@ class BlocksAnswer:
     def lines(self) -> list[str]:
         """For people."""
         held = "one well for all" if self.wells == "one" else "a well for each block"
-        said = [
+        parts = [
             f"{self.fault.name} cut into blocks, {held}, a law designed for each number of blocks; the certificates "
             "are about the plants without stick that are derived from the fault, not about the derivation",
             f"from rest, with zero-order hold over {UpperBound(self.step):.6g} s, each block its own friction of the "
@@ -48,14 +48,14 @@ class BlocksAnswer:
         for blocks, one in self.found.items():
             ends = self.peaks(blocks)
             if not one.proved or ends is None:
-                said.append(f"{blocks:3} blocks: {one.sentence()}")
+                parts.append(f"{blocks:3} blocks: {one.sentence()}")
                 continue
             about = "its balance" if self.wells == "one" else "the reference"
-            said.append(
+            parts.append(
                 f"{blocks:3} blocks: proved: slip-rate error at most {ends[1]:.4g} m/s, slip within {ends[0]:.4g} m of "
                 f"{about}"
             )
-        return said
+        return parts
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI."""

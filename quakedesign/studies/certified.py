@@ -231,13 +231,13 @@ def _reach_lines(reach: CertifiedLimit) -> list[str]:
     if reach.value is None:
         return [f"nothing is proved with Lyapunov functions of degree {degrees}"]
     value = f"{LowerBound(reach.value)} (exactly {reach.value})"
-    said = f"largest {names[reach.quantity]}: {value}, V of degree {reach.degree}"
+    text = f"largest {names[reach.quantity]}: {value}, V of degree {reach.degree}"
     if reach.beyond is None and reach.sharp:
-        return [said, "which is within 1e-4 of what no Lyapunov function can exceed"]
+        return [text, "which is within 1e-4 of what no Lyapunov function can exceed"]
     if reach.beyond is None:
-        return [said, "the search stopped there, as there seems to be no end"]
+        return [text, "the search stopped there, as there seems to be no end"]
     beyond = f"at {UpperBound(reach.beyond)} the search finds none of degree {degrees}"
-    return [said, beyond if reach.sharp else f"{beyond}; in between it is not known"]
+    return [text, beyond if reach.sharp else f"{beyond}; in between it is not known"]
 
 
 def _limit_line(limit: Fraction | None) -> str:
@@ -341,5 +341,5 @@ def trajectory_premise(law: Controller, lipschitz: float | None, run: Trajectory
     premise = on_trajectory(limit if lipschitz is None else lipschitz, run)
     if premise is None or lipschitz is not None:
         return premise
-    said = f"{premise.note}; no certificate is at hand, and none of these gains exceeds {limit:.4g} {premise.unit}"
-    return replace(premise, certified=0.0, proved=False, note=said)
+    text = f"{premise.note}; no certificate is at hand, and none of these gains exceeds {limit:.4g} {premise.unit}"
+    return replace(premise, certified=0.0, proved=False, note=text)

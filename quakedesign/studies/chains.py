@@ -44,7 +44,7 @@ _NO_RUN = "nothing is simulated, as no law is proved"
 
 def chain_lines(chain: BlockChain) -> list[str]:
     """What a file of several blocks says, within 80 columns."""
-    said = [
+    lines = [
         f"{chain.name}: {len(chain.blocks)} blocks, {counted(len(chain.wells), 'well')} (box {chain.fault.box.name}, "
         f"task {chain.fault.reference.target_slip:g} m in {chain.fault.reference.operation_time:g} s)",
         "",
@@ -53,18 +53,18 @@ def chain_lines(chain: BlockChain) -> list[str]:
     for place, (block, row) in enumerate(zip(chain.blocks, chain.shares, strict=True), 1):
         shares = ", ".join(f"{float(v):.3g}" for v in row)
         stress = block.effective_normal_stress
-        said.append(f"{place:5}{block.length:12g}{quantity(stress, 'Pa', 4):>13}  {shares:24}{block.friction.name}")
+        lines.append(f"{place:5}{block.length:12g}{quantity(stress, 'Pa', 4):>13}  {shares:24}{block.friction.name}")
     springs = ", ".join(f"{float(K):.4g}" for i, j, K in chain.springs if i < j)
-    said += ["", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
+    lines += ["", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
     pole, peak = _growth(chain), natural_peak(chain)
     stable = "stable" if pole == 0 else "stability unknown, as floating point does not tell its modes apart"
-    said += [f"without control: {f'unstable, errors grow with up to {pole:.4g} 1/s' if pole else stable}"]
-    said += [] if peak is None else [f"natural earthquake: slip rate up to {quantity(peak, 'm/s')}"]
+    lines += [f"without control: {f'unstable, errors grow with up to {pole:.4g} 1/s' if pole else stable}"]
+    lines += [] if peak is None else [f"natural earthquake: slip rate up to {quantity(peak, 'm/s')}"]
     if chain.diffusivity is not None:
-        said.append(
+        lines.append(
             f"pressure along the fault diffuses with {chain.diffusivity:g} m^2/s; shares are those at steady state"
         )
-    return said
+    return lines
 
 
 def chain_dict(chain: BlockChain) -> dict[str, Any]:
@@ -208,7 +208,7 @@ class ChainRun:
         rates, slips = self.proved_slip_rates, [UpperBound(v) for v in self.found.claims.outputs[:N]]
         powers = [power_of(float(max(values))) for values in (rates, slips)]
         heads = ["", f"slip rate [{PREFIXES[powers[0]]}m/s]", f"slip error [{PREFIXES[powers[1]]}m]"]
-        said = [
+        parts = [
             f"{heads[0]:10}{heads[1]:>20}{heads[2]:>20}",
             f"{'':10}{'proved':>10}{'run':>10}{'proved':>10}{'run':>10}",
         ]
@@ -219,9 +219,9 @@ class ChainRun:
                 shown = "–" if value is None else plain(float(value) / 10.0**power)
                 cells += f"{plain(float(f'{UpperBound(bound / Fraction(10) ** power):.3g}')):>10}{shown:>10}"
             rests = "" if run is None else f"   at rest {100 * run.rest[i]:.3g} % of the run"
-            said.append(f"{f'block {i + 1}':10}{cells}{rests}")
+            parts.append(f"{f'block {i + 1}':10}{cells}{rests}")
         ends, left = self.proved_pressures, False
-        said += [] if ends is None and run is None else ["pressure"]
+        parts += [] if ends is None and run is None else ["pressure"]
         for j in range(len(chain.wells)):
             told = []
             if ends is not None:
@@ -231,16 +231,16 @@ class ChainRun:
                 outside = ends is not None and not ends[j][0] <= low <= high <= ends[j][1]
                 told.append(f"run {quantity(low, 'Pa')} to {quantity(high, 'Pa')}{' (OUTSIDE)' if outside else ''}")
                 left |= outside
-            said += [f"{f'well {j + 1}':10}{', '.join(told)}"] if told else []
+            parts += [f"{f'well {j + 1}':10}{', '.join(told)}"] if told else []
         if run is not None:
             did = ", as pressures do here" if left else ""
-            said += [f"run: {lasting(float(run.times[-1]))} on the stick-slip plant, where errors and pressures may"]
-            said += [f"exceed bounds, which are proved of the plant without stick{did}"]
+            parts += [f"run: {lasting(float(run.times[-1]))} on the stick-slip plant, where errors and pressures may"]
+            parts += [f"exceed bounds, which are proved of the plant without stick{did}"]
             if len(chain.wells) < N:
-                said.append("slip error: proved from the equilibrium of a block, in the run from the reference")
+                parts.append("slip error: proved from the equilibrium of a block, in the run from the reference")
             for event, happened in (("a block would slip backward", run.reversed), ("a block opens", run.opened)):
-                said += [f"{event}: the run is outside the model"] if happened else []
-        return said
+                parts += [f"{event}: the run is outside the model"] if happened else []
+        return parts
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the run, SI."""
@@ -387,9 +387,9 @@ class SlidingChainRun:
         """Whether all errors of a run under a law are within what is proved of their blocks and wells."""
         assert isinstance(self.found, PlantGuarantee)
         N, claims, errors = len(self.chain.blocks), self.found.claims, self.errors
-        told = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
+        lines = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
         proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
-        return bool((np.concatenate(told) <= np.array(proved, dtype=float)).all())
+        return bool((np.concatenate(lines) <= np.array(proved, dtype=float)).all())
 
     def screen(self, conditions: Sequence[str]) -> list[str]:
         """What the proof depends on, and the run."""
@@ -406,7 +406,7 @@ class SlidingChainRun:
         end = lasting(float(self.run.times[-1]))
         if self.found is not None:
             covered = LowerBound(self.covered).quantity("Pa")
-            said = [
+            parts = [
                 f"run over {end} under a sine of {quantity(self.stress, 'Pa')} of shear on every block; proved for up "
                 f"to {covered}, a lag of {float(self.lag):g} s, with |ln(v/V)| <= {self.log_rate:.3g}",
                 *(
@@ -419,13 +419,13 @@ class SlidingChainRun:
                 ),
             ]
             return [
-                *said,
+                *parts,
                 f"{'within' if self.within else 'OUTSIDE'} what is proved of slips, slip rates, states and pressures",
             ]
         events = self.events
         loaded = f"{self.chain.name}, loaded from afar at {quantity(self.run.loading_rate, 'm/s')}"
-        said = [f"{loaded}: {counted(len(events), 'event')} in {end}"]
-        said += [
+        parts = [f"{loaded}: {counted(len(events), 'event')} in {end}"]
+        parts += [
             f"event {i}: from {lasting(event.onset)}, slip "
             + (", ".join(quantity(v, "m") for v in event.slip) if event.slip else "not ended")
             + f", up to {', '.join(quantity(v, 'm/s') for v in event.peak_slip_rate)}"
@@ -433,24 +433,24 @@ class SlidingChainRun:
             for i, event in enumerate(events, 1)
         ]
         last = self.run.onsets[-2:]
-        return [*said, f"recurrence interval {lasting(float(last[1] - last[0]))}"] if len(last) > 1 else said
+        return [*parts, f"recurrence interval {lasting(float(last[1] - last[0]))}"] if len(last) > 1 else parts
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI."""
         run = self.run
         assert run is not None
-        facts: dict[str, Any] = {
+        entries: dict[str, Any] = {
             "plant": "smooth" if self.inertia else "quasi-dynamic",
             "duration": float(run.times[-1]),
             "steps": len(run.times),
         }
         if self.found is not None:
             errors = {f"max_{name}": values.tolist() for name, values in self.errors.items()}
-            told = {"lag": float(self.lag), "stress": self.stress, "covered_stress": float(self.covered)}
-            told |= {"proved_log_rate": float(self.log_rate)}
-            return facts | told | errors | {"within": self.within}
+            content = {"lag": float(self.lag), "stress": self.stress, "covered_stress": float(self.covered)}
+            content |= {"proved_log_rate": float(self.log_rate)}
+            return entries | content | errors | {"within": self.within}
         last = run.onsets[-2:]
-        return facts | {
+        return entries | {
             "loading_rate": run.loading_rate,
             "recurrence_interval": float(last[1] - last[0]) if len(last) > 1 else None,
             "slip_events": [asdict(event) for event in self.events],
@@ -512,5 +512,5 @@ def run_sliding_chain(
         inertia=inertia,
         progress=tell,
     )
-    told: dict[str, Any] = {"lag": lag, "covered": covered, "log_rate": rate, "stress": size}
-    return SlidingChainRun(chain=chain, run=held, inertia=inertia, found=found, controller=controller, **told)
+    entries: dict[str, Any] = {"lag": lag, "covered": covered, "log_rate": rate, "stress": size}
+    return SlidingChainRun(chain=chain, run=held, inertia=inertia, found=found, controller=controller, **entries)

@@ -501,10 +501,10 @@ def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, 
     )
     if diverged is None:
         return premise
-    said = (
+    text = (
         f"the loop with exact states diverges at {diverged:.4g} s, so that no λ_d is enough; until then {premise.note}"
     )
-    return replace(premise, certified=0.0, proved=False, note=said)
+    return replace(premise, certified=0.0, proved=False, note=text)
 
 
 def _note(order: int, reached: float, condition: JointCondition) -> str:
@@ -709,10 +709,10 @@ def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Cont
     Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **setup.path))
     found: Any = guarantee(fault, name, setup)
     if not isinstance(found.found, Guarantee):
-        told = ", ".join(f"{part} {time:g} s" for part, time in path.items())
+        text = ", ".join(f"{part} {time:g} s" for part, time in path.items())
         sooner = f"--step '{float(found.shorter.held.step):g} s', where it has, " if found.shorter else ""
         raise ParameterError(
-            f"designed gains must have a proof behind what is around them. Received {name} with {told}, "
+            f"designed gains must have a proof behind what is around them. Received {name} with {text}, "
             f"T_s = {fault.sampling_time:g} s: {found.found.reason}. Give {sooner}gains as numbers, or see limits."
         )
     return found.compensation.limited if found.compensation else found.found.controller

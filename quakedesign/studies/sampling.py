@@ -67,11 +67,11 @@ class SamplingReport:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able facts, SI; exact quantities are texts, null stands for what diverged or does not apply."""
-        told = {name: study.to_dict() for name, study in self.studies.items()}
-        if "orders" in told:
-            told["orders"]["exponents"] = self.studies["orders"].orders()
+        entries = {name: study.to_dict() for name, study in self.studies.items()}
+        if "orders" in entries:
+            entries["orders"]["exponents"] = self.studies["orders"].orders()
         none = dict.fromkeys(("orders", "slip_noise", "rate_noise", "input_gain"))
-        return {"fault": self.fault.name, "schemes": [row.to_dict() for row in self.rows], **none, **told}
+        return {"fault": self.fault.name, "schemes": [row.to_dict() for row in self.rows], **none, **entries}
 
     def figures(self) -> dict[str, Any]:
         """Matplotlib figures of the studies, by name."""
@@ -142,8 +142,8 @@ def _row(
 ) -> SchemeRow:
     label = f"{law.title}{f', λ {float(law.scale):.3g}' if law.scale is not None else ''}"
     label = f"{law.title}, published" if origin == "published" else label
-    said = f"{label}, {scheme}"
-    run = simulate(fault, law, scheme=scheme, duration=duration, samples=1000, progress=lambda done: tell(said, done))
+    text = f"{label}, {scheme}"
+    run = simulate(fault, law, scheme=scheme, duration=duration, samples=1000, progress=lambda done: tell(text, done))
     premise = trajectory_premise(law, None if bound is None else float(bound * (law.scale or 1)), run)
     return SchemeRow(label=label, origin=origin, controller=law, scheme=scheme, run=run, premise=premise)
 

@@ -322,5 +322,5 @@ def plain(expression: Any) -> str:
     """Text of a derived expression: r, r' and r'' for the reference and its rates, k_hat for a symbol with a hat."""
     if isinstance(expression, sp.MatrixBase):
         return f"Matrix({plain(expression.tolist())})"
-    said = _Plain().doprint(expression).replace(r"\mu_0\hat{N}_0", "(mu_0*N_hat_0)").replace(r"\mu^*", "mu_star")
-    return re.sub(r"\\hat\{\\?(\w+)\}", r"\1_hat", said).replace("\\", "")
+    text = _Plain().doprint(expression).replace(r"\mu_0\hat{N}_0", "(mu_0*N_hat_0)").replace(r"\mu^*", "mu_star")
+    return re.sub(r"\\hat\{\\?(\w+)\}", r"\1_hat", text).replace("\\", "")

@@ -313,11 +313,11 @@ def design(
             f"the objective of a design in continuous time must be {OBJECTIVES[0]}. Received {objective!r}. "
             "Omit objective, or continuous."
         )
-    told: Any = {"objective": objective, "continuous": continuous, "disturbance_class": disturbance_class}
-    told |= {"plant": plant}
-    told["setup"] = replace(setup, diffusion=Fraction(0)) if fault.friction.state_names else setup
-    told |= {"tell": progress} if progress else {}
-    return law.design(GainProblem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **told))
+    entries: Any = {"objective": objective, "continuous": continuous, "disturbance_class": disturbance_class}
+    entries |= {"plant": plant}
+    entries["setup"] = replace(setup, diffusion=Fraction(0)) if fault.friction.state_names else setup
+    entries |= {"tell": progress} if progress else {}
+    return law.design(GainProblem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **entries))
 
 
 _DESIGNED_FOR = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", "rate_noise")

@@ -370,13 +370,13 @@ class Samples(DesignMethod[SampledController]):
         largest, opposite = (spectral_radius(replace(held, law=_times(f, law)).loop(task)) for f in (1, -1))
         if largest < _STABLE:
             return found
-        said = f"{found.reason}: of a period it has an eigenvalue of size {largest:.4g}"
+        text = f"{found.reason}: of a period it has an eigenvalue of size {largest:.4g}"
         if not any(row[0] for row in (*law.measured, law.feedback)):
-            said += (
+            text += (
                 "; the law does not use the slip, so that any constant slip error remains (eigenvalue 1): add "
                 "slip_error or slip to its inputs"
             )
-        return replace(found, reason=said + _OPPOSITE * (opposite < _STABLE))
+        return replace(found, reason=text + _OPPOSITE * (opposite < _STABLE))
 
     def given(self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup) -> LoopAnswer:
         """Guarantee with the worst case found, for a law of the errors alone."""

@@ -111,19 +111,19 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
             if other.found.proved:
                 return LoopAnswer(fault=fault, found=given, nearest=(GAINS, other.found))
             return replace(other, found=given)
-        told: Any = {"measured": setup.measured, **around}
-        found = design_held(task, step, objective=wanted.objective, **told)
+        entries: Any = {"measured": setup.measured, **around}
+        found = design_held(task, step, objective=wanted.objective, **entries)
         if found.proved:
             return attacked(fault, found)
         if setup.longest_step or found.pressed:
-            nearest = nearest_setup(task, step, pressed=found.pressed, **told)
+            nearest = nearest_setup(task, step, pressed=found.pressed, **entries)
             if nearest is not None or not found.pressed:
                 return LoopAnswer(fault=fault, found=found, nearest=nearest)
-        longest = longest_step(task, **told)
-        if (again := continued(task, step, longest, **told)) is not None:
+        longest = longest_step(task, **entries)
+        if (again := continued(task, step, longest, **entries)) is not None:
             return attacked(fault, again)
         shorter, asked = (None, None) if longest is None else (design_at(task, longest), step)
-        nearest = nearest_setup(task, step, **told)
+        nearest = nearest_setup(task, step, **entries)
         return LoopAnswer(fault=fault, found=found, shorter=shorter, asked_step=asked, nearest=nearest)
 
 

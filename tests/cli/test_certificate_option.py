@@ -10,7 +10,7 @@ import xarray as xr
 import quakedesign as qd
 from quakedesign.cli import main
 from quakedesign.guarantees import Guarantee, Held, guarantee, save_guarantee
-from quakedesign.laws import Prediction, disturbance_estimate
+from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.plant import uncertain_plant
 
 REAL = qd.load_fault("real-fault")
@@ -18,8 +18,7 @@ STEP = F(3, 20)
 LAW = disturbance_estimate(
     (F(672300000), F(206000000)),
     F("0.57"),
-    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),)),
-    F("2.282e-8"),
+    ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), F("2.282e-8")),
 )
 HELD = Held(law=LAW, step=STEP, lag=F(1, 50), slip_noise=F(1, 10**7))
 CLAIM = guarantee(uncertain_plant(REAL), HELD)

@@ -1,4 +1,4 @@
-"""A law that knows its path, against its recursion in exact arithmetic."""
+"""Compensators with a model of the path, against their recursion in exact arithmetic."""
 
 from dataclasses import replace
 from fractions import Fraction as F
@@ -7,14 +7,12 @@ from random import Random
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.laws import PathModel, estimate_through_path, observer_through_path
+from quakedesign.laws import ErrorModel, disturbance_estimate, slip_observer
 
-MODEL = PathModel(
-    of_errors=((F(9, 8), F(2, 13)), (F(1, 12), F(3, 4))),
-    of_pressures=((F(1, 5), F(1, 8), F(-1, 9)), (F(1, 6), F(-1, 5), F(2, 7))),
-    of_asked=(F(1, 30), F(1, 9)),
-    kept=((F(1, 2), F(1, 3), F(0)), (F(1, 7), F(2, 5), F(-1, 4)), (F(0), F(3, 8), F(1, 6))),
-)
+OF_ERRORS = (F(9, 8), F(2, 13)), (F(1, 12), F(3, 4))
+OF_PRESSURES = (F(1, 5), F(1, 8), F(-1, 9)), (F(1, 6), F(-1, 5), F(2, 7))
+OF_COMMAND = F(1, 30), F(1, 9)
+PATH = (F(1, 2), F(1, 3), F(0)), (F(1, 7), F(2, 5), F(-1, 4)), (F(0), F(3, 8), F(1, 6))
 GAINS = (F(4), F(2), F(3, 2), F(-5, 3), F(7, 4))
 WEIGHT, GAIN = F(2, 5), F(3, 11)
 CORRECTIONS = F(2, 3), F(5, 4), F(-7, 6)
@@ -24,25 +22,37 @@ def dot(row, values):
     return sum((a * b for a, b in zip(row, values, strict=True)), F(0))
 
 
+MODEL = ErrorModel(
+    update=(
+        *((*now, *pushed) for now, pushed in zip(OF_ERRORS, OF_PRESSURES, strict=True)),
+        *((F(0), F(0), *row) for row in PATH),
+    ),
+    command=tuple(GAIN * v for v in (*OF_COMMAND, *(1 - sum(row) for row in PATH))),
+    gain=GAIN,
+    pressures=("path0", "path1", "path2"),
+    unit=GAIN,
+)
+
+
 def pressed(errors, level, scaled, more):
-    """The pressure asked for, what is expected of both errors, and the path after so much more than asked for."""
-    pressures, constant = [q / GAIN for q in scaled], [sum(MODEL.of_pressures[i]) + MODEL.of_asked[i] for i in (0, 1)]
+    """The commanded pressure, the prediction of both errors, and the path if the pressure is `more` than commanded."""
+    pressures, constant = [q / GAIN for q in scaled], [sum(OF_PRESSURES[i]) + OF_COMMAND[i] for i in (0, 1)]
     k1, k2, *others = GAINS
-    asked = -k1 * errors[0] - k2 * errors[1] - dot(others, [q + level / GAIN for q in pressures]) - level / GAIN
+    commanded = -k1 * errors[0] - k2 * errors[1] - dot(others, [q + level / GAIN for q in pressures]) - level / GAIN
     expected = [
-        dot(MODEL.of_errors[i], errors)
+        dot(OF_ERRORS[i], errors)
         + constant[i] * level
-        + GAIN * (dot(MODEL.of_pressures[i], pressures) + MODEL.of_asked[i] * (asked + more))
+        + GAIN * (dot(OF_PRESSURES[i], pressures) + OF_COMMAND[i] * (commanded + more))
         for i in (0, 1)
     ]
-    after = [dot(row, pressures) + (1 - sum(row)) * (asked + more) for row in MODEL.kept]
-    return asked, expected, [GAIN * q for q in after]
+    after = [dot(row, pressures) + (1 - sum(row)) * (commanded + more) for row in PATH]
+    return commanded, expected, [GAIN * q for q in after]
 
 
 def of_both(state, seen, more):
-    """One sample of slip and slip rate: the states after it, and the pressure that is asked for."""
+    """One sample of slip and slip rate: the states after it, and the commanded pressure."""
     predicted, level, *scaled = state
-    level += WEIGHT * (seen[1] - predicted) / (sum(MODEL.of_pressures[1]) + MODEL.of_asked[1])
+    level += WEIGHT * (seen[1] - predicted) / (sum(OF_PRESSURES[1]) + OF_COMMAND[1])
     asked, expected, after = pressed(seen, level, scaled, more)
     return [expected[1], level, *after], asked
 
@@ -56,8 +66,9 @@ def of_slip(state, seen, more):
     return [*expected, level, *after], asked
 
 
-ESTIMATE = estimate_through_path(GAINS, WEIGHT, MODEL, GAIN)
-OBSERVER = observer_through_path(GAINS, CORRECTIONS, MODEL, GAIN)
+FEEDBACK = (*GAINS[:2], *(k / GAIN for k in GAINS[2:]))  # of the states βb·q
+ESTIMATE = disturbance_estimate(FEEDBACK, WEIGHT, MODEL)
+OBSERVER = slip_observer(FEEDBACK, CORRECTIONS, MODEL)
 
 
 @pytest.mark.parametrize(("law", "by_hand"), [(ESTIMATE, of_both), (OBSERVER, of_slip)], ids=["estimate", "observer"])
@@ -90,23 +101,24 @@ def test_a_constant_pressure_against_a_disturbance_is_a_steady_state():
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"kept": MODEL.kept[:2]}, "kept of 3 × 3, .* Received 2 and 2 rows"),
-        ({"kept": (*MODEL.kept, MODEL.kept[0])}, "kept of 3 × 3, .* Received 4 and 2 rows"),
-        ({"kept": tuple(row[:2] for row in MODEL.kept)}, "rows of 2, 2, 2, 3, 3 entries"),
-        ({"of_pressures": MODEL.of_pressures[::-1] * 2}, "of_pressures of 2 × 3 .* Received 3 and 4 rows"),
-        ({"of_asked": (F(1),)}, "of_asked of 2 entries.* 1 entries of of_asked"),
-        ({"of_asked": (F(1), -sum(MODEL.of_pressures[1]))}, "must not be 0. Received 0"),
+        ({"update": MODEL.update[:4]}, "matrix A of an error model with 5 states must be 5 × 5. Received 4 rows"),
+        ({"update": (*MODEL.update, MODEL.update[0])}, "must be 5 × 5. Received 6 rows"),
+        ({"update": tuple(row[:4] for row in MODEL.update)}, "5 × 5. Received 5 rows of 4, 4, 4, 4, 4 entries"),
+        ({"pressures": ()}, "matrix A of an error model with 2 states must be 2 × 2"),
+        ({"command": MODEL.command[:2]}, "matrix B of an error model with 5 states must be 1 × 5. .* of 2 entries"),
+        ({"command": (F(0), -GAIN * sum(OF_PRESSURES[1]), F(1), F(1), F(1))}, "must not be 0. Received 0"),
+        ({"gain": F(0)}, "input gain of a model must be positive"),
+        ({"gain": F(-1)}, "input gain of a model must be positive"),
     ],
 )
-def test_sizes_that_do_not_fit_and_pressures_that_move_nothing_are_refused(wrong, said):
-    assert replace(MODEL, of_asked=(F(-1), F(1))).of_asked == (-1, 1)
+def test_sizes_that_do_not_fit_and_pressures_that_move_nothing_are_rejected(wrong, said):
     with pytest.raises(ParameterError, match=said):
         replace(MODEL, **wrong)
 
 
-@pytest.mark.parametrize(("gains", "gain"), [(GAINS[:4], GAIN), ((*GAINS, F(1)), GAIN), (GAINS, F(0)), (GAINS, F(-1))])
-def test_other_gains_are_refused(gains, gain):
-    with pytest.raises(ParameterError, match="a path model of 3 pressures needs 5 gains and a positive input gain"):
-        estimate_through_path(gains, WEIGHT, MODEL, gain)
-    with pytest.raises(ParameterError, match="a path model of 3 pressures needs 5 gains and a positive input gain"):
-        observer_through_path(gains, CORRECTIONS, MODEL, gain)
+@pytest.mark.parametrize("gains", [FEEDBACK[:4], (*FEEDBACK, F(1))])
+def test_other_numbers_of_gains_are_rejected(gains):
+    with pytest.raises(ParameterError, match=r"matrix k of an error model with 5 states must be 1 × 5"):
+        disturbance_estimate(gains, WEIGHT, MODEL)
+    with pytest.raises(ParameterError, match=r"matrix l of an error model .* must be 3 × 2. Received 2 rows"):
+        MODEL.compensator(FEEDBACK, ((F(1), F(0)), (F(0), F(1))))

@@ -6,7 +6,7 @@ from random import Random
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.laws import ImplicitRoot, LinearLaw, Power, Prediction, disturbance_estimate, summed_integrals
+from quakedesign.laws import ErrorModel, ImplicitRoot, LinearLaw, Power, disturbance_estimate, summed_integrals
 from quakedesign.loop import PeriodicLoop, Segment
 
 ROOT = ImplicitRoot(pull=(Power(factor=(F(1), F(1)), exponent=F(1), argument="slip"),))
@@ -50,57 +50,52 @@ def test_sums_take_four_gains(number):
 
 @pytest.mark.parametrize("late", [0, 1, 3])
 def test_the_estimate_is_its_recursion(late):
-    """d ← d + a(e2 − π)/Σγ, p by the errors that are expected, π ← what comes of the pressures on their way."""
+    """d ← d + a(e2 − π)/Σγ, p = −k1·e1 − k2·e2 − Σκ_j(p_j + d/b) − d/b, π ← Φ2e + Σγ_j(b·p_j + d), exactly."""
     random = Random(late)
-    gains, weight, gain = (some(random), some(random)), some(random), abs(some(random))
-    given = Prediction(
-        of_slip=some(random),
-        of_rate=some(random),
-        of_pushes=tuple(some(random) for _ in range(late + 1)),
-        ahead=tuple((some(random), some(random)) for _ in range(2)),
-        ahead_of_pushes=tuple((some(random), some(random)) for _ in range(late)),
-    )
+    gains, weight, gain = tuple(some(random) for _ in range(2 + late)), some(random), abs(some(random))
+    of_errors = tuple((some(random), some(random)) for _ in range(2))
+    of_commands = tuple((some(random), some(random)) for _ in range(late + 1))
+    share = weight / sum(of_rate for _, of_rate in of_commands)
     errors = [(some(random), some(random)) for _ in range(5)]
-    expected, level, before, asked = F(0), F(0), [F(0)] * late, []
+    expected, level, before, commanded = F(0), F(0), [F(0)] * late, []
     for e in errors:
-        level += weight * (e[1] - expected) / sum(given.of_pushes)
-        then = [
-            product(row, e)
-            + sum((added[i] * (gain * p + level) for added, p in zip(given.ahead_of_pushes, before, strict=True)), F(0))
-            for i, row in enumerate(given.ahead)
-        ]
-        asked.append(-gains[0] * then[0] - gains[1] * then[1] - level / gain)
-        before = [asked[-1], *before]
-        pushed = sum(g * (gain * p + level) for g, p in zip(given.of_pushes, before, strict=True))
-        expected = given.of_slip * e[0] + given.of_rate * e[1] + pushed
+        level += share * (e[1] - expected)
+        commanded.append(-product(gains, [*e, *(p + level / gain for p in before)]) - level / gain)
+        before = [commanded[-1], *before]
+        pushed = sum(of_rate * (gain * p + level) for (_, of_rate), p in zip(of_commands, before, strict=True))
+        expected = product(of_errors[1], e) + pushed
         before = before[:late]
-    law = disturbance_estimate(gains, weight, given, gain)
-    assert pressures(law, errors) == asked
+    law = disturbance_estimate(gains, weight, ErrorModel.delayed(of_errors, of_commands, gain))
+    assert pressures(law, errors) == commanded
     assert law.states == ("predicted_rate", "disturbance", *(f"asked_{j}_ago" for j in range(1, late + 1)))
 
 
-def test_without_a_delay_the_errors_of_now_are_those_that_are_met():
-    given = Prediction(of_slip=F(0), of_rate=F(1), of_pushes=(F(1),))
-    law = disturbance_estimate((F(2), F(3)), F(1, 2), given, F(1))
+EYE = ((F(1), F(0)), (F(0), F(1)))
+
+
+def test_without_a_delay_the_measured_errors_are_fed_back():
+    law = disturbance_estimate((F(2), F(3)), F(1, 2), ErrorModel.delayed(EYE, ((F(0), F(1)),), F(1)))
     assert law.feedback == (-2, -3 - F(1, 2))
-    assert given.ahead_of_pushes == ()
 
 
 @pytest.mark.parametrize("gain", [F(0), F(-1)])
 def test_the_gain_of_a_model_is_positive(gain):
     with pytest.raises(ParameterError, match="must be positive"):
-        disturbance_estimate((F(1), F(1)), F(1), Prediction(of_slip=F(0), of_rate=F(1), of_pushes=(F(1),)), gain)
+        ErrorModel.delayed(EYE, ((F(0), F(1)),), gain)
 
 
 @pytest.mark.parametrize(
-    ("pushes", "ahead"),
-    [((F(1), F(1)), ()), ((F(1),), ((F(1), F(1)),)), ((F(0),), ()), ((F(1), F(-1)), ((F(1), F(1)),))],
+    ("of_commands", "said"),
+    [
+        ((), "γ of a delayed error model must be 1 × 2. Received 0 rows"),
+        (((F(1),),), "γ of a delayed error model must be 1 × 2. Received 1 rows of 1 entries"),
+        (((F(1), F(0)),), "effect of a constant pressure on the slip rate of an error model must not be 0"),
+        (((F(1), F(1)), (F(1), F(-1))), "effect of a constant pressure on the slip rate of an error model must not"),
+    ],
 )
-def test_a_prediction_needs_pushes_that_fit_and_act(pushes, ahead):
-    with pytest.raises(
-        ParameterError, match=f"Received {len(pushes)} and {len(ahead)} entries, and the sum {sum(pushes)}"
-    ):
-        Prediction(of_slip=F(0), of_rate=F(1), of_pushes=pushes, ahead_of_pushes=ahead)
+def test_commands_that_do_not_fit_or_do_not_act_are_rejected(of_commands, said):
+    with pytest.raises(ParameterError, match=said):
+        ErrorModel.delayed(EYE, of_commands, F(1))
 
 
 def sizes(n, seen=2):

@@ -16,8 +16,7 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import Held, guarantee
 from quakedesign.guarantees.search.adversary import _Limit, _searched, worst_found
 from quakedesign.laws import (
-    ErrorPrediction,
-    Prediction,
+    ErrorModel,
     RestLimit,
     SampledController,
     Signals,
@@ -35,19 +34,11 @@ from quakedesign.simulation.campaign.space import Sample
 
 REAL, STEP, GAIN = load_fault("real-fault"), F("0.184"), F("2.282e-8")
 GAINS = F(672300000), F(206000000)
-LATE = Prediction(
-    of_slip=F("0.07"),
-    of_rate=F("0.75"),
-    of_pushes=(F("0.01"), F("0.15")),
-    ahead=((F(1), F("0.184")), (F("0.07"), F("0.75"))),
-    ahead_of_pushes=((F("0.015"), F("0.16")),),
+LATE = ErrorModel.delayed(
+    ((F(1), F("0.16")), (F("0.07"), F("0.75"))), ((F("0.002"), F("0.01")), (F("0.013"), F("0.15"))), GAIN
 )
-SLIP_ALONE = ErrorPrediction(
-    of_errors=((F(1), F("0.16")), (F("0.07"), F("0.75"))),
-    of_pushes=((F("0.002"), F("0.01")), (F("0.013"), F("0.15"))),
-    ahead=LATE.ahead,
-    ahead_of_pushes=LATE.ahead_of_pushes,
-)
+ARRIVAL = (F(1), F("0.184"), GAIN * F("0.015")), (F("0.07"), F("0.75"), GAIN * F("0.16"))  # errors there
+LATE_GAINS = tuple(GAINS[0] * slip + GAINS[1] * rate for slip, rate in zip(*ARRIVAL, strict=True))
 
 
 LOOSE = RestLimit(width=F(100), per_slip=F(7), resolution=F(10**9))  # wherever the fault goes, it rests
@@ -55,8 +46,8 @@ LOOSE = RestLimit(width=F(100), per_slip=F(7), resolution=F(10**9))  # wherever 
 
 @pytest.fixture(scope="module")
 def proved():
-    prediction = Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),))
-    law = disturbance_estimate(GAINS, F("0.57"), prediction, GAIN)
+    model = ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), GAIN)
+    law = disturbance_estimate(GAINS, F("0.57"), model)
     return guarantee(uncertain_plant(REAL), Held(law=law, step=STEP))
 
 
@@ -81,7 +72,7 @@ def cut(asked, highest, width):
 
 def test_a_law_with_an_estimate_expects_what_is_applied():
     """π ← of_slip·e1 + of_rate·e2 + Σγ_j(βb·p_j + d) with the p that is applied; one period late p_1 is that too."""
-    law = disturbance_estimate(GAINS, F("0.57"), LATE, GAIN)
+    law = disturbance_estimate(LATE_GAINS, F("0.57"), LATE)
     limit = RestLimit(width=F(50), per_slip=F(0), resolution=F(1))
     controller = SampledController(law=law, step=STEP, rest_limit=limit)
     z, highest, cuts, random = [0.0] * 5, 0.0, 0, np.random.default_rng(5)
@@ -102,7 +93,7 @@ def test_a_law_with_an_estimate_expects_what_is_applied():
 
 
 def test_an_observer_expects_what_is_applied():
-    law = slip_observer(GAINS, (F("0.9"), F("3.5"), F("3.2")), SLIP_ALONE, GAIN)
+    law = slip_observer(LATE_GAINS, (F("0.9"), F("3.5"), F("3.2")), LATE)
     limit = RestLimit(width=F(50), per_slip=F(0), resolution=F(1, 10**6))
     limited, free = (SampledController(law=law, step=STEP, rest_limit=one) for one in (limit, None))
     z = [1e-6, -1e-6, 1e-6, 20.0, 30.0, 1.5e-6]

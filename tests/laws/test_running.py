@@ -17,8 +17,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Guarantee, Held, guarantee
 from quakedesign.laws import (
-    ErrorPrediction,
-    Prediction,
+    ErrorModel,
     SampledController,
     Signals,
     disturbance_estimate,
@@ -36,8 +35,7 @@ STEP = F("0.184")
 LAW = disturbance_estimate(
     (F(672300000), F(206000000)),
     F("0.57"),
-    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),)),
-    F("2.282e-8"),
+    ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), F("2.282e-8")),
 )
 HELD = Held(law=LAW, step=STEP)
 
@@ -85,10 +83,9 @@ def recursion(run, law):
 OBSERVER = slip_observer(
     (F(1250000000), F(306200000)),
     (F("0.942"), F("6.12"), F("9.85")),
-    ErrorPrediction(
-        of_errors=((F("1.007"), F("0.1598")), (F("0.0718"), F("0.7513"))), of_pushes=((F("0.0154"), F("0.1598")),)
+    ErrorModel.delayed(
+        ((F("1.007"), F("0.1598")), (F("0.0718"), F("0.7513"))), ((F("0.0154"), F("0.1598")),), F("2.282e-8")
     ),
-    F("2.282e-8"),
 )
 
 

@@ -11,12 +11,11 @@ from thinned import few
 from quakedesign.errors import ParameterError
 from quakedesign.laws import (
     NOISES,
-    ErrorPrediction,
+    ErrorModel,
     ImplicitRoot,
     LinearLaw,
     NominalModel,
     Power,
-    Prediction,
     compensated,
     disturbance_estimate,
     slip_observer,
@@ -30,13 +29,12 @@ MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
 AUTHORITY = F(2)
 PROPORTIONAL = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(F(-3), F(-2)))
 ESTIMATE = disturbance_estimate(
-    (F(4), F(2)), F(2, 5), Prediction(of_slip=F(1, 12), of_rate=F(3, 4), of_pushes=(F(1, 6),)), F(2)
+    (F(4), F(2)), F(2, 5), ErrorModel.delayed(((F(1), F(0)), (F(1, 12), F(3, 4))), ((F(0), F(1, 6)),), F(2))
 )
 OBSERVER = slip_observer(
     (F(4), F(2)),
     (F("0.9"), F(4), F(2)),
-    ErrorPrediction(of_errors=((F("1.01"), F("0.17")), (F("0.09"), F("0.75"))), of_pushes=((F("0.018"), F("0.17")),)),
-    F(2),
+    ErrorModel.delayed(((F("1.01"), F("0.17")), (F("0.09"), F("0.75"))), ((F("0.018"), F("0.17")),), F(2)),
 )
 INTEGRALS = summed_integrals((F(4), F(2), F(1), F(1, 10)), STEP)
 
@@ -210,22 +208,17 @@ def test_a_law_that_knows_the_delay_expects_what_comes(delay, ages):
     whole, part = divmod(F(delay), STEP)
     flow = np.array([[0, 1, 0], [0.5, -1.5, 1], [0, 0, 0]])
     pushed = lambda t: expm(flow * t)[:2, 2]  # noqa: E731
-    pushes = [0.0] * (ages + 1)
-    pushes[int(whole)] = pushed(period - float(part))[1]
+    pushes = [np.zeros(2)] * (ages + 1)
+    pushes[int(whole)] = pushed(period - float(part))
     if part:
-        pushes[int(whole) + 1] = pushed(period)[1] - pushes[int(whole)]
+        pushes[int(whole) + 1] = pushed(period) - pushes[int(whole)]
     ahead = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in range(1, ages + 1)]
+    rows = lambda m: tuple(tuple(map(F, row)) for row in m)  # noqa: E731
+    arrival = np.column_stack([expm(flow * late)[:2, :2], *(float(MODEL.gain) * v for v in ahead)])
     law = disturbance_estimate(
-        (F(4), F(2)),
+        tuple(map(F, np.array([4, 2]) @ arrival)),
         F(2, 5),
-        Prediction(
-            of_slip=F(expm(flow * period)[1][0]),
-            of_rate=F(expm(flow * period)[1][1]),
-            of_pushes=tuple(map(F, pushes)),
-            ahead=tuple(tuple(map(F, row[:2])) for row in expm(flow * late)[:2]),
-            ahead_of_pushes=tuple(tuple(map(F, row)) for row in ahead),
-        ),
-        MODEL.gain,
+        ErrorModel.delayed(rows(expm(flow * period)[:2, :2]), rows(pushes), MODEL.gain),
     )
     assert np.allclose(run_matrices(held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay)), 120, 0.3)[-1], 0, atol=1e-9)
     # a constant disturbance is known after the first samples: the innovation decays with 1 − a alone
@@ -244,9 +237,10 @@ def test_a_law_that_knows_the_delay_expects_what_comes(delay, ages):
 
 def test_the_estimate_rests_on_the_disturbance_that_its_model_has():
     """With the model's own plant and a constant disturbance the level settles on it: p* = −d/gain, no error."""
-    near = expm(np.array([[0, 1, 0], [0.5, -1.5, 1], [0, 0, 0]]) * 0.2)[1]
-    prediction = Prediction(of_slip=F(near[0]), of_rate=F(near[1]), of_pushes=(F(near[2]),))
-    law = disturbance_estimate((F(4), F(2)), F(2, 5), prediction, MODEL.gain)
+    near = expm(np.array([[0, 1, 0], [0.5, -1.5, 1], [0, 0, 0]]) * 0.2)
+    of_errors, of_command = (tuple(tuple(map(F, row)) for row in m) for m in (near[:2, :2], near[:2, 2:].T))
+    model = ErrorModel.delayed(of_errors, of_command, MODEL.gain)
+    law = disturbance_estimate((F(4), F(2)), F(2, 5), model)
     loop = held_loop(law, MODEL, AUTHORITY, STEP)
     assert np.allclose(run_matrices(loop, 80, 0.3)[-1], 0, atol=1e-9)
 

@@ -15,7 +15,7 @@ from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_g
 from quakedesign.guarantees.exact.norms import norms
 from quakedesign.guarantees.exact.small_gain import grown
 from quakedesign.guarantees.search.estimate import gains_of
-from quakedesign.laws import Prediction, disturbance_estimate
+from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
 
@@ -24,8 +24,7 @@ TASK = uncertain_plant(load_fault("real-fault"))
 LAW = disturbance_estimate(
     (F("3.9e8"), F("1.5e8")),
     F("0.1"),
-    Prediction(of_slip=F("0.07"), of_rate=F("0.752"), of_pushes=(F("0.16"),)),
-    F("2.282e-8"),
+    ErrorModel.delayed(((F(1), F(0)), (F("0.07"), F("0.752"))), ((F(0), F("0.16")),), F("2.282e-8")),
 )
 HELD = Held(law=LAW, step=STEP, diffusion=F("0.1"))
 OUTPUTS = ("slip_error", "slip_rate_error", "push", "left_out", "asked")

@@ -19,7 +19,7 @@ from quakedesign.guarantees import Guarantee, Held, NoGuarantee, SlowGain, guara
 from quakedesign.guarantees.exact import statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import Bounds, grown, slow_gains
-from quakedesign.laws import NominalModel, Prediction, disturbance_estimate
+from quakedesign.laws import ErrorModel, NominalModel, disturbance_estimate
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
 
@@ -27,7 +27,9 @@ STEP, SLOW = F("0.184"), SlowGain(parts=2, growth=F(1, 4))
 TASK = uncertain_plant(load_fault("real-fault"))
 GAIN = F("2.282e-8")
 LAW = disturbance_estimate(
-    (F("7.8e8"), F("2.38e8")), F("0.1"), Prediction(of_slip=F("0.07"), of_rate=F("0.752"), of_pushes=(F("0.16"),)), GAIN
+    (F("7.8e8"), F("2.38e8")),
+    F("0.1"),
+    ErrorModel.delayed(((F(1), F(0)), (F("0.07"), F("0.752"))), ((F(0), F("0.16")),), GAIN),
 )
 HELD = Held(law=LAW, step=STEP)
 BETA = tuple(map(float, TASK.beta))

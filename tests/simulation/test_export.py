@@ -18,9 +18,8 @@ from quakedesign.guarantees import NoGuarantee, compensated, design_compensated
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee, save_guarantee
 from quakedesign.guarantees.search.compensated_search import implicit_pull, recovered
 from quakedesign.laws import (
-    ErrorPrediction,
+    ErrorModel,
     ImplicitRoot,
-    Prediction,
     RestLimit,
     SampledController,
     SampledLaw,
@@ -56,8 +55,7 @@ SAMPLED = SampledController(
     law=disturbance_estimate(
         (F(149400000), F(460800)),
         F("0.4"),
-        Prediction(of_slip=F("0.6"), of_rate=F("0.99"), of_pushes=(F("0.000995"),)),
-        F("0.002"),
+        ErrorModel.delayed(((F(1), F(0)), (F("0.6"), F("0.99"))), ((F(0), F("0.000995")),), F("0.002")),
     ),
     step=F(1, 1000),
 )
@@ -65,8 +63,7 @@ OBSERVER = SampledController(
     law=slip_observer(
         (F(149400000), F(460800)),
         (F("0.9"), F(700), F(80000)),
-        ErrorPrediction(of_errors=((F(1), F("0.001")), (F("0.6"), F("0.99"))), of_pushes=((F("5e-7"), F("0.000995")),)),
-        F("0.002"),
+        ErrorModel.delayed(((F(1), F("0.001")), (F("0.6"), F("0.99"))), ((F("5e-7"), F("0.000995")),), F("0.002")),
     ),
     step=F(1, 1000),
 )

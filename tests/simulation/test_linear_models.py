@@ -14,7 +14,7 @@ from thinned import few
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.laws import Prediction, SampledController, disturbance_estimate
+from quakedesign.laws import ErrorModel, SampledController, disturbance_estimate
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Saturation
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation.interop import resting_pressure
@@ -165,8 +165,7 @@ STEP = F(23, 125)
 SAMPLED = disturbance_estimate(
     (F(672300000), F(206000000)),
     F("0.57"),
-    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),)),
-    F("2.282e-8"),
+    ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), F("2.282e-8")),
 )
 AT_ONCE = SampledController(law=SAMPLED, step=STEP)
 

@@ -314,11 +314,11 @@ def test_a_step_goes_through_a_lag_and_then_the_layer(lag):
     def behind(t):
         return quad(lambda s: (1 - shares @ np.exp(-rates * (t - s))) * math.exp(-s / lag) / lag, 0, t, epsabs=1e-9)[0]
 
-    loop = _Loop.of(fault(), path, Tide(), SlidingVariation(), inertia=False)
+    loop = _Loop.of(fault(), path, Tide(), SlidingVariation(), False, None)
     for time in (40.0, 400.0, 2000.0):
         found = loop.pressure(0.0, 1.0, time, np.zeros(len(loop.decay)))
         assert found == pytest.approx(behind(time), abs=2e-5)
-    alone = _Loop.of(fault(), PressurePath(lag=Fraction(lag)), Tide(), SlidingVariation(), inertia=False)
+    alone = _Loop.of(fault(), PressurePath(lag=Fraction(lag)), Tide(), SlidingVariation(), False, None)
     assert alone.pressure(0.0, 1.0, 40.0, np.zeros(1)) == pytest.approx(-math.expm1(-40.0 / lag), rel=1e-12)
 
 
@@ -413,7 +413,7 @@ def test_a_fault_without_a_state_has_no_tide():
 
 def test_a_step_goes_through_the_layer_as_in_carslaw_and_jaeger():
     """1 − (4/π)Σ(−1)ⁿ/(2n + 1)e^(−((2n + 1)π/2)²t/τ) after a unit step of the well."""
-    loop = _Loop.of(fault(), PressurePath(diffusion=PATH), Tide(), SlidingVariation(), inertia=False)
+    loop = _Loop.of(fault(), PressurePath(diffusion=PATH), Tide(), SlidingVariation(), False, None)
     for share in (0.05, 0.2, 1.0):
         time = share * float(PATH)
         n = np.arange(200)

@@ -117,20 +117,20 @@ class PlantGuarantee:
         part, law = self.part, self.law
         size = f"{counted(len(part.A), 'state')}, {counted(len(part.B[0]), 'control')}"
         of_plant, of_forces = (self.remarks.get(name, "") for name in ("plant", "disturbances"))
-        said = f"on the uncertain plant of the certificate ({size}){of_plant and f' {of_plant}'}, "
-        said += f"from |x_i(0)| <= {_listed(part.start)}" if any(part.start) else "from rest"
-        said += f", with zero-order hold over {UpperBound(law.step):.6g} s"
-        said += f", with a delay of {UpperBound(law.delay):.6g} s" if law.delay else ""
-        said += f", for all uncertain terms in {counted(len(part.sectors), 'sector')}" if part.sectors else ""
+        text = f"on the uncertain plant of the certificate ({size}){of_plant and f' {of_plant}'}, "
+        text += f"from |x_i(0)| <= {_listed(part.start)}" if any(part.start) else "from rest"
+        text += f", with zero-order hold over {UpperBound(law.step):.6g} s"
+        text += f", with a delay of {UpperBound(law.delay):.6g} s" if law.delay else ""
+        text += f", for all uncertain terms in {counted(len(part.sectors), 'sector')}" if part.sectors else ""
         regions = [s.within for s in part.sectors if s.within is not None]
-        said += f", {len(regions)} of which hold for |y| <= {_listed(regions)}" if regions else ""
+        text += f", {len(regions)} of which hold for |y| <= {_listed(regions)}" if regions else ""
         sizes, first = [size for _, size in part.disturbances], len(self.claims.outputs)
         pushed = self.units[first + len(part.B[0]) :]
-        said += f", disturbances of at most {_listed(sizes, pushed)}{of_forces and f' ({of_forces})'}" if sizes else ""
+        text += f", disturbances of at most {_listed(sizes, pushed)}{of_forces and f' ({of_forces})'}" if sizes else ""
         rates, unit = [load.rate for load in part.loads], self.units[first] if self.units else ""
-        said += f", loads of rates of at most {_listed(rates, [unit and f'{unit}/s'] * len(rates))}" if rates else ""
-        said += f", measurement noise of at most {_listed(part.noise)}" if any(part.noise) else ""
-        return f"{said}, for all t >= 0: {', '.join(self._peaks())}"
+        text += f", loads of rates of at most {_listed(rates, [unit and f'{unit}/s'] * len(rates))}" if rates else ""
+        text += f", measurement noise of at most {_listed(part.noise)}" if any(part.noise) else ""
+        return f"{text}, for all t >= 0: {', '.join(self._peaks())}"
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts."""
@@ -174,8 +174,8 @@ def row_bounds(part: LinearPart, found: ResponseBounds, inputs: Row) -> Row:
     own = [size for _, size in part.disturbances] + [load.rate for load in part.loads]
     halves = [(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors]
     sizes = [*own, *(w if h else Fraction(0) for w, h in zip(inputs, halves, strict=True))]
-    told = [size for size in part.noise if size]
-    parts = (*zip(found.inputs, sizes, strict=True), *zip(found.sampled, told, strict=True))
+    lines = [size for size in part.noise if size]
+    parts = (*zip(found.inputs, sizes, strict=True), *zip(found.sampled, lines, strict=True))
     bounds = list(found.start)
     for gains, size in parts:
         if size:

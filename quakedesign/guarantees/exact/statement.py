@@ -743,14 +743,14 @@ class SlidingGuarantee:
 
 
 def _path(held: Held) -> str:
-    said = f"with zero-order hold over {float(held.step):.6g} s"
-    said += f", with a delay of {float(held.delay):.6g} s" if held.delay else ""
-    said += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
-    said += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
+    text = f"with zero-order hold over {float(held.step):.6g} s"
+    text += f", with a delay of {float(held.delay):.6g} s" if held.delay else ""
+    text += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
+    text += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
     noise = LowerBound(held.slip_noise)
     if held.slip_noise:
-        return f"{said}, with any noise of at most {noise:.6g} m in the measured slip"
-    return f"{said}, with exact measurements of slip"
+        return f"{text}, with any noise of at most {noise:.6g} m in the measured slip"
+    return f"{text}, with exact measurements of slip"
 
 
 def _along(task: SlidingPlant) -> str:
@@ -761,15 +761,15 @@ def _along(task: SlidingPlant) -> str:
 
 def _friction(task: SlidingPlant) -> list[str]:
     """Parts of the statement on regularised friction and on the slip law."""
-    said = ["friction regularised"] if task.regularised else []
-    return said + (["state by the slip law"] if task.state_law == "slip" else [])
+    lines = ["friction regularised"] if task.regularised else []
+    return lines + (["state by the slip law"] if task.state_law == "slip" else [])
 
 
 def _box(task: SlidingPlant) -> str:
-    said = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
+    entries = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
     wide = [
         f"{short} from {_inside(*task.ranges[axis])}"
-        for axis, short in said.items()
+        for axis, short in entries.items()
         if task.ranges[axis][0] < task.ranges[axis][1]
     ]
     return f"for all constant {', '.join(wide)}" if wide else "for a, b and D_c as they are given"

@@ -6,7 +6,7 @@ sliding and its poles.
 """
 
 from cmath import sqrt
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import exp, log10
@@ -21,18 +21,8 @@ from quakedesign.exact import fraction_of, rational, shortly, to_sympy
 from quakedesign.fault import Fault
 from quakedesign.guarantees.exact.loop import Around
 from quakedesign.guarantees.search.estimate import rounded, short
-from quakedesign.laws import (
-    ErrorPrediction,
-    LinearLaw,
-    NominalModel,
-    PathModel,
-    Prediction,
-    disturbance_estimate,
-    estimate_through_path,
-    observer_through_path,
-    slip_observer,
-)
-from quakedesign.laws.sampled_law import Row
+from quakedesign.laws import ErrorModel, LinearLaw, NominalModel, compensator, disturbance_estimate, slip_observer
+from quakedesign.laws.sampled_law import Matrix, Row, unit_row
 from quakedesign.loop import SHORTEST, Layer, SlidingModel
 from quakedesign.loop.layer import MODES
 from quakedesign.loop.loop_setup import MEASURED
@@ -64,8 +54,7 @@ def path_modes(step: Fraction, around: Around, *, observed: bool = False) -> int
 class PathFeedback:
     """A model of fault and path, and the feedback of both by a linear quadratic regulator on the sampled pair."""
 
-    model: PathModel
-    gain: Fraction
+    model: ErrorModel
     flow: np.ndarray
     first: np.ndarray
     unit: float
@@ -74,16 +63,19 @@ class PathFeedback:
     @classmethod
     def of(cls, model: NominalModel, step: Fraction, around: Around, *, observed: bool = False) -> "PathFeedback":
         """With as many modes of a layer as a law may know, of the slip alone if `observed`."""
-        gain = float(model.gain)
+        gain, short_gain = float(model.gain), short(float(model.gain))
         flow, first = _sampled(model, step, around, path_modes(step, around, observed=observed))
-        path = PathModel(
-            of_errors=rounded(flow[:2, :2]),
-            of_pressures=rounded(flow[:2, 2:] / gain),
-            of_asked=rounded([first[:2] / gain])[0],
-            kept=rounded(flow[2:, 2:]),
+        path, count = rounded(flow[2:, 2:]), len(flow) - 2  # states b·q of the pressures q of the path
+        errors = np.hstack([flow[:2, :2], flow[:2, 2:] / gain])
+        known = ErrorModel(
+            update=(*rounded(errors), *((Fraction(0), Fraction(0), *row) for row in path)),
+            command=tuple(short_gain * v for v in (*rounded([first[:2] / gain])[0], *(1 - sum(row) for row in path))),
+            gain=short_gain,
+            pressures=tuple(f"path{i}" for i in range(count)),
+            unit=short_gain,
         )
         unit = float(around.get("diffusion") or step + around.get("delay", 0) + around["lag"])
-        return cls(path, short(gain), flow, first, unit, unit * gain)
+        return cls(known, flow, first, unit, unit * gain)
 
     def gains(self, slip: float, pressure: float) -> Row:
         """For logarithms of the weights of slip error and pressure, that of the slip-rate error being 1.
@@ -98,13 +90,24 @@ class PathFeedback:
         weights = np.zeros(self.flow.shape)
         weights[0, 0], weights[1, 1] = exp(slip) / self.unit**2, 1
         cost = exp(pressure) * self.push**2
-        riccati = solve_discrete_are(self.flow, self.first[:, None], weights, np.array([[cost]]))
-        found = self.first @ riccati @ self.flow / (cost + self.first @ riccati @ self.first)
-        return tuple(short(float(v)) for v in found)
+        of_slip, of_rate, *of_path = map(short, _regulator(self.flow, self.first, weights, cost))
+        return of_slip, of_rate, *(v / self.model.gain for v in of_path)
+
+
+def _regulator(update: np.ndarray, command: np.ndarray, weights: np.ndarray, of_command: float) -> np.ndarray:
+    """K of p = −Kx that minimises Σ xᵀQx + R·p² of x⁺ = Ax + Bp."""
+    value = solve_discrete_are(update, command[:, None], weights, np.array([[of_command]]))
+    return np.array(command @ value @ update / (of_command + command @ value @ command))
+
+
+def _filter(update: np.ndarray, process: np.ndarray) -> np.ndarray:
+    """Corrections per innovation of the first state, whose measurement noise has the variance 1."""
+    covariance = solve_discrete_are(update.T, np.eye(len(update))[:, :1], process, np.eye(1))
+    return np.array(covariance[:, 0] / (covariance[0, 0] + 1))
 
 
 def _sampled(model: NominalModel, step: Fraction, around: Around, modes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Over one period: what becomes of e1, e2, the path's pressures and those asked for before, and of p [Pa]."""
+    """A and B over one period, of e1, e2, the pressures of the path and the commands that wait [Pa]."""
     delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
     whole, late = int(delay // step), float(delay % step)
     ages = whole + (late > 0)
@@ -142,7 +145,7 @@ def _sampled(model: NominalModel, step: Fraction, around: Around, modes: int) ->
 
 _STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
 _NOT_BY_DIFFERENCES = ("diffusion", "lag", "initial_slip", "initial_slip_rate", "jitter", "averaging")
-_GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same where the slip rate is told late
+_GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same where the slip rate is measured late
 _OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains, and decades above what noise allows
 _DECADES = 4.0  # of process noise over that of the measurement, at most, at the start
 _FEWEST_MODES = 2  # of a layer, of a law that knows its path
@@ -170,17 +173,14 @@ def measured_by(law: LinearLaw) -> str:
 
 
 def require_surroundings(around: Around) -> None:
-    """Refuse rock and noise below zero.
-
-    Raises
-    ------
-    ParameterError
-    """
-    told: dict[str, Any] = {**around}
-    for name, unit in (("diffusion", "s"), ("slip_noise", "m"), ("rate_noise", "m/s")):
-        value = told.get(name, Fraction(0))
+    """Reject a diffusion time or noise below 0."""
+    limits = (
+        ("diffusion", around.get("diffusion", Fraction(0)), "s"),
+        ("slip noise", around.get("slip_noise", Fraction(0)), "m"),
+        ("rate noise", around.get("rate_noise", Fraction(0)), "m/s"),
+    )
+    for what, value, unit in limits:
         if value < 0:
-            what = name.replace("_", " ")
             raise ParameterError(
                 f"{what} must be 0 or more. Received {shortly(value)} {unit}. Give its absolute value."
             )
@@ -203,7 +203,7 @@ def why_no_law(step: Fraction, measured: str, around: Around) -> str:
 def family_of(task: FaultPlant, step: Fraction, measured: str, around: Around) -> LawFamily:
     """Feedback with an estimate of the disturbance, from slip and slip rate, from the slip alone or a differentiator.
 
-    Through a lag or a layer it is a feedback of the pressures on their way as well, which the law simulates.
+    Behind a lag or a diffusion path the law also feeds back the pressures on their way, which it computes by its model.
 
     Parameters
     ----------
@@ -213,76 +213,37 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, around: Around) -
     measured : str
         One of `MEASURED`.
     around : Around
-        Near the bound of whose noise of the slip an observer's search begins; `why_no_law` must have no reason.
+        Loop setup, for which `why_no_law` has no reason. The search of an observer begins near its slip noise.
     """
     if measured == MEASURED[2]:
-        told = family_of(task, step, MEASURED[0], around)
-        return replace(told, law=lambda x: told_by_differences(told.law(x), step), starts=(*_GENTLE, *told.starts))
-    delay = around.get("delay", Fraction(0))
-    observed, noise = measured == "slip", around.get("slip_noise", Fraction(0))
-    if around.get("diffusion") or (around.get("lag") and path_modes(step, around, observed=observed) >= 0):
-        return (_observers_through_path if observed else _through_path)(task, step, around)
-    if observed:
-        return _observers(task, step, delay, noise)
-    scale, prediction = _Scale.of(task, step), _ahead(task, step, delay)
-    expected = Prediction(
-        of_slip=prediction.of_errors[1][0],
-        of_rate=prediction.of_errors[1][1],
-        of_pushes=tuple(v[1] for v in prediction.of_pushes),
-        ahead=prediction.ahead,
-        ahead_of_pushes=prediction.ahead_of_pushes,
-    )
+        plain = family_of(task, step, MEASURED[0], around)
+        return replace(plain, law=lambda x: told_by_differences(plain.law(x), step), starts=(*_GENTLE, *plain.starts))
+    observed, layer = measured == "slip", bool(around.get("diffusion"))
+    path = layer or (bool(around.get("lag")) and path_modes(step, around, observed=observed) >= 0)
+    feedback: PathFeedback | DelayFeedback
+    if path:
+        feedback = PathFeedback.of(task.model, step, around, observed=observed)
+    else:
+        feedback = DelayFeedback.of(task.model, step, around.get("delay", Fraction(0)))
+    kalman = _Kalman.of(task.model, step)
 
     def law(x: np.ndarray) -> LinearLaw:
-        return disturbance_estimate(scale.gains(x), short(float(x[2])), expected, scale.gain)
-
-    return LawFamily(law, _STARTS, lambda x: bool(0 < x[2] < 1), room=1.6, period=step)
-
-
-def _through_path(task: FaultPlant, step: Fraction, around: Around) -> LawFamily:
-    feedback = PathFeedback.of(task.model, step, around)
-
-    def law(x: np.ndarray) -> LinearLaw:
-        slip, pressure, weight = map(float, x)
-        return estimate_through_path(feedback.gains(slip, pressure), short(weight), feedback.model, feedback.gain)
+        gains = feedback.gains(float(x[0]), float(x[1]))
+        if observed:
+            return slip_observer(gains, kalman.corrections(float(x[2]), float(x[3])), feedback.model)
+        return disturbance_estimate(gains, short(float(x[2])), feedback.model)
 
     def admits(x: np.ndarray) -> bool:
-        return bool(0 < x[2] < 1 and np.abs(x[:2]).max() < _WIDEST)
+        exponents = np.abs(x[0 if path else 2 : 4 if observed else 2])
+        return bool((exponents < _WIDEST).all() and (observed or 0 < x[2] < 1))
 
-    return LawFamily(law, _path_starts(around), admits, room=1.6, period=step + around.get("diffusion", 0))
-
-
-def _observers_through_path(task: FaultPlant, step: Fraction, around: Around) -> LawFamily:
-    feedback, kalman = PathFeedback.of(task.model, step, around, observed=True), _Kalman.of(task, step)
-    decades = kalman.decades(task, around.get("slip_noise", Fraction(0)))
-
-    def law(x: np.ndarray) -> LinearLaw:
-        gains, corrections = feedback.gains(float(x[0]), float(x[1])), kalman.corrections(float(x[2]), float(x[3]))
-        return observer_through_path(gains, corrections, feedback.model, feedback.gain)
-
-    noisy = [(decades + acceleration, decades + level) for *_, acceleration, level in _OBSERVERS]
-    starts = tuple((*path[:2], *above) for path, above in zip(_path_starts(around), noisy, strict=False))
-    return LawFamily(law, starts, _solvable, room=1.4, period=step + around.get("diffusion", 0))
-
-
-def _path_starts(around: Around) -> tuple[tuple[float, float, float], ...]:
-    return THROUGH_ROCK if around.get("diffusion") else BEHIND_LAG
-
-
-def _solvable(x: np.ndarray) -> bool:
-    return bool(np.abs(x).max() < _WIDEST)
-
-
-def _observers(task: FaultPlant, step: Fraction, delay: Fraction, noise: Fraction) -> LawFamily:
-    """Steady-state Kalman observers: two gains, decades of the variances of accelerations and of the level's steps."""
-    scale, prediction, kalman = _Scale.of(task, step), _ahead(task, step, delay), _Kalman.of(task, step)
-
-    def law(x: np.ndarray) -> LinearLaw:
-        return slip_observer(scale.gains(x), kalman.corrections(float(x[2]), float(x[3])), prediction, scale.gain)
-
-    decades = kalman.decades(task, noise)
-    starts = tuple((k1, k2, decades + a, decades + b) for k1, k2, a, b in _OBSERVERS)
-    return LawFamily(law, starts, lambda x: _solvable(x[2:]), room=1.4, period=step)
+    starts: tuple[tuple[float, ...], ...] = (THROUGH_ROCK if layer else BEHIND_LAG) if path else _STARTS
+    if observed:
+        decades = kalman.decades(float(task.amplitude), around.get("slip_noise", Fraction(0)))
+        first = starts if path else _OBSERVERS
+        starts = tuple((*k[:2], decades + a, decades + b) for k, (*_, a, b) in zip(first, _OBSERVERS, strict=False))
+    period = step + around.get("diffusion", 0)
+    return LawFamily(law, starts, admits, room=1.4 if observed else 1.6, period=period)
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,78 +255,78 @@ class _Kalman:
     step: float
 
     @classmethod
-    def of(cls, task: FaultPlant, step: Fraction) -> "_Kalman":
+    def of(cls, model: NominalModel, step: Fraction) -> "_Kalman":
         period = float(step)
         units = np.diag([1, 1 / period, 1 / period**2])
-        return cls(np.linalg.inv(units) @ expm(_flow(task) * period) @ units, units, period)
+        return cls(np.linalg.inv(units) @ expm(_flow(model) * period) @ units, units, period)
 
-    def decades(self, task: FaultPlant, noise: Fraction) -> float:
-        """Where a search begins: of what the disturbance moves within T_s, over the noise [m]."""
-        moved = float(task.amplitude) * self.step**2
+    def decades(self, amplitude: float, noise: Fraction) -> float:
+        """Where a search begins: of what the disturbance [m/s²] moves within T_s, over the noise [m]."""
+        moved = amplitude * self.step**2
         return _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
 
     def corrections(self, acceleration: float, level: float) -> tuple[Fraction, Fraction, Fraction]:
         """Per innovation of the slip, whose noise has the variance 1, by the Riccati equation of the filter."""
         pushed = self.follows[:, 2] * [1, 1, 0]
         process = 10**acceleration * np.outer(pushed, pushed) + np.diag([0, 0, 10**level]) + _FAINT * np.eye(3)
-        covariance = solve_discrete_are(self.follows.T, np.eye(3)[:, :1], process, np.eye(1))
-        first, second, third = self.units @ covariance[:, 0] / (covariance[0, 0] + 1)
-        return short(float(first)), short(float(second)), short(float(third))
+        first, second, third = map(short, self.units @ _filter(self.follows, process))
+        return first, second, third
+
+
+def _flow(model: NominalModel) -> np.ndarray:
+    """Generator of e1, e2 and a constant acceleration."""
+    return np.array([[0, 1, 0], [float(model.slip), -float(model.rate), 1], [0, 0, 0]])
 
 
 @dataclass(frozen=True, slots=True)
-class _Scale:
-    """β0·b of the model, in a few digits [m²/kg], and T_s [s]."""
+class DelayFeedback:
+    """A model of the fault and of the commands on their way, and feedback of the errors when a pressure arrives.
 
-    gain: Fraction
-    model_gain: float
+    Attributes
+    ----------
+    model : ErrorModel
+    arrival : tuple of rows
+        Coefficients of e1, e2 and the waiting commands for both errors at the arrival of the present command.
+    input_gain, step : float
+        β·b [m²/kg] and T_s [s].
+    """
+
+    model: ErrorModel
+    arrival: Matrix
+    input_gain: float
     step: float
 
     @classmethod
-    def of(cls, task: FaultPlant, step: Fraction) -> "_Scale":
-        gain = float(task.model.gain)
-        return cls(short(gain), gain, float(step))
+    def of(cls, model: NominalModel, step: Fraction, delay: Fraction) -> "DelayFeedback":
+        """With coefficients of four digits."""
+        flow, period, late = _flow(model), float(step), float(delay)
 
-    def gains(self, x: np.ndarray) -> tuple[Fraction, Fraction]:
-        """k1 [Pa/m] and k2 [Pa·s/m]."""
-        return short(float(x[0]) / self.model_gain / self.step**2), short(float(x[1]) / self.model_gain / self.step)
+        def pushed(duration: float) -> np.ndarray:
+            """Errors after a unit acceleration for some time."""
+            return np.array(expm(flow * duration))[:2, 2]
 
+        moved, first = _sampled(model, step, {"delay": delay}, 0)
+        ages = range(1, len(moved) - 1)
+        arriving = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in ages]
+        gain = float(model.gain)
+        of_commands = rounded(v / gain for v in (first[:2], *moved[:2, 2:].T))
+        known = ErrorModel.delayed(rounded(moved[:2, :2]), of_commands, short(gain))
+        free, forced = rounded(expm(flow * late)[:2, :2]), rounded(arriving)
+        arrival = tuple((*row, *(known.gain * v[i] for v in forced)) for i, row in enumerate(free))
+        return cls(known, arrival, gain, period)
 
-def _flow(task: FaultPlant) -> np.ndarray:
-    """Of e1, e2 and a constant push."""
-    return np.array([[0, 1, 0], [float(task.model.slip), -float(task.model.rate), 1], [0, 0, 0]])
-
-
-def _ahead(task: FaultPlant, step: Fraction, delay: Fraction) -> ErrorPrediction:
-    """What the model says of the next sample, and of the time at which a pressure arrives; numbers of four digits."""
-    flow, period, late = _flow(task), float(step), float(delay)
-
-    def pushed(duration: float) -> np.ndarray:
-        """Errors after a unit push for some time."""
-        return np.array(expm(flow * duration))[:2, 2]
-
-    whole, part = int(delay // step), float(delay % step)
-    ages = whole + (1 if part else 0)
-    pushes = [np.zeros(2)] * (ages + 1)
-    pushes[whole] = pushed(period - part)
-    if part:
-        pushes[whole + 1] = pushed(period) - pushes[whole]
-    arriving = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in range(1, ages + 1)]
-    return ErrorPrediction(
-        of_errors=rounded(expm(flow * period)[:2, :2]),
-        of_pushes=rounded(pushes),
-        ahead=rounded(expm(flow * late)[:2, :2]),
-        ahead_of_pushes=rounded(arriving),
-    )
+    def gains(self, slip: float, rate: float) -> Row:
+        """For k1·β·b·T_s² and k2·β·b·T_s of the errors at the arrival."""
+        k1, k2 = short(slip / self.input_gain / self.step**2), short(rate / self.input_gain / self.step)
+        return tuple(k1 * e1 + k2 * e2 for e1, e2 in zip(*self.arrival, strict=True))
 
 
 # ----------------------------------------------------------------------
 # An e-LQR that holds slow sliding: LQ on the sampled plant through its path, fed by a Kalman observer of the slip.
 #
 # The model is scaled: slip error in D, pressures and stresses in N, time in 1/ρ = D/V; the law carries the slow modes
-# of the layer of rock and a level of everything that it does not know. Whatever the numbers, its states rest where it
-# asks for a constant pressure without errors: the gain of the level, and how the level moves the slip, follow from
-# that.
+# of the diffusion path and a level of all disturbances. For any numbers a constant pressure without errors is a steady
+# state of the law: the gain of the level, and its effect on the slip, follow from this condition.
 
 SLIDING_MODES = 4
 _DIGITS = 9
@@ -375,14 +336,14 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
-    """What LQ and observer trade, in the scaled model.
+    """Weights of regulator and filter in the scaled model.
 
     Attributes
     ----------
     slip, state, pressure : float
-        LQ weights of x², z² and u² beside y².
+        LQ weights of x², z² and u²; that of y² is 1.
     slip_noise, state_noise, level_noise : float
-        Variances of what moves x, z and the level from sample to sample, beside that of the measured x.
+        Variances of the process noise of x, z and the level per sample; that of the measured x is 1.
     """
 
     slip: float
@@ -400,104 +361,61 @@ FAVOURED = Weights(slip=4.4e-3, state=5.5e-3, pressure=344.0, slip_noise=5.9e3, 
 def sliding_law(
     model: SlidingModel, step: Fraction, *, diffusion: Fraction = _ZERO, weights: Weights = FAVOURED
 ) -> LinearLaw:
-    """Law of samples of the slip error, its pressure held over a step [s] and brought through rock of L²/D [s].
+    """LQG compensator of the sampled slip error, with a zero-order hold of `step` [s] and a diffusion path of L²/D [s].
 
-    The pressure is what the law adds to that which the reference needs. States: predicted x, z, the modes of the layer
-    and the level; all scaled.
+    The pressure is relative to that which the reference needs. States: predicted x, z, the modes of the path and the
+    level, all scaled.
 
     Raises
     ------
     ParameterError
-        When no gains are found: the step, or the way through the rock, is too long for the instability.
+        When the Riccati equations have no solution: the step or the diffusion time is too long for the instability.
     """
     layer = Layer(time=diffusion * model.state_rate) if diffusion else None
-    modes = SLIDING_MODES if layer else 0
-    shares = [layer.share(i) for i in range(modes)] if layer else []
-    scaled_step = step * model.state_rate
-    fades = [short(exp(-float(layer.rate(i) * scaled_step)), _DIGITS) for i in range(modes)] if layer else []
-    seen = _reading(model, shares)
-    moved = expm(_sliding_flow(seen, layer, modes) * float(scaled_step))
-    size = 2 + modes
-    own = [[short(v, _DIGITS) for v in row[: size + 2]] for row in moved[:2]]
-    for row in own:  # (x, z, modes, level, pressure): a level that the pressure balances moves nothing
-        row[size] = (sum(row[2:size], _ZERO) + row[size + 1]) / model.coefficient
-    update = [
-        *own,
-        *([*[_ZERO] * (2 + i), fade, *[_ZERO] * (size - 1 - i - 1), 1 - fade] for i, fade in enumerate(fades)),
-        [*[_ZERO] * size, _ONE, _ZERO],
-    ]
-    gains, corrections = _gains(update, seen, weights)
-    gains.append((1 + sum(gains[2:], _ZERO)) / model.coefficient)
+    shares = [layer.share(i) for i in range(SLIDING_MODES)] if layer else []
+    rates = [layer.rate(i) for i in range(SLIDING_MODES)] if layer else []
+    scaled_step, size = step * model.state_rate, 2 + len(shares)
     stress, length = model.weakening / model.evolution, model.rate / model.state_rate
-    return _law(update, gains, corrections, length=length, stress=stress)
-
-
-def _reading(model: SlidingModel, shares: Sequence[Fraction]) -> Any:
-    """y of (x, z, modes, level, pressure), scaled."""
-    normal, length = model.weakening / model.evolution, model.rate / model.state_rate
-    pressure = [*shares, _ZERO, 1 - sum(shares, _ZERO)]
-    row = [-model.stiffness * length / normal, -model.evolution, *(model.coefficient * c for c in pressure)]
-    row[-2] = _ONE
-    return np.array([float(v * normal / model.strength) for v in row])
-
-
-def _sliding_flow(seen: Any, layer: Layer | None, modes: int) -> Any:
-    """Generator of (x, z, modes, level, pressure): x′ = y, z′ = −y − z."""
-    flow = np.zeros((4 + modes, 4 + modes))
-    flow[0], flow[1] = seen, -seen
+    # Flow of (x, z, modes, level, pressure), and their coefficients in y: x′ = y, z′ = −y − z.
+    *by_mode, at_once = (model.coefficient * share for share in (*shares, 1 - sum(shares, _ZERO)))
+    by_state = (-model.stiffness * length / stress, -model.evolution)
+    log_rate = np.array([float(v * stress / model.strength) for v in (*by_state, *by_mode, _ONE, at_once)])
+    flow = np.zeros((size + 2, size + 2))
+    flow[0], flow[1] = log_rate, -log_rate
     flow[1, 1] -= 1
-    for i in range(modes):
-        speed = float(layer.rate(i)) if layer else 0.0
-        flow[2 + i, 2 + i], flow[2 + i, -1] = -speed, speed
-    return flow
+    for i, rate in enumerate(map(float, rates), start=2):
+        flow[i, i], flow[i, -1] = -rate, rate
+    errors = [[short(v, _DIGITS) for v in row] for row in expm(flow * float(scaled_step))[:2]]
+    for row in errors:  # a level that a constant pressure balances has no effect
+        row[size] = (sum(row[2:size], _ZERO) + row[-1]) / model.coefficient
+    fades = enumerate((short(exp(-float(rate * scaled_step)), _DIGITS) for rate in rates), start=2)
+    path = (unit_row(size + 2, {i: fade, size + 1: 1 - fade}) for i, fade in fades)
+    update = (*map(tuple, errors), *path, unit_row(size + 2, {size: _ONE}))
 
-
-def _gains(update: list[list[Fraction]], seen: Any, w: Weights) -> tuple[list[Fraction], list[Fraction]]:
-    """LQ gains on (x, z, modes), and how the observer corrects x, z and the level."""
-    moved = np.array(update, dtype=float)
-    size = len(moved) - 1
-    cost = np.outer(seen[:size], seen[:size]) + np.diag([w.slip, w.state, *[0.0] * (size - 2)]) + _LEAST * np.eye(size)
-    of_state, of_pressure, held = moved[:size, :size], moved[:size, -1:], [0, 1, size]
-    own, told = moved[np.ix_(held, held)], np.array([[1.0, 0.0, 0.0]])
+    plant = np.array(update, dtype=float)
+    corrected = [0, 1, size]
+    cost = np.outer(log_rate[:size], log_rate[:size]) + _LEAST * np.eye(size)
+    cost[[0, 1], [0, 1]] += weights.slip, weights.state
+    process = np.diag([weights.slip_noise, weights.state_noise, weights.level_noise])
     try:
-        value = solve_discrete_are(of_state, of_pressure, cost, np.array([[w.pressure]]))
-        spread = solve_discrete_are(own.T, told.T, np.diag([w.slip_noise, w.state_noise, w.level_noise]), np.eye(1))
+        gains = _regulator(plant[:size, :size], plant[:size, -1], cost, weights.pressure)
+        corrections = dict(zip(corrected, _filter(plant[np.ix_(corrected, corrected)], process), strict=True))
     except (LinAlgError, ValueError):
         raise ParameterError(
             "step, delay and diffusion time must be short compared with the growth of the instability of slow sliding. "
             "Received values for which the Riccati equation has no solution. Shorten the step or the diffusion path."
         ) from None
-    gains = of_pressure.T @ value @ of_state / (w.pressure + of_pressure.T @ value @ of_pressure)
-    corrections = spread[:, 0] / (spread[0, 0] + 1)
-    return [short(v, _DIGITS) for v in gains[0]], [short(v, _DIGITS) for v in corrections]
-
-
-def _law(
-    update: list[list[Fraction]],
-    gains: list[Fraction],
-    corrections: list[Fraction],
-    *,
-    length: Fraction,
-    stress: Fraction,
-) -> LinearLaw:
-    """u = −K(π + l(x − π_x)), π⁺ = A(π + l(x − π_x)) + Bu, with the slip in m and the pressure in Pa outside."""
-    size = len(gains)
-    spread = [corrections[0], corrections[1], *[_ZERO] * (size - 3), corrections[2]]
-    closed = [[row[j] - row[size] * gains[j] for j in range(size)] for row in update]
-
-    def of_measured(row: Sequence[Fraction]) -> Fraction:
-        return sum((v * c for v, c in zip(row, spread, strict=True)), _ZERO)
-
-    def of_predicted(row: Sequence[Fraction]) -> list[Fraction]:
-        return [v - of_measured(row) * (j == 0) for j, v in enumerate(row)]
-
-    return LinearLaw(
-        states=("slip", "state", *(f"mode{i}" for i in range(size - 3)), "level"),
-        update=tuple(tuple(of_predicted(row)) for row in closed),
-        measured=tuple((of_measured(row) / length, _ZERO) for row in closed),
-        output=tuple(-stress * v for v in of_predicted(gains)),
-        feedback=(-stress * of_measured(gains) / length, _ZERO),
+    feedback = [short(v, _DIGITS) for v in gains]
+    feedback.append((1 + sum(feedback[2:], _ZERO)) / model.coefficient)
+    law = compensator(
+        states=("slip", "state", *(f"mode{i}" for i in range(size - 2)), "level"),
+        update=tuple(row[:-1] for row in update),
+        command=tuple(row[-1] / stress for row in update),
+        measured=(unit_row(size + 1, {0: length}), unit_row(size + 1, {})),
+        estimator=tuple((short(corrections.get(i, 0.0), _DIGITS) / length, _ZERO) for i in range(size + 1)),
+        feedback=tuple(stress * k for k in feedback),
     )
+    return replace(law, applied=())  # without a pressure limit, hence without anti-windup
 
 
 # ----------------------------------------------------------------------

@@ -376,11 +376,11 @@ class Sampled(Scheme, Decided):
     @property
     def settings(self) -> dict[str, Any]:
         """See `Scheme.settings`."""
-        said: dict[str, Any] = {"substeps": self.substeps}
-        said |= {"actuator": ", ".join(map(repr, self.actuator.stages))} if self.actuator.stages else {}
-        said |= {"authority": self.authority} if self.authority else {}
-        said |= {"clock": repr(self.clock)} if self.clock else {}
-        return said | ({"measurement": repr(self.measurement)} if self.measurement.noisy else {})
+        entries: dict[str, Any] = {"substeps": self.substeps}
+        entries |= {"actuator": ", ".join(map(repr, self.actuator.stages))} if self.actuator.stages else {}
+        entries |= {"authority": self.authority} if self.authority else {}
+        entries |= {"clock": repr(self.clock)} if self.clock else {}
+        return entries | ({"measurement": repr(self.measurement)} if self.measurement.noisy else {})
 
     def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
         """See `Scheme.advance`."""

@@ -85,8 +85,8 @@ class StickSlip(Sampled):
         pull, feed_forward, slope = found
         gain, step = known[discrete_law.step] * known[discrete_law.authority], known[discrete_law.step]
         gains = weight / gain, slip_weight / (gain * step), rest_slip
-        told = dict(zip((*_STATES, *_GAINS), (*states, *gains), strict=True))
-        level = discrete_law.values((_LEVEL,), known | told)[0] if pull != 0 else ca.SX(0)
+        entries = dict(zip((*_STATES, *_GAINS), (*states, *gains), strict=True))
+        level = discrete_law.values((_LEVEL,), known | entries)[0] if pull != 0 else ca.SX(0)
         solved = inclusion(pull).solve(known)
         ahead, share = discrete_law.values((feed_forward, slope), solved)
         rate, rate_error = known[discrete_law.rate], known[discrete_law.rate_error]

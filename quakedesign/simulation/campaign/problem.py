@@ -233,8 +233,8 @@ class SlidingProgram:
     @property
     def fingerprint(self) -> str:
         """Of the fields that are not named elsewhere; the solver is that of the versions of the libraries."""
-        told = f"{self.path} {self.stress!r} {self.period!r} {self.method}"
-        return hashlib.sha256(told.encode()).hexdigest()
+        text = f"{self.path} {self.stress!r} {self.period!r} {self.method}"
+        return hashlib.sha256(text.encode()).hexdigest()
 
     def compiled(self, folder: Path) -> Self:
         """Itself: nothing is compiled."""
@@ -297,10 +297,10 @@ class SlidingProblem(CampaignProblem):
                 f"Received {self.controller}. Give an elqr from design."
             )
         if self.scheme != simulation_scheme("explicit", actuator=getattr(self.scheme, "actuator", DIRECT)):
-            told = {"scheme": self.scheme.name} | {k: v for k, v in self.scheme.settings.items() if k != "actuator"}
+            entries = {"scheme": self.scheme.name} | {k: v for k, v in self.scheme.settings.items() if k != "actuator"}
             raise ParameterError(
                 "scheme of a campaign of slow sliding must be explicit, with exact slip and one substep. Received "
-                f"{', '.join(f'{k} {v}' for k, v in told.items())}. Omit scheme, measurement and substeps."
+                f"{', '.join(f'{k} {v}' for k, v in entries.items())}. Omit scheme, measurement and substeps."
             )
 
     @cached_property

@@ -204,7 +204,7 @@ def campaign_problem(
     if isinstance(way, str):
         actuator, substeps = (None, 1) if fault.friction.state_names else own_path(controller, None)
         way = sampled_scheme(way, substeps, actuator, **own)
-    told: dict[str, Any] = {
+    entries: dict[str, Any] = {
         "fault": fault,
         "controller": controller,
         "scheme": way,
@@ -220,13 +220,13 @@ def campaign_problem(
             )
         space = sliding_space(fault, rational(spread, "spread"))
         solver = "cvodes" if method == DormandPrince.name else method
-        return SlidingProblem(**told, space=space, method=solver, stress=stress, stress_period=stress_period)
+        return SlidingProblem(**entries, space=space, method=solver, stress=stress, stress_period=stress_period)
     if spread or stress:
         raise ParameterError(
             f"spread and stress need friction with a state. Received {fault.friction.name}. Omit both."
         )
     space = Space.of(fault, initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
-    return SteppedProblem(**told, space=space, method=integrator(method), load=load or Load())
+    return SteppedProblem(**entries, space=space, method=integrator(method), load=load or Load())
 
 
 def run_campaign(

@@ -118,13 +118,13 @@ class Forced:
             return self
         pivot = next((j for j, c in enumerate(equation[1:]) if c), None)
         if pivot is None:
-            said = f"{rule}, but {equation[0]} stands before it"
-            return replace(self, reasons=(*self.reasons, said), contradiction=True)
+            text = f"{rule}, but {equation[0]} stands before it"
+            return replace(self, reasons=(*self.reasons, text), contradiction=True)
         row = tuple(Fraction(0) if j == pivot + 1 else -c / equation[pivot + 1] for j, c in enumerate(equation))
-        said = f"{rule}, so {names[pivot]} = {_sentence(row, names)}"
+        text = f"{rule}, so {names[pivot]} = {_sentence(row, names)}"
         solved = {pivot: row} | {j: _insert(old, pivot, row) for j, old in self.solved.items()}
         requirements = tuple(_eliminated(r, pivot, row) for r in self.requirements)
-        return Forced(requirements=requirements, solved=solved, reasons=(*self.reasons, said))
+        return Forced(requirements=requirements, solved=solved, reasons=(*self.reasons, text))
 
 
 def _eliminated(asked: Requirement, pivot: int, row: Affine) -> Requirement:
@@ -177,8 +177,8 @@ def _monomial(variables: Sequence[str], e: Exponents) -> str:
 def _sentence(equation: Affine, names: Sequence[str]) -> str:
     """Affine function of the decisions."""
     terms = [(equation[0], ""), *zip(equation[1:], names, strict=True)]
-    said = "".join(f" {'-' if c < 0 else '+'} {'*'.join(filter(None, (_factor(c, n), n)))}" for c, n in terms if c)
-    return said.removeprefix(" + ").removeprefix(" ") or "0"
+    text = "".join(f" {'-' if c < 0 else '+'} {'*'.join(filter(None, (_factor(c, n), n)))}" for c, n in terms if c)
+    return text.removeprefix(" + ").removeprefix(" ") or "0"
 
 
 def _factor(c: Fraction, name: str) -> str:

@@ -21,10 +21,9 @@ from quakedesign.guarantees import Held, continuous_peaks, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, save_guarantee
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import (
-    ErrorPrediction,
+    ErrorModel,
     ImplicitRoot,
     Power,
-    Prediction,
     compensated,
     disturbance_estimate,
     slip_observer,
@@ -45,8 +44,7 @@ STEP = F("0.184")
 ESTIMATE = disturbance_estimate(
     (F(672300000), F(198900000)),
     F("0.6"),
-    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),)),
-    F("2.282e-8"),
+    ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), F("2.282e-8")),
 )
 INTEGRALS = summed_integrals((F(696000000), F(253000000), F(602000000), F(216000000)), STEP)
 GAIN = STEP * F("2.25e-8")
@@ -65,10 +63,9 @@ def implicit(scale, slope, remainder="0"):
 OBSERVER = slip_observer(
     (F(680000000), F(215900000)),
     (F("0.949"), F("6.53"), F("0.605")),
-    ErrorPrediction(
-        of_errors=((F("1.007"), F("0.1598")), (F("0.0718"), F("0.7513"))), of_pushes=((F("0.0154"), F("0.1598")),)
+    ErrorModel.delayed(
+        ((F("1.007"), F("0.1598")), (F("0.0718"), F("0.7513"))), ((F("0.0154"), F("0.1598")),), F("2.282e-8")
     ),
-    F("2.282e-8"),
 )
 NOISY = {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
 LOOPS = {

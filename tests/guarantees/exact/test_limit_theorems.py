@@ -25,7 +25,7 @@ from quakedesign.guarantees.exact.limit_theorems import (
     smallest_stick_slip_rate,
     smallest_withdrawal,
 )
-from quakedesign.laws import Prediction, disturbance_estimate
+from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.plant import uncertain_plant
 
 REAL = uncertain_plant(load_fault("real-fault"))
@@ -552,11 +552,10 @@ def law_for(task, step):
     """Feedback with an estimate of the disturbance, its three numbers as usual ones."""
     model = task.model
     flow = np.array([[0, 1, 0], [float(model.slip), -float(model.rate), 1], [0, 0, 0]])
-    of_slip, of_rate, of_push = map(F, expm(flow * float(step))[1])
-    now = ((F(1), F(0)), (F(0), F(1)))
-    ahead = Prediction(of_slip=of_slip, of_rate=of_rate, of_pushes=(of_push,), ahead=now, ahead_of_pushes=())
-    gain = model.gain
-    return disturbance_estimate((F(3, 5) / gain / step**2, 1 / gain / step), F(1, 10), ahead, gain)
+    moved, gain = expm(flow * float(step)), model.gain
+    of_errors, of_command = (tuple(tuple(map(F, row)) for row in m) for m in (moved[:2, :2], moved[:2, 2:].T))
+    known = ErrorModel.delayed(of_errors, of_command, gain)
+    return disturbance_estimate((F(3, 5) / gain / step**2, 1 / gain / step), F(1, 10), known)
 
 
 def contradicted(numbers, noise=(F(0), F(0))):

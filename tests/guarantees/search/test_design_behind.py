@@ -11,7 +11,7 @@ from quakedesign.cli.design_commands import DesignOptions
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.guarantees import Held, guarantee
 from quakedesign.guarantees.search.defaults import SampledDesign
-from quakedesign.laws import Prediction, disturbance_estimate
+from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.plant import uncertain_plant
 from quakedesign.studies import comparison
 from quakedesign.synthesis import state_feedback
@@ -20,8 +20,7 @@ REAL = qd.load_fault("real-fault")
 LAW = disturbance_estimate(
     (F(672300000), F(206000000)),
     F("0.57"),
-    Prediction(of_slip=F("0.0722"), of_rate=F("0.7475"), of_pushes=(F("0.1596"),)),
-    F("2.282e-8"),
+    ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), F("2.282e-8")),
 )
 LAG = F(1, 50)
 CLAIM = guarantee(uncertain_plant(REAL), Held(law=LAW, step=F(23, 125), lag=LAG))
