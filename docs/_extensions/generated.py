@@ -13,7 +13,7 @@ DOCS = Path(__file__).parents[1]
 
 def _fault_file():
     """Rows of the keys of a fault file: table, key, type, meaning."""
-    from quakedesign.fault.fault_toml import fault_schema
+    from quakedesign.fault.fault_template import fault_schema
 
     schema = fault_schema()
     yield from _keys("", schema)
@@ -25,11 +25,11 @@ def _fault_file():
 
 
 def _keys(table, schema):
-    for key, said in schema["properties"].items():
+    for key, entry in schema["properties"].items():
         if key in ("friction", "task", "disturbance", "law"):
             continue
-        example = json.dumps(said["examples"][0]) if "examples" in said else ""
-        yield table, key, "yes" if key in schema["required"] else "", example, said.get("description", "")
+        example = json.dumps(entry["examples"][0]) if "examples" in entry else ""
+        yield table, key, "yes" if key in schema["required"] else "", example, entry.get("description", "")
 
 
 def _names():

@@ -7,7 +7,7 @@ D/L_i·Σ(q_j − q_i)/|x_j − x_i| (finite volumes, without flow at the ends),
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -18,9 +18,11 @@ from typing import Any
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, ScenarioError
 from quakedesign.exact import apart, rational, shortly
-from quakedesign.fault.fault_toml import Table, fault_of_tables, read_friction, source_text
+from quakedesign.fault.entries import FileEntry, Table, entries_of
+from quakedesign.fault.fault_toml import PLANT, fault_of_tables, read_friction, source_text
 from quakedesign.fault.friction.base import FrictionLaw
 from quakedesign.fault.model import Fault, Problems, require_nonnegative, require_ordinary, require_positive
+from quakedesign.fault.units import quantity
 from quakedesign.files import parse_toml
 from quakedesign.text import counted
 
@@ -61,13 +63,13 @@ class BlockChain:
     wells : tuple of float
         Positions along the fault [m], in increasing order.
     diffusivity : float, optional
-        Of the pressure along the fault [m²/s]; None for steady pressures.
+        of the pressure along a fault of several blocks [m²/s]; steady pressure unless given
     """
 
     fault: Fault
     blocks: tuple[FaultBlock, ...]
     wells: tuple[float, ...]
-    diffusivity: float | None = None
+    diffusivity: float | None = field(default=None, metadata=quantity("m^2/s", "1e6 m^2/s"))
 
     def __post_init__(self) -> None:
         blocks, wells = len(self.blocks), len(self.wells)
@@ -206,6 +208,12 @@ def add_springs(rows: Any, springs: Iterable[tuple[int, int, Fraction]], scale: 
         rows[i][i] -= K * scale
 
 
+BLOCK = {name: replace(PLANT[name], required=name == "length") for name in ("length", "effective_normal_stress")}
+WELL = {"position": FileEntry(name="position", unit="m", example="1 km", text="along the fault")}
+DIFFUSION = entries_of(BlockChain)
+"""Entries of a file of several blocks outside of its tables."""
+
+
 def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool = False) -> BlockChain | None:
     """Fault of several blocks from a TOML file; None for a file or preset without ``[[block]]`` tables.
 
@@ -225,21 +233,18 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
     if not {"block", "well"} & set(raw):
         return None
     problems = Problems()
-    along = Table({key: raw.pop(key) for key in ("diffusivity",) if key in raw}, problems)
-    read = along.quantities({"diffusivity": "m^2/s"}, optional=True)
+    along = Table({key: raw.pop(key) for key in DIFFUSION if key in raw}, problems)
+    values = along.read(DIFFUSION)
     tables = {key: _tables(raw.pop(key, []), key, problems) for key in ("block", "well")}
-    fault = fault_of_tables(Table(raw, problems), problems, allow_code)
+    fault = fault_of_tables(Table(raw, problems), allow_code)
     blocks = [_block(table, fault, allow_code) for table in tables["block"]]
     wells = [_position(table) for table in tables["well"]]
     for key in tables:
         for place, table in enumerate(tables[key], 1):
             problems.found += [type(one)(f"{key} {place}: {one}") for one in table.problems.found]
-    problems.refuse(str(source))
-    fault = fault.with_box(box) if box else fault
-    with problems.collected():
-        return BlockChain(fault=fault, blocks=tuple(blocks), wells=tuple(wells), **read)
-    problems.refuse(str(source))
-    return None
+    fault = problems.resolved(fault, str(source))
+    parts = {"fault": fault.with_box(box) if box else fault, "blocks": tuple(blocks), "wells": tuple(wells)}
+    return problems.resolved(along.built(BlockChain, parts | values), str(source))
 
 
 def _tables(given: Any, key: str, problems: Problems) -> list[Table]:
@@ -251,23 +256,24 @@ def _tables(given: Any, key: str, problems: Problems) -> list[Table]:
     return [Table(one, Problems()) for one in given]
 
 
-def _block(table: Table, fault: Fault | None, allow_code: bool) -> Any:
-    read = table.quantities({"length": "m"})
-    read |= table.quantities({"effective_normal_stress": "Pa"}, optional=True)
+def _block(table: Table, fault: Fault | None, allow_code: bool) -> FaultBlock | None:
+    values = table.read(BLOCK)
     own = table.table("friction", optional=True)
-    law = getattr(fault, "friction", None) if own is None else read_friction(own, table.problems, allow_code)
+    if own.where:  # given, and a table
+        values["friction"] = read_friction(own, allow_code)
     table.close()
-    if fault is None or law is None or None in read.values():
+    if fault is None or None in values.values():
         return None
+    shared = {name: getattr(fault, name) for name in ("effective_normal_stress", "friction")}
     with table.problems.collected():
-        require_ordinary(**{key: value for key, value in read.items() if value is not None and isfinite(value)})
-        return FaultBlock(**{"effective_normal_stress": fault.effective_normal_stress, "friction": law} | read)
+        require_ordinary(**{key: value for key, value in values.items() if key in BLOCK and isfinite(value)})
+        return FaultBlock(**shared | values)
     return None
 
 
-def _position(table: Table) -> Any:
-    read = table.quantities({"position": "m"})
+def _position(table: Table) -> float | None:
+    values = table.read(WELL)
     table.close()
     with table.problems.collected():
-        require_nonnegative("", **{key: value for key, value in read.items() if value is not None})
-    return read["position"]
+        require_nonnegative("", **{key: value for key, value in values.items() if value is not None})
+    return values["position"]  # type: ignore[no-any-return]

@@ -1,15 +1,13 @@
-"""Fault files in TOML with units: presets, reading, default values, template and schema.
+"""Fault files in TOML with units: presets, reading, default values, writing.
 
 Units are checked and converted to SI here, at the boundary. All errors of a file are collected and
 reported together. Default values: radiation damping, and a task like that of the faults in the paper.
 """
 
-import inspect
 import json
 import math
-import re
-from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import MISSING, fields, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from decimal import ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from math import inf, nextafter
@@ -19,6 +17,7 @@ from typing import Any
 from quakedesign.discovery import user_code
 from quakedesign.errors import ParameterError, ScenarioError, UnknownNameError
 from quakedesign.exact import float_below, rational
+from quakedesign.fault.entries import FileEntry, Table, entries_of
 from quakedesign.fault.friction import friction_law, friction_laws
 from quakedesign.fault.friction.base import FrictionLaw
 from quakedesign.fault.model import (
@@ -30,124 +29,15 @@ from quakedesign.fault.model import (
     UncertaintyBox,
     acceleration,
     is_ordinary,
+    require_all,
     require_name,
     require_plant,
     require_positive,
     uncertainty_box,
 )
-from quakedesign.fault.units import si_value, units_of
+from quakedesign.fault.units import si_value
 from quakedesign.files import parse_toml, read_text
-from quakedesign.text import nearest_name, shown
-
-# ----------------------------------------------------------------------
-# Tables of a file with quantities, read entry by entry; whatever is wrong with them is collected.
-
-Reader = Callable[[Any, str, str], float]
-"""Value in an SI unit of an entry, with the entry's name for messages."""
-
-
-class Table:
-    """One table of a file.
-
-    Parameters
-    ----------
-    entries : mapping
-        As the file has them.
-    problems : Problems
-        That collect what is wrong.
-    where : str
-        Dotted name of the table, empty for the whole file.
-    """
-
-    def __init__(self, entries: Mapping[str, Any], problems: Problems, where: str = "") -> None:
-        self.entries, self.problems, self.where = entries, problems, where
-        self._known: list[str] = []
-        self._missing: list[str] = []
-
-    def quantities(
-        self, units: Mapping[str, str], *, optional: bool = False, read: Reader = si_value
-    ) -> dict[str, float | None]:
-        """Values in SI units by name; None for one that is wrong, nothing for an optional one that is not given."""
-        quantities: dict[str, float | None] = {}
-        for key, unit in units.items():
-            if self._given(key, optional):
-                quantities[key] = None
-                with self.problems.collected():
-                    quantities[key] = read(self.entries[key], unit, self._name(key))
-            elif not optional:
-                quantities[key] = None
-        return quantities
-
-    def spelling(self, name: str, symbol: str) -> str:
-        """How the file spells an entry: by its name, or by its symbol, as ``Dc`` or ``d_c`` for :math:`d_c`."""
-        spelt = [
-            key for key in self.entries if key == name or (key not in self._known and _letters(key) == _letters(symbol))
-        ]
-        with self.problems.collected():
-            if len(spelt) > 1:
-                raise ScenarioError(
-                    f"{self._name(name)} must be given once. Received {' and '.join(spelt)}. Omit one of them."
-                )
-        return spelt[0] if len(spelt) == 1 else name
-
-    def text(self, key: str) -> str | None:
-        """Text of an entry; None for one that is wrong or not given."""
-        return self._of_type(key, str, "a text") if self._given(key) else None
-
-    def table(self, key: str, *, optional: bool = False) -> "Table | None":
-        """Table inside this one; None for one that is wrong or not given."""
-        entries = self._of_type(key, dict, "a table") if self._given(key, optional) else None
-        return None if entries is None else Table(entries, self.problems, self._name(key))
-
-    def name_or_table(self, key: str, default: str) -> "str | Table | None":
-        """Text or table of an entry, the default where it is not given; None for a wrong one."""
-        value = self._of_type(key, (str, dict), "a name or a table") if self._given(key, True) else default
-        return Table(value, self.problems, self._name(key)) if isinstance(value, dict) else value
-
-    def close(self) -> None:
-        """Say at once which entries are missing, and which are not known and what they are near to."""
-        near = {key: nearest_name(key, self._missing or self._known) for key in self._others()}
-        meant = {key for key in self._missing if f" Did you mean {key}?" in near.values()}
-        self.say_missing(meant)
-        with self.problems.collected():
-            if near:
-                named = " ".join(f"{self._name(key)} is not a known key.{question}" for key, question in near.items())
-                raise ScenarioError(f"{named} Known here are {', '.join(self._known)}.")
-
-    def say_missing(self, but: Collection[str] = ()) -> None:
-        """Say which entries are missing."""
-        missing = [self._name(key) for key in self._missing if key not in but]
-        with self.problems.collected():
-            if missing:
-                raise ScenarioError(f"{', '.join(missing)} must be given. Received nothing. Compare with a preset.")
-
-    def _others(self) -> list[str]:
-        return [key for key in self.entries if key not in self._known]
-
-    def _given(self, key: str, optional: bool = False) -> bool:
-        self._known.append(key)
-        if key not in self.entries and not optional:
-            self._missing.append(key)
-        return key in self.entries
-
-    def _of_type(self, key: str, kind: type | tuple[type, ...], what: str) -> Any:
-        value = self.entries[key]
-        with self.problems.collected():
-            if not isinstance(value, kind):
-                raise ScenarioError(
-                    f"{self._name(key)} must be {what}. Received {shown(value)}. Compare with a preset."
-                )
-            return value
-        return None
-
-    def _name(self, key: str) -> str:
-        return f"{self.where}.{key}".strip(".")
-
-
-def _letters(symbol: str) -> str:
-    """Letters and digits of a symbol, in small letters."""
-    return re.sub(r"[^a-z0-9]", "", symbol.lower())
-
+from quakedesign.text import nearest_name
 
 # ----------------------------------------------------------------------
 # Where descriptions of faults come from: presets, and files of the user.
@@ -342,12 +232,12 @@ def _cut(value: float, digits: int = 3) -> float:
 # ----------------------------------------------------------------------
 # Fault descriptions: TOML files with unit strings, checked at the boundary and turned into `Fault`.
 
-PLANT = units_of(Fault)
-TASK = units_of(Reference) | {"sampling_time": PLANT.pop("sampling_time")}
-DISTURBANCE = units_of(Disturbance)
-WIDTHS = ("stiffness", "damping", "authority")
-OPTIONAL = ("damping", "width")  # of the plant
-_NO_SOURCE = "no source given"
+PLANT = entries_of(Fault)
+TEXTS = {name: PLANT.pop(name) for name in ("name", "source", "poor_fit")}
+TASK = entries_of(Reference) | {"sampling_time": PLANT.pop("sampling_time")}
+DISTURBANCE = entries_of(Disturbance)
+WIDTHS = entries_of(UncertaintyBox)
+del WIDTHS["name"]
 _UNDISTURBED = "no disturbance, so that no guarantee covers one: give amplitude in [disturbance], such as '2 kPa'"
 _STILL = (
     "frequency 0 of the disturbance, so that its sine is 0 in every run; guarantees are for any course of its size. "
@@ -414,83 +304,61 @@ def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
             f"{name} must have no [[block]] and [[well]] tables here. Received a fault of several blocks. Use the "
             "commands fault, design, guarantee, compare, simulate, export or limits (Python: quakedesign.load_chain)."
         )
-    problems = Problems()
-    fault: Fault = fault_of_tables(Table(raw, problems), problems, allow_code)
-    problems.refuse(name)
-    return fault
+    table = Table(raw, Problems())
+    return table.problems.resolved(fault_of_tables(table, allow_code), name)
 
 
-def fault_of_tables(table: Table, problems: Problems, allow_code: bool) -> Any:
-    """Fault of a whole file; there are problems where it is None."""
-    parts: dict[str, Any] = {"name": table.text("name"), "source": _NO_SOURCE}
-    if "source" in table.entries:
-        parts["source"] = table.text("source")
-    if "poor_fit" in table.entries:
-        parts["poor_fit"] = table.text("poor_fit")
-    for key, unit in PLANT.items():
-        parts |= table.quantities({key: unit}, optional=key in OPTIONAL)
-    parts["friction"] = read_friction(table.table("friction"), problems, allow_code)
-    task = _task(table.table("task", optional=True), problems)
-    parts["disturbance"] = _disturbance(table.table("disturbance", optional=True), problems, _authority(parts))
-    parts["box"] = _box(table, problems)
+def fault_of_tables(table: Table, allow_code: bool) -> Fault | None:
+    """Fault of a whole file; None if the table has problems."""
+    parts: dict[str, Any] = {"source": TEXTS["source"].default_text} | table.read(TEXTS | PLANT)
+    parts["friction"] = read_friction(table.table("friction"), allow_code)
+    task = _task(table.table("task", optional=True))
+    parts["disturbance"] = _disturbance(table.table("disturbance", optional=True), _authority(parts))
+    parts["box"] = _box(table)
     table.close()
     given = {key: value for key, value in parts.items() if value is not None}
-    whole = task if given == parts else None
-    with problems.collected():
-        if whole is not None:
-            return completed(parts, whole, _assumed(parts, table))
-        require_plant(**{key: given[key] for key in PLANT if key in given})
-    with problems.collected():
-        if whole is None and "name" in given:
-            require_name(given["name"])
+    with table.problems.collected():
+        if task is not None and given == parts:
+            return completed(parts, task, _assumed(parts, table))
+        require_all(
+            lambda: require_plant(**{key: given[key] for key in PLANT if key in given}),
+            lambda: require_name(given.get("name", "not given")),
+        )
     return None
 
 
-def read_friction(table: Table | None, problems: Problems, allow_code: bool) -> Any:
+def read_friction(table: Table, allow_code: bool) -> FrictionLaw | None:
     """Friction law of a table; None for one that is wrong."""
-    name = table.text("law") if table else None
-    if table is None or name is None:
-        if table:
-            table.say_missing()
+    name = table.read({"law": FileEntry(name="law")})["law"]
+    if name is None:
+        table.report_missing()
         return None
-    with problems.collected(), user_code():
+    with table.problems.collected(), user_code():
         law = friction_law(name, in_file=True, allow_code=allow_code)
-        quantities = law.quantities()
-        optional = {f.name for f in fields(law) if f.default is not MISSING}  # type: ignore[arg-type]
-        read: dict[str, Any] = {}
-        for field in fields(law):  # type: ignore[arg-type]
-            if field.name in quantities:
-                key = table.spelling(field.name, field.metadata["symbol"])
-                value = table.quantities({key: field.metadata["unit"]}, optional=field.name in optional)
-                read |= dict.fromkeys([field.name] if value else [], value.get(key))
-            elif "unit" in field.metadata:
-                read |= table.quantities({field.name: field.metadata["unit"]}, optional=field.name in optional)
-            elif field.name not in optional or field.name in table.entries:
-                read[field.name] = table.text(field.name)
+        values = table.read(entries_of(law))
         table.close()
-        return None if None in read.values() else law(**read)
+        return None if None in values.values() else law(**values)
     return None
 
 
-def _task(table: Table | None, problems: Problems) -> dict[str, float] | None:
-    """What a file says of the task; None where that is wrong."""
-    if table is None:
-        return {}
-    read = table.quantities(TASK, optional=True)
+def _task(table: Table) -> dict[str, float] | None:
+    """Entries of the task in a file; None if one is wrong."""
+    values = table.read(TASK)
     table.close()
-    with problems.collected():
-        require_positive("", **{key: value for key, value in read.items() if value is not None})
-        return {key: value for key, value in read.items() if value is not None} if None not in read.values() else None
+    given = {key: value for key, value in values.items() if value is not None}
+    with table.problems.collected():
+        require_positive("", **given)
+        return given if given == values else None
     return None
 
 
 def _authority(parts: Mapping[str, Any]) -> Fraction:
-    """A/m [m²/kg]; of a plant that is wrong, and refused for it, any."""
+    """A/m [m²/kg]; any number for a plant that is wrong, whose error is reported elsewhere."""
     density, *sides = (parts.get(name) for name in ("density", "length", "width"))
-    told = [value for value in (density, *sides) if value is not None]
-    if density is None or len(told) == 1 or not all(map(is_ordinary, told)):
+    given = [value for value in (density, *sides) if value is not None]
+    if density is None or len(given) == 1 or not all(map(is_ordinary, given)):
         return Fraction(1)
-    return 1 / (rational(density) * rational(min(told[1:])))
+    return 1 / (rational(density) * rational(min(given[1:])))
 
 
 def _assumed(parts: Mapping[str, Any], table: Table) -> tuple[str, ...]:
@@ -499,11 +367,11 @@ def _assumed(parts: Mapping[str, Any], table: Table) -> tuple[str, ...]:
         return ()
     if "disturbance" not in table.entries:
         return (_UNDISTURBED,)
-    told = parts["disturbance"]
-    return (_STILL,) if told.amplitude and not (told.frequency or told.constant) else ()
+    given = parts["disturbance"]
+    return (_STILL,) if given.amplitude and not (given.frequency or given.constant) else ()
 
 
-def _disturbance(table: Table | None, problems: Problems, authority: Fraction) -> Disturbance | None:
+def _disturbance(table: Table, authority: Fraction) -> Disturbance | None:
     stresses = []
 
     def value(quantity: Any, unit: str, name: str) -> float:
@@ -513,100 +381,55 @@ def _disturbance(table: Table | None, problems: Problems, authority: Fraction) -
         stresses.extend([name.rpartition(".")[2]] if stressed else [])
         return size
 
-    read: dict[str, Any] = {**table.quantities(DISTURBANCE, optional=True, read=value)} if table else {}
-    if table:
-        table.close()
-    with problems.collected():
-        return None if None in read.values() else Disturbance(**read, stresses=tuple(sorted(stresses)))
-    return None
+    values = table.read(DISTURBANCE, value)
+    table.close()
+    return table.built(Disturbance, values | {"stresses": tuple(sorted(stresses))})
 
 
-def _box(parent: Table, problems: Problems) -> UncertaintyBox | None:
-    """Named box, or one of the file's own."""
+def _box(parent: Table) -> UncertaintyBox | None:
+    """Named box, or one with the half-widths of the file."""
     given = parent.name_or_table("uncertainty", "paper")
     if not isinstance(given, Table):
-        with problems.collected():
-            return None if given is None else uncertainty_box(given)
-        return None
-    read = given.quantities(dict.fromkeys(WIDTHS, ""), optional=True)
+        return parent.built(uncertainty_box, {"name": given})
+    values = given.read(WIDTHS, lambda quantity, unit, name: rational(si_value(quantity, unit, name), name))
     given.close()
-    with problems.collected():
-        widths = {key: rational(value, f"uncertainty.{key}") for key, value in read.items() if value is not None}
-        return None if None in read.values() else UncertaintyBox(name="own", **widths)
-    return None
+    return given.built(UncertaintyBox, {"name": "own"} | values)
 
 
 # ----------------------------------------------------------------------
-# A fault as a TOML file: one to start from, one that says all that a result rests on, and the schema for editors.
-
-SCHEMA_NAME = "fault.schema.json"
-_EXAMPLES: dict[str, str | float] = {
-    "density": "2600 kg/m^3",
-    "shear_modulus": "25 GPa",
-    "length": "1.5 km",
-    "width": "1.5 km",
-    "damping": "1e13 kg/s",
-    "effective_normal_stress": "25 MPa",
-    "target_slip": "5 cm",
-    "operation_time": "2 days",
-    "ramp": 0.1,
-    "sampling_time": "10 ms",
-    "constant": "0 m/s^2",
-    "amplitude": "1e-4 m/s^2",
-    "frequency": "1 rad/s",
-    "slip_growth": "0 1/s^2",
-    "rate_growth": "0 1/s",
-    "residual": 0.45,
-    "healing": 0.0001,
-    "drop": 0.15,
-    "critical_slip": "2 cm",
-    "critical_rate": "10 cm/s",
-    "reference_coefficient": 0.6,
-    "direct_effect": 0.010,
-    "evolution_effect": 0.015,
-    "reference_rate": "1 um/s",
-    "slowest_rate": "1e-12 m/s",
-    "fastest_rate": "1 m/s",
-}
-_WIDTHS_SAID = {"stiffness": "of k/m", "damping": "of η/m", "authority": "of A/m, the area per mass"}
-_COME_TO_REST = ("exponential-slip-weakening", "linear-slip-weakening")
-_LEFT_OUT = {
-    "healing": "0 if left out",
-    "width": "square if left out",
-    "damping": "radiation of shear waves, G A/(2 c_s), if left out",
-    "target_slip": "the next rest slip if left out",
-    "operation_time": "about as many natural periods as for the paper's faults if left out",
-    "ramp": "all of it at a constant rate if left out",
-    "sampling_time": "at least ten samples while an error grows e-fold, with a state near D_c/(20 V), if left out",
-}
+# A fault as a TOML file with all numbers that a result rests on.
 
 
 def fault_toml(fault: Fault) -> str:
     """Text of a TOML file that `load_fault` reads as this fault, every number in SI units and nothing left out."""
     law = type(fault.friction)
-    named: dict[str, Mapping[str, Any]] = {
-        "friction": {"law": (law.name if law in friction_laws().values() else f"{law.__module__}:{law.__qualname__}")}
-        | _law_values(fault.friction),
+    name = law.name if law in friction_laws().values() else f"{law.__module__}:{law.__qualname__}"
+    friction = _values(fault.friction, entries_of(law))
+    tables: dict[str, Mapping[str, Any]] = {
+        "friction": {"law": name} | {key: value for key, value in friction.items() if key != "healing" or value},
         "task": _values(fault.reference, TASK) | {"sampling_time": f"{fault.sampling_time!r} s"},
         "disturbance": _values(fault.disturbance, DISTURBANCE) | _stresses(fault),
-        "uncertainty": {key: float(getattr(fault.box, key)) for key in WIDTHS},
+        "uncertainty": _values(fault.box, WIDTHS),
     }
     top: dict[str, Any] = {"name": fault.name, "source": fault.source} | _values(fault, PLANT)
     if fault.poor_fit:
         top["poor_fit"] = fault.poor_fit
     if fault.box == BOXES.get(fault.box.name):
         top["uncertainty"] = fault.box.name
-        del named["uncertainty"]
-    lines = [*_entries(top)]
-    for table, entries in named.items():
-        lines += ["", f"[{table}]", *_entries(entries)]
+        del tables["uncertainty"]
+    lines = []
+    for table, entries in {"": top, **tables}.items():
+        lines += ["", f"[{table}]"] if table else []
+        lines += [f"{key} = {written(value)}" for key, value in entries.items()]
     return "\n".join(lines) + "\n"
 
 
-def _values(part: object, units: Mapping[str, str]) -> dict[str, Any]:
-    held = {key: getattr(part, key, None) for key in units}
+def _values(part: object, entries: Mapping[str, FileEntry]) -> dict[str, Any]:
+    """Values of the entries that a part has, quantities with their units."""
     return {
-        key: (f"{value!r} {units[key]}" if units[key] else value) for key, value in held.items() if value is not None
+        name: f"{value!r} {entry.unit}" if entry.unit else value
+        for name, entry in entries.items()
+        if (value := getattr(part, name, None)) is not None
     }
 
 
@@ -622,188 +445,8 @@ def _stresses(fault: Fault) -> dict[str, str]:
     return found
 
 
-def _law_values(law: FrictionLaw) -> dict[str, Any]:
-    options = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
-    found = options | _values(law, units_of(type(law)))
-    return {name: value for name, value in found.items() if name != "healing" or value}
-
-
-def _entries(entries: Mapping[str, Any]) -> Iterator[str]:
-    for key, value in entries.items():
-        yield f"{key} = {_written(value)}"
-
-
-def _written(value: Any) -> str:
-    """Text or number as TOML has it."""
+def written(value: Any) -> str:
+    """Text or number in TOML."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(float(value))
-
-
-def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault", schema: bool = False) -> str:
-    """Text of a commented TOML file to start from.
-
-    Parameters
-    ----------
-    law : str
-        Friction law.
-    name : str
-        Of the fault.
-    schema : bool
-        Whether its first line names the schema beside it, for editors.
-
-    Raises
-    ------
-    UnknownNameError
-        For another law.
-    """
-    friction = friction_law(law)
-    asks = set() if law in _COME_TO_REST else {"target_slip"}
-    task = {key: unit for key, unit in TASK.items() if friction.state_names or key != "ramp"}
-    lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []
-    lines += [
-        "# A fault for quakedesign. Every number is an example: put in your own, each with its unit. What begins with",
-        "# a # may be left out. `quakedesign fault FILE` shows what follows from it and what was assumed.",
-        f"name = {_written(name)}",
-        '# source = "where the numbers come from"',
-        *_asked(PLANT, _described(Fault), OPTIONAL),
-        "",
-        "# What is uncertain besides friction: paper (nothing) or ten-percent (stiffness, damping and authority), or a",
-        "# table [uncertainty] of your own, see the end.",
-        '# uncertainty = "paper"',
-        "",
-        f"[friction]  # {_first(friction)}",
-        '# A law of your own, "module:Class", runs its code: such a file is read with --allow-code alone.',
-        f"law = {_written(law)}  # or {', '.join(sorted(set(friction_laws()) - {law}))}",
-        *_asked(units_of(friction), _described(friction), _optional(friction)),
-        "",
-        f"{'' if asks else '# '}[task]  # what the fault shall do: slip slowly from rest to rest",
-        *_asked(task, _task_described(), set(TASK) - asks),
-        "",
-        "# [disturbance]  # acceleration that nobody measures; the bound that guarantees are for",
-        *_asked(DISTURBANCE, _described(Disturbance), DISTURBANCE),
-        "",
-        "# [uncertainty]  # half-widths relative to the numbers above, from 0 up to 1, each 0 if left out",
-        *(f"# {key} = 0.1  # {said}" for key, said in _WIDTHS_SAID.items()),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _asked(units: Mapping[str, str], said: Mapping[str, str], optional: Any) -> Iterator[str]:
-    for key in units:
-        left = f"; {_LEFT_OUT[key]}" if key in _LEFT_OUT and key in optional else ""
-        mark = "# " if key in optional else ""
-        yield f"{mark}{key} = {_written(_example(key, units[key]))}  # {said[key].split('; ')[0].rstrip('.')}{left}"
-
-
-def _example(key: str, unit: str) -> str | float:
-    return _EXAMPLES.get(key, f"1 {unit}" if unit else 0.1)
-
-
-def _task_described() -> dict[str, str]:
-    return _described(Reference) | {"sampling_time": _described(Fault)["sampling_time"]}
-
-
-def _first(law: type[FrictionLaw]) -> str:
-    return (inspect.getdoc(law) or "").split("\n\n")[0].replace("\n", " ")
-
-
-def _optional(law: type[FrictionLaw]) -> set[str]:
-    return {field.name for field in fields(law) if field.default is not MISSING}  # type: ignore[arg-type]
-
-
-def _described(kind: type) -> dict[str, str]:
-    """What the docstring of a class and of those that it derives from say of its attributes, by name."""
-    from docstring_parser import DocstringStyle, parse
-
-    said: dict[str, str] = {}
-    for of in reversed(kind.__mro__):
-        for entry in parse(inspect.cleandoc(of.__doc__ or ""), DocstringStyle.NUMPYDOC).params:
-            for name in entry.arg_name.split(", "):
-                said[name] = " ".join((entry.description or "").split())
-    return said
-
-
-def fault_schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of fault files, for editors that complete and check TOML."""
-    said = _described(Fault)
-    widths = {key: {"type": "number", "description": said} for key, said in _WIDTHS_SAID.items()}
-    properties = {
-        "name": {"type": "string", "description": "letters, digits, spaces and _ . -"},
-        "source": {"type": "string", "description": said["source"]},
-        "poor_fit": {"type": "string", "description": said["poor_fit"]},
-        **_quantities(PLANT, said),
-        "uncertainty": {
-            "oneOf": [{"enum": sorted(BOXES)}, _table(widths, ())],
-            "description": (inspect.getdoc(UncertaintyBox) or "").splitlines()[0],
-        },
-        "friction": {"oneOf": [_law_schema(law) for _, law in sorted(friction_laws().items())]},
-        "task": _table(_quantities(TASK, _task_described()), ()),
-        "disturbance": _table(_quantities(DISTURBANCE, _described(Disturbance)), ()),
-    }
-    own = {key: properties[key] for key in ("length", "effective_normal_stress", "friction")}
-    place = {"type": "string", "description": "along the fault", "examples": ["1 km"]}
-    for key, items, needed, text in (
-        ("block", own, "length", "tables [[block]], in a row; friction and stress are the fault's unless given"),
-        ("well", {"position": place}, "position", "tables [[well]], from one end of the row"),
-    ):
-        properties[key] = {"type": "array", "description": text, "items": _table(items, (needed,))}
-    properties["diffusivity"] = {
-        "type": "string",
-        "description": "of the pressure along a fault of several blocks [m²/s]; steady pressure unless given",
-        "examples": ["1e6 m^2/s"],
-    }
-    required = ("name", *(key for key in PLANT if key not in OPTIONAL), "friction")
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "fault of quakedesign",
-        **_table(properties, required),
-    }
-
-
-def _table(properties: Mapping[str, Any], required: Any) -> dict[str, Any]:
-    return {
-        "type": "object",
-        "additionalProperties": False,
-        "required": list(required),
-        "properties": dict(properties),
-    }
-
-
-def _quantities(units: Mapping[str, str], said: Mapping[str, str]) -> dict[str, Any]:
-    return {
-        key: {
-            "type": "string" if unit else ["number", "string"],
-            "description": said[key],
-            "examples": [_example(key, unit)],
-        }
-        for key, unit in units.items()
-    }
-
-
-def _law_schema(law: type[FrictionLaw]) -> dict[str, Any]:
-    units, said = units_of(law), _described(law)
-    options = {field.name for field in fields(law)} - set(units)  # type: ignore[arg-type]
-    properties = {
-        "law": {"const": law.name, "description": _first(law)},
-        **_quantities(units, said),
-        **{key: {"type": "string", "description": said.get(key, "")} for key in sorted(options)},
-    }
-    schema = _table(properties, ("law",))
-    schema["patternProperties"] = {
-        _pattern(field.metadata["symbol"]): properties[key] for key, field in law.quantities().items()
-    }
-    schema["allOf"] = [_one_of(law, key) for key in units if key not in _optional(law)]
-    return schema
-
-
-def _pattern(symbol: str) -> str:
-    """Pattern of the spellings of a symbol, as `Table.spelling` reads them."""
-    letters = re.sub(r"[^a-z0-9]", "", symbol.lower())
-    return "^_?" + "_?".join(f"[{c}{c.upper()}]" if c.isalpha() else c for c in letters) + "_?$"
-
-
-def _one_of(law: type[FrictionLaw], key: str) -> dict[str, Any]:
-    """That a parameter is given, by name or symbol."""
-    pattern = _pattern(law.quantities()[key].metadata["symbol"])
-    return {"anyOf": [{"required": [key]}, {"not": {"propertyNames": {"not": {"pattern": pattern}}}}]}

@@ -14,7 +14,7 @@ from fractions import Fraction
 from functools import cached_property
 from math import inf, nan, nextafter
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import (
@@ -27,7 +27,7 @@ from quakedesign.errors import (
 )
 from quakedesign.exact import rational
 from quakedesign.fault.friction.base import FrictionLaw
-from quakedesign.fault.units import si_value
+from quakedesign.fault.units import quantity, si_value
 from quakedesign.text import shown
 
 if TYPE_CHECKING:
@@ -52,9 +52,9 @@ class UncertaintyBox:
     """
 
     name: str
-    stiffness: Fraction = Fraction(0)
-    damping: Fraction = Fraction(0)
-    authority: Fraction = Fraction(0)
+    stiffness: Fraction = field(default=Fraction(0), metadata=quantity("", 0.1, text="of k/m"))
+    damping: Fraction = field(default=Fraction(0), metadata=quantity("", 0.1, text="of η/m"))
+    authority: Fraction = field(default=Fraction(0), metadata=quantity("", 0.1, text="of A/m, the area per mass"))
 
     def __post_init__(self) -> None:
         for part in ("stiffness", "damping", "authority"):
@@ -135,6 +135,7 @@ def _turn(drive: Callable[[float], Any], furthest: float) -> tuple[float, float]
 MOST_WORKERS = 256
 """Processes that one command may start."""
 
+_Value = TypeVar("_Value")
 _LARGEST = 1e40
 _NAME = re.compile(r"\w[\w .-]{0,59}")
 _MOST_BYTES = 120  # files and folders are named after it, and a system gives them 255
@@ -160,12 +161,18 @@ class Problems:
             return
         kinds = {type(error) for error in self.found}
         kind = kinds.pop() if len(kinds) == 1 else ScenarioError
-        told = [str(error) for error in self.found]
-        if len(told) > 1:
-            told = [f"{len(told)} errors.", *(f"({i}) {text}" for i, text in enumerate(told, start=1))]
-        error = kind(f"{where}: {' '.join(told)}" if where else " ".join(told))
-        error.parts = tuple(self.found) if len(told) > 1 else ()
+        messages = [str(error) for error in self.found]
+        if len(messages) > 1:
+            messages = [f"{len(messages)} errors.", *(f"({i}) {text}" for i, text in enumerate(messages, start=1))]
+        error = kind(f"{where}: {' '.join(messages)}" if where else " ".join(messages))
+        error.parts = tuple(self.found) if len(messages) > 1 else ()
         raise error from None
+
+    def resolved(self, value: _Value | None, where: str = "") -> _Value:
+        """Return a value that is None only if there are errors, which are raised; `where` begins their message."""
+        self.refuse(where)
+        assert value is not None
+        return value
 
 
 def require_all(*checks: Callable[[], None]) -> None:
@@ -270,10 +277,13 @@ class Reference:
         released at a constant rate. None: a constant rate for all of it.
     """
 
-    target_slip: float = field(metadata={"unit": "m", "symbol": "d_{max}"})
-    operation_time: float = field(metadata={"unit": "s", "symbol": "t_{op}"})
+    target_slip: float = field(metadata=quantity("m", "5 cm", "the next rest slip", symbol="d_{max}"))
+    operation_time: float = field(
+        metadata=quantity("s", "2 days", "about as many natural periods as for the paper's faults", symbol="t_{op}")
+    )
     ramp: float | None = field(
-        default=None, metadata={"unit": "", "directed_unit": "slip_m/slip_m", "symbol": r"\lambda_r"}
+        default=None,
+        metadata=quantity("", 0.1, "all of it at a constant rate", symbol=r"\lambda_r", directed_unit="slip_m/slip_m"),
     )
 
     def __post_init__(self) -> None:
@@ -422,11 +432,11 @@ class Disturbance:
         the fault's box, while the number itself is for the nominal one.
     """
 
-    constant: float = field(default=0.0, metadata={"unit": "m/s^2"})
-    amplitude: float = field(default=0.0, metadata={"unit": "m/s^2"})
-    frequency: float = field(default=0.0, metadata={"unit": "rad/s"})
-    slip_growth: float = field(default=0.0, metadata={"unit": "1/s^2"})
-    rate_growth: float = field(default=0.0, metadata={"unit": "1/s"})
+    constant: float = field(default=0.0, metadata=quantity("m/s^2", "0 m/s^2"))
+    amplitude: float = field(default=0.0, metadata=quantity("m/s^2", "1e-4 m/s^2"))
+    frequency: float = field(default=0.0, metadata=quantity("rad/s", "1 rad/s"))
+    slip_growth: float = field(default=0.0, metadata=quantity("1/s^2", "0 1/s^2"))
+    rate_growth: float = field(default=0.0, metadata=quantity("1/s", "0 1/s"))
     stresses: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -516,17 +526,25 @@ class Fault:
         When a value is unphysical or not finite.
     """
 
-    name: str
-    source: str
-    density: float = field(metadata={"unit": "kg/m^3", "directed_unit": "kg/fault_m^3", "symbol": r"\rho"})
-    shear_modulus: float = field(metadata={"unit": "Pa", "directed_unit": "shear_Pa/(slip_m/fault_m)", "symbol": "G"})
-    length: float = field(metadata={"unit": "m", "directed_unit": "fault_m", "symbol": "L"})
-    width: float | None = field(default=None, metadata={"unit": "m", "directed_unit": "fault_m"})
-    damping: float = field(metadata={"unit": "kg/s", "symbol": r"\eta"})
-    effective_normal_stress: float = field(metadata={"unit": "Pa", "symbol": r"\sigma'_n"})
+    name: str = field(metadata={"text": "letters, digits, spaces and _ . -"})
+    source: str = field(metadata={"default": "no source given"})
+    density: float = field(metadata=quantity("kg/m^3", "2600 kg/m^3", symbol=r"\rho", directed_unit="kg/fault_m^3"))
+    shear_modulus: float = field(
+        metadata=quantity("Pa", "25 GPa", symbol="G", directed_unit="shear_Pa/(slip_m/fault_m)")
+    )
+    length: float = field(metadata=quantity("m", "1.5 km", symbol="L", directed_unit="fault_m"))
+    width: float | None = field(default=None, metadata=quantity("m", "1.5 km", "square", directed_unit="fault_m"))
+    damping: float = field(
+        metadata=quantity("kg/s", "1e13 kg/s", "radiation of shear waves, G A/(2 c_s)", symbol=r"\eta")
+    )
+    effective_normal_stress: float = field(metadata=quantity("Pa", "25 MPa", symbol=r"\sigma'_n"))
     friction: FrictionLaw
     reference: Reference
-    sampling_time: float = field(metadata={"unit": "s", "symbol": "T_s"})
+    sampling_time: float = field(
+        metadata=quantity(
+            "s", "10 ms", "at least ten samples while an error grows e-fold, with a state near D_c/(20 V)", symbol="T_s"
+        )
+    )
     disturbance: Disturbance = field(default_factory=Disturbance)
     box: UncertaintyBox = field(default_factory=lambda: uncertainty_box("paper"))
     assumed: tuple[str, ...] = field(default=(), compare=False, repr=False)
@@ -537,7 +555,7 @@ class Fault:
         with problems.collected():
             require_name(self.name)
         with problems.collected():
-            require_plant(**{name: getattr(self, name) for name in _PLANT}, **self._other_side)
+            require_plant(**{name: value for name in _UNITS if (value := getattr(self, name)) is not None})
         with problems.collected():
             require_ordinary(**{name: getattr(self.friction, name) for name in self.friction.quantities()})
         problems.refuse()
@@ -575,13 +593,9 @@ class Fault:
         return replace(self, disturbance=disturbance)
 
     @property
-    def _other_side(self) -> dict[str, float]:
-        return {} if self.width is None else {"width": self.width}
-
-    @property
     def side(self) -> float:
         """h [m], the shorter side of the patch; L of a square one."""
-        return min((self.length, *self._other_side.values()))
+        return min(self.length, self.width or self.length)
 
     @cached_property
     def squares(self) -> Fraction:
@@ -675,14 +689,7 @@ class Fault:
         return rest_slip(self.friction, self.effective_normal_stress * self.area, self.stiffness)
 
 
-_PLANT = {
-    "density": "kg/m^3",
-    "shear_modulus": "Pa",
-    "length": "m",
-    "damping": "kg/s",
-    "effective_normal_stress": "Pa",
-    "sampling_time": "s",
-}
+_UNITS = {each.name: each.metadata["unit"] for each in fields(Fault) if "unit" in each.metadata}
 
 
 def require_plant(**numbers: float) -> None:
@@ -694,7 +701,7 @@ def require_plant(**numbers: float) -> None:
             if name == "damping":
                 require_nonnegative(damping=value)
             else:
-                usual = f"It is in {_PLANT[name]} here; check sign and unit." if name in _PLANT else ""
+                usual = f"It is in {_UNITS[name]} here; check sign and unit."
                 require_positive(compression if name == "effective_normal_stress" else usual, **{name: value})
             require_ordinary(**{name: value})
     problems.refuse()

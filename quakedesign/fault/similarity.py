@@ -112,14 +112,12 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
     """
     law = fault.friction
     named = {name: (unit, attrgetter(name)(fault)) for name, unit in PLANT_UNITS.items()}
-    named |= {f"friction.{name}": (_friction_unit(f.metadata), getattr(law, name)) for name, f in _fields(law)}
+    named |= {
+        f"friction.{name}": (_friction_unit(f.metadata), getattr(law, name)) for name, f in law.quantities().items()
+    }
     if not stretches(law):
         named[_UNIT_FRICTION] = _FRICTION, 1
     return {n: Quantity(n, unit, rational(value, n)) for n, (unit, value) in named.items() if value is not None}
-
-
-def _fields(law: FrictionLaw) -> Any:
-    return law.quantities().items()
 
 
 def _friction_unit(metadata: Mapping[str, Any]) -> str:
@@ -133,7 +131,7 @@ def stretches(law: FrictionLaw) -> bool:
 
     factor, symbols = sp.Symbol("c", positive=True), law.symbols()
     plain = sp.sympify(law.symbolic().coefficient(*_arguments(law)))
-    numbers = [symbols[n] for n, f in _fields(law) if _friction_unit(f.metadata) == _FRICTION]
+    numbers = [symbols[n] for n, f in law.quantities().items() if _friction_unit(f.metadata) == _FRICTION]
     grown = plain.subs({symbol: factor * symbol for symbol in numbers}, simultaneous=True)
     return bool(sp.expand(grown - factor * plain) == 0)
 

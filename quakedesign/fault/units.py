@@ -1,7 +1,6 @@
 """Quantities with units, at the boundary only."""
 
 import re
-from dataclasses import fields
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
@@ -133,9 +132,9 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
     return float(converted.magnitude)
 
 
-def units_of(kind: Any) -> dict[str, str]:
-    """SI units of the fields of a dataclass that have one, by name."""
-    return {each.name: each.metadata["unit"] for each in fields(kind) if "unit" in each.metadata}
+def quantity(unit: str, example: str | float, default: str = "", **more: str) -> dict[str, str | float]:
+    """Metadata of a field for a fault file: SI unit, example, what applies by default; see `entries.FileEntry`."""
+    return {"unit": unit, "example": example, "default": default} | more
 
 
 def exact_value(quantity: str | float | Fraction, unit: str, name: str) -> Fraction:

@@ -154,6 +154,8 @@ def without(text, start):
         ),
         (TEXT.split("[[block]]")[0] + '[[well]]\nposition = "1 km"\n', "Received 0 blocks and 1 well. Add or omit tab"),
         (TEXT.replace('density = "2500 kg/m^3"', ""), "density"),
+        (TEXT.replace('length = "2 km"', 'length = "2 km"\nfriction = {}'), "block 1: friction.law must be given"),
+        (TEXT.replace('length = "2 km"', 'length = "0 m"\nfriction = 3'), "a table. Received 3.* block 1: length must"),
         (TEXT.split("[[block]]")[0] + "[block]\nlength = 1\n", r"block must be tables \[\[block\]\]"),
     ],
 )

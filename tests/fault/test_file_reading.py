@@ -15,6 +15,17 @@ from quakedesign.fault.fault_toml import fault_toml
 from quakedesign.plant import uncertain_plant
 
 REAL = (files("quakedesign.fault") / "presets" / "real-fault.toml").read_text(encoding="utf-8")
+REGULAR = """law = "regularised-rate-and-state"
+evoluton = "slip"
+reference_coefficient = 0.6
+direct_effect = 0.01
+evolution_effect = 0.015
+critical_slip = "2 cm"
+reference_rate = "1 um/s"
+slowest_rate = "1e-12 m/s"
+fastest_rate = "1 m/s"
+"""
+LAW = 'law = "exponential-slip-weakening"\nresidual = 0.2353\ndrop = 0.1\ncritical_slip = "276.35 mm"'
 LENGTH, BOX, DROP = 'length = "5 km"', 'uncertainty = "paper"', "drop = 0.1"
 
 
@@ -137,6 +148,13 @@ WRONG = {
     "missing table": ("[task]", "[job]", ScenarioError, "job is not a known key"),
     "extra key": (LENGTH, LENGTH + '\nheight = "1 km"', ScenarioError, "height is not a known key"),
     "missing parameter": (DROP, "", ScenarioError, "friction.drop must be given. Received nothing"),
+    "misspelt source": (
+        'name = "real-fault"',
+        'name = "x"\nsorce = "y"',
+        ScenarioError,
+        "sorce .* mean source.* poor_fit",
+    ),
+    "misspelt option": (LAW, REGULAR, ScenarioError, "evoluton .* mean evolution"),
     "extra parameter": (DROP, DROP + "\na = 1", ScenarioError, "friction.a is not a known key. Known .* drop"),
     "no law": ('law = "exponential-slip-weakening"', "", ScenarioError, "friction.law must be given. Received nothing"),
     "unknown law": ("exponential-slip-weakening", "magic", UnknownNameError, "one of exponential.*Received 'magic'"),
@@ -233,6 +251,11 @@ def test_everything_that_is_wrong_is_said_at_once():
     assert "shear_modulus must be given" not in said
     assert len(raised.value.parts) == 8
     assert said.count("errors.") == 1
+
+
+def test_all_half_widths_that_are_wrong_are_named():
+    with pytest.raises(ParameterError, match=r"2 errors. \(1\) uncertainty.stiffness .*\(2\) uncertainty.authority"):
+        parse_fault(edited(BOX, "uncertainty = { stiffness = nan, authority = inf }"), "own.toml")
 
 
 def test_an_empty_file_lacks_every_key_in_one_sentence():

@@ -63,6 +63,13 @@ def test_an_unphysical_width_is_refused(width):
         replace(SQUARE, width=width)
 
 
+@pytest.mark.parametrize("name", ["length", "width", "sampling_time"])
+def test_the_message_of_a_negative_number_has_its_unit(name):
+    unit = "s" if name == "sampling_time" else "m"
+    with pytest.raises(ParameterError, match=f"{name} must be .* It is in {unit} here; check sign and unit"):
+        replace(ROW, **{name: -1.0})
+
+
 def test_a_patch_is_written_and_read_and_scaled():
     read = parse_fault(fault_toml(ROW), "row")
     assert read == ROW

@@ -1,13 +1,18 @@
 """The file to start from can be read as it is, and the schema of editors accepts what the program accepts."""
 
 import tomllib
+from fractions import Fraction
 from importlib.resources import files
 
 import jsonschema
 import pytest
 
 from quakedesign.fault import Fault, fault_toml, friction_laws, load_fault, parse_fault, presets
-from quakedesign.fault.fault_toml import fault_schema, template
+from quakedesign.fault.block_chain import BLOCK, DIFFUSION, WELL
+from quakedesign.fault.entries import entries_of
+from quakedesign.fault.fault_template import fault_schema, template
+from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, TEXTS, WIDTHS
+from quakedesign.fault.units import si_value
 
 VALIDATOR = jsonschema.Draft202012Validator(fault_schema())
 
@@ -94,3 +99,39 @@ def test_the_schema_knows_symbols():
     assert "\na = 0.01" in text
     assert VALIDATOR.is_valid(tomllib.loads(text))
     assert parse_fault(text, "x").friction.direct_effect == 0.01
+
+
+@pytest.mark.parametrize("width", ["0.3", '"0.3"'])
+def test_a_half_width_is_a_number_or_a_text_for_the_schema_and_the_program(width):
+    text = fault_toml(load_fault("real-fault")).replace('uncertainty = "paper"\n', "")
+    text += f"\n[uncertainty]\nstiffness = {width}\n"
+    assert VALIDATOR.is_valid(tomllib.loads(text))
+    assert parse_fault(text, "own.toml").box.stiffness == Fraction(3, 10)
+
+
+def test_a_law_without_descriptions_has_a_file_to_start_from():
+    text = template("tests.data.own_parts:Hyperbolic")
+    drop = next(line for line in text.splitlines() if line.startswith("drop = "))
+    assert "#" not in drop
+    assert parse_fault(text, "own.toml", allow_code=True).friction.drop == float(drop.split()[-1])
+
+
+TABLES = {"top": TEXTS | PLANT, "task": TASK, "disturbance": DISTURBANCE, "uncertainty": WIDTHS, "block": BLOCK}
+TABLES |= {"well": WELL, "diffusion": DIFFUSION} | {name: entries_of(law) for name, law in friction_laws().items()}
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_every_entry_has_a_description_and_an_example_in_its_unit(table):
+    for name, entry in TABLES[table].items():
+        assert (entry.name, bool(entry.description)) == (name, True)
+        if entry.unit is not None:
+            assert si_value(entry.example, entry.unit, name) >= 0
+
+
+def test_an_entry_is_declared_once_for_reading_writing_template_and_schema():
+    """A declared default and example appear in the template and the schema; the unit in the written file."""
+    entry = PLANT["damping"]
+    assert (entry.unit, entry.required) == ("kg/s", False)
+    assert f'# damping = "{entry.example}"  # η [kg/s], not negative; {entry.default_text}, if left out' in template()
+    assert fault_schema()["properties"]["damping"]["examples"] == [entry.example]
+    assert '\ndamping = "500000000000000.0 kg/s"\n' in fault_toml(load_fault("real-fault"))

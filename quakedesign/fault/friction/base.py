@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 class FrictionLaw(ABC):
     """One friction coefficient μ(slip, slip rate, state …), written once with the parameters as attributes.
 
-    A subclass is a frozen dataclass. Each quantity carries ``metadata`` with ``unit`` (as pint reads it) and
-    ``symbol`` (LaTeX); a field without a symbol is an option, not a quantity. The same method is used for numbers,
-    exact rationals and symbols: `symbolic` and `exact` return copies of the law with these instead of floats.
+    A subclass is a frozen dataclass. Each quantity carries ``metadata`` with ``unit`` (as pint reads it), ``symbol``
+    (LaTeX) and ``example`` (for templates); a field without a symbol is an option, not a quantity. The same method is
+    used for numbers, exact rationals and symbols: `symbolic` and `exact` return copies of the law with these.
 
     A law without state defines `coefficient`, `extended` and the bounds. A law with state also names its variables
     in `state_names` (with `state_units`), and defines `state_rates`, `steady_state`, `operating_rate` and

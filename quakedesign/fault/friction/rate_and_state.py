@@ -60,13 +60,13 @@ class RateAndState(FrictionLaw):
     state_names: ClassVar[tuple[str, ...]] = ("theta",)
     state_units: ClassVar[tuple[str, ...]] = ("s",)
 
-    reference_coefficient: float = field(metadata={"unit": "", "symbol": r"\mu_0"})
-    direct_effect: float = field(metadata={"unit": "", "symbol": "a"})
-    evolution_effect: float = field(metadata={"unit": "", "symbol": "b"})
-    critical_slip: float = field(metadata={"unit": "m", "symbol": "d_c"})
-    reference_rate: float = field(metadata={"unit": "m/s", "symbol": "v_0"})
-    slowest_rate: float = field(metadata={"unit": "m/s", "symbol": "v_s"})
-    fastest_rate: float = field(metadata={"unit": "m/s", "symbol": "v_f"})
+    reference_coefficient: float = field(metadata={"unit": "", "symbol": r"\mu_0", "example": 0.6})
+    direct_effect: float = field(metadata={"unit": "", "symbol": "a", "example": 0.01})
+    evolution_effect: float = field(metadata={"unit": "", "symbol": "b", "example": 0.015})
+    critical_slip: float = field(metadata={"unit": "m", "symbol": "d_c", "example": "2 cm"})
+    reference_rate: float = field(metadata={"unit": "m/s", "symbol": "v_0", "example": "1 um/s"})
+    slowest_rate: float = field(metadata={"unit": "m/s", "symbol": "v_s", "example": "1e-12 m/s"})
+    fastest_rate: float = field(metadata={"unit": "m/s", "symbol": "v_f", "example": "1 m/s"})
     stress_sensitivity: float = field(default=0.0, metadata={"unit": "", "symbol": r"\alpha"})
 
     def __post_init__(self) -> None:

@@ -37,9 +37,9 @@ class Weakening(FrictionLaw):
         When a parameter is outside its range.
     """
 
-    residual: float = field(metadata={"unit": "", "symbol": r"\mu_{res}"})
-    drop: float = field(metadata={"unit": "", "symbol": r"\Delta\mu"})
-    healing: float = field(default=0.0, metadata={"unit": ""})
+    residual: float = field(metadata={"unit": "", "symbol": r"\mu_{res}", "example": 0.45})
+    drop: float = field(metadata={"unit": "", "symbol": r"\Delta\mu", "example": 0.15})
+    healing: float = field(default=0.0, metadata={"unit": "", "example": 0.0001, "default": "0"})
 
     def __post_init__(self) -> None:
         remedy = "It is the static minus the kinetic coefficient; the paper's Δμ has the opposite sign."
@@ -75,7 +75,7 @@ class SlipWeakening(Weakening):
         Characteristic slip d_c [m], positive.
     """
 
-    critical_slip: float = field(metadata={"unit": "m", "symbol": "d_c"})
+    critical_slip: float = field(metadata={"unit": "m", "symbol": "d_c", "example": "2 cm"})
 
     def __post_init__(self) -> None:
         require_all(lambda: Weakening.__post_init__(self), lambda: require_positive(critical_slip=self.critical_slip))
@@ -153,7 +153,7 @@ class SlipRateWeakening(Weakening):
     )
     domain: ClassVar[str] = "rate >= 0"
 
-    critical_rate: float = field(metadata={"unit": "m/s", "symbol": "v_c"})
+    critical_rate: float = field(metadata={"unit": "m/s", "symbol": "v_c", "example": "10 cm/s"})
 
     def __post_init__(self) -> None:
         require_all(lambda: Weakening.__post_init__(self), lambda: require_positive(critical_rate=self.critical_rate))

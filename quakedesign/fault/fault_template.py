@@ -1,0 +1,134 @@
+"""Commented fault file to start from, and the JSON Schema of fault files, both of the same entries."""
+
+import inspect
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from quakedesign.fault.block_chain import BLOCK, DIFFUSION, WELL
+from quakedesign.fault.entries import FileEntry, entries_of
+from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, TEXTS, WIDTHS, written
+from quakedesign.fault.friction import friction_law, friction_laws
+from quakedesign.fault.friction.base import FrictionLaw
+from quakedesign.fault.model import BOXES, UncertaintyBox
+
+SCHEMA_NAME = "fault.schema.json"
+_COME_TO_REST = ("exponential-slip-weakening", "linear-slip-weakening")
+
+
+def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault", schema: bool = False) -> str:
+    """Text of a commented TOML file to start from.
+
+    Parameters
+    ----------
+    law : str
+        Friction law.
+    name : str
+        Of the fault.
+    schema : bool
+        Whether its first line names the schema beside it, for editors.
+
+    Raises
+    ------
+    UnknownNameError
+        For another law.
+    """
+    friction = friction_law(law)
+    task = {key: entry for key, entry in TASK.items() if friction.state_names or key != "ramp"}
+    if needs_target := law not in _COME_TO_REST:
+        task["target_slip"] = replace(task["target_slip"], required=True)
+    lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []
+    lines += [
+        "# A fault for quakedesign. Every number is an example: put in your own, each with its unit. What begins with",
+        "# a # may be left out. `quakedesign fault FILE` shows what follows from it and what was assumed.",
+        f"name = {written(name)}",
+        '# source = "where the numbers come from"',
+        *_lines(PLANT),
+        "",
+        "# What is uncertain besides friction: paper (nothing) or ten-percent (stiffness, damping and authority), or a",
+        "# table [uncertainty] of your own, see the end.",
+        '# uncertainty = "paper"',
+        "",
+        f"[friction]  # {_first_paragraph(friction)}",
+        '# A law of your own, "module:Class", runs its code: such a file is read with --allow-code alone.',
+        f"law = {written(law)}  # or {', '.join(sorted(set(friction_laws()) - {law}))}",
+        *_lines(entries_of(friction)),
+        "",
+        f"{'' if needs_target else '# '}[task]  # what the fault shall do: slip slowly from rest to rest",
+        *_lines(task),
+        "",
+        "# [disturbance]  # acceleration that nobody measures; the bound that guarantees are for",
+        *_lines(DISTURBANCE),
+        "",
+        "# [uncertainty]  # half-widths relative to the numbers above, from 0 up to 1, each 0 if left out",
+        *_lines(WIDTHS),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _lines(entries: Mapping[str, FileEntry]) -> Iterator[str]:
+    """Line of each quantity with its example and description, as a comment if a file may omit it."""
+    for key, entry in entries.items():
+        if entry.unit is not None:
+            comment = entry.description.split("; ")[0].rstrip(".")
+            if entry.default_text and not entry.required:
+                comment += f"; {entry.default_text}{',' * (', ' in entry.default_text)} if left out"
+            yield f"{'' if entry.required else '# '}{key} = {written(entry.example)}{comment and f'  # {comment}'}"
+
+
+def _first_paragraph(kind: type) -> str:
+    return (inspect.getdoc(kind) or "").split("\n\n")[0].replace("\n", " ")
+
+
+def fault_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of fault files, for editors that complete and check TOML."""
+    friction = {"oneOf": [_law_schema(law) for _, law in sorted(friction_laws().items())]}
+    box = [{"enum": sorted(BOXES)}, _table(WIDTHS)]
+    schema = _table(
+        TEXTS | PLANT,
+        uncertainty={"oneOf": box, "description": _first_paragraph(UncertaintyBox)},
+        friction=friction,
+        task=_table(TASK),
+        disturbance=_table(DISTURBANCE),
+        block={
+            "type": "array",
+            "description": "tables [[block]], in a row; friction and stress are the fault's unless given",
+            "items": _table(BLOCK, friction=friction),
+        },
+        well={"type": "array", "description": "tables [[well]], from one end of the row", "items": _table(WELL)},
+        diffusivity=_property(DIFFUSION["diffusivity"]),
+    )
+    schema["required"].append("friction")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "fault of quakedesign"} | schema
+
+
+def _table(entries: Mapping[str, FileEntry], **tables: Any) -> dict[str, Any]:
+    """Schema of a table of these entries and of tables inside it."""
+    properties = {name: _property(entry) for name, entry in entries.items()} | tables
+    return _object(properties, [name for name, entry in entries.items() if entry.required])
+
+
+def _object(properties: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
+    return {"type": "object", "additionalProperties": False, "required": required, "properties": properties}
+
+
+def _property(entry: FileEntry) -> dict[str, Any]:
+    if entry.unit is None:
+        return {"type": "string", "description": entry.description}
+    kind = "string" if entry.unit else ["number", "string"]
+    return {"type": kind, "description": entry.description, "examples": [entry.example]}
+
+
+def _law_schema(law: type[FrictionLaw]) -> dict[str, Any]:
+    """Schema of a table of friction, whose parameters are given by their names or symbols."""
+    entries = entries_of(law)
+    properties = {"law": {"const": law.name, "description": _first_paragraph(law)}} | _table(entries)["properties"]
+    spelt = {entry.symbol_pattern: entry for entry in entries.values() if entry.symbol}
+    return _object(properties, ["law"]) | {
+        "patternProperties": {pattern: properties[entry.name] for pattern, entry in spelt.items()},
+        "allOf": [
+            {"anyOf": [{"required": [entry.name]}, {"not": {"propertyNames": {"not": {"pattern": pattern}}}}]}
+            for pattern, entry in spelt.items()
+            if entry.required
+        ],
+    }
