@@ -164,10 +164,10 @@ class LoopAnswer(LoopResult):
         seen = self.worst_with_stick
         if not self.found.proved or (seen is not None and not (self.given and seen.pressures is None)):
             return ""
-        searched = "no search" if seen is None else "no search of the pressure"
+        searched = "case" if seen is None else "pressure"
         return (
-            f"stick-slip plant: no proof and {searched} for a given law: run simulate; slip, slip rate or pressure may "
-            "exceed these bounds"
+            f"on the stick-slip plant nothing is proved for a given law, and its worst {searched} is not searched: the "
+            "bounds may be exceeded there; run simulate"
         )
 
     @property

@@ -105,13 +105,15 @@ def test_the_stick_slip_plant_is_searched_when_its_worst_case_is_read(stuck, fou
     told = replace(found).lines()
     assert "an integrator that rounding has moved" in told[-1]
     assert told[2] == "worst case found on the stick-slip plant: slip error 1 mm, slip-rate error 20 µm/s"
-    assert told[3].startswith("stick-slip plant: no proof and no search of the pressure for a given law: run simulate")
+    assert told[3].startswith(
+        "on the stick-slip plant nothing is proved for a given law, and its worst pressure is not"
+    )
     assert "a course was found that exceeds the bounds" in "".join(told)
     assert replace(found).to_dict()["worst_found_with_stick"]["slip_error"] == 1e-3
 
 
 def test_no_search_of_the_stick_slip_plant_is_said_of_laws_that_it_does_not_take(stuck, found, referred, monkeypatch):
-    gap = "stick-slip plant: no proof and no search for a given law: run simulate; slip, slip rate or pressure may"
+    gap = "on the stick-slip plant nothing is proved for a given law, and its worst case is not searched"
     assert referred.stick_slip_gap.startswith(gap)
     assert referred.to_dict()["worst_found_with_stick"] is None
     monkeypatch.setattr(guarantee_result, "growth_at_rest", lambda law, step: 0.5)  # e-fold in 0.5 s at rest
