@@ -250,6 +250,11 @@ def blocks(
     from quakedesign.studies import one_block
 
     loaded = load_fault(fault, box=box, disturbance=disturbance)
+    if loaded.friction.state_names:
+        raise ParameterError(
+            f"blocks needs friction of slip and slip rate. Received {loaded.friction.name}. Write [[block]] and "
+            "[[well]] tables into the fault file, and run limits: it names unstable modes that no well reaches."
+        )
     files = {count: out / f"{loaded.name}-{count}-blocks.json" for count in range(least, most + 1)} if out else {}
     if out is not None:
         require_room(out)

@@ -238,7 +238,10 @@ def _given(found: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], li
     for column in unknown:
         near = nearest_name(column.name.lower().replace(" ", "_"), COLUMNS)
         if near and near.split()[-1].strip("?") not in given:
-            raise RecordError(f"a column must be one of {', '.join(COLUMNS)}. Received {shown(column.name)}.{near}")
+            raise RecordError(
+                f"a column must be one of {', '.join(COLUMNS)}. Received {shown(column.name)}.{near} Other headings "
+                f"are assigned by --columns 'time={column.name} [s], …'."
+            )
     left = ", ".join(shown(column.heading) for column in unknown)
     if "time" not in given:
         others, example = (f", and {left}, unknown", unknown[0].name) if unknown else ("", "1")

@@ -22,6 +22,8 @@ from quakedesign.fault import Fault, fault_toml
 from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, WIDTHS
 from quakedesign.guarantees import SlidingGuarantee
 from quakedesign.laws import LinearLaw
+from quakedesign.laws.stick_slip_controller import StickSlipController
+from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.lyapunov import Verdict
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
@@ -38,7 +40,7 @@ from quakedesign.report.sentences import (
 )
 from quakedesign.report.summary import SUMMARY_COLUMNS, summary, summary_cells
 from quakedesign.report.tables import COLUMNS, rows
-from quakedesign.studies.facts import coordinates, fault_sentences, law_latex, plant_latex
+from quakedesign.studies.facts import coordinates, fault_sentences, law_latex, plant_latex, stick_slip_latex
 from quakedesign.studies.runs import StateRun
 from quakedesign.text import quantity, visible
 
@@ -165,10 +167,11 @@ def _account(entry: "Entry") -> Account:
         proof=[
             *compensated,
             *([f"it runs in the scheme {sampling.scheme}, once every {float(sampling.step):g} s"] if sampling else []),
+            *_at_samples(entry),
             *_slowly(entry),
             *domain,
         ],
-        law=[mathml(equation) for equation in law_latex(design.controller)] + _difference(entry),
+        law=_equations(entry) + _difference(entry),
         python=_python(entry),
         gains=_gains(entry),
         premises=[_row(p) for p in design.conditions],
@@ -198,6 +201,29 @@ def _linear_law(entry: "Entry") -> "LinearLaw | None":
     """The sampled linear law of a guarantee; None for laws with an implicit step, and without a guarantee."""
     law = getattr(getattr(entry.guaranteed, "held", None), "law", None)
     return law if isinstance(law, LinearLaw) and law.root is None else None
+
+
+def _at_samples(entry: "Entry") -> list[str]:
+    """What the difference equations of the stick–slip plant stand for; nothing for other laws."""
+    law = getattr(getattr(entry.guaranteed, "held", None), "law", None)
+    if not isinstance(law, StickSlipLaw):
+        return []
+    root = " (within the proved errors, where the implicit step of the sliding mode is deadbeat)" if law.pull else ""
+    return [
+        f"the equations with the index k are what runs{root}: x and y are the measured slip [m] and slip rate [m/s], r "
+        "the reference, v the target slip rate, i the innovation of the slip, D the estimate of the disturbance [Pa]; "
+        "D, v+, x and y are 0 before the first sample"
+    ]
+
+
+def _equations(entry: "Entry") -> list[Markup]:
+    """The law in continuous time, where it has one, and that of the stick–slip plant at its samples."""
+    held: Any = getattr(entry.guaranteed, "held", None)
+    controller, law = entry.design.controller, getattr(held, "law", None)
+    latex = [] if isinstance(controller, StickSlipController) else law_latex(controller)
+    if isinstance(law, StickSlipLaw):
+        latex += stick_slip_latex(law, float(held.step))
+    return [mathml(equation) for equation in latex]
 
 
 def _difference(entry: "Entry") -> list[Markup]:

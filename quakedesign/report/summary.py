@@ -99,7 +99,8 @@ def guaranteed_sentence(
         stress = LowerBound(found.task.stress).quantity("Pa")
         slow = f" {found.lasts}, under every shear stress disturbance of at most {stress}"
     else:
-        task = f", {quantity(float(found.task.target_slip), 'm')} within {duration(float(found.task.operation_time))}"
+        moved, time = quantity(float(found.task.target_slip), "m"), duration(float(found.task.operation_time))
+        task = f", which moves {moved} in {time}"
     return (
         f"{first}. {under} slip rate never exceeds {rate.quantity('m/s')}{share}{sticks}{slow}, and the slip stays "
         f"within {found.claims.slip_error.quantity('m')} of the reference{task}"
@@ -139,7 +140,7 @@ def _row(entry: "Entry") -> Row:
         pressure = found.valve_pressures
     elif isinstance(found, Guarantee | StickSlipGuarantee):
         pressure = found.claims.pressures[-1]
-    label = entry.label.removesuffix(" (designed)").removesuffix(" (given)").replace(" (published)", ", published")
+    label = entry.label.removesuffix(" (designed)").removesuffix(" (given)").replace(" (published)", " published")
     return Row(
         name=label,
         outcome=run.outcome.kind if run else "not run",
@@ -230,7 +231,7 @@ def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
     if len(same) > 1 and all(e.guaranteed.claims == same[0].guaranteed.claims for e in same):  # type: ignore[union-attr]
         names = " and ".join(entry.design.title for entry in same)
         yield (
-            f"{names} have the same numbers: within the proved errors both laws compute the same pressure; in "
+            f"{names} act identically in this loop: within the proved errors both compute the same pressures; in "
             "continuous time (--continuous) they differ"
         )
 
@@ -268,7 +269,7 @@ def _range(row: Row) -> str:
 
 
 LEGEND = (
-    "worst: worst case found; pressure: proved for every friction of the box, or seen",
+    "worst: worst case found; pressure: range proved for the box, else of the run",
     "tracked: slip within 2 % of the task's, slip rate within 1 % of the natural peak",
 )
 

@@ -38,6 +38,7 @@ from quakedesign.synthesis.guarantee import BLOCK_LAWS
 from quakedesign.text import PREFIXES, counted, lasting, plain, power_of, quantity
 
 _NONE = UpperBound(0)
+_FORESHOCK = 0.1  # of the largest slip: events of less are no cycles of their own
 _FINENESS = 1e-3  # substep times natural frequency of a run without control
 _NO_RUN = "nothing is simulated, as no law is proved"
 
@@ -432,8 +433,12 @@ class SlidingChainRun:
             + ("" if event.magnitude is None else f", magnitude {event.magnitude:.2f}")
             for i, event in enumerate(events, 1)
         ]
-        last = self.run.onsets[-2:]
-        return [*parts, f"recurrence interval {lasting(float(last[1] - last[0]))}"] if len(last) > 1 else parts
+        sizes = [sum(event.slip or ()) for event in events]
+        main = [event.onset for event, size in zip(events, sizes, strict=True) if size > _FORESHOCK * max(sizes)]
+        if len(main) > 1:
+            small = f", of events with over {_FORESHOCK:.0%} of the largest slip" if len(main) < len(events) else ""
+            parts.append(f"recurrence interval {lasting(main[-1] - main[-2])}{small}")
+        return parts
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI."""

@@ -22,6 +22,7 @@ from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, mean_rate, slidi
 from quakedesign.guarantees.exact.limit_theorems import longest_reaction
 from quakedesign.guarantees.search.lqg import sliding_model, sliding_poles
 from quakedesign.laws import Controller, Signals
+from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation.state_plant import spring_acceleration, stretch
 from quakedesign.studies.comparison import need_sentence, needed_pressure, ways
@@ -83,6 +84,34 @@ def law_latex(law: Controller | None) -> list[str]:
     rates = zip(states, law.integral_rates(signals), strict=True)
     named = [("p", law.pressure(signals)), *((rf"\dot {{{z}}}", rate) for z, rate in rates)]
     return [f"{name} = {_written(expression)}" for name, expression in named]
+
+
+def stick_slip_latex(law: StickSlipLaw, step: float) -> list[str]:
+    """Difference equations of a `StickSlipLaw` in four digits: what it computes at the sample k.
+
+    Parameters
+    ----------
+    law : StickSlipLaw
+        One with an implicit step must be deadbeat, so that its target slip rate is linear.
+    step : float
+        T_s [s].
+    """
+    number = {name: _number(float(getattr(law, name))) for name in GAIN_UNITS}
+    period, half = _number(step), _number(step / 2)
+    rest = f" - {number['rest_slip']}" if law.rest_slip else ""
+    return [
+        rf"i_k = x_k - x_{{k-1}} - {half}\,(y_{{k-1}} + v^+_{{k-1}}), \quad T_s = {period}",
+        rf"i_k \leftarrow \max(i_k, -{half}\,v^+_{{k-1}}{rest}) \text{{ if }} y_k = 0",
+        rf"D_k = D_{{k-1}} + {number['level_gain']}\,(y_k - v^+_{{k-1}}) + {number['slip_gain']}\,i_k",
+        rf"v_k = r'_k - {number['return_rate']}\,(x_k - r_k), \quad v^+_k = \max(v_k, 0)",
+        rf"p_k = -{number['rate_gain']}\,y_k + {number['target_gain']}\,v_k - D_k",
+    ]
+
+
+def _number(value: float) -> str:
+    """LaTeX of a number in four digits."""
+    digits, _, power = f"{value:.4g}".partition("e")
+    return rf"{digits} \cdot 10^{{{int(power)}}}" if power else digits
 
 
 def _written(expression: Any) -> str:

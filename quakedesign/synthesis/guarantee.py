@@ -172,8 +172,8 @@ def guarantee(
             usual = usual and not exact_value(spread, "", "spread")
             if not usual or stress is None or setup.given().keys() - {"step", "lag"}:
                 raise ParameterError(
-                    "blocks in slow sliding are guaranteed with a designed law, a lag and a stress: give stress, lag "
-                    "and, if you like, step; omit all else"
+                    "blocks in slow sliding are guaranteed with a designed law: give stress (--stress), lag (--lag, "
+                    "such as D_c/(10 V)) and perhaps step (--step, such as D_c/(20 V)); omit all else"
                 )
             blocks = SlidingBlocks(chain=fault, lag=setup.lag, stress=exact_value(stress, "Pa", "stress"))
             assert setup.step is not None

@@ -68,7 +68,7 @@ def test_the_table_has_proved_bounds_rounded_up_beside_the_worst_found_and_the_r
     assert law.split() == ["e-LQR", "tracked", "14.9", "13.7", "11.7", "3.34", "1.3", "0.64", "-0.119", "…", "1.81"]
     assert name == "a law with a long name"
     assert other.split() == ["slow", "slip", "–", "–", "20", "–", "–", "–", "-0.8", "…", "0"]
-    assert worst == "worst: worst case found; pressure: proved for every friction of the box, or seen"
+    assert worst == "worst: worst case found; pressure: range proved for the box, else of the run"
     assert tracked.startswith("tracked: slip within 2 % of the task's")
     assert max(map(len, lines)) <= 80
 
@@ -129,7 +129,8 @@ def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthqu
     )
     assert said.answer == (
         "mine: guaranteed. With the B (designed) the slip rate never exceeds 143 µm/s (1.5 % of the natural "
-        "earthquake's 10 mm/s, magnitude 5.2), and the slip stays within 20 µm of the reference, 50 mm within 5 days"
+        "earthquake's 10 mm/s, magnitude 5.2), and the slip stays within 20 µm of the reference, which moves 50 mm in "
+        "5 days"
     )
     unknown = compared(monkeypatch, entry("B (designed)", "1/7000", "2e-5"))
     unknown.fault.magnitude = float("nan")
@@ -275,11 +276,9 @@ def test_friction_that_is_extrapolated_to_the_rate_of_the_task_is_said(monkeypat
 def test_two_sliding_modes_with_the_same_bounds_say_why(monkeypatch):
     one, other = (entry(f"{name} (designed)", 3e-4, 1e-5, compensation="c") for name in ("2-CTA", "2-DIA"))
     other.guaranteed.claims = one.guaranteed.claims
-    assert any(
-        "2-CTA and 2-DIA have the same numbers" in note for note in summary(compared(monkeypatch, one, other)).notes
-    )
+    assert any("2-CTA and 2-DIA act identically" in note for note in summary(compared(monkeypatch, one, other)).notes)
     other.guaranteed.claims = SimpleNamespace(slip_error=UpperBound(1))
-    assert not any("same numbers" in note for note in summary(compared(monkeypatch, one, other)).notes)
+    assert not any("act identically" in note for note in summary(compared(monkeypatch, one, other)).notes)
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBloc
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.simulation.coupled_sliders import BlockEvent
 from quakedesign.simulation.natural import natural_peak
 from quakedesign.studies import chains
 
@@ -539,3 +540,18 @@ def test_the_law_of_slow_sliding_is_exported_with_its_plan(monkeypatch, capsys, 
     assert "writes the fluid pressure [Pa] beside the plan of CONTROLLER_PRESSURES wells" in header
     assert "the plan reaches the fault as it is" in header
     assert "|ln(v/V)| <= 0.0738" in header
+
+
+def test_a_small_event_before_a_large_one_is_no_cycle(monkeypatch):
+    """Main events 100 s apart, a foreshock with a hundredth of their slip 1 s before the last."""
+    slips = ((1.0, 1.0), (1.0, 1.0), (0.02, 0.0), (1.0, 1.0))
+    onsets = (50.0, 150.0, 249.0, 250.0)
+    events = tuple(
+        BlockEvent(onset=onset, arrest=onset + 1, slip=slip, peak_slip_rate=(1.0, 1.0), magnitude=None)
+        for onset, slip in zip(onsets, slips, strict=True)
+    )
+    monkeypatch.setattr(chains.SlidingChainRun, "events", events)
+    run = SimpleNamespace(times=[0.0, 300.0], loading_rate=1e-9, onsets=onsets)
+    chain = SimpleNamespace(name="two")
+    free = chains.SlidingChainRun(chain=chain, run=run, inertia=False, found=None, controller="")
+    assert free.lines()[-1] == "recurrence interval 100 s, of events with over 10% of the largest slip"

@@ -1,14 +1,18 @@
 """What is said of a fault: friction as it was read, its box in numbers, and units that look wrong."""
 
+import re
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from thinned import few
 
 from quakedesign.fault import UncertaintyBox, load_fault
-from quakedesign.studies.facts import box_sentence, fault_sentences
+from quakedesign.guarantees import load_guarantee
+from quakedesign.studies.facts import box_sentence, fault_sentences, stick_slip_latex
 
+CERTIFICATES = Path(__file__).parents[2] / "proofs" / "certificates"
 REAL, PATCH = load_fault("real-fault"), load_fault("crustal-patch")
 
 
@@ -45,3 +49,23 @@ def test_a_task_beyond_the_rates_of_its_friction_is_said_to_be_extrapolated(slow
     law = replace(PATCH.friction, slowest_rate=slowest, fastest_rate=fastest, reference_rate=(slowest * fastest) ** 0.5)
     told = [line for line in fault_sentences(replace(PATCH, friction=law)) if "extrapolated" in line]
     assert [f"V = 1e-06 m/s is {side} the rates" in line for line in told] == [True] * bool(side)
+
+
+def test_the_difference_equations_of_the_report_are_the_recursion_that_runs():
+    """The numbers of the LaTeX in the recursion of FORMAT.md against the controller of the scheme."""
+    claim = load_guarantee(CERTIFICATES / "stick_slip_real-fault.json")
+    law, step = claim.held.law, float(claim.held.step)
+    latex = stick_slip_latex(law, step)
+
+    def numbers(text):
+        parts = re.findall(r"(?<![\w_{])(\d+\.?\d*)(?: \\cdot 10\^\{(-?\d+)\})?(?!\})", text)
+        return [float(digits) * 10.0 ** int(power or 0) for digits, power in parts]
+
+    half, period = numbers(latex[0])
+    assert (half, period) == (pytest.approx(step / 2, rel=1e-3), step)
+    assert numbers(latex[2]) == pytest.approx([float(law.level_gain), float(law.slip_gain)], rel=1e-3)
+    assert numbers(latex[3])[0] == pytest.approx(float(law.return_rate), rel=1e-3)
+    assert numbers(latex[4]) == pytest.approx([float(law.rate_gain), float(law.target_gain)], rel=1e-3)
+    assert r"v^+_k = \max(v_k, 0)" in latex[3]
+    assert r"\max(i_k, " in latex[1]
+    assert r"y_k = 0" in latex[1]

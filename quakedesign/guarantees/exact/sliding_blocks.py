@@ -112,7 +112,8 @@ class SlidingBlocks:
             if task.state_law != "ageing" or task.regularised:
                 raise UnsupportedError(
                     "blocks in slow sliding need rate-and-state-aging friction. Received "
-                    f"{self.chain.blocks[place - 1].friction.name} in block {place}. Change the law."
+                    f"{self.chain.blocks[place - 1].friction.name} in block {place}: for this law no guarantee of "
+                    "several blocks is known. limits accepts it; one block has a guarantee."
                 )
         if len({task.ranges["coefficient"] for task in self.tasks}) > 1:
             raise UnsupportedError(

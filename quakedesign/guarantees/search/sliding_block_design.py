@@ -61,7 +61,8 @@ def sliding_block_guarantee(
         if small >= _LOST / 2:
             return NoGuarantee(
                 reason="no law is found whose loop forgets soon enough: with fewer wells than blocks, modes that no "
-                "well reaches must decay within some 60 T_s. Lengthen T_s, or add wells",
+                "well reaches must decay within some 60 T_s. Run limits, which says whether wells are missing; "
+                "else lengthen T_s",
                 small_gain=None,
             )
         reason = f"no bounds of slip rate and state close: small gain {small:.3g}. Reduce the stress"

@@ -295,12 +295,12 @@ def run(*arguments):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("guarantee", PATH), "give stress, lag and, if you like, step"),
+        (("guarantee", PATH), "give stress (--stress), lag (--lag"),
         (("guarantee", PATH, "--stress", "10 kPa"), "positive lag and a positive bound of the shear stress"),
         (("guarantee", PATH, "--stress", "10 kPa", "--lag", "800 s", "--delay", "1 s"), "Received --delay"),
-        (("design", PATH, "--out", "unwritten"), "give stress, lag and, if you like, step"),
+        (("design", PATH, "--out", "unwritten"), "give stress (--stress), lag (--lag"),
         (("design", PATH, "--stress", "10 kPa", "--out", "unwritten"), "positive lag and a positive bound"),
-        (("compare", PATH), "give stress, lag and, if you like, step"),
+        (("compare", PATH), "give stress (--stress), lag (--lag"),
         (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--controller", "dia"), "centralised, decentralised"),
         (("guarantee", PATH, "--stress", "1 kPa", "--lag", "8 s", "--box", "ten-percent"), "box paper"),
         (("guarantee", PATH.with_name("three_blocks.toml"), "--lag", "1 s"), "need friction with a state"),
