@@ -77,6 +77,7 @@ def test_the_report_holds_everything_and_asks_for_nothing(main_job, tmp_path, ca
     assert not re.search(r"""(src|href)\s*=\s*["'](?!#)|url\((?!#)|@import|https?://|proved\*""", text)
     assert "default-src 'none'" in text
     first = text[text.index('<div class="answer">') : text.index("<figure")]
+    assert "model: one block under a uniform pressure" in first
     assert text.count("box paper: every friction from ") == first.count("box paper: every friction from ") + 1 == 2
     assert set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text)) <= {
         pair for name in re.findall(r'\bid="([^"]+)"', text) for pair in ((name, ""), ("", name))
