@@ -46,8 +46,8 @@ class DesignOptions(WellOptions):
     Parameters
     ----------
     controller
-        Control law to design: cta, dia, elqr or all. Of several blocks: centralised, or decentralised, the pressure of
-        each well from its own measurements.
+        Control law to design: cta, dia, elqr or all. For several blocks: centralised, or decentralised, which computes
+        the pressure of each well from its own measurements.
     objective
         tracking, or peak for the smallest certified slip-rate error.
     continuous
@@ -59,8 +59,9 @@ class DesignOptions(WellOptions):
         Disturbances of the guarantee. amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of
         change is bounded by the fault's too, and it starts at 0, such as a tide.
     scheme
-        Scheme of the runs of gains from --continuous: continuous (default, as in the paper), or sampled with a
-        zero-order hold: explicit, implicit, semi-implicit, compensated, stick-slip. Other designs run as designed.
+        Scheme that simulates the gains designed with --continuous: continuous (default, as in the paper), or sampled
+        with a zero-order hold: explicit, implicit, semi-implicit, compensated, stick-slip. Other designs run as
+        designed.
     stress
         Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; default: the largest proved.
     spread

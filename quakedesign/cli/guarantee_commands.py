@@ -90,7 +90,7 @@ def guarantee(
         The e-LQR runs in explicit.
     measured
         Measurement of the e-LQR: slip-and-rate; slip, from which a designed law estimates the slip rate; or
-        differentiator (implicit, n_d = 2, any n_f): its smallest λ_d is printed.
+        differentiator (implicit, n_d = 2, any n_f), for which the smallest λ_d is printed.
     disturbance_class
         amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of change is bounded too.
     plant
@@ -239,7 +239,7 @@ def blocks(
     wells
         one: one well for all blocks, whose law measures the means of slip and slip rate; each: a well for each block.
     coupling
-        Stiffness of a spring over the mass of a block in 1/s^2; that of elastic strips by default.
+        Spring stiffness divided by the mass of a block, in 1/s^2; by default the stiffness of elastic strips.
     step
         Sampling time T_s; the fault's by default.
     out

@@ -416,7 +416,7 @@ class WellOptions:
         str | None,
         Parameter(
             converter=_exact_reader("m"),
-            help="Distance of the well, such as '40 m', with --diffusivity, in place of --diffusion.",
+            help="Distance of the well, such as '40 m'. Give --well and --diffusivity together instead of --diffusion.",
         ),
     ] = None
     diffusivity: Annotated[

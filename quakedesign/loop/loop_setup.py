@@ -170,8 +170,8 @@ class LoopSetup:
     )
     slip_noise: Fraction = quantity(
         "m",
-        "Bound of the measurement error of the slip at any time, such as '1 um'; q/2 for readings in steps of q. "
-        "--slip-noise-deviation of simulate is a standard deviation.",
+        "Bound of the measurement error of the slip at any time, such as '1 um'. For a gauge with resolution q, give "
+        "q/2. --slip-noise-deviation of simulate is a standard deviation.",
     )
     rate_noise: Fraction = quantity("m/s", "Bound of the measurement error of the slip rate at any time.")
     initial_slip: Fraction = quantity(
@@ -189,11 +189,13 @@ class LoopSetup:
     delay_jitter: Fraction = quantity("s", "Largest additional time by which the pressure is early or late.")
     averaging_time: Fraction = quantity(
         "s",
-        "The law measures means of slip and slip rate over this time before each sample, from which --delay counts.",
+        "The law measures means of slip and slip rate over this time before each sample; --delay counts from the "
+        "sample.",
     )
     longest_step: Fraction = quantity(
         "s",
-        "Aperiodic sampling: longest interval between samples, T_s the shortest; the law does not know the intervals.",
+        "Aperiodic sampling: longest interval between samples; T_s is the shortest. The law does not know the "
+        "intervals.",
     )
     saturation: Fraction | None = quantity(
         "Pa",

@@ -46,7 +46,7 @@ class Delay(SampledStage):
             name="jitter",
             unit="",
             help="Largest random addition to the delay, in steps, drawn at every sample: with --delay '1 ms', steps of "
-            "1 ms and 1 the delay is 1 or 2 ms.",
+            "1 ms and --jitter 1, the delay is 1 or 2 ms.",
         ),
     )
 
