@@ -287,3 +287,12 @@ def test_the_summary_of_a_fault_fits_a_screen():
     lines = summary_lines(summary(comparison))
     assert len(lines) <= 40
     assert max(map(len, lines)) <= 80
+
+
+def test_the_legend_says_what_the_controllers_are_where_there_are_several():
+    said = made()
+    laws = "2-CTA, 2-DIA: sliding modes; e-LQR: linear feedback with disturbance estimate"
+    assert laws not in summary_lines(said)
+    several = replace(said, rows=(*said.rows, replace(said.rows[1], name="2-CTA")))
+    assert laws in summary_lines(several)
+    assert len(laws) <= 80
