@@ -66,7 +66,7 @@ for premise in paper.premises:
 
 # %% [markdown]
 # ## A forged certificate
-# A certificate with one gain exchanged is rejected. The other gains may have a proof of their own.
+# If one gain of a certificate is replaced, the check rejects the certificate. The changed set of gains may still have a proof of its own.
 
 # %%
 loop = cta.certificate.loop
@@ -98,7 +98,7 @@ display(elqr)
 
 # %% [markdown]
 # ## Simulations
-# First ten hours of the task, then the whole task, where errors count after a quarter of it. In the first hours the fault rests most of the time:
+# We simulate the first ten hours of the task, then the whole task. For the whole task, errors are evaluated only after its first quarter. In the first hours the fault rests most of the time:
 # the reference is slow compared with the disturbance. The table has samples at which the fault moves.
 
 # %%

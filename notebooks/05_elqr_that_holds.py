@@ -45,8 +45,8 @@ from own import printed_examples as examples  # beside this notebook
 
 # %% [markdown]
 # ## Friction that the bound does not contain
-# The first entry of $G$ as printed has the *uncertainty* of $\hat N$ where its value belongs. For the real fault with $\hat N$ known the bound is zero,
-# friction or no friction. The theorem then accepts a $K$ that leaves the fault unstable.
+# The first entry of $G$, as printed, contains the *uncertainty* of $\hat N$ instead of the value of $\hat N$. For the real fault with $\hat N$ known the bound is zero,
+# whatever the friction is. The theorem then accepts a $K$ that leaves the fault unstable.
 
 # %%
 missing = examples.printed_bound_example()
@@ -108,7 +108,7 @@ print(uncertainty_bounds(fault).table())
 # %% [markdown]
 # Turned round: with a given $Q$ the guarantee holds for every $R$ that leaves $Q - R\,W$ positive definite for some $w$. With $s_1 = R/w$ and $s_2 = R/(1-w)$ that
 # is a linear matrix inequality, $Q \ge \mathrm{diag}(g_1^2 s_1,\; g_2^2 s_2,\; 0,\; 0)$ and $\mathrm{diag}(s_1, s_2) \ge R\,11^\top$, to solve with cvxpy and to extend. It also has a closed form:
-# $R < (ab - c^2)/(g_1^2 b + g_2^2 a + 2 g_1 g_2 |c|)$, where $a$, $b$ and $c$ are the entries of what is left of $Q$ on $(x_1, x_2)$ for the best $\xi$.
+# $R < (ab - c^2)/(g_1^2 b + g_2^2 a + 2 g_1 g_2 |c|)$, where $a$, $b$ and $c$ are the entries of the Schur complement of $Q$ on $(x_1, x_2)$, that is, of $x^\top Q x$ minimised over the two integrals.
 
 # %%
 root = np.array([[3.0, 1, 0, 1], [-1, 2, 1, 0], [0, 1, 2, 0], [1, 0, 0, 3]])
@@ -124,7 +124,7 @@ print(f"largest R: {searched.value:.6f} by the matrix inequality, {closed:.6f} i
 # %% [markdown]
 # ## The published gains
 # `quakedesign certify elqr real-fault --gains …` answers for any $K$. A premise that fails says nothing against a $K$: the published gains tolerate almost
-# 25 times the friction slope of this fault, and no quadratic $V$ could do much better, since just above a constant slope is unstable. What they do not
+# 25 times the friction slope of this fault. No quadratic $V$ could prove much more, because the loop is unstable with a constant slope just above that limit. What they do not
 # tolerate is a pressure that is held for the 184 ms of this task.
 
 # %%
@@ -132,9 +132,9 @@ printed = judge(fault, qd.published("real-fault")["elqr"])
 print("\n".join(verdict_lines(printed)))
 
 # %% [markdown]
-# `design` with `continuous=True` gives gains in the way of the paper, for a pressure that acts at once. They are proved for every constant reference, and no more
-# stable than the published ones when that pressure is held. By default `design` is about the loop that samples and holds: what it never exceeds is proved, while
-# friction, stiffness and damping do what they like inside their ranges.
+# `design` with `continuous=True` gives gains in the way of the paper, for a pressure that acts at once. They are proved for every constant reference. With zero-order hold they are
+# unstable, like the published ones. By default `design` is about the sampled loop with zero-order hold. It proves bounds for all
+# friction, stiffness and damping inside their ranges.
 
 # %%
 design = qd.design(fault, "elqr", continuous=True)
@@ -146,8 +146,8 @@ print(sampled.sentence())
 # %% [markdown]
 # ## How fast can the fault slip?
 # The theorem is about a constant reference and a disturbance that vanishes. The task has neither: $r(t)$ moves and $|\varphi_e| \le 3.2\cdot10^{-4}$ m/s² does not
-# vanish. So write the loop with the middle of every range and put the rest into one bounded input, $a = \varphi_e - w r' - r'' + \delta_s e_1 - \delta_w e_2 + \delta_\beta b(p-p^*)$. What $a$ can do to
-# $e_1$, $e_2$ and $p$ are integrals of absolute impulse responses, $g_1$, $g_2$, $g_p$; where $m = \delta_s g_1 + \delta_w g_2 + \delta_\beta g_p < 1$, $|a| \le H/(1-m)$ for ever and with it everything else. *amplitude*: any
+# vanish. We therefore write the loop with the midpoint of every range, and collect all other terms in one bounded input, $a = \varphi_e - w r' - r'' + \delta_s e_1 - \delta_w e_2 + \delta_\beta b(p-p^*)$. The gains from $a$ to
+# $e_1$, $e_2$ and $p$ are integrals of absolute impulse responses, $g_1$, $g_2$, $g_p$; if $m = \delta_s g_1 + \delta_w g_2 + \delta_\beta g_p < 1$, then $|a| \le H/(1-m)$ for all $t \ge 0$, and $e_1$, $e_2$ and $p$ are bounded as well. *amplitude*: any
 # measurable disturbance of that size; *rate*: one that is also no faster than the sine of the task. This is continuous time, for a pressure that acts at once; `design.guarantee` says the same of the loop that runs.
 
 # %%
@@ -171,7 +171,7 @@ plt.show()
 
 # %% [markdown]
 # The bound is a file like any other certificate (`quakedesign certify elqr … --peaks amplitude --out FILE`), and `proofs/check.py` verifies it without this package, from the fault's data to the sentence. For a bound that is
-# one percent smaller it is refused: that is no proof of it.
+# one percent smaller the file is rejected, because it does not prove that bound.
 
 # %%
 certificate = peaks["amplitude"]

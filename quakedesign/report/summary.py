@@ -272,11 +272,13 @@ LEGEND = (
     "worst: worst case found; pressure: range proved for the box, else of the run",
     "tracked: slip within 2 % of the task's, slip rate within 1 % of the natural peak",
 )
+_LAWS = "2-CTA, 2-DIA: sliding modes; e-LQR: linear feedback with disturbance estimate"
 
 
 def summary_lines(said: Summary) -> list[str]:
     """Lines of at most 80 characters."""
-    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), *LEGEND, ""]
+    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), *LEGEND]
+    lines += [_LAWS, ""] if any(row.name.startswith("2-") for row in said.rows) else [""]
     lines += wrap(said.conditions, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     for note in said.notes:
         lines += wrap(note, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
