@@ -772,7 +772,9 @@ def _box(task: SlidingPlant) -> str:
         for axis, short in entries.items()
         if task.ranges[axis][0] < task.ranges[axis][1]
     ]
-    return f"for all constant {', '.join(wide)}" if wide else "for a, b and D_c as they are given"
+    if not wide:
+        return "for the constants of fault and friction as they are given"
+    return f"for all constant {', '.join(wide)}, all other constants as they are given"
 
 
 def _inside(low: Fraction, high: Fraction) -> str:
