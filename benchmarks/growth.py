@@ -14,7 +14,7 @@ from typing import Any
 
 import quakedesign as qd
 from quakedesign import cache
-from quakedesign.guarantees import Guarantee
+from quakedesign.guarantees import TrackingProof
 from quakedesign.guarantees.exact.norms import _norms
 from quakedesign.laws import family
 from quakedesign.loop import Actuator, Diffusion
@@ -63,9 +63,9 @@ def of_states() -> Iterator[Line]:
     for late in range(4):
         step = Fraction(1, 20)
         designing, found = spent(partial(qd.guarantee, FAULT, step=step, delay=late * step))
-        if isinstance(found.found, Guarantee):
+        if isinstance(found.proof, TrackingProof):
             _norms.cache_clear()
-            yield f"{len(found.found.loop.states)} states", spent(found.found.check)[0], f"designing {designing:.1f} s"
+            yield f"{len(found.proof.loop.states)} states", spent(found.proof.check)[0], f"designing {designing:.1f} s"
 
 
 def of_degree() -> Iterator[Line]:

@@ -25,8 +25,8 @@ import sympy as sp
 
 from quakedesign.fault import Disturbance, Fault, load_fault
 from quakedesign.files import temporary_folder
-from quakedesign.guarantees import Guarantee
-from quakedesign.guarantees.guarantee_result import LoopAnswer
+from quakedesign.guarantees import TrackingProof
+from quakedesign.guarantees.guarantee_result import TrackingGuarantee
 from quakedesign.laws import Controller, published
 from quakedesign.loop import Actuator, Delay, Lag, Saturation, simulation_scheme
 from quakedesign.loop.actuators.base import Stage
@@ -316,7 +316,7 @@ def _run(problem: CampaignProblem, specimens: int) -> Campaign:
         return run_campaign(problem, specimens, folder / "specimens", executor=SerialExecutor(), batch=specimens)
 
 
-def guarantees() -> dict[str, LoopAnswer]:
+def guarantees() -> dict[str, TrackingGuarantee]:
     """What is guaranteed of an e-LQR of the slip alone, in less and more of the apparatus, by its conditions."""
     fault = load_fault(PRESET)
     return {
@@ -333,7 +333,7 @@ def guarantees() -> dict[str, LoopAnswer]:
     }
 
 
-def as_proved(one: Apparatus, proof: Guarantee) -> Apparatus:
+def as_proved(one: Apparatus, proof: TrackingProof) -> Apparatus:
     """An apparatus with the delay and the lag of a proof, without jitter."""
     held = proof.held
     return replace(one, delay=int(held.delay / held.step), jitter=0, lag=float(held.lag))
@@ -341,7 +341,7 @@ def as_proved(one: Apparatus, proof: Guarantee) -> Apparatus:
 
 def guaranteed_in(
     one: Apparatus,
-    proof: Guarantee,
+    proof: TrackingProof,
     *,
     specimens: int = LANES,
     seed: int = 0,
@@ -354,7 +354,7 @@ def guaranteed_in(
 
 
 def guaranteed_problem(
-    one: Apparatus, proof: Guarantee, seed: int, *, duration: float | None = None
+    one: Apparatus, proof: TrackingProof, seed: int, *, duration: float | None = None
 ) -> CampaignProblem:
     """Campaign of a guaranteed law in an apparatus; duration in s, the whole task unless given."""
     noise = Measurement(slip_noise=float(proof.held.slip_noise), bounded=True)
@@ -449,8 +449,8 @@ def whole_task(found: LaboratoryFinding) -> LaboratoryFinding:
 def runs(folder: Path) -> None:
     """One specimen over the whole task, in what is printed, with stick, and in the apparatus."""
     stick, drawn = replace(Apparatus.printed(), stick=1), {}
-    proof = guarantees()["1 ms late, lag 1 ms, readings off by 500 nm, amplitude"].found
-    assert isinstance(proof, Guarantee)
+    proof = guarantees()["1 ms late, lag 1 ms, readings off by 500 nm, amplitude"].proof
+    assert isinstance(proof, TrackingProof)
     for name, one in {"stick, λ_d = 1e-5 m/s³": stick, "apparatus, λ_d = 1e-5 m/ms³": Apparatus.known()}.items():
         problems = {law: one.problem(gains, 0) for law, gains in published("lab-fault").items()}
         if one.bound == Apparatus.known().bound:
@@ -465,9 +465,9 @@ def guaranteed(folder: Path) -> None:
     known = Apparatus.known()
     for name, answer in guarantees().items():
         print(name, *answer.lines(), sep="\n  ", flush=True)
-        if isinstance(answer.found, Guarantee):
-            for where, one in (("as proved", as_proved(known, answer.found)), ("apparatus", known)):
-                keep(folder, [guaranteed_in(one, answer.found, duration=DURATION, name=f"{where}: {name}")])
+        if isinstance(answer.proof, TrackingProof):
+            for where, one in (("as proved", as_proved(known, answer.proof)), ("apparatus", known)):
+                keep(folder, [guaranteed_in(one, answer.proof, duration=DURATION, name=f"{where}: {name}")])
 
 
 if __name__ == "__main__":

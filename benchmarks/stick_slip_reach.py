@@ -68,11 +68,11 @@ def row(name, fault, options):
     answer = qd.guarantee(fault, plant="stick-slip", **options)
     spent = process_time() - began
     if not answer.proved:
-        return (name, f"none: {answer.found.reason}", "", "", "", f"{spent:.1f} s", *[""] * 3)
-    claims = answer.found.claims
+        return (name, f"none: {answer.proof.reason}", "", "", "", f"{spent:.1f} s", *[""] * 3)
+    claims = answer.proof.claims
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "proof.json"
-        save_guarantee(answer.found, path)
+        save_guarantee(answer.proof, path)
         checked = subprocess.run([sys.executable, CHECK, path], capture_output=True, text=True)
         seen = Attack(json.loads(path.read_text())).run()
     return (
@@ -80,7 +80,7 @@ def row(name, fault, options):
         f"{claims.peak_slip_rate:.3g} m/s",
         f"{claims.slip_behind:.3g} … {claims.slip_ahead:.3g} m",
         f"{answer.worst.peak_slip_rate / float(claims.peak_slip_rate):.2f}",
-        str(len(answer.found.reach.facets)),
+        str(len(answer.proof.reach.facets)),
         f"{spent:.1f} s",
         "proved" if checked.returncode == 0 else "REFUSED",
         f"{seen['facet']:.3f} ({seen['long_facet']:.3f})",

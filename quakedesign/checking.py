@@ -105,7 +105,7 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     lines = [f'fault "{claim.task.name}", by the data in the file', claim.sentence(), *about]
     if fault is not None:
         task, healing = _task(claim, fault), rational(fault.friction.rest_excess)
-        covers = isinstance(claim, guarantees.StickSlipGuarantee) and healing > 0
+        covers = isinstance(claim, guarantees.StickSlipProof) and healing > 0
         if covers and task.amplitude <= claim.task.amplitude:  # type: ignore[union-attr]
             covered = claim.covered_healing(task.amplitude)  # type: ignore[union-attr]
             if covered < healing:
@@ -137,7 +137,7 @@ def _plant(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
 
 def _task(claim: "Claim", fault: "Fault") -> "FaultPlant | SlidingPlant":
     """What a claim of the kind would be about on a fault."""
-    if not isinstance(claim, guarantees.SlidingGuarantee):
+    if not isinstance(claim, guarantees.SlidingProof):
         return plants.uncertain_plant(fault, rate_limited=claim.task.change is not None)
     low, high = claim.task.ranges["direct_effect"]
     return plants.slow_sliding_plant(fault, claim.task.stress, (high - low) / (high + low))
@@ -145,10 +145,10 @@ def _task(claim: "Claim", fault: "Fault") -> "FaultPlant | SlidingPlant":
 
 def _other_step(claim: "Claim", fault: "Fault") -> str:
     """The box, and that a loop is not sampled as the fault is, where it is so."""
-    if isinstance(claim, guarantees.SlidingGuarantee):
+    if isinstance(claim, guarantees.SlidingProof):
         return ""
     text = f", box {fault.box.name}"
-    if isinstance(claim, guarantees.ContinuousPeaks) or float(claim.held.step) == fault.sampling_time:
+    if isinstance(claim, guarantees.ContinuousProof) or float(claim.held.step) == fault.sampling_time:
         return text
     return f"{text}; NOT at its T_s = {fault.sampling_time:g} s, but at {float(claim.held.step):.4g} s"
 

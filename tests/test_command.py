@@ -13,7 +13,7 @@ from quakedesign import lyapunov as certificates
 from quakedesign.checking import check_files, statement
 from quakedesign.errors import CertificateError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee
+from quakedesign.guarantees import TrackingProof
 from quakedesign.lyapunov import Certificate, Verdict, load_certificate
 from quakedesign.lyapunov.exact.claim import Equilibrium
 from quakedesign.symbolic.terms import Term
@@ -69,7 +69,7 @@ def test_a_verdict_that_is_no_proof_covers_nobody(monkeypatch):
 
 def test_a_guarantee_covers_the_fault_whose_data_it_has(monkeypatch, tmp_path):
     path = CERTIFICATES / "guarantee_real-fault.json"
-    monkeypatch.setattr(Guarantee, "check", lambda self: Verdict.PROVED)
+    monkeypatch.setattr(TrackingProof, "check", lambda self: Verdict.PROVED)
     verdict, said = checked(path)
     assert (verdict, said[0]) == ("proved", 'fault "real-fault", by the data in the file')
     assert said[1].startswith("on the plant without stick, from rest, with zero-order hold over 0.184 s")
@@ -88,7 +88,7 @@ def test_a_guarantee_covers_the_fault_whose_data_it_has(monkeypatch, tmp_path):
     raw["disturbance"]["change"] = "7/31250"
     (tmp_path / "slow.json").write_text(json.dumps(raw))
     assert checked(tmp_path / "slow.json", "real-fault")[0] == 'invalid: the data are not those of "real-fault"'
-    monkeypatch.setattr(Guarantee, "check", lambda self: Verdict.UNDECIDED)
+    monkeypatch.setattr(TrackingProof, "check", lambda self: Verdict.UNDECIDED)
     expected = "invalid: the claims do not follow from the loop and the fault's data"
     assert checked(path) == (expected, [])
 

@@ -94,7 +94,7 @@ def test_premises_of_a_law_stand_beside_those_of_its_family():
 
 
 def test_what_runs_is_asked_of_ones_own_law_too():
-    assert qd.guarantee(LAB, controller=own_parts.PID).found.reason.startswith("no analysis of PID")
+    assert qd.guarantee(LAB, controller=own_parts.PID).proof.reason.startswith("no analysis of PID")
 
 
 def test_a_run_names_ones_own_law():

@@ -43,7 +43,7 @@ REPRESENTED = {
     "Trajectory": lambda: qd.simulate(qd.load_fault("lab-fault"), qd.published("lab-fault")["elqr"], duration=0.1),
     "Certificate": lambda: qd.load_certificate(CERTIFICATES / "cta_7_5_2.3_1.1.json"),
     "Design": lambda: qd.assess(qd.load_fault("lab-fault"), qd.published("lab-fault")["elqr"]),
-    "Guarantee": lambda: qd.load_guarantee(CERTIFICATES / "guarantee_real-fault.json"),
+    "TrackingProof": lambda: qd.load_guarantee(CERTIFICATES / "guarantee_real-fault.json"),
 }
 
 

@@ -164,7 +164,7 @@ def guarantee_chain(
     written = None if out is None or not found.proved else str(out)
     from quakedesign.studies.chains import ChainRun
 
-    one = None if sliding is not None else ChainRun(chain=chain, controller=law, found=found, run=None)
+    one = None if sliding is not None else ChainRun(chain=chain, controller=law, proof=found, run=None)
     output.show({**_facts(found, chain, one), "certificate": written}, [*_lines(found, chain, one), *unwritten])
     return 0 if found.proved else 1
 
@@ -201,7 +201,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
         *meant,
         "",
         *("  ".join(f"{v:{w}}" for v, w in zip(row, widths, strict=True)).rstrip() for row in rows),
-        *(f"{one.controller}: {one.found.sentence()}" for one in runs if one.run is None and one.found is not None),
+        *(f"{one.controller}: {one.proof.sentence()}" for one in runs if one.run is None and one.proof is not None),
         "",
         last,
     ]
@@ -216,9 +216,9 @@ def require_loads(chain: "BlockChain", sliding: dict[str, Any]) -> None:
 
 
 def _run_facts(one: "ChainRun | SlidingChainRun") -> dict[str, Any]:
-    if one.found is None:
+    if one.proof is None:
         return {"run": one.to_dict(), "guarantee": None}
-    found = _facts(one.found, one.chain, one)
+    found = _facts(one.proof, one.chain, one)
     return found if one.run is None else {"guarantee": found, "run": one.to_dict()}
 
 
@@ -268,7 +268,7 @@ def run_chain(
         if chain.ages:
             given |= {"tell": lambda done: tell("run", done)}
         one = run_sliding_chain(chain, **given) if chain.ages else run_of_chain(chain, **given)
-    found: Any = one.found
+    found: Any = one.proof
     facts = _run_facts(one)
     said = [] if found is None else _lines(found, chain, one)
     said += one.lines() if found is None or not found.proved else []

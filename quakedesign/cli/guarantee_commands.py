@@ -170,7 +170,7 @@ def _first(fault: Any, answer: Any) -> Iterator[str]:
         peak = None if fault.friction.state_names else natural_peak(fault)
     except SimulationError:  # whose earthquake cannot be computed
         peak = None
-    yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', answer.found, peak, fault.magnitude)}.", 80)
+    yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', answer.proof, peak, fault.magnitude)}.", 80)
     yield ""
 
 
@@ -205,7 +205,7 @@ def _facts(answer: Any, path: Path | None) -> dict[str, Any]:
     written = path if answer.proved else None
     if written is not None:
         with made_folder(written.parent):
-            save_guarantee(answer.found, written)
+            save_guarantee(answer.proof, written)
     return {**answer.to_dict(), "certificate": written and str(written)}
 
 

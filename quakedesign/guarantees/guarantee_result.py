@@ -19,9 +19,9 @@ from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS
 from quakedesign.guarantees.exact.limit_theorems import SlidingPush, SmallestPeak, longest_diffusion, smallest_peak
 from quakedesign.guarantees.exact.loop import Around, Held
-from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.exact.statement import Guarantee, SlidingGuarantee, guarantee
-from quakedesign.guarantees.loop_result import LoopResult
+from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.statement import SlidingProof, TrackingProof, guarantee
+from quakedesign.guarantees.loop_result import Guarantee
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding, worst_found, worst_sliding
 from quakedesign.guarantees.search.compensated_search import Compensation
 from quakedesign.guarantees.search.linear_design import AMPLITUDE, BOX, SATURATION
@@ -67,20 +67,20 @@ _TOLD = (
 
 
 @checked_dataclass(frozen=True, kw_only=True)
-class LoopAnswer(LoopResult):
+class TrackingGuarantee(Guarantee):
     """Guarantee of one loop, or the reason why there is none.
 
     Attributes
     ----------
     fault : Fault
-    found : Guarantee or NoGuarantee
+    proof : TrackingProof or NoProof
     worst, stick_search : WorstFound or None
         Of a search on the same loop, and on the stick–slip plant; None without a guarantee.
-    shorter : Guarantee or None
+    shorter : TrackingProof or None
         For a design without a guarantee at its step: one near the longest step that has one.
     asked_step : Fraction or None
         T_s [s] that has no guarantee where `shorter` has one.
-    nearest : (str, Guarantee) or None
+    nearest : (str, TrackingProof) or None
         For a loop without a guarantee: another quantity of its setup and a design with the value nearest to it that
         has one, all else as it is; `GAINS` for a design in place of given gains, `FACTOR` for a law with its pressure
         times `factor`.
@@ -96,12 +96,12 @@ class LoopAnswer(LoopResult):
     """
 
     fault: Fault
-    found: Guarantee | NoGuarantee
+    proof: TrackingProof | NoProof
     worst: WorstFound | None = None
     stick_search: WorstFound | None = None
-    shorter: Guarantee | None = None
+    shorter: TrackingProof | None = None
     asked_step: Fraction | None = None
-    nearest: tuple[str, Guarantee] | None = None
+    nearest: tuple[str, TrackingProof] | None = None
     factor: Fraction | None = None
     compensation: Compensation | None = None
     notes: tuple[str, ...] | None = None
@@ -114,9 +114,9 @@ class LoopAnswer(LoopResult):
 
         None for a law that uses the slip, the slip rate or the reference itself, or that is unstable by itself.
         """
-        if not (self.given and self.found.proved) or self.found.held.law.of_reference or self.grows_at_rest:
+        if not (self.given and self.proof.proved) or self.proof.held.law.of_reference or self.grows_at_rest:
             return self.stick_search
-        return worst_found(self.found, sticks=True)
+        return worst_found(self.proof, sticks=True)
 
     def lines(self) -> list[str]:
         """Lines of text: the guarantee first, then the worst case found, then what was changed in the law."""
@@ -128,10 +128,10 @@ class LoopAnswer(LoopResult):
         return [*self._lines(), *tried, *(healed if excess else ()), *(self.notes or ())]
 
     def _lines(self) -> list[str]:
-        if not self.found.proved:
-            lines = [self.found.sentence()]
+        if not self.proof.proved:
+            lines = [self.proof.sentence()]
             if self.asked_step is not None:
-                lines = [f"not guaranteed at T_s = {float(self.asked_step):g} s: {self.found.reason}"]
+                lines = [f"not guaranteed at T_s = {float(self.asked_step):g} s: {self.proof.reason}"]
             if self.shorter is not None:
                 lines.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             if self.nearest is not None:
@@ -142,7 +142,7 @@ class LoopAnswer(LoopResult):
             if len(lines) == 1 and not self.given:
                 lines.append("no T_s was found for which a design is proved with this box, disturbance and setup")
             return lines
-        lines = [f"proved: {self.found.sentence()}", *self._at_rest()]
+        lines = [f"proved: {self.proof.sentence()}", *self._at_rest()]
         for name, seen in (("", self.worst), (" on the stick-slip plant", self.worst_with_stick)):
             if seen is not None:
                 ends = [quantity(end, "Pa", 4) for end in seen.pressures or ()]
@@ -162,7 +162,7 @@ class LoopAnswer(LoopResult):
     def stick_slip_gap(self) -> str:
         """What is neither proved nor searched on the stick–slip plant; empty without a guarantee, and of a design."""
         seen = self.worst_with_stick
-        if not self.found.proved or (seen is not None and not (self.given and seen.pressures is None)):
+        if not self.proof.proved or (seen is not None and not (self.given and seen.pressures is None)):
             return ""
         searched = "case" if seen is None else "pressure"
         return (
@@ -176,16 +176,16 @@ class LoopAnswer(LoopResult):
 
         Then what is measured no longer answers to the pressure, and the law is left to itself.
         """
-        if not self.found.proved:
+        if not self.proof.proved:
             return None
-        return growth_at_rest(self.found.held.law, self.found.held.step)
+        return growth_at_rest(self.proof.held.law, self.proof.held.step)
 
     @property
     def differentiator_bound(self) -> UpperBound | None:
         """Least λ_d [m/s³] of the differentiator for the guarantee; None for a law without one."""
-        if not self.found.proved or measured_by(self.found.held.law) != MEASURED[2]:
+        if not self.proof.proved or measured_by(self.proof.held.law) != MEASURED[2]:
             return None
-        return UpperBound(least_bound(self.found.slip_acceleration, self.found.held.slip_noise, self.found.held.step))
+        return UpperBound(least_bound(self.proof.slip_acceleration, self.proof.held.slip_noise, self.proof.held.step))
 
     def _told(self) -> list[str]:
         """For people; nothing of a law without a differentiator."""
@@ -199,17 +199,17 @@ class LoopAnswer(LoopResult):
 
     def _at_rest(self) -> list[str]:
         """For people; nothing of a law that does not grow."""
-        if not self.found.proved:
+        if not self.proof.proved:
             return []
-        limited = self.found.rest_limit is not None
-        return list(filter(None, [warning_at_rest(self.found.held.law, self.found.held.step, limited=limited)]))
+        limited = self.proof.rest_limit is not None
+        return list(filter(None, [warning_at_rest(self.proof.held.law, self.proof.held.step, limited=limited)]))
 
     def limit_lines(self) -> list[str]:
         """Performance limits at the same T_s, as text; empty if unknown."""
         limit = self.limit
-        if limit is None or not self.found.proved:
+        if limit is None or not self.proof.proved:
             return []
-        held = self.found.held
+        held = self.proof.held
         step = f"{float(max(held.step, held.longest_step)):.6g} s"
         step += " with that noise" if held.noise else ""
         both = "" if limit.slip_error is None else f" while the slip error stays below {limit.slip_error.quantity('m')}"
@@ -226,7 +226,7 @@ class LoopAnswer(LoopResult):
     def _narrower_class(self) -> list[str]:
         """That the fault's own disturbance belongs to the class ``rate`` as well, for people."""
         given = self.fault.disturbance
-        own = self.found.proved and self.found.task.change is None
+        own = self.proof.proved and self.proof.task.change is None
         if not own or given.constant or not given.largest_rate:
             return []
         change = UpperBound(self.fault.disturbance_bounds[1])
@@ -238,12 +238,12 @@ class LoopAnswer(LoopResult):
     @property
     def limit(self) -> SmallestPeak | None:
         """Performance limit at the same T_s, delay and measurements; None for the class ``rate``."""
-        if not self.found.proved or self.found.task.change is not None:
+        if not self.proof.proved or self.proof.task.change is not None:
             return None
-        held = self.found.held
+        held = self.proof.held
         rate_noise = None if held.law.of_slip_alone else held.rate_noise
         step = max(held.step, held.longest_step)
-        return smallest_peak(self.found.task, step, held.delay, slip_noise=held.slip_noise, rate_noise=rate_noise)
+        return smallest_peak(self.proof.task, step, held.delay, slip_noise=held.slip_noise, rate_noise=rate_noise)
 
     @property
     def least_slip_rate(self) -> LowerBound | None:
@@ -253,9 +253,9 @@ class LoopAnswer(LoopResult):
     @property
     def leaves_with_stick(self) -> bool:
         """Whether the stick–slip plant exceeds the claims in the worst case found."""
-        if not self.found.proved or self.worst_with_stick is None:
+        if not self.proof.proved or self.worst_with_stick is None:
             return False
-        claims, seen = self.found.claims, self.worst_with_stick
+        claims, seen = self.proof.claims, self.worst_with_stick
         (least, largest), ends = claims.pressures[-1], seen.pressures
         if ends is not None and not least <= ends[0] <= ends[1] <= largest:
             return True
@@ -263,31 +263,31 @@ class LoopAnswer(LoopResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        if not self.found.proved:
-            gain = self.found.small_gain
+        if not self.proof.proved:
+            gain = self.proof.small_gain
             other = self.shorter
             shorter = None if other is None else {"step": str(other.held.step), **other.claims.to_dict()}
             return {
                 "verdict": "undecided",
-                "sentence": self.found.sentence(),
-                "reason": self.found.reason,
+                "sentence": self.proof.sentence(),
+                "reason": self.proof.reason,
                 "small_gain": None if gain is None else gain.exact,
                 "shorter": shorter,
                 "nearest": self.nearest and _nearest(*self.nearest, self.factor),
                 **({} if self.notes is None else {"notes": list(self.notes)}),
                 **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             }
-        bounds, held = self.found.bounds(), self.found.held
+        bounds, held = self.proof.bounds(), self.proof.held
         small = None if not bounds.proved else float_above(bounds.small_gain)
         return {
             "verdict": "proved",
-            "sentence": self.found.sentence(),
-            **self.found.claims.to_dict(),
+            "sentence": self.proof.sentence(),
+            **self.proof.claims.to_dict(),
             "small_gain": small,
             "worst_found": self.worst and asdict(self.worst),
             "worst_found_with_stick": self.worst_with_stick and asdict(self.worst_with_stick),
             "grows_at_rest": self.grows_at_rest,
-            "rest_limit": _rest_limit(self.found.rest_limit),
+            "rest_limit": _rest_limit(self.proof.rest_limit),
             "limit": _limit(self.limit),
             "measured": measured_by(held.law),
             "differentiator_bound": None if self.differentiator_bound is None else self.differentiator_bound.exact,
@@ -313,7 +313,7 @@ _QUANTITIES = {
 }
 
 
-def _with_nearest(name: str, found: Guarantee) -> str:
+def _with_nearest(name: str, found: TrackingProof) -> str:
     """For people."""
     if name == GAINS:
         return "with designed gains"
@@ -336,7 +336,7 @@ def _with_nearest(name: str, found: Guarantee) -> str:
     return f"with a pump of at least {UpperBound(pump.rate or 0).quantity('Pa/s')}"
 
 
-def _nearest(name: str, found: Guarantee, factor: Fraction | None) -> dict[str, Any]:
+def _nearest(name: str, found: TrackingProof, factor: Fraction | None) -> dict[str, Any]:
     """Plain values, SI; exact numbers as texts, of a box and of a pump's pressures several."""
     pump, value = found.held.pump, None
     if name == FACTOR:
@@ -352,38 +352,42 @@ def _nearest(name: str, found: Guarantee, factor: Fraction | None) -> dict[str, 
     return {"quantity": name, "value": value, **found.claims.to_dict()}
 
 
-def _widths(found: Guarantee) -> list[tuple[Fraction, str]]:
+def _widths(found: TrackingProof) -> list[tuple[Fraction, str]]:
     """Relative half-widths of the box of a guarantee, and of what."""
     return [pair for pair in zip(found.task.spreads, ("k", "eta", "N"), strict=True) if pair[0]]
 
 
-def attacked(fault: Fault, found: Guarantee | NoGuarantee) -> LoopAnswer:
+def attacked(fault: Fault, found: TrackingProof | NoProof) -> TrackingGuarantee:
     """A guarantee with the worst case found on its loop; about a second.
 
     Where a course with stick leaves a claim of a slow input gain, that of any gain takes its place if it is wider than
     the course.
     """
     if not found.proved:
-        return LoopAnswer(fault=fault, found=found)
-    seen = LoopAnswer(fault=fault, found=found, worst=worst_found(found), stick_search=worst_found(found, sticks=True))
+        return TrackingGuarantee(fault=fault, proof=found)
+    seen = TrackingGuarantee(
+        fault=fault, proof=found, worst=worst_found(found), stick_search=worst_found(found, sticks=True)
+    )
     return seen if found.slow_gain is None or not seen.leaves_with_stick else _with_room(seen, found)
 
 
-def given_answer(fault: Fault, found: Guarantee | NoGuarantee, notes: tuple[str, ...] | None = None) -> LoopAnswer:
+def given_answer(
+    fault: Fault, found: TrackingProof | NoProof, notes: tuple[str, ...] | None = None
+) -> TrackingGuarantee:
     """The guarantee of a given law with the worst case found, for a law of the errors alone."""
     worst = worst_found(found) if found.proved and not found.held.law.of_reference else None
-    return LoopAnswer(fault=fault, found=found, worst=worst, notes=notes, given=True)
+    return TrackingGuarantee(fault=fault, proof=found, worst=worst, notes=notes, given=True)
 
 
-def _with_room(seen: LoopAnswer, found: Guarantee) -> LoopAnswer:
+def _with_room(seen: TrackingGuarantee, found: TrackingProof) -> TrackingGuarantee:
     anyhow, worst = guarantee(found.task, found.held), seen.worst_with_stick
     if not anyhow.proved or worst is None:
         return seen
     left = ["slip_error"] if worst.slip_error > found.claims.slip_error else []
     left += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate_error > found.claims.slip_rate_error else []
     claims = replace(found.claims, **{name: getattr(anyhow.claims, name) for name in left})
-    wider = replace(seen, found=replace(found, claims=claims))
-    return seen if wider.leaves_with_stick or wider.found.check() is not Verdict.PROVED else wider
+    wider = replace(seen, proof=replace(found, claims=claims))
+    return seen if wider.leaves_with_stick or wider.proof.check() is not Verdict.PROVED else wider
 
 
 def _limit(limit: SmallestPeak | None) -> dict[str, str | None] | None:
@@ -417,18 +421,18 @@ _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of a
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlidingAnswer(LoopResult):
+class SlidingGuarantee(Guarantee):
     """Guarantee of slow sliding, or the reason why there is none.
 
     Attributes
     ----------
-    found : SlidingGuarantee or NoGuarantee
+    proof : SlidingProof or NoProof
     task : SlidingPlant
     held : Held or None
         The law as it runs; None where no law was found.
     """
 
-    found: SlidingGuarantee | NoGuarantee
+    proof: SlidingProof | NoProof
     task: SlidingPlant
     held: Held | None
     compensation: None = None
@@ -436,14 +440,14 @@ class SlidingAnswer(LoopResult):
     @cached_property
     def worst(self) -> WorstSliding | None:
         """Worst case found (lower bound); some tenths of a second for every corner of the box."""
-        return worst_sliding(self.found) if self.found.proved else None
+        return worst_sliding(self.proof) if self.proof.proved else None
 
     def lines(self) -> list[str]:
         """For people."""
         if self.worst is None:
-            return [self.found.sentence()]
+            return [self.proof.sentence()]
         seen = f"slip error {quantity(self.worst.slip_error, 'm')}, slip rate {exp(self.worst.log_rate):.4g} V"
-        return [f"proved: {self.found.sentence()}", f"worst case found without inertia: {seen}"]
+        return [f"proved: {self.proof.sentence()}", f"worst case found without inertia: {seen}"]
 
     def limit_lines(self) -> list[str]:
         """Performance limits at the same T_s; none is known."""
@@ -455,13 +459,13 @@ class SlidingAnswer(LoopResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        if not self.found.proved:
-            return {"verdict": "undecided", "sentence": self.found.sentence(), "reason": self.found.reason}
-        held = self.found.held
+        if not self.proof.proved:
+            return {"verdict": "undecided", "sentence": self.proof.sentence(), "reason": self.proof.reason}
+        held = self.proof.held
         return {
             "verdict": "proved",
-            "sentence": self.found.sentence(),
-            **self.found.to_dict(),
+            "sentence": self.proof.sentence(),
+            **self.proof.to_dict(),
             **{name: str(getattr(held, name)) for name in ("step", "diffusion", "lag", "delay", "slip_noise")},
             "measured": "slip",
             "worst_found": self.worst and asdict(self.worst),
@@ -477,7 +481,7 @@ def answer_sliding(
     spread: Fraction = Fraction(0),
     tell: Tell = lambda what, done: None,
     **around: Unpack[Around],
-) -> SlidingAnswer:
+) -> SlidingGuarantee:
     """Design and prove a law for a rate-and-state fault at the mean rate of its task.
 
     Parameters
@@ -541,17 +545,17 @@ def answer_sliding(
         smaller = _answer(task, held_over, log_rate, around, prove, reach.numbers)
         more = smaller.proved and (not answer.proved or smaller.task.stress > answer.task.stress)
         answer = smaller if more else answer
-    if not answer.found.proved and not remedy and stress:
+    if not answer.proof.proved and not remedy and stress:
         pumped: dict[str, Any] = {} if pump is None else {"pump": pump}
         remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, **around, **pumped))
         if remedy and answer.held is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
-            answer = replace(answer, found=NoGuarantee(reason=none, small_gain=None))
-    if not answer.found.proved and not remedy:
+            answer = replace(answer, proof=NoProof(reason=none, small_gain=None))
+    if not answer.proof.proved and not remedy:
         remedy = _with_less_noise(task, held_over, around, prove)
-    if not answer.found.proved:
-        why = (stress and _beyond(fault, stress, around)) or answer.found.reason
-        return replace(answer, found=replace(answer.found, reason="; ".join(filter(None, (why, remedy)))))
+    if not answer.proof.proved:
+        why = (stress and _beyond(fault, stress, around)) or answer.proof.reason
+        return replace(answer, proof=replace(answer.proof, reason="; ".join(filter(None, (why, remedy)))))
     return answer
 
 
@@ -569,7 +573,7 @@ def _beyond(fault: Fault, stress: Fraction, around: Around) -> str:
     )
 
 
-def _under_less(answer: SlidingAnswer) -> str:
+def _under_less(answer: SlidingGuarantee) -> str:
     """The stress for which a proof was found that is not for the one that was asked for; empty without one."""
     if not answer.proved:
         return ""
@@ -600,16 +604,16 @@ def _remedy(
 def _proof(pump: Pump | None, tell: Tell, *, given: bool) -> Prove:
     """Proofs whose pressures the pump can hold, under the task's stress if that is given, or about the largest."""
 
-    def tried(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+    def tried(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingProof | NoProof:
         under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
         tell(f"{under}: proof", _SEARCHED)
         found = _held_by(pump, proved_sliding(task, held, log_rate=log_rate))
         tell(f"{under}: {'proved' if found.proved else 'not proved'}", _SEARCHED)
         return found
 
-    def about_the_largest(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingGuarantee | NoGuarantee:
+    def about_the_largest(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingProof | NoProof:
         most = largest_stress(task, held, log_rate=log_rate)
-        found: SlidingGuarantee | NoGuarantee
+        found: SlidingProof | NoProof
         for share in _SHARES if most else _SHARES[:1]:
             found = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), held, log_rate)
             if found.proved:
@@ -626,18 +630,18 @@ def _answer(
     around: Around,
     prove: Prove,
     near: np.ndarray | None = None,
-) -> SlidingAnswer:
+) -> SlidingGuarantee:
     """With |ln(v/V)| at most `log_rate`, searched near the numbers of a law as well if they are told."""
     design = designed_sliding(task, step, log_rate=log_rate, near=near, **around)
-    if isinstance(design, NoGuarantee):
-        return SlidingAnswer(found=design, task=task, held=None)
+    if isinstance(design, NoProof):
+        return SlidingGuarantee(proof=design, task=task, held=None)
     proved = prove(task, design, log_rate)
-    return SlidingAnswer(found=proved, task=proved.task if proved.proved else task, held=design)
+    return SlidingGuarantee(proof=proved, task=proved.task if proved.proved else task, held=design)
 
 
-def _held_by(pump: Pump | None, found: SlidingGuarantee | NoGuarantee) -> SlidingGuarantee | NoGuarantee:
+def _held_by(pump: Pump | None, found: SlidingProof | NoProof) -> SlidingProof | NoProof:
     """A guarantee whose pressures at the valve the pump can hold."""
     if pump is None or not found.proved:
         return found
     too_much = pump.exceeded(*found.valve_pressures)
-    return NoGuarantee(reason=too_much, small_gain=None) if too_much else found
+    return NoProof(reason=too_much, small_gain=None) if too_much else found

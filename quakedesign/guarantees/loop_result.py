@@ -10,18 +10,18 @@ from quakedesign.guarantees.exact.guarantee_files import save_guarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 
 
-class LoopResult:
+class Guarantee:
     """Base of results with a guarantee, or the reason why there is none, in `found`; the worst case in `worst`."""
 
     __slots__ = ()
-    found: Any
+    proof: Any
     worst: Any
     compensation: Any
 
     @property
     def proved(self) -> bool:
         """Whether there is a guarantee."""
-        return bool(self.found.proved)
+        return bool(self.proof.proved)
 
     @property
     def verdict(self) -> Verdict:
@@ -31,7 +31,7 @@ class LoopResult:
     @property
     def reason(self) -> str:
         """Why there is no guarantee; empty if there is one."""
-        return "" if self.proved else self.found.reason
+        return "" if self.proved else self.proof.reason
 
     @property
     def bounds(self) -> dict[str, Bound]:
@@ -42,7 +42,7 @@ class LoopResult:
         """
         if not self.proved:
             return {}
-        found, claims = self.found, self.found.claims
+        found, claims = self.proof, self.proof.claims
         least, largest = found.pressures if hasattr(found, "pressures") else claims.pressures[0]
         named = {part.name: getattr(claims, part.name) for part in fields(claims)}
         named |= {"slip_error": claims.slip_error, "peak_slip_rate": found.peak_slip_rate}
@@ -62,11 +62,11 @@ class LoopResult:
 
     def sentence(self) -> str:
         """What is guaranteed and for what, or why nothing is."""
-        return str(self.found.sentence())
+        return str(self.proof.sentence())
 
     def check(self) -> Verdict:
         """Decide the guarantee again in exact arithmetic; UNDECIDED without one."""
-        return Verdict(self.found.check())
+        return Verdict(self.proof.check())
 
     @property
     def controller(self) -> Any:
@@ -97,4 +97,4 @@ class LoopResult:
             raise CertificateError(
                 f"a result must be proved to have a law and a certificate. Received {self.sentence()}."
             )
-        return self.found
+        return self.proof

@@ -9,9 +9,9 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees.exact.limit_theorems import smallest_stick_slip_rate
-from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
-from quakedesign.guarantees.loop_result import LoopResult
+from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
+from quakedesign.guarantees.loop_result import Guarantee
 from quakedesign.guarantees.search.compensated_search import Compensation, design_sticking
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip, design_stick_slip, worst_stick_slip
 from quakedesign.laws import SlidingMode
@@ -22,13 +22,13 @@ from quakedesign.text import quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StickSlipAnswer(LoopResult):
+class StickSlipGuarantee(Guarantee):
     """Guarantee of one loop on the stick–slip plant, or why there is none.
 
     Attributes
     ----------
     fault : Fault
-    found : StickSlipGuarantee or NoGuarantee
+    proof : StickSlipProof or NoProof
     worst : WorstStickSlip or None
         Largest values that a search reaches on the same loop: lower bounds of the worst case; None without a guarantee.
     compensation : Compensation or None
@@ -36,35 +36,35 @@ class StickSlipAnswer(LoopResult):
     """
 
     fault: Fault
-    found: StickSlipGuarantee | NoGuarantee
+    proof: StickSlipProof | NoProof
     worst: WorstStickSlip | None = None
     compensation: Compensation | None = None
 
     @property
     def least_slip_rate(self) -> LowerBound | None:
         """Slip rate [m/s] that the fault reaches at this T_s under every controller; None without a guarantee."""
-        if not self.found.proved:
+        if not self.proof.proved:
             return None
-        task = replace(self.found.task, amplitude=self.found.disturbance)  # which healing does not enlarge
-        return smallest_stick_slip_rate(task, self.found.held.longest)
+        task = replace(self.proof.task, amplitude=self.proof.disturbance)  # which healing does not enlarge
+        return smallest_stick_slip_rate(task, self.proof.held.longest)
 
     def limit_lines(self) -> list[str]:
         """Performance limit at the same T_s, as text; empty if unknown."""
         least = self.least_slip_rate
-        if least is None or not self.found.proved:
+        if least is None or not self.proof.proved:
             return []
         return [
-            f"no controller with zero-order hold over T_s = {float(self.found.held.longest):.6g} s keeps the slip rate "
+            f"no controller with zero-order hold over T_s = {float(self.proof.held.longest):.6g} s keeps the slip rate "
             f"below {least.quantity('m/s')} for all disturbances"
         ]
 
     def lines(self) -> list[str]:
         """For people: the sentence first, then the worst case found and the performance limit."""
-        if not self.found.proved:
-            return [self.found.sentence(), "the plant without stick may have a guarantee: use --plant printed"]
-        healing = self.found.covered_healing()
+        if not self.proof.proved:
+            return [self.proof.sentence(), "the plant without stick may have a guarantee: use --plant printed"]
+        healing = self.proof.covered_healing()
         parts = [
-            f"proved: {self.found.sentence()}",
+            f"proved: {self.proof.sentence()}",
             f"without a disturbance the same bounds hold if friction at rest is up to {healing:.3g} above friction in "
             "slip",
         ]
@@ -79,17 +79,17 @@ class StickSlipAnswer(LoopResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        if not self.found.proved:
-            return {"verdict": "undecided", "sentence": self.found.sentence(), "reason": self.found.reason}
-        worst, law = self.worst, self.found.held.law
+        if not self.proof.proved:
+            return {"verdict": "undecided", "sentence": self.proof.sentence(), "reason": self.proof.reason}
+        worst, law = self.worst, self.proof.held.law
         return {
             "verdict": "proved",
-            "sentence": self.found.sentence(),
-            "plant": self.found.plant,
-            "slip_error": self.found.claims.slip_error.exact,
-            **self.found.claims.to_dict(),
-            "covered_healing": float(self.found.covered_healing()),
-            "healing": str(self.found.healing),
+            "sentence": self.proof.sentence(),
+            "plant": self.proof.plant,
+            "slip_error": self.proof.claims.slip_error.exact,
+            **self.proof.claims.to_dict(),
+            "covered_healing": float(self.proof.covered_healing()),
+            "healing": str(self.proof.healing),
             "worst_found": worst
             and {
                 "slip_error": worst.slip_error,
@@ -98,9 +98,9 @@ class StickSlipAnswer(LoopResult):
                 "slip_ahead": worst.slip_ahead,
             },
             "limit": None if (least := self.least_slip_rate) is None else {"slip_rate": least.exact},
-            "step": str(self.found.held.step),
-            **({"longest_step": str(self.found.held.longest_step)} if self.found.held.longest_step else {}),
-            **{name: str(size) for name, size in self.found.held.noise.items()},
+            "step": str(self.proof.held.step),
+            **({"longest_step": str(self.proof.held.longest_step)} if self.proof.held.longest_step else {}),
+            **{name: str(size) for name, size in self.proof.held.noise.items()},
             "law": {name: str(getattr(law, name)) for name in GAIN_UNITS},
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
@@ -117,7 +117,7 @@ def answer_stick_slip(
     objective: str = "tracking",
     sliding: SlidingMode | None = None,
     progress: Callable[[str, float], None] | None = None,
-) -> StickSlipAnswer:
+) -> StickSlipGuarantee:
     """Design a law for the stick–slip plant and prove its bounds.
 
     Parameters
@@ -152,15 +152,15 @@ def answer_stick_slip(
     if sliding is None:
         return attacked_stick_slip(fault, design_stick_slip(task, step, **wanted))
     made = design_sticking(task, sliding, step, **wanted)
-    if isinstance(made, NoGuarantee):
+    if isinstance(made, NoProof):
         return attacked_stick_slip(fault, made)
-    assert isinstance(made.found, StickSlipGuarantee)
-    return attacked_stick_slip(fault, made.found, made)
+    assert isinstance(made.proof, StickSlipProof)
+    return attacked_stick_slip(fault, made.proof, made)
 
 
 def attacked_stick_slip(
-    fault: Fault, found: StickSlipGuarantee | NoGuarantee, compensation: Compensation | None = None
-) -> StickSlipAnswer:
+    fault: Fault, found: StickSlipProof | NoProof, compensation: Compensation | None = None
+) -> StickSlipGuarantee:
     """A guarantee with the worst case found on its loop."""
     worst = worst_stick_slip(found) if found.proved else None
-    return StickSlipAnswer(fault=fault, found=found, worst=worst, compensation=compensation)
+    return StickSlipGuarantee(fault=fault, proof=found, worst=worst, compensation=compensation)

@@ -12,7 +12,7 @@ from typing import Any
 from quakedesign.errors import OutputError
 from quakedesign.exact import rational
 from quakedesign.fault import Fault
-from quakedesign.guarantees import ContinuousPeaks, NoGuarantee
+from quakedesign.guarantees import ContinuousProof, NoProof
 from quakedesign.guarantees.exact.guarantee_files import save_guarantee
 from quakedesign.guarantees.search.linear_design import certified_peaks
 from quakedesign.laws.elqr import ExtendedLQR
@@ -98,7 +98,7 @@ class LinearVerdict:
     analysis: Analysis
     facts: Mapping[str, Any]  # mapping: See `linear_facts`
     held: HeldLoop  # What is decided when p is held over the sampling period asked for
-    peaks: ContinuousPeaks | NoGuarantee | None  # In continuous time; None when they were not asked for
+    peaks: ContinuousProof | NoProof | None  # In continuous time; None when they were not asked for
     asked: str | None = None  # Class of the disturbance for which peaks were asked for
 
     def to_dict(self) -> dict[str, Any]:
@@ -106,13 +106,13 @@ class LinearVerdict:
         return {
             **self.analysis.to_dict(),
             **self.facts,
-            "peaks": self.peaks.to_dict() if isinstance(self.peaks, ContinuousPeaks) else None,
+            "peaks": self.peaks.to_dict() if isinstance(self.peaks, ContinuousProof) else None,
         }
 
-    def proofs(self) -> dict[str, Certificate | Answer | ContinuousPeaks]:
+    def proofs(self) -> dict[str, Certificate | Answer | ContinuousProof]:
         """Every proof that has a file format, by name."""
-        by_name: dict[str, Certificate | Answer | ContinuousPeaks] = dict(self.analysis.certificates)
-        if isinstance(self.peaks, ContinuousPeaks):
+        by_name: dict[str, Certificate | Answer | ContinuousProof] = dict(self.analysis.certificates)
+        if isinstance(self.peaks, ContinuousProof):
             by_name["peaks"] = self.peaks
         problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
         held = held_files(problem, gains, self.held.runs)
@@ -142,7 +142,7 @@ class LinearVerdict:
                 "Give --force to replace them."
             )
         for name, proof in proofs.items():
-            if isinstance(proof, ContinuousPeaks):
+            if isinstance(proof, ContinuousProof):
                 save_guarantee(proof, paths[name])
             else:
                 proof.save(paths[name])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quakedesign.fault import Fault
-from quakedesign.guarantees import Guarantee, SlidingGuarantee
+from quakedesign.guarantees import SlidingProof, TrackingProof
 from quakedesign.report.drawing import (
     INDUCED,
     NATURAL,
@@ -426,8 +426,8 @@ def _proved_bounds(slip: Any, rate: Any, entries: "Sequence[Entry]") -> None:
     bounds: dict[tuple[float, float], tuple[str, str]] = {}
     for entry in entries:
         found = entry.guaranteed
-        if found is not None and not isinstance(found, SlidingGuarantee):
-            label = "proved for the plant without stick" if isinstance(found, Guarantee) else "proved"
+        if found is not None and not isinstance(found, SlidingProof):
+            label = "proved for the plant without stick" if isinstance(found, TrackingProof) else "proved"
             ends = float(found.claims.slip_error), float(found.slip_rate_error)
             bounds.setdefault(ends, (colour(entry.design.name), label))
     named = set[str]()

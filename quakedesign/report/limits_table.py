@@ -9,7 +9,7 @@ import numpy as np
 
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational
 from quakedesign.files import whole_folder
-from quakedesign.guarantees import SlidingGuarantee
+from quakedesign.guarantees import SlidingProof
 from quakedesign.report.drawing import NATURAL, figure, finish, write_figures, write_results
 from quakedesign.studies import Limits
 from quakedesign.studies.performance_limits import SlidingLimits
@@ -106,7 +106,7 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
     ]
 
 
-def _constants(found: SlidingGuarantee) -> str:
+def _constants(found: SlidingProof) -> str:
     """Whether the design is for a spread of a, b and D_c."""
     low, high = found.task.ranges["direct_effect"]
     spread = UpperBound((high - low) / (high + low))
@@ -118,7 +118,7 @@ def _box(limits: Limits) -> str:
     return "" if isinstance(limits, SlidingLimits) else f"box {limits.fault.box.name}, "
 
 
-def _path(found: SlidingGuarantee) -> str:
+def _path(found: SlidingProof) -> str:
     """What the design that is proved stands behind."""
     ways = {"a lag of": found.held.lag, "rock of L^2/D =": found.held.diffusion}
     lines = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]

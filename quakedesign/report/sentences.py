@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational
 from quakedesign.fault import Fault, SlidingReference
-from quakedesign.guarantees import ContinuousPeaks, Guarantee, NoGuarantee
+from quakedesign.guarantees import ContinuousProof, NoProof, TrackingProof
 from quakedesign.laws import control_laws
 from quakedesign.linear.robust_stability import Analysis
 from quakedesign.linear.sampled_stability import HeldLoop
@@ -27,7 +27,7 @@ from quakedesign.synthesis import Design
 from quakedesign.text import lasting, quantity
 
 if TYPE_CHECKING:
-    from quakedesign.guarantees import SlidingGuarantee, StickSlipGuarantee
+    from quakedesign.guarantees import SlidingProof, StickSlipProof
     from quakedesign.simulation.recorder import Metrics
     from quakedesign.studies.runs import StateRun
 
@@ -51,7 +51,7 @@ def grade(entry: "Entry") -> str:
     return f"{reach}; UNSTABLE with zero-order hold over T_s" if _unstable_if_held(entry) else reach
 
 
-def _guaranteed(found: "Guarantee | SlidingGuarantee | StickSlipGuarantee") -> str:
+def _guaranteed(found: "TrackingProof | SlidingProof | StickSlipProof") -> str:
     return f"guaranteed: slip rate <= {found.peak_slip_rate:.3g} m/s, slip error <= {found.claims.slip_error:.3g} m"
 
 
@@ -180,7 +180,7 @@ def _proved_up_to(held: HeldLoop) -> str:
     return proved if held.refuted_step is None else f"{proved} and refuted for {held.refuted_step:.15g} s"
 
 
-def peaks_sentence(peaks: Mapping[str, ContinuousPeaks | NoGuarantee]) -> str:
+def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
     """How fast the fault can slip at most in continuous time, for every class of disturbances that was asked for."""
     lines = [
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
@@ -328,7 +328,7 @@ def _verdict(design: Design, run: Trajectory | None) -> list[str]:
     """Of the sampled loop or in continuous time, with the reason where it is not positive."""
     if design.verdict is Verdict.PROVED:
         lasts = "for all t >= 0" if design.runs is None or not design.runs.proved else design.runs.lasts
-        plant, proved = "for the loop that ran", getattr(design.runs, "plant", Guarantee.plant)
+        plant, proved = "for the loop that ran", getattr(design.runs, "plant", TrackingProof.plant)
         slides = bool(design.fault.friction.state_names)  # forward throughout, on either plant
         if run is not None and run.provenance["plant"] != proved and not slides:
             other = "stick-slip plant" if proved == STICK_SLIP else "plant without stick"

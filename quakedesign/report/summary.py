@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from quakedesign.exact import Bound, LowerBound, UpperBound
 from quakedesign.fault.fault_toml import beyond_rates, mean_rate
-from quakedesign.guarantees import Guarantee, SlidingGuarantee, StickSlipGuarantee
+from quakedesign.guarantees import SlidingProof, StickSlipProof, TrackingProof
 from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
 from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines, steady_start_sentence
@@ -76,7 +76,7 @@ def _answer(comparison: "Compared", best: "Entry | None") -> str:
 
 def guaranteed_sentence(
     first: str,
-    found: Guarantee | SlidingGuarantee | StickSlipGuarantee,
+    found: TrackingProof | SlidingProof | StickSlipProof,
     earthquake: float | None,
     magnitude: float,
     law: str = "",
@@ -90,12 +90,12 @@ def guaranteed_sentence(
         ratio = UpperBound(100 * Fraction(rate) / Fraction(earthquake))
         size = "" if isnan(magnitude) else f", magnitude {magnitude:.1f}"
         share = f" ({ratio:.2g} % of the natural earthquake's {quantity(earthquake, 'm/s')}{size})"
-    plant = "on the plant without stick" if isinstance(found, Guarantee) else ""
+    plant = "on the plant without stick" if isinstance(found, TrackingProof) else ""
     under = ", ".join(filter(None, (plant, law)))
     under = f"{under[:1].upper()}{under[1:]}{',' if plant else ''} the" if under else "The"
-    sticks = ", whether the fault slides or sticks" if isinstance(found, StickSlipGuarantee) else ""
+    sticks = ", whether the fault slides or sticks" if isinstance(found, StickSlipProof) else ""
     slow, task = "", ""
-    if isinstance(found, SlidingGuarantee):
+    if isinstance(found, SlidingProof):
         stress = LowerBound(found.task.stress).quantity("Pa")
         slow = f" {found.lasts}, under every shear stress disturbance of at most {stress}"
     else:
@@ -108,7 +108,7 @@ def guaranteed_sentence(
 
 
 def _without_stick(entry: "Entry") -> bool:
-    return isinstance(entry.guaranteed, Guarantee)
+    return isinstance(entry.guaranteed, TrackingProof)
 
 
 def _conditions(designed: Sequence["Entry"], best: "Entry | None") -> str:
@@ -136,9 +136,9 @@ def _row(entry: "Entry") -> Row:
     rate = None if worst is None else worst_slip_rate(worst, found)
     seen = pressure_extremes(run) if run else None
     pressure: tuple[Bound | float, Bound | float] | None = seen
-    if isinstance(found, SlidingGuarantee):
+    if isinstance(found, SlidingProof):
         pressure = found.valve_pressures
-    elif isinstance(found, Guarantee | StickSlipGuarantee):
+    elif isinstance(found, TrackingProof | StickSlipProof):
         pressure = found.claims.pressures[-1]
     label = entry.label.removesuffix(" (designed)").removesuffix(" (given)").replace(" (published)", " published")
     return Row(
@@ -155,11 +155,11 @@ def _row(entry: "Entry") -> Row:
 
 
 def worst_slip_rate(
-    worst: WorstFound | WorstSliding | WorstStickSlip, found: Guarantee | SlidingGuarantee | StickSlipGuarantee | None
+    worst: WorstFound | WorstSliding | WorstStickSlip, found: TrackingProof | SlidingProof | StickSlipProof | None
 ) -> float:
     """Slip rate [m/s] of the worst case found; its error if only that is computed."""
     if isinstance(worst, WorstSliding):
-        assert isinstance(found, SlidingGuarantee)
+        assert isinstance(found, SlidingProof)
         return float(found.task.rate) * exp(worst.log_rate)
     return worst.peak_slip_rate if isinstance(worst, WorstStickSlip) else worst.slip_rate_error
 

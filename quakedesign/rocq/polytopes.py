@@ -11,7 +11,7 @@ from flint import ctx
 
 from quakedesign.errors import UnsupportedError
 from quakedesign.exact import fraction_of
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import (
     BALLS,
     BITS,
@@ -36,7 +36,7 @@ _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (
 """Least or largest r' of four polytopes, by the order of `resting_rows`."""
 
 
-def polytope_theorem(claim: StickSlipGuarantee) -> Iterator[str]:
+def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
     """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant."""
     task, held, reach = claim.task, claim.held, claim.reach
     if held.longest_step:

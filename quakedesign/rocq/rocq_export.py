@@ -8,7 +8,7 @@ from typing import Any, cast
 from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.files import made_folder, sole_writer, write_whole
 from quakedesign.guarantees.exact.guarantee_files import read_guarantee
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
 from quakedesign.lyapunov.exact.certificate_files import (
     ATTRACTION,
     POLYNOMIAL,
@@ -126,7 +126,7 @@ def library(names: Sequence[str] = _LIBRARY) -> list[str]:
 
 
 def _stick_slip(raw: Any) -> Iterator[str]:
-    yield from polytope_theorem(cast(StickSlipGuarantee, read_guarantee(raw)))
+    yield from polytope_theorem(cast(StickSlipProof, read_guarantee(raw)))
 
 
 def _polynomial(raw: Any) -> Iterator[str]:

@@ -7,8 +7,8 @@ from typing import Any
 
 from quakedesign.exact import UpperBound, rational
 from quakedesign.fault import Fault
-from quakedesign.guarantees import NoGuarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.guarantees import NoProof
+from quakedesign.guarantees.exact.plant_guarantee import PlantProof
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.plant import UncertainPlant
 from quakedesign.synthesis import guarantee
@@ -21,7 +21,7 @@ class BlocksAnswer:
     fault: Fault
     wells: str  # ``"one"`` or ``"each"``
     step: Fraction  # T_s [s]
-    found: Mapping[int, PlantGuarantee | NoGuarantee]  # By the number of blocks
+    found: Mapping[int, PlantProof | NoProof]  # By the number of blocks
 
     @property
     def proved(self) -> bool:

@@ -13,9 +13,9 @@ import numpy as np
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import BlockChain, Disturbance, SlidingReference
-from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, named
+from quakedesign.guarantees.exact.plant_guarantee import PlantProof, named
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
 from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.search.plant_search import linear_part
@@ -85,7 +85,7 @@ def chain_dict(chain: BlockChain) -> dict[str, Any]:
 # A designed law, its proof and a run.
 
 
-def farthest_balance(chain: BlockChain, found: PlantGuarantee) -> UpperBound | None:
+def farthest_balance(chain: BlockChain, found: PlantProof) -> UpperBound | None:
     """How far from the reference a block may be at balance [m], under fewer wells than blocks; else None."""
     N, task = len(chain.blocks), uncertain_plant(chain.fault)
     if len(chain.wells) == N:
@@ -130,7 +130,7 @@ class ChainRun:
 
     chain: BlockChain
     controller: str
-    found: Any
+    proof: Any
     run: BlockRun | None
 
     @property
@@ -142,7 +142,7 @@ class ChainRun:
         """Largest values of all blocks for a table: law, proved slip rate and slip, those of the run, pressures."""
         if self.run is None:
             return [self.controller, "none", *[""] * 5]
-        outputs, N = self.found.claims.outputs, len(self.chain.blocks)
+        outputs, N = self.proof.claims.outputs, len(self.chain.blocks)
         worst = self.run.slip_rate_error.max(), self.run.slip_error.max()
         return table_row(self.controller, max(outputs[N:]), max(outputs[:N]), worst, self.run.pressure)
 
@@ -150,12 +150,12 @@ class ChainRun:
     def answer(self) -> str:
         """What is guaranteed, beside the natural earthquake."""
         N, peak = len(self.chain.blocks), natural_peak(self.chain)
-        rate, slip = max(self.proved_slip_rates), max(self.found.claims.outputs[:N])
+        rate, slip = max(self.proved_slip_rates), max(self.proof.claims.outputs[:N])
         share = ""
         if peak is not None:
             ratio = UpperBound(100 * rate / rational(peak))
             share = f" ({ratio:.2g} % of the natural earthquake's {quantity(peak, 'm/s')})"
-        far = farthest_balance(self.chain, self.found)
+        far = farthest_balance(self.chain, self.proof)
         about = "the reference"
         if far is not None:
             about = f"its equilibrium, which lies within {far.quantity('m')} of the reference"
@@ -169,7 +169,7 @@ class ChainRun:
     def proved_slip_rates(self) -> list[UpperBound]:
         """Bounds of the slip rates themselves [m/s], that of the reference included."""
         first = uncertain_plant(self.chain.fault).reference_rates[0]
-        return [UpperBound(first + error) for error in self.found.claims.outputs[len(self.chain.blocks) :]]
+        return [UpperBound(first + error) for error in self.proof.claims.outputs[len(self.chain.blocks) :]]
 
     @property
     def proved_pressures(self) -> list[tuple[LowerBound, UpperBound]] | None:
@@ -180,7 +180,7 @@ class ChainRun:
             return None
         rest = [uncertain_plant(fault).rest_pressure for fault in chain.faults]
         ends = []
-        for row, error in zip(inverse, self.found.claims.controls, strict=True):
+        for row, error in zip(inverse, self.proof.claims.controls, strict=True):
             low, high = (
                 sum((v * p[(v < 0) != side] for v, p in zip(row, rest, strict=True)), Fraction(0)) for side in (0, 1)
             )
@@ -204,9 +204,9 @@ class ChainRun:
     def lines(self) -> list[str]:
         """Lines of at most 80 characters: blocks and wells, what is proved beside what a run shows."""
         chain, run, N = self.chain, self.run, len(self.chain.blocks)
-        if not self.found.proved:
+        if not self.proof.proved:
             return [_NO_RUN]
-        rates, slips = self.proved_slip_rates, [UpperBound(v) for v in self.found.claims.outputs[:N]]
+        rates, slips = self.proved_slip_rates, [UpperBound(v) for v in self.proof.claims.outputs[:N]]
         powers = [power_of(float(max(values))) for values in (rates, slips)]
         heads = ["", f"slip rate [{PREFIXES[powers[0]]}m/s]", f"slip error [{PREFIXES[powers[1]]}m]"]
         parts = [
@@ -279,7 +279,7 @@ def chain_law(
         return guarantee(chain, controller, **sliding)
     claim = load_guarantee(certificate)
     if chain.ages:
-        if not isinstance(claim, PlantGuarantee):
+        if not isinstance(claim, PlantProof):
             raise CertificateError(
                 f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of "
                 "guarantee."
@@ -287,7 +287,7 @@ def chain_law(
         found: Any = covered_stress(chain, claim)[-1]
     else:
         plant = UncertainPlant.from_blocks(chain)
-        if not isinstance(claim, PlantGuarantee) or claim.part != linear_part(plant, {}):
+        if not isinstance(claim, PlantProof) or claim.part != linear_part(plant, {}):
             raise CertificateError(
                 f"a certificate must be about the fault. Received {certificate}, about another plant than "
                 f"{plant.name}. Give a file of guarantee {chain.name} --out FILE."
@@ -326,7 +326,7 @@ def run_of_chain(
     whole_periods(chain, rational(chain.fault.sampling_time), duration)  # is refused before the long search
     found = chain_law(chain, controller, certificate)
     run = simulate_blocks(chain, found.law, duration=duration) if found.proved else None
-    return ChainRun(chain=chain, controller=controller, found=found, run=run)
+    return ChainRun(chain=chain, controller=controller, proof=found, run=run)
 
 
 # ----------------------------------------------------------------------
@@ -340,7 +340,7 @@ class SlidingChainRun:
     chain: BlockChain
     run: SlidersRun | None
     inertia: bool
-    found: PlantGuarantee | NoGuarantee | None = None
+    proof: PlantProof | NoProof | None = None
     controller: str = ""
     # Lag [s] and largest stress [Pa] that the guarantee covers, its bound of |ln(v/V)|, and the stress of the run [Pa]
     lag: Fraction = Fraction(0)
@@ -355,10 +355,10 @@ class SlidingChainRun:
 
     def row(self) -> list[str]:
         """As of `ChainRun`; slip rates themselves, and pressures beside the plan."""
-        if self.run is None or self.found is None:
+        if self.run is None or self.proof is None:
             return [self.controller, "none", *[""] * 5]
         rate = SlidingReference(task=self.chain.fault.reference).first_rate * exponential(self.log_rate)
-        slip = max(self.found.claims.outputs[: len(self.chain.blocks)])  # type: ignore[union-attr]
+        slip = max(self.proof.claims.outputs[: len(self.chain.blocks)])  # type: ignore[union-attr]
         worst = self.run.slip_rate.max(), self.errors["slip_error"].max()
         return table_row(self.controller, rate, slip, worst, self.run.pressure)
 
@@ -386,8 +386,8 @@ class SlidingChainRun:
     @property
     def within(self) -> bool:
         """Whether all errors of a run under a law are within what is proved of their blocks and wells."""
-        assert isinstance(self.found, PlantGuarantee)
-        N, claims, errors = len(self.chain.blocks), self.found.claims, self.errors
+        assert isinstance(self.proof, PlantProof)
+        N, claims, errors = len(self.chain.blocks), self.proof.claims, self.errors
         lines = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
         proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
         return bool((np.concatenate(lines) <= np.array(proved, dtype=float)).all())
@@ -405,7 +405,7 @@ class SlidingChainRun:
         if self.run is None:
             return [_NO_RUN]
         end = lasting(float(self.run.times[-1]))
-        if self.found is not None:
+        if self.proof is not None:
             covered = LowerBound(self.covered).quantity("Pa")
             parts = [
                 f"run over {end} under a sine of {quantity(self.stress, 'Pa')} of shear on every block; proved for up "
@@ -449,7 +449,7 @@ class SlidingChainRun:
             "duration": float(run.times[-1]),
             "steps": len(run.times),
         }
-        if self.found is not None:
+        if self.proof is not None:
             errors = {f"max_{name}": values.tolist() for name, values in self.errors.items()}
             content = {"lag": float(self.lag), "stress": self.stress, "covered_stress": float(self.covered)}
             content |= {"proved_log_rate": float(self.log_rate)}
@@ -504,7 +504,7 @@ def run_sliding_chain(
         raise ParameterError("the far end rests in slow sliding. Received a loading rate. Omit it.")
     found = chain_law(chain, controller, certificate, **(sliding or {}))
     if not found.proved:
-        return SlidingChainRun(chain=chain, run=None, inertia=inertia, found=found, controller=controller)
+        return SlidingChainRun(chain=chain, run=None, inertia=inertia, proof=found, controller=controller)
     lag, covered, rate, _ = covered_stress(chain, found)
     size = float(covered) if stress is None else stress
     held = simulate_held_blocks(
@@ -518,4 +518,4 @@ def run_sliding_chain(
         progress=tell,
     )
     entries: dict[str, Any] = {"lag": lag, "covered": covered, "log_rate": rate, "stress": size}
-    return SlidingChainRun(chain=chain, run=held, inertia=inertia, found=found, controller=controller, **entries)
+    return SlidingChainRun(chain=chain, run=held, inertia=inertia, proof=found, controller=controller, **entries)

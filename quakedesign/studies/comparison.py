@@ -15,16 +15,16 @@ from quakedesign.exact import Enclosure, rational
 from quakedesign.fault import Fault, require_fault
 from quakedesign.guarantees import (
     CLASSES,
-    ContinuousPeaks,
-    Guarantee,
-    LoopAnswer,
-    NoGuarantee,
-    SlidingGuarantee,
-    StickSlipAnswer,
+    ContinuousProof,
+    NoProof,
+    SlidingProof,
     StickSlipGuarantee,
+    StickSlipProof,
+    TrackingGuarantee,
+    TrackingProof,
     attacked,
 )
-from quakedesign.guarantees.guarantee_result import SlidingAnswer, given_answer
+from quakedesign.guarantees.guarantee_result import SlidingGuarantee, given_answer
 from quakedesign.guarantees.stick_slip_answer import attacked_stick_slip
 from quakedesign.laws import Controller, published
 from quakedesign.linear.riccati import vertex_poles
@@ -73,11 +73,11 @@ class Entry:
         For a designed sliding mode: certified properties of the same gains with every named feed-forward.
     held : HeldLoop or None
         For a linear law: stability with zero-order hold over T_s, see `Design.held_loop`.
-    peaks : mapping of str to ContinuousPeaks
+    peaks : mapping of str to ContinuousProof
         For a designed linear law that is proved: peaks in continuous time by class; no class without any.
     given : bool
         Whether the law is given, not designed.
-    answer : LoopAnswer, SlidingAnswer, StickSlipAnswer or None
+    answer : TrackingGuarantee, SlidingGuarantee, StickSlipGuarantee or None
         For a designed or given law: guarantee with zero-order hold over T_s, see `Design.guarantee`, and worst case
         found.
     """
@@ -90,9 +90,9 @@ class Entry:
     growth_per_step: float | None = None
     variants: tuple[Variant, ...] = ()
     held: HeldLoop | None = None
-    peaks: Mapping[str, ContinuousPeaks] = field(default_factory=dict)
+    peaks: Mapping[str, ContinuousProof] = field(default_factory=dict)
     given: bool = False
-    answer: LoopAnswer | SlidingAnswer | StickSlipAnswer | None = None
+    answer: TrackingGuarantee | SlidingGuarantee | StickSlipGuarantee | None = None
 
     @property
     def kind(self) -> str:
@@ -100,12 +100,12 @@ class Entry:
         return "given" if self.given else self.origin
 
     @property
-    def guarantee(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee | None:
+    def guarantee(self) -> TrackingProof | SlidingProof | StickSlipProof | NoProof | None:
         """Guarantee of the loop with zero-order hold over T_s."""
-        return self.answer.found if self.answer else None
+        return self.answer.proof if self.answer else None
 
     @property
-    def guaranteed(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | None:
+    def guaranteed(self) -> TrackingProof | SlidingProof | StickSlipProof | None:
         """The guarantee, if there is one."""
         found = self.guarantee
         return found if found is not None and found.proved else None
@@ -220,11 +220,13 @@ def behind_path(fault: Fault) -> dict[str, str]:
     return {name: why for name in designable(fault) if name != "elqr"}
 
 
-def _answer(fault: Fault, design: Design, *, given: bool) -> LoopAnswer | SlidingAnswer | StickSlipAnswer | None:
+def _answer(
+    fault: Fault, design: Design, *, given: bool
+) -> TrackingGuarantee | SlidingGuarantee | StickSlipGuarantee | None:
     found = design.guarantee
-    if isinstance(found, SlidingGuarantee):
+    if isinstance(found, SlidingProof):
         return design.sliding
-    if isinstance(found, StickSlipGuarantee):
+    if isinstance(found, StickSlipProof):
         return attacked_stick_slip(fault, found, design.compensation)
     if given:
         notes = getattr(design.controller, "notes", None)
@@ -297,7 +299,7 @@ def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
     wanted = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
     classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
     peaks = {kind: design.certified_peaks(kind) for kind in classes}
-    proved = {kind: found for kind, found in peaks.items() if isinstance(found, ContinuousPeaks)}
+    proved = {kind: found for kind, found in peaks.items() if isinstance(found, ContinuousProof)}
     return replace(entry, growth_per_step=growth, held=held, peaks=proved)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.fault import Fault
-from quakedesign.guarantees import Guarantee, design_held
+from quakedesign.guarantees import TrackingProof, design_held
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.closed_loop import ClosedLoop
@@ -116,13 +116,13 @@ class FrontPoint:
     ----------
     objective : str
         ``peak``, or ``tracking`` with its room.
-    guarantee : Guarantee
+    guarantee : TrackingProof
     run : Trajectory
         Under the fault's own disturbance, from rest.
     """
 
     objective: str
-    guarantee: Guarantee
+    guarantee: TrackingProof
     run: Trajectory
 
 
@@ -146,7 +146,7 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
             run=simulate(fault, claim.controller, duration=max(length, float(step)), settled_from=length / 2),
         )
         for name, claim in designs.items()
-        if isinstance(claim, Guarantee)
+        if isinstance(claim, TrackingProof)
     )
 
 

@@ -10,9 +10,9 @@ from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
 from quakedesign.guarantees import (
-    Guarantee,
-    NoGuarantee,
-    SlidingGuarantee,
+    NoProof,
+    SlidingProof,
+    TrackingProof,
     continued,
     design_at,
     design_held,
@@ -31,7 +31,7 @@ from quakedesign.guarantees.exact.limit_theorems import (
     smallest_stick_slip_rate,
     smallest_withdrawal,
 )
-from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
+from quakedesign.guarantees.guarantee_result import SlidingGuarantee, answer_sliding
 from quakedesign.guarantees.search.lqg import near_path, sliding_model
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Quantity
 from quakedesign.plant import FaultPlant, uncertain_plant
@@ -170,7 +170,7 @@ class Limits:
         Within which the smallest slip-rate error is meant [m]; None for any bounded slip error.
     peak_slip_rate_error, largest_step, largest_delay, largest_diffusion_time, farthest_well, smallest_pressure : Limit
         Each of the latter three and the delay at the fault's T_s.
-    proved : tuple of Guarantee
+    proved : tuple of TrackingProof
         Of the designs without delay that were found on the way, by T_s.
     told : Told
         What controllers are told, for the slip-rate error and designs; all others may know everything.
@@ -186,7 +186,7 @@ class Limits:
     largest_diffusion_time: Limit
     farthest_well: Limit
     smallest_pressure: Limit
-    proved: tuple[Guarantee, ...]
+    proved: tuple[TrackingProof, ...]
     told: Told
 
     def __repr__(self) -> str:
@@ -255,7 +255,7 @@ class SlidingLimits(Limits):
     """Limits of a fault in slow sliding along its task, of its nominal plant linearised there."""
 
     push: SlidingPush
-    guarantee: SlidingGuarantee | None
+    guarantee: SlidingProof | None
     rock: Fraction  # L²/D [s] of the well that was asked about; 0 without one
 
     @property
@@ -293,7 +293,7 @@ class SlidingLimits(Limits):
         return [(step, self.push.smallest_rate_error(step)) for step in self._steps()]
 
 
-def above_the_reference(found: SlidingGuarantee) -> UpperBound:
+def above_the_reference(found: SlidingProof) -> UpperBound:
     """Proved bound of the slip rate, less V [m/s]."""
     return UpperBound(found.peak_slip_rate - found.task.rate)
 
@@ -464,7 +464,7 @@ def _sliding_limits(
     told = setup if setup is not None and setup.path else None
     near = near_path(model)
     answer = None if setup is None else answer_sliding(fault, stress=asked, spread=off, diffusion=near)
-    found = answer.found if answer is not None and answer.found.proved else None
+    found = answer.proof if answer is not None and answer.proof.proved else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
         raise ParameterError(
@@ -474,7 +474,7 @@ def _sliding_limits(
     push = SlidingPush(model=model, amplitude=amplitude)
     farthest, rock = longest_diffusion(push, withdrawal, step), (told or IDEAL).diffusion
     if told is not None and (farthest is None or rock <= farthest):
-        behind = answer_sliding(fault, stress=asked, spread=off, **told.around()).found
+        behind = answer_sliding(fault, stress=asked, spread=off, **told.around()).proof
         found = behind if behind.proved else None
         push = replace(push, amplitude=found.task.stress) if found else push
     impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
@@ -499,13 +499,15 @@ def _sliding_limits(
     )
 
 
-def _why(answer: SlidingAnswer | None) -> str:
-    return f": {answer.found.reason}" if answer is not None and not answer.found.proved else ""
+def _why(answer: SlidingGuarantee | None) -> str:
+    return f": {answer.proof.reason}" if answer is not None and not answer.proof.proved else ""
 
 
-def _proved_steps(task: FaultPlant, step: Fraction, told: Told) -> tuple[tuple[Guarantee, ...], Guarantee | None]:
+def _proved_steps(
+    task: FaultPlant, step: Fraction, told: Told
+) -> tuple[tuple[TrackingProof, ...], TrackingProof | None]:
     """Guarantees at growing T_s up to nearly the longest, and that at the fault's own, if there is one."""
-    own: Guarantee | NoGuarantee | None = design_held(task, step, objective="peak", **told.around)
+    own: TrackingProof | NoProof | None = design_held(task, step, objective="peak", **told.around)
     longest = longest_step(task, **told.around)
     if own is not None and own.proved:
         own = _best_at(own, told)
@@ -517,7 +519,7 @@ def _proved_steps(task: FaultPlant, step: Fraction, told: Told) -> tuple[tuple[G
     return tuple(found), own
 
 
-def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
+def _best_at(least_peak: TrackingProof, told: Told) -> TrackingProof:
     """Of a design for the smallest slip-rate error and one that tracks, that with the smaller one that is proved."""
     tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.around)
     found = [least_peak, *([tracking] if tracking.proved else [])]

@@ -19,10 +19,10 @@ from quakedesign.errors import CertificateError, ParameterError, SimulationError
 from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, Fault
 from quakedesign.fault.model import require_positive
-from quakedesign.guarantees import ContinuousPeaks, Guarantee, SlidingGuarantee, load_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.guarantees import ContinuousProof, SlidingProof, TrackingProof, load_guarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantProof
 from quakedesign.guarantees.exact.statement import differences
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
 from quakedesign.guarantees.search.compensated_search import recovered
 from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_model
 from quakedesign.laws import Controller, Sampling, control_law, published
@@ -306,7 +306,7 @@ def run_held(
     duration: float | None = None,
     plant: str = "smooth",
     method: str = "cvodes",
-    claim: SlidingGuarantee | None = None,
+    claim: SlidingProof | None = None,
 ) -> tuple[SlidingRun, dict[str, Any]]:
     """Run the e-LQR of `sliding_law`, or of a guarantee, on a fault that starts in steady sliding; with its JSON.
 
@@ -326,7 +326,7 @@ def run_held(
         Of a sine of shear stress [Pa], [s].
     duration, plant, method
         As of `run_state`.
-    claim : SlidingGuarantee, optional
+    claim : SlidingProof, optional
         Its law runs, with its T_s, delay, lag, rock and planned pressure in place of those above, which are not to be
         given.
     """
@@ -543,7 +543,7 @@ class Choice:
     # Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law
     lipschitz: Fraction | None = None
     # What is proved of the law, where it comes from a certificate file
-    claim: Guarantee | SlidingGuarantee | StickSlipGuarantee | None = None
+    claim: TrackingProof | SlidingProof | StickSlipProof | None = None
 
     def noise(self, seed: int) -> Measurement:
         """Bounds of the measurement errors in the guarantee of the controller; none without one."""
@@ -570,12 +570,12 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         For a sliding mode whose gains cannot be read off its implicit step.
     """
     claim = load_guarantee(path)
-    if isinstance(claim, PlantGuarantee):
+    if isinstance(claim, PlantProof):
         raise CertificateError(
             f"the certificate of a law must be about a fault. Received {path}, about an uncertain plant. Give a "
             f"file of guarantee {fault.name} --out FILE."
         )
-    if isinstance(claim, ContinuousPeaks) or isinstance(claim, SlidingGuarantee) != bool(fault.friction.state_names):
+    if isinstance(claim, ContinuousProof) or isinstance(claim, SlidingProof) != bool(fault.friction.state_names):
         raise CertificateError(
             "the law of a certificate runs once per sample, and is about friction with a state where that of the fault "
             f"has one. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."
@@ -585,9 +585,9 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
             f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
             f"{'; '.join(apart)}. Give the fault that it is about, or prove a new one with guarantee."
         )
-    if isinstance(claim, StickSlipGuarantee) and claim.held.law.pull:
+    if isinstance(claim, StickSlipProof) and claim.held.law.pull:
         controller: Controller = recovered(claim).controller
-    elif isinstance(claim, Guarantee) and claim.held.law.root is not None:
+    elif isinstance(claim, TrackingProof) and claim.held.law.root is not None:
         controller = recovered(claim).limited
     else:
         controller = claim.controller
@@ -598,12 +598,12 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
     return Choice(controller=controller, claim=claim)
 
 
-def _apart(fault: Fault, claim: Guarantee | SlidingGuarantee | StickSlipGuarantee) -> list[str]:
+def _apart(fault: Fault, claim: TrackingProof | SlidingProof | StickSlipProof) -> list[str]:
     """What of a fault a certificate does not cover; the planned pressure of slow sliding is that of the certificate."""
-    if isinstance(claim, SlidingGuarantee):
+    if isinstance(claim, SlidingProof):
         return claim.task.differences(replace(slow_sliding_plant(fault, claim.task.stress), ramp=claim.task.ramp))
     task = uncertain_plant(fault, rate_limited=claim.task.change is not None)
-    if isinstance(claim, StickSlipGuarantee) and task.amplitude <= claim.task.amplitude:
+    if isinstance(claim, StickSlipProof) and task.amplitude <= claim.task.amplitude:
         covered = claim.covered_healing(task.amplitude)
         if covered < rational(fault.friction.rest_excess):
             return [f"healing beside this disturbance up to {covered:.3g} there, {fault.friction.rest_excess:.3g} here"]
@@ -708,14 +708,14 @@ def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Cont
     setup = IDEAL.with_given(**path)
     Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **setup.path))
     found: Any = guarantee(fault, name, setup)
-    if not isinstance(found.found, Guarantee):
+    if not isinstance(found.proof, TrackingProof):
         text = ", ".join(f"{part} {time:g} s" for part, time in path.items())
         sooner = f"--step '{float(found.shorter.held.step):g} s', where it has, " if found.shorter else ""
         raise ParameterError(
             f"designed gains must have a proof behind what is around them. Received {name} with {text}, "
-            f"T_s = {fault.sampling_time:g} s: {found.found.reason}. Give {sooner}gains as numbers, or see limits."
+            f"T_s = {fault.sampling_time:g} s: {found.proof.reason}. Give {sooner}gains as numbers, or see limits."
         )
-    return found.compensation.limited if found.compensation else found.found.controller
+    return found.compensation.limited if found.compensation else found.proof.controller
 
 
 def run_single(

@@ -17,13 +17,13 @@ from quakedesign.guarantees import (
     CLASSES,
     OBJECTIVES,
     Compensation,
-    ContinuousPeaks,
-    Guarantee,
-    NoGuarantee,
-    SlidingGuarantee,
-    StickSlipGuarantee,
+    ContinuousProof,
+    NoProof,
+    SlidingProof,
+    StickSlipProof,
+    TrackingProof,
 )
-from quakedesign.guarantees.guarantee_result import SlidingAnswer
+from quakedesign.guarantees.guarantee_result import SlidingGuarantee
 from quakedesign.guarantees.search.defaults import REACH
 from quakedesign.laws import Controller, control_law, control_laws
 from quakedesign.laws.feed_forward import NONE, feed_forward
@@ -64,9 +64,9 @@ class Design:
         What synthesis decided: exact numbers as texts.
     setup : LoopSetup
         For which a sampled law is designed.
-    runs : Guarantee, SlidingGuarantee, StickSlipGuarantee or NoGuarantee, optional
+    runs : TrackingProof, SlidingProof, StickSlipProof or NoProof, optional
         What was proved of the loop that runs while it was designed; None to find it when `guarantee` is asked for.
-    sliding : SlidingAnswer, optional
+    sliding : SlidingGuarantee, optional
         For friction with a state: the law as it runs, with its rock, and the task that it is designed for.
     disturbance_class : str
         Of the disturbances that the guarantee is about: ``amplitude``, or ``rate`` for those of bounded rate.
@@ -81,8 +81,8 @@ class Design:
     domain: Domain | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
     setup: LoopSetup = IDEAL
-    runs: Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee | None = None
-    sliding: SlidingAnswer | None = None
+    runs: TrackingProof | SlidingProof | StickSlipProof | NoProof | None = None
+    sliding: SlidingGuarantee | None = None
     disturbance_class: str = CLASSES[0]
 
     @property
@@ -136,7 +136,7 @@ class Design:
         law = self.controller
         return method_of(type(law)).variants(self.fault, law, self.certificate) if law else ()
 
-    def certified_peaks(self, disturbance_class: str = "amplitude") -> ContinuousPeaks | NoGuarantee:
+    def certified_peaks(self, disturbance_class: str = "amplitude") -> ContinuousProof | NoProof:
         """Certified peaks of slip, slip rate and pressure of an e-LQR in continuous time.
 
         What holds for the law as it runs is `guarantee`.
@@ -153,11 +153,11 @@ class Design:
         """
         law = self.controller
         if law is None:
-            return NoGuarantee(reason=f"no gains of {self.title} are known", small_gain=None)
+            return NoProof(reason=f"no gains of {self.title} are known", small_gain=None)
         return method_of(type(law)).certified_peaks(self.fault, law, disturbance_class)
 
     @property
-    def guarantee(self) -> Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee:
+    def guarantee(self) -> TrackingProof | SlidingProof | StickSlipProof | NoProof:
         """Guarantee of the sampled law with zero-order hold, or the reason why there is none.
 
         A law of samples has its own T_s, a sliding mode of samples its own scheme; the integrals of
@@ -167,7 +167,7 @@ class Design:
         if self.runs is not None:
             return self.runs
         if law is None:
-            return NoGuarantee(reason=f"no gains of {self.title} are known", small_gain=None)
+            return NoProof(reason=f"no gains of {self.title} are known", small_gain=None)
         task = uncertain_plant(self.fault, rate_limited=self.disturbance_class == "rate")
         return method_of(type(law)).guarantee(self.fault, task, law, self.setup)
 
@@ -175,7 +175,7 @@ class Design:
     def compensation(self) -> Compensation | None:
         """A sampled sliding mode with its guarantee; None for another law."""
         law, found = self.controller, self.guarantee
-        if law is None or law.sampling is None or isinstance(found, SlidingGuarantee):
+        if law is None or law.sampling is None or isinstance(found, SlidingProof):
             return None
         return method_of(type(law)).compensation(law, found)
 
@@ -307,7 +307,7 @@ def design(
     require_known(objective, OBJECTIVES, "objective")
     require_known(disturbance_class, CLASSES, "class")
     if plant is not None:
-        require_known(plant, (StickSlipGuarantee.plant, Guarantee.plant), "plant")
+        require_known(plant, (StickSlipProof.plant, TrackingProof.plant), "plant")
     if continuous and objective != OBJECTIVES[0]:
         raise ParameterError(
             f"the objective of a design in continuous time must be {OBJECTIVES[0]}. Received {objective!r}. "

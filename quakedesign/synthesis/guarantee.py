@@ -10,14 +10,14 @@ from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.exact import exact_text, rational
 from quakedesign.fault import BlockChain, Fault, with_accepted_fit
 from quakedesign.fault.units import exact_value
-from quakedesign.guarantees import CLASSES, OBJECTIVES, Guarantee, LoopAnswer, NoGuarantee, StickSlipGuarantee
+from quakedesign.guarantees import CLASSES, OBJECTIVES, NoProof, StickSlipProof, TrackingGuarantee, TrackingProof
 from quakedesign.guarantees.exact.limit_theorems import hopeless, too_slow
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantProof
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
-from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
+from quakedesign.guarantees.guarantee_result import SlidingGuarantee, answer_sliding
 from quakedesign.guarantees.search.linear_design import nearest_setup
 from quakedesign.guarantees.search.sliding_block_design import sliding_block_guarantee
-from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer, answer_stick_slip
+from quakedesign.guarantees.stick_slip_answer import StickSlipGuarantee, answer_stick_slip
 from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
@@ -73,7 +73,7 @@ def _asked(question: Callable[[], Found]) -> Found | QuakedesignError:
         return refused
 
 
-STICK_SLIP, PRINTED = PLANTS = StickSlipGuarantee.plant, Guarantee.plant
+STICK_SLIP, PRINTED = PLANTS = StickSlipProof.plant, TrackingProof.plant
 BLOCK_LAWS = ("centralised", "decentralised")
 """Of several blocks: the pressure of each well depends on all measurements, or only on those of its block."""
 _PUMP = ("saturation", "withdrawal", "rate_limit")
@@ -96,7 +96,7 @@ def guarantee(
     progress: Callable[[str, float], None] | None = None,
     accept_poor_fit: bool = False,
     **given: Quantity | None,
-) -> LoopAnswer | SlidingAnswer | StickSlipAnswer | PlantGuarantee | NoGuarantee:
+) -> TrackingGuarantee | SlidingGuarantee | StickSlipGuarantee | PlantProof | NoProof:
     """Prove bounds of slip, slip rate and pressure of the sampled loop, as the command `guarantee` does.
 
     The controller is designed for the loop setup unless gains are given.
@@ -146,11 +146,11 @@ def guarantee(
 
     Returns
     -------
-    LoopAnswer, SlidingAnswer or StickSlipAnswer
+    TrackingGuarantee, SlidingGuarantee or StickSlipGuarantee
         All have ``verdict``, ``bounds`` and ``worst_case`` (by name, SI units), ``reason``, ``sentence()``,
         ``check()``, ``controller`` for `simulate`, `loop_transfer` and `export_controller`, ``save(path)`` of the
         certificate and ``to_dict()``; ``lines()`` are what the command prints. Of an `UncertainPlant` or blocks the
-        guarantee, `PlantGuarantee`, or `NoGuarantee` itself, with ``verdict``, ``bounds``, ``reason``, ``sentence()``
+        guarantee, `PlantProof`, or `NoProof` itself, with ``verdict``, ``bounds``, ``reason``, ``sentence()``
         and ``check()``.
 
     Raises
@@ -268,14 +268,14 @@ def guarantee(
     if plant is None and usual and may_stick(family, setup, disturbance_class):
         mode = method_of(family).base_law(task, family, wanted.gains)
         sticking = answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
-        if sticking.found.proved:
+        if sticking.proof.proved:
             return sticking
-        without = sticking.found.reason
+        without = sticking.proof.reason
     answer = _sampled(fault, task, family, wanted)
     return replace(answer, not_at_rest=without) if without else answer
 
 
-def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> LoopAnswer:
+def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> TrackingGuarantee:
     """Guarantee on a moving reference; none without given gains where no controller within σ′ can hold the fault."""
     setup, most = wanted.setup, rational(fault.effective_normal_stress)
     step = rational(fault.sampling_time) if setup.step is None else setup.step
@@ -284,12 +284,12 @@ def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Want
     beyond = hopeless(task, most, delay, setup.diffusion)
     if beyond and not wanted.gains:
         near = nearest_setup(task, step, **around) if law.name == "elqr" else None
-        return LoopAnswer(fault=fault, found=NoGuarantee(reason=beyond, small_gain=None), nearest=near)
+        return TrackingGuarantee(fault=fault, proof=NoProof(reason=beyond, small_gain=None), nearest=near)
     result = method_of(law).sampled(fault, task, law, step, wanted)
     slow = "" if wanted.gains else too_slow(task, most, max(step, setup.longest_step), delay)
     if not slow or result.proved:
         return result
-    return replace(result, found=NoGuarantee(reason=slow, small_gain=None))
+    return replace(result, proof=NoProof(reason=slow, small_gain=None))
 
 
 def _exact_texts(gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]") -> tuple[str, ...]:

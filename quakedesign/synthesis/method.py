@@ -19,13 +19,13 @@ from quakedesign.guarantees import (
     CLASSES,
     OBJECTIVES,
     Compensation,
-    ContinuousPeaks,
-    Guarantee,
+    ContinuousProof,
     Held,
-    LoopAnswer,
-    NoGuarantee,
-    SlidingGuarantee,
-    StickSlipGuarantee,
+    NoProof,
+    SlidingProof,
+    StickSlipProof,
+    TrackingGuarantee,
+    TrackingProof,
     best_guarantee,
 )
 from quakedesign.guarantees.guarantee_result import FACTOR, given_answer
@@ -135,7 +135,7 @@ class GainProblem(Generic[Designed]):
         controller: Controller,
         certificate: Certificate | None = None,
         *,
-        runs: Guarantee | SlidingGuarantee | StickSlipGuarantee | NoGuarantee | None = None,
+        runs: TrackingProof | SlidingProof | StickSlipProof | NoProof | None = None,
         premises: tuple[Premise, ...] = (),
         **more: Any,
     ) -> Designed:
@@ -159,7 +159,7 @@ class GainProblem(Generic[Designed]):
         known = (*premises, *own, *controller.premises(self.fault, certificate))
         return self.answer(fault=self.fault, controller=controller, certificate=certificate, premises=known, **found)
 
-    def undecided(self, name: str, reason: str, runs: NoGuarantee | None = None, **more: Any) -> Designed:
+    def undecided(self, name: str, reason: str, runs: NoProof | None = None, **more: Any) -> Designed:
         """Result without gains."""
         none: dict[str, Any] = {"controller": None, "certificate": None, "premises": (), "details": {"reason": reason}}
         none |= {"disturbance_class": self.disturbance_class, "setup": self.setup}
@@ -250,17 +250,15 @@ class DesignMethod(Generic[L]):
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup
-    ) -> Guarantee | StickSlipGuarantee | NoGuarantee:
+    ) -> TrackingProof | StickSlipProof | NoProof:
         """Guarantee of the sampled law on a task of the fault, with the noise of a loop setup."""
-        return NoGuarantee(
-            reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None
-        )
+        return NoProof(reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None)
 
-    def certified_peaks(self, fault: Fault, controller: L, disturbance_class: str) -> ContinuousPeaks | NoGuarantee:
+    def certified_peaks(self, fault: Fault, controller: L, disturbance_class: str) -> ContinuousProof | NoProof:
         """Certified peaks of slip, slip rate and pressure in continuous time."""
-        return NoGuarantee(reason=f"no bound of peaks of {controller.title} is known here", small_gain=None)
+        return NoProof(reason=f"no bound of peaks of {controller.title} is known here", small_gain=None)
 
-    def compensation(self, controller: L, found: Guarantee | StickSlipGuarantee | NoGuarantee) -> Compensation | None:
+    def compensation(self, controller: L, found: TrackingProof | StickSlipProof | NoProof) -> Compensation | None:
         """Sampled sliding mode with its guarantee; None for other laws."""
         return None
 
@@ -276,12 +274,14 @@ class DesignMethod(Generic[L]):
         """Premises and domain of the same gains with every named feed-forward; none for laws without."""
         return ()
 
-    def sampled(self, fault: Fault, task: FaultPlant, law: type[L], step: Fraction, wanted: Wanted) -> LoopAnswer:
+    def sampled(
+        self, fault: Fault, task: FaultPlant, law: type[L], step: Fraction, wanted: Wanted
+    ) -> TrackingGuarantee:
         """Guarantee of given gains, or of a design, with sampling every T_s [s]."""
         reason = f"no analysis of {law.title} under a held pressure is known here"
-        return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
+        return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason, small_gain=None))
 
-    def given(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> LoopAnswer:
+    def given(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> TrackingGuarantee:
         """Guarantee of a given controller in a loop setup.
 
         Raises
@@ -343,7 +343,7 @@ class Samples(DesignMethod[SampledController]):
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
-    ) -> Guarantee | NoGuarantee:
+    ) -> TrackingProof | NoProof:
         """Guarantee at the law's T_s, with its delay, lag and diffusion path where the loop setup gives none."""
         law, step = controller.law, controller.step
         if setup.step is not None and setup.step != step:
@@ -362,7 +362,7 @@ class Samples(DesignMethod[SampledController]):
         try:
             steady_states(still, law.output, (Fraction(0),) * len(law.states), Fraction(1))
         except ParameterError:
-            return NoGuarantee(reason=_STANDING, small_gain=None)
+            return NoProof(reason=_STANDING, small_gain=None)
         held = Held(law=law, step=step, **around)
         found = best_guarantee(task, held)
         if found.proved or found.small_gain is not None or held.longest_step:
@@ -379,7 +379,9 @@ class Samples(DesignMethod[SampledController]):
             )
         return replace(found, reason=text + _OPPOSITE * (opposite < _STABLE))
 
-    def given(self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup) -> LoopAnswer:
+    def given(
+        self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
+    ) -> TrackingGuarantee:
         """Guarantee with the worst case found, for a law of the errors alone."""
         found = self.guarantee(fault, task, controller, setup)
         answer = given_answer(fault, found, controller.notes)

@@ -7,9 +7,9 @@ import numpy as np
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import rational, shortly
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantProof
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
-from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.small_gain import NoProof
 from quakedesign.guarantees.search.block_design import block_law
 from quakedesign.guarantees.search.plant_search import escaping, plant_guarantee
 from quakedesign.laws.user_law import exact_matrix, integrating
@@ -22,7 +22,7 @@ _UNSEEN = 1e-9
 
 def guarantee_plant(
     plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup, *, decentralised: bool = False
-) -> PlantGuarantee | NoGuarantee:
+) -> PlantProof | NoProof:
     """Peaks of a plant's outputs under a law, a gain matrix, or a law that is designed for several blocks.
 
     Parameters
@@ -53,7 +53,7 @@ def guarantee_plant(
         mode = mode / (max(mode[:count], key=abs) or 1)  # blocks may have pressures [Pa] beside slips [m]
         shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[:count], 9))
         seen = np.abs(np.array(around.C, dtype=float) @ mode).max() > _UNSEEN
-        return NoGuarantee(
+        return NoProof(
             reason=f"a mode escapes{'' if seen else ', which is not measured'}: with every uncertain term at its "
             f"steepest the states ({shape}) grow by {radius:.4g} a sample",
             small_gain=None,

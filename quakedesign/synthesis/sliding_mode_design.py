@@ -10,10 +10,10 @@ from quakedesign.exact import rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees import (
     Compensation,
-    Guarantee,
-    LoopAnswer,
-    NoGuarantee,
-    StickSlipGuarantee,
+    NoProof,
+    StickSlipProof,
+    TrackingGuarantee,
+    TrackingProof,
     attacked,
     guarantee_of,
     sampled_sliding_mode,
@@ -98,7 +98,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SlidingMode, setup: LoopSetup
-    ) -> Guarantee | StickSlipGuarantee | NoGuarantee:
+    ) -> TrackingProof | StickSlipProof | NoProof:
         """In the scheme ``compensated`` or ``stick-slip``, and in no other."""
         return guarantee_of(task, controller, **setup.noise)
 
@@ -106,11 +106,9 @@ class SlidingModes(DesignMethod[SlidingMode]):
         """Given base gains, or the first ones known."""
         return deadbeat(task, law, gains).controller
 
-    def compensation(
-        self, controller: SlidingMode, found: Guarantee | StickSlipGuarantee | NoGuarantee
-    ) -> Compensation:
+    def compensation(self, controller: SlidingMode, found: TrackingProof | StickSlipProof | NoProof) -> Compensation:
         """With the weight and the authority of its scheme."""
-        return Compensation(controller=controller, found=found)
+        return Compensation(controller=controller, proof=found)
 
     def variants(self, fault: Fault, controller: SlidingMode, certificate: Certificate | None) -> tuple[Variant, ...]:
         """Every named feed-forward, its own first; takes a few seconds."""
@@ -118,24 +116,24 @@ class SlidingModes(DesignMethod[SlidingMode]):
 
     def sampled(
         self, fault: Fault, task: FaultPlant, law: type[SlidingMode], step: Fraction, wanted: Wanted
-    ) -> LoopAnswer:
+    ) -> TrackingGuarantee:
         """In a scheme, with given base gains or the first ones known."""
         wanted.require_all_measured()
         options: Any = {"gains": wanted.gains, "scheme": wanted.scheme or GUARANTEED, "objective": wanted.objective}
         around: Any = wanted.setup.around()
         made = sliding_mode(task, law, step, **options, **around)
-        if isinstance(made, NoGuarantee):
-            return LoopAnswer(fault=fault, found=made)
-        if not made.found.proved:
-            laws, none = deadbeat(task, law, wanted.gains), made.found
+        if isinstance(made, NoProof):
+            return TrackingGuarantee(fault=fault, proof=made)
+        if not made.proof.proved:
+            laws, none = deadbeat(task, law, wanted.gains), made.proof
             longest = longest_step(task, kind=laws, **around)
             again = laws.continued(task, step, longest, **around)
             if again is None:
                 nearest = nearest_setup(task, step, kind=laws, pressed=none.pressed, **around)
-                shorter = None if longest is None else laws.at(task, longest).found
-                known = shorter if isinstance(shorter, Guarantee) else None
+                shorter = None if longest is None else laws.at(task, longest).proof
+                known = shorter if isinstance(shorter, TrackingProof) else None
                 asked = step if known else None
-                return LoopAnswer(fault=fault, found=none, shorter=known, asked_step=asked, nearest=nearest)
+                return TrackingGuarantee(fault=fault, proof=none, shorter=known, asked_step=asked, nearest=nearest)
             made = again
         return replace(attacked(fault, made.without_stick), compensation=made)
 
@@ -159,23 +157,23 @@ def _compensated(
     law = base.law.with_divisor(least_authority(fault))
     step = rational(fault.sampling_time)
     without: dict[str, Any] = {}
-    if problem.plant != Guarantee.plant and may_stick(type(law), problem.setup, problem.disturbance_class):
+    if problem.plant != TrackingProof.plant and may_stick(type(law), problem.setup, problem.disturbance_class):
         sticking = design_sticking(problem.task, law, step, **sticking_options(problem))
         if isinstance(sticking, Compensation):
-            assert isinstance(sticking.found, StickSlipGuarantee)
+            assert isinstance(sticking.proof, StickSlipProof)
             details = {
                 "objective": problem.objective,
                 "step": str(step),
                 "reason": None,
-                **{name: str(value) for name, value in sticking.found.held.noise.items()},
+                **{name: str(value) for name, value in sticking.proof.held.noise.items()},
                 "rho": str(smallest_root(sticking.controller.scale)),
                 **_origin(base),
             }
-            return problem.judged(sticking.controller, certificate, details=details, runs=sticking.found)
+            return problem.judged(sticking.controller, certificate, details=details, runs=sticking.proof)
         without = {"not_at_rest": sticking.reason}
     made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, **problem.setup.noise)
     if found.runs is None:
-        none = NoGuarantee(reason=f"run in the scheme compensated, {found.reason}", small_gain=None)
+        none = NoProof(reason=f"run in the scheme compensated, {found.reason}", small_gain=None)
         return _scaled(problem, base, certificate, runs=none)
     details = {
         "objective": problem.objective,
@@ -193,7 +191,7 @@ def _scaled(
     problem: GainProblem[Designed],
     base: BaseGains[SlidingMode],
     certificate: Certificate | None,
-    runs: NoGuarantee | None = None,
+    runs: NoProof | None = None,
 ) -> Designed:
     """In continuous time, with the smallest scale for the fault's |h'|; with why nothing is proved of what runs."""
     law, divisor, added = base.law, least_authority(problem.fault), problem.feedforward

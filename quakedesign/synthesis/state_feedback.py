@@ -10,12 +10,12 @@ from quakedesign.fault import Fault
 from quakedesign.guarantees import (
     CLASSES,
     OBJECTIVES,
-    ContinuousPeaks,
-    Guarantee,
+    ContinuousProof,
     Held,
-    LoopAnswer,
-    NoGuarantee,
-    StickSlipGuarantee,
+    NoProof,
+    StickSlipProof,
+    TrackingGuarantee,
+    TrackingProof,
     attacked,
     best_guarantee,
     certified_peaks,
@@ -72,7 +72,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: ExtendedLQR, setup: LoopSetup
-    ) -> Guarantee | StickSlipGuarantee | NoGuarantee:
+    ) -> TrackingProof | StickSlipProof | NoProof:
         """With integrals summed over the T_s of the fault."""
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
             return super().guarantee(fault, task, controller, setup)
@@ -81,7 +81,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
 
     def certified_peaks(
         self, fault: Fault, controller: ExtendedLQR, disturbance_class: str
-    ) -> ContinuousPeaks | NoGuarantee:
+    ) -> ContinuousProof | NoProof:
         """In continuous time."""
         return certified_peaks(fault, controller, disturbance_class=disturbance_class)
 
@@ -91,7 +91,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
 
     def sampled(
         self, fault: Fault, task: FaultPlant, law: type[ExtendedLQR], step: Fraction, wanted: Wanted
-    ) -> LoopAnswer:
+    ) -> TrackingGuarantee:
         """Integrals of given gains are summed; without gains, a law with an estimate of the disturbance."""
         setup, differs = wanted.setup, wanted.setup.measured == MEASURED[2]
         if wanted.gains and not differs:
@@ -102,15 +102,15 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         if wanted.gains:
             summed = summed_integrals(_four(wanted.gains), step)
             if differs and (reason := why_no_law(step, setup.measured, around)):
-                return LoopAnswer(fault=fault, found=NoGuarantee(reason=reason, small_gain=None))
+                return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason, small_gain=None))
             summed = told_by_differences(summed, step) if differs else summed
             given = best_guarantee(task, Held(law=summed, step=step, **around))
             if given.proved:
                 return attacked(fault, given)
             other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
-            if other.found.proved:
-                return LoopAnswer(fault=fault, found=given, nearest=(GAINS, other.found))
-            return replace(other, found=given)
+            if other.proof.proved:
+                return TrackingGuarantee(fault=fault, proof=given, nearest=(GAINS, other.proof))
+            return replace(other, proof=given)
         entries: Any = {"measured": setup.measured, **around}
         found = design_held(task, step, objective=wanted.objective, **entries)
         if found.proved:
@@ -118,13 +118,13 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         if setup.longest_step or found.pressed:
             nearest = nearest_setup(task, step, pressed=found.pressed, **entries)
             if nearest is not None or not found.pressed:
-                return LoopAnswer(fault=fault, found=found, nearest=nearest)
+                return TrackingGuarantee(fault=fault, proof=found, nearest=nearest)
         longest = longest_step(task, **entries)
         if (again := continued(task, step, longest, **entries)) is not None:
             return attacked(fault, again)
         shorter, asked = (None, None) if longest is None else (design_at(task, longest), step)
         nearest = nearest_setup(task, step, **entries)
-        return LoopAnswer(fault=fault, found=found, shorter=shorter, asked_step=asked, nearest=nearest)
+        return TrackingGuarantee(fault=fault, proof=found, shorter=shorter, asked_step=asked, nearest=nearest)
 
 
 def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
@@ -151,7 +151,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     fault = problem.fault
     step, task, setup = rational(fault.sampling_time), problem.task, problem.setup
     without: dict[str, Any] = {}
-    if problem.plant != Guarantee.plant and may_stick(law, setup, problem.disturbance_class):
+    if problem.plant != TrackingProof.plant and may_stick(law, setup, problem.disturbance_class):
         sticking = design_stick_slip(task, step, **sticking_options(problem))
         if sticking.proved:
             details = {"objective": problem.objective, "step": str(step), "reason": None, "measured": setup.measured}
@@ -161,7 +161,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     around: Any = setup.around()
     most = rational(fault.effective_normal_stress)
     if beyond := hopeless(task, most, around.get("delay", Fraction(0)), setup.diffusion):
-        return problem.undecided(law.name, beyond, NoGuarantee(reason=beyond, small_gain=None))
+        return problem.undecided(law.name, beyond, NoProof(reason=beyond, small_gain=None))
     found = sampled_design(task, step, problem.objective, measured=setup.measured, **around)
     if found.runs is None:
         return problem.undecided(law.name, found.reason)
@@ -189,7 +189,7 @@ def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     wanted, fault = problem.sliding, problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))
     answer = answer_sliding(fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, diffusion=path)
-    reason = answer.found.reason if not answer.found.proved else None
+    reason = answer.proof.reason if not answer.proof.proved else None
     if answer.held is None:
         return problem.undecided(law.name, str(reason), sliding=answer)
     near = quantity(float(path) ** 0.5, "m")
@@ -198,7 +198,7 @@ def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     )
     details = {"step": str(answer.held.step), "diffusion": str(path), "measured": MEASURED[1]}
     details |= {name: said for name, said in {"assumed": assumed, "reason": reason}.items() if said}
-    return problem.judged(answer.held.controller, name=law.name, details=details, runs=answer.found, sliding=answer)
+    return problem.judged(answer.held.controller, name=law.name, details=details, runs=answer.proof, sliding=answer)
 
 
 def _continuous(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:

@@ -45,7 +45,7 @@ class Written:
 
 def proof(proved, name="claim"):
     return SimpleNamespace(
-        proved=proved, found=name, lines=lambda: [f"line of {name}"], to_dict=lambda: {"verdict": name}
+        proved=proved, proof=name, lines=lambda: [f"line of {name}"], to_dict=lambda: {"verdict": name}
     )
 
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 import quakedesign as qd
 from quakedesign.cli import main
-from quakedesign.guarantees import Guarantee, Held, guarantee, save_guarantee
+from quakedesign.guarantees import Held, TrackingProof, guarantee, save_guarantee
 from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.plant import uncertain_plant
 
@@ -27,7 +27,7 @@ SHORT = ("--duration", "30 s")
 
 @pytest.fixture
 def file(tmp_path):
-    assert isinstance(CLAIM, Guarantee)
+    assert isinstance(CLAIM, TrackingProof)
     save_guarantee(CLAIM, tmp_path / "law.json")
     return tmp_path / "law.json"
 

@@ -9,7 +9,7 @@ import quakedesign as qd
 from quakedesign.cli import block_commands, main
 from quakedesign.cli.design_commands import DesignOptions, positive
 from quakedesign.errors import QuakedesignError
-from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees import NoProof
 from quakedesign.report import comparison_table
 
 BLOCKS = Path(__file__).parents[1] / "data" / "three_blocks.toml"
@@ -157,7 +157,7 @@ def entry(*, verdict="proved", runs=None, premises=(), harmless=True):
         ({"premises": [("sampling_time", True), ("start", False)]}, True),  # of the run and its start
         ({"verdict": "undecided"}, False),
         ({"verdict": "refuted"}, False),
-        ({"runs": NoGuarantee(reason="small gain", small_gain=None)}, False),
+        ({"runs": NoProof(reason="small gain", small_gain=None)}, False),
         ({"harmless": False}, False),
         *(
             ({"premises": [(name, False), ("start", True)]}, False)

@@ -19,7 +19,7 @@ from quakedesign.cli.options import SetupOptions
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.fault.fault_toml import source_text as load_text
-from quakedesign.guarantees import Held, LoopAnswer, NoGuarantee, guarantee
+from quakedesign.guarantees import Held, NoProof, TrackingGuarantee, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search.lqg import family_of
@@ -116,7 +116,9 @@ def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks():
     """A design one period late with larger gains, run on a fault at rest whatever it asks for: its own recursion."""
     fault, late = load_fault("real-fault"), F("0.184")
     law = family_of(uncertain_plant(fault), late, "slip-and-rate", {"delay": late}).law(np.array((0.6, 1.0, 0.1)))
-    found = LoopAnswer(fault=fault, found=guarantee(uncertain_plant(fault), Held(law=law, step=late, delay=late)))
+    found = TrackingGuarantee(
+        fault=fault, proof=guarantee(uncertain_plant(fault), Held(law=law, step=late, delay=late))
+    )
     assert found.proved
     rows, seen = (np.array(m, dtype=float) for m in (law.update, law.measured))
     states, sizes = np.zeros(len(rows)), []
@@ -189,9 +191,9 @@ def test_everything_else_is_designed_for(monkeypatch, name, least, most):
 def test_where_no_controller_renews_its_pressure_so_slowly_the_answer_says_so(monkeypatch, step, slow):
     """17.9 s on real-fault: a constant push needs 50 MPa by then."""
     fault = load_fault("real-fault")
-    none = LoopAnswer(fault=fault, found=NoGuarantee(reason="small gain 7", small_gain=None))
+    none = TrackingGuarantee(fault=fault, proof=NoProof(reason="small gain 7", small_gain=None))
     monkeypatch.setattr(StateFeedback, "sampled", lambda *_: none)
-    said = qd.guarantee(fault, step=step).found.reason
+    said = qd.guarantee(fault, step=step).proof.reason
     assert said.startswith("no controller that withdraws at most 50 MPa can hold the fault with T_s") is slow
     assert (" s in all (for some friction of the box, against the largest disturbance" in said) is slow
     for other in ({"gains": GAINS}, {"disturbance_class": "rate"}):
@@ -331,7 +333,7 @@ def test_noise_that_is_none_is_refused_in_a_line(call, options, said):
 
 
 def test_gains_that_know_nothing_of_the_rock_say_what_fails(call, monkeypatch):
-    none = NoGuarantee(reason="a design through rock is another test's", small_gain=None)
+    none = NoProof(reason="a design through rock is another test's", small_gain=None)
     family = import_module("quakedesign.synthesis.state_feedback")
     for name, found in (("design_held", none), ("longest_step", None), ("nearest_setup", None)):
         monkeypatch.setattr(family, name, lambda *_, a=found, **__: a)

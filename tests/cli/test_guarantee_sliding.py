@@ -11,7 +11,7 @@ from quakedesign.cli import main
 from quakedesign.exact import UpperBound
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.fault.fault_toml import fault_toml
-from quakedesign.guarantees import Held, NoGuarantee, SlidingClaims, SlidingGuarantee
+from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof
 from quakedesign.guarantees import guarantee_result as sliding_answer
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.sliding_design import WellReach, proved_sliding
@@ -26,7 +26,7 @@ LAW = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(Fraction
 HELD = Held(law=LAW, step=Fraction(300))
 CLAIMS = SlidingClaims(**{name: UpperBound(Fraction(1)) for name in SlidingClaims.__dataclass_fields__})
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
-NONE = NoGuarantee(reason="too much", small_gain=None)
+NONE = NoProof(reason="too much", small_gain=None)
 LAGGED = ("guarantee", "creeping-patch", "--lag", "200 s", "--step", "4000 s")
 
 
@@ -61,7 +61,7 @@ def test_an_estimate_of_the_largest_stress_that_is_too_large_is_lowered_until_it
 
     def proved(task, design, *, log_rate):
         tried.append(task.stress)
-        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
+        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
 
     monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
     monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
@@ -76,7 +76,7 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
 
     def proved(task, design, *, log_rate):
         tried.append((log_rate, task.stress))
-        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS)
+        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS)
 
     monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
     monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(stands[log_rate]))
@@ -85,7 +85,7 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
     assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800)).task.stress == 7_000
     assert tried == [(half, 1), (quarter, 7_000)]
     stands[half] = stands[quarter] = stands[Fraction(1, 8)] = 0
-    assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800)).found.task.stress == 1
+    assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800)).proof.task.stress == 1
     tried.clear()
     assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800), stress=Fraction(1, 2)).task.stress == half
     assert tried == [(half, half)]
@@ -99,7 +99,7 @@ def test_a_well_that_is_impossible_is_said_to_be_that_before_what_would_do(monke
     fault = load_fault("crustal-patch")
 
     def reason(diffusion, stress):
-        return sliding_answer.answer_sliding(fault, diffusion=Fraction(diffusion), stress=stress).found.reason
+        return sliding_answer.answer_sliding(fault, diffusion=Fraction(diffusion), stress=stress).proof.reason
 
     assert reason(10**6, Fraction(25_000)) == "too much; another"
     assert reason(2 * 10**6, None) == "too much; another"
@@ -110,31 +110,31 @@ def test_a_well_that_is_impossible_is_said_to_be_that_before_what_would_do(monke
 
 def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch):
     def proved(task, design, *, log_rate):
-        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
+        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
 
     monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
     monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
     monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
     fault, around = load_fault("crustal-patch"), {"diffusion": Fraction(800)}
-    found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found
+    found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).proof
     assert found.reason == (
         "too much; a proof was found for a stress of at most 20 kPa: give --stress '20 kPa'; somewhat more may do"
     )
-    none = NoGuarantee(reason="no law whose loop is stable", small_gain=None)
+    none = NoProof(reason="no law whose loop is stable", small_gain=None)
     with monkeypatch.context() as patched:
         found_below = lambda task, step, **around: HELD if task.stress < 35_000 else none  # noqa: E731
         patched.setattr(sliding_answer, "designed_sliding", found_below)
         patched.setattr(sliding_answer, "farthest", lambda *_, **__: WellReach(share=Fraction(1)))
-        found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found
+        found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).proof
     assert found.reason.startswith("no law was found that holds the fault under 40 kPa; a proof was found for a stress")
     monkeypatch.setattr(sliding_answer, "proved_sliding", lambda task, design, *, log_rate: NONE)
-    assert sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).found == NONE
+    assert sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).proof == NONE
 
 
 def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch):
     def proved(task, design, *, log_rate):
         quiet = design.slip_noise <= Fraction(1, 10**7)
-        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if quiet else NONE
+        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if quiet else NONE
 
     design = lambda task, step, **more: replace(HELD, slip_noise=more.get("slip_noise", Fraction(0)))  # noqa: E731
     monkeypatch.setattr(sliding_answer, "designed_sliding", design)
@@ -142,7 +142,7 @@ def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeyp
     monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
     around = {"diffusion": Fraction(800), "slip_noise": Fraction(1, 10**6)}
     for stress in (None, Fraction(10_000)):
-        found = sliding_answer.answer_sliding(load_fault("crustal-patch"), stress=stress, **around).found
+        found = sliding_answer.answer_sliding(load_fault("crustal-patch"), stress=stress, **around).proof
         assert found.reason == "too much; a proof was found with slip noise of at most 100 nm"
 
 
@@ -222,7 +222,7 @@ def test_a_pump_that_cannot_hold_what_may_be_asked_for_has_no_guarantee(monkeypa
 
 def test_the_stresses_that_are_tried_are_told_with_what_came_of_them(monkeypatch):
     def proved(task, design, *, log_rate):
-        return SlidingGuarantee(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 38_000 else NONE
+        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 38_000 else NONE
 
     monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
     monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
@@ -235,7 +235,7 @@ def test_the_stresses_that_are_tried_are_told_with_what_came_of_them(monkeypatch
     tried = [what for what in told if "stress" in what]
     assert [what.partition(" Pa")[0] for what in tried] == ["a stress of 4.1e+04"] * 2 + ["a stress of 3.6e+04"] * 2
     assert [what.rpartition(": ")[2] for what in tried] == ["proof", "not proved", "proof", "proved"]
-    missing = replace(known, found=NONE, held=None)
+    missing = replace(known, proof=NONE, held=None)
     monkeypatch.setattr(state_feedback, "answer_sliding", lambda *_, tell, **__: tell("a law", 0.5) or missing)
     synthesise(load_fault("crustal-patch"), "elqr", progress=lambda what, done: told.append(what))
     assert told[-1] == "a law"

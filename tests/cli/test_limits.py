@@ -9,9 +9,9 @@ import pytest
 
 from quakedesign.cli import main
 from quakedesign.fault import fault_toml, load_fault
-from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.guarantee_result import SlidingAnswer
+from quakedesign.guarantees.guarantee_result import SlidingGuarantee
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.studies import performance_limits as impossible_and_proved
 
@@ -24,7 +24,7 @@ def _quick(monkeypatch):
     monkeypatch.setattr("quakedesign.studies.performance_limits.natural_peak", lambda _fault: 0.05)
     monkeypatch.setattr(
         "quakedesign.studies.performance_limits.design_held",
-        lambda *_, **__: NoGuarantee(reason="none", small_gain=None),
+        lambda *_, **__: NoProof(reason="none", small_gain=None),
     )
     for name in ("longest_step", "longest_delay", "farthest_rock"):
         monkeypatch.setattr(f"quakedesign.studies.performance_limits.{name}", lambda *_, **__: None)
@@ -84,7 +84,7 @@ def test_a_disturbance_may_be_a_shear_stress(capsys):
 
 def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(capsys, monkeypatch, tmp_path):
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
-    answer = SlidingAnswer(found=known, task=known.task, held=known.held)
+    answer = SlidingGuarantee(proof=known, task=known.task, held=known.held)
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0
     said = capsys.readouterr().out
@@ -97,7 +97,7 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
         name: (Fraction(95, 100) * low, Fraction(105, 100) * high) for name, (low, high) in known.task.ranges.items()
     }
     wide = replace(known, task=replace(known.task, ranges=ranges))
-    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **_: replace(answer, found=wide))
+    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **_: replace(answer, proof=wide))
     assert run("crustal-patch") == 0
     assert "for a, b and D_c within 0.05 of their values, on" in " ".join(capsys.readouterr().out.split())
     assert "linearised about slow sliding" in said
@@ -134,8 +134,8 @@ def test_a_stress_or_noise_that_does_not_apply_is_refused(given, said, capsys):
 
 def test_where_no_design_stands_a_stress_the_reason_is_told(capsys, monkeypatch):
     """A sampling time that suits no law would else look like a missing option."""
-    none = NoGuarantee(reason="T_s near 0.51 s suits", small_gain=None)
-    answer = SlidingAnswer(found=none, task=None, held=None)
+    none = NoProof(reason="T_s near 0.51 s suits", small_gain=None)
+    answer = SlidingGuarantee(proof=none, task=None, held=None)
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch") == 2
     assert "no design was found that withstands any: T_s near 0.51 s suits. Give --stress" in capsys.readouterr().err
@@ -147,7 +147,7 @@ def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, m
     patch = load_fault("double-direct-shear")
     file.write_text(fault_toml(patch))
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
-    answer = SlidingAnswer(found=known, task=known.task, held=known.held)
+    answer = SlidingGuarantee(proof=known, task=known.task, held=known.held)
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run(str(file)) == 0
     assert "errors of this fault oscillate while they grow, or do not grow" in " ".join(capsys.readouterr().out.split())
@@ -159,8 +159,8 @@ def test_both_sides_are_of_the_stress_that_the_design_behind_the_well_stands(mon
     known = {Fraction(800): near, Fraction(900): replace(near, task=replace(near.task, stress=near.task.stress / 2))}
 
     def answered(fault, *, diffusion, lag=0, **asked):
-        found = known.get(diffusion, NoGuarantee(reason="too far", small_gain=None))
-        return SlidingAnswer(found=found, task=near.task, held=None)
+        found = known.get(diffusion, NoProof(reason="too far", small_gain=None))
+        return SlidingGuarantee(proof=found, task=near.task, held=None)
 
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", answered)
     sides = {}
@@ -184,7 +184,7 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     def answered(fault, *, stress, spread, **around):
         asked.append(around)
         spreads.append(spread)
-        return SlidingAnswer(found=known, task=known.task, held=known.held)
+        return SlidingGuarantee(proof=known, task=known.task, held=known.held)
 
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", answered)
     patch = ("crustal-patch", "--stress", "25 kPa")
@@ -223,7 +223,7 @@ def test_designs_are_proved_with_the_whole_setup(monkeypatch, capsys):
     """A well of 2 m at 0.5 m²/s is L²/D = 8 s; a mean over 0.02 s comes 0.01 s later."""
     told = {}
     for name in ("design_held", "longest_step"):
-        none = NoGuarantee(reason="none", small_gain=None) if name == "design_held" else None
+        none = NoProof(reason="none", small_gain=None) if name == "design_held" else None
         monkeypatch.setattr(
             f"quakedesign.studies.performance_limits.{name}",
             lambda *_, n=name, a=none, **around: told.__setitem__(n, around) or a,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import LoopAnswer, WorstFound, attacked, guarantee
+from quakedesign.guarantees import TrackingGuarantee, WorstFound, attacked, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 
@@ -34,7 +34,7 @@ def stuck(monkeypatch, slip, rate):
 
 def test_claims_that_no_course_leaves_stay(monkeypatch):
     inside = (float(v) * (1 - 1e-9) for v in (SLOW.claims.slip_error, SLOW.claims.slip_rate_error))
-    assert stuck(monkeypatch, *inside).found == SLOW
+    assert stuck(monkeypatch, *inside).proof == SLOW
 
 
 @pytest.mark.parametrize(
@@ -47,9 +47,9 @@ def test_claims_that_no_course_leaves_stay(monkeypatch):
 def test_a_claim_that_a_course_with_stick_leaves_is_that_of_any_gain(monkeypatch, slip, rate, left):
     found = stuck(monkeypatch, slip, rate)
     assert not found.leaves_with_stick
-    assert (found.found.check(), found.found.slow_gain) == (Verdict.PROVED, SLOW.slow_gain)
+    assert (found.proof.check(), found.proof.slow_gain) == (Verdict.PROVED, SLOW.slow_gain)
     for name in ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure"):
-        assert getattr(found.found.claims, name) == getattr(ANYHOW if name in left else SLOW.claims, name)
+        assert getattr(found.proof.claims, name) == getattr(ANYHOW if name in left else SLOW.claims, name)
 
 
 def test_a_disturbance_that_is_slow_has_a_class_of_its_own(monkeypatch):
@@ -61,13 +61,13 @@ def test_a_disturbance_that_is_slow_has_a_class_of_its_own(monkeypatch):
     for other in (replace(given, constant=1e-6), replace(given, frequency=0.0)):
         asked = replace(found, fault=replace(found.fault, disturbance=other))
         assert "to jump" not in " ".join(asked.lines())
-    of_rate = replace(found.found, task=replace(found.found.task, change=F(1)))
-    assert "to jump" not in " ".join(replace(found, found=of_rate).lines())
+    of_rate = replace(found.proof, task=replace(found.proof.task, change=F(1)))
+    assert "to jump" not in " ".join(replace(found, proof=of_rate).lines())
 
 
 def test_a_course_beyond_both_is_said_and_the_narrow_claims_stay(monkeypatch):
     found = stuck(monkeypatch, between("slip_error", F(2)), 0.0)
-    assert found.found == SLOW
+    assert found.proof == SLOW
     assert "exceeds the bounds" in found.lines()[-1]
     assert found.limit_lines()[0].startswith(
         "no controller with zero-order hold over T_s = 0.184 s keeps the slip-rate error below "
@@ -76,23 +76,23 @@ def test_a_course_beyond_both_is_said_and_the_narrow_claims_stay(monkeypatch):
 
 def test_what_is_widened_is_proved_or_not_said(monkeypatch):
     monkeypatch.setattr(MODULE, "guarantee", lambda *_: SLOW)
-    assert stuck(monkeypatch, between("slip_error"), 0.0).found == SLOW
+    assert stuck(monkeypatch, between("slip_error"), 0.0).proof == SLOW
     monkeypatch.setattr(type(SLOW), "check", lambda _: Verdict.UNDECIDED)
     monkeypatch.setattr(MODULE, "guarantee", lambda *_: WIDE)
-    assert stuck(monkeypatch, between("slip_error"), 0.0).found == SLOW
+    assert stuck(monkeypatch, between("slip_error"), 0.0).proof == SLOW
 
 
 def test_a_sliding_mode_of_a_file_whose_law_states_no_gains_has_lines():
     """Its law is run from the controller of the design, and its pressure has a limit at rest: nothing to warn of."""
     claim = parse_guarantee(FILE.with_name("guarantee_cta_real-fault.json").read_text())
-    told = LoopAnswer(fault=load_fault("real-fault"), found=claim).lines()
+    told = TrackingGuarantee(fault=load_fault("real-fault"), proof=claim).lines()
     assert told[0] == f"proved: {claim.sentence()}"
     assert not any("on a fault that sticks" in line for line in told)
 
 
 def test_a_law_that_would_wind_up_is_warned_of_unless_its_pressure_is_limited_at_rest(monkeypatch):
     monkeypatch.setattr("quakedesign.laws.sampled_controller.winds_up", lambda _: True)
-    answer = LoopAnswer(fault=load_fault("real-fault"), found=SLOW)
+    answer = TrackingGuarantee(fault=load_fault("real-fault"), proof=SLOW)
     assert any(line.startswith("MAY WIND UP") for line in answer.lines())
     monkeypatch.setattr(type(SLOW), "rest_limit", property(lambda _: "a limit"))
     assert not any(line.startswith("MAY WIND UP") for line in answer.lines())

@@ -9,12 +9,12 @@ import pytest
 import quakedesign as qd
 from quakedesign.errors import CertificateError
 from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.guarantees import Guarantee, NoGuarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
-from quakedesign.guarantees.guarantee_result import LoopAnswer, SlidingAnswer
+from quakedesign.guarantees import NoProof, TrackingProof
+from quakedesign.guarantees.exact.plant_guarantee import PlantProof
+from quakedesign.guarantees.guarantee_result import SlidingGuarantee, TrackingGuarantee
 from quakedesign.guarantees.search.adversary import WorstSliding
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
-from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer
+from quakedesign.guarantees.stick_slip_answer import StickSlipGuarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
@@ -33,15 +33,15 @@ def test_each_kind_of_result_has_the_bounds_of_its_claims_in_si():
     sticking, slow = stored("stick_slip"), stored("slow_sliding")
     printed = qd.guarantee(FAULT, law=qd.SampledLaw.from_pid(3e8, 1e8, 2e8, N=40, step="50 ms"))
     seen = WorstStickSlip(slip_behind=1e-6, slip_ahead=3e-6, peak_slip_rate=2e-6)
-    stick_slip = StickSlipAnswer(fault=FAULT, found=sticking, worst=seen)
-    sliding = SlidingAnswer(found=slow, task=slow.task, held=slow.held)
+    stick_slip = StickSlipGuarantee(fault=FAULT, proof=sticking, worst=seen)
+    sliding = SlidingGuarantee(proof=slow, task=slow.task, held=slow.held)
     common = {"slip_error", "peak_slip_rate", "least_pressure", "largest_pressure"}
     for result in (printed, stick_slip, sliding):
         assert common <= result.bounds.keys()
         assert result.bounds["least_pressure"] < result.bounds["largest_pressure"]
         assert (result.verdict, result.reason) == (Verdict.PROVED, "")
-        assert result.sentence() == result.found.sentence()
-        assert result.controller == result.found.controller
+        assert result.sentence() == result.proof.sentence()
+        assert result.controller == result.proof.controller
     written = printed.to_dict()
     for name in ("slip_error", "slip_rate_error", "peak_slip_rate"):
         assert printed.bounds[name].exact == written[name]
@@ -58,9 +58,9 @@ def test_each_kind_of_result_has_the_bounds_of_its_claims_in_si():
 def test_the_pressures_are_those_in_the_fault_and_not_at_the_valve():
     """Behind a lag the commanded pressure may go farther than that in the fault."""
     one = qd.load_guarantee(PROOFS / "guarantee_lab-fault.json")
-    assert isinstance(one, Guarantee)
+    assert isinstance(one, TrackingProof)
     asked = {"least_asked": LowerBound(Fraction(-(10**9))), "largest_asked": UpperBound(Fraction(10**9))}
-    found = LoopAnswer(fault=FAULT, found=replace(one, claims=replace(one.claims, **asked))).bounds
+    found = TrackingGuarantee(fault=FAULT, proof=replace(one, claims=replace(one.claims, **asked))).bounds
     assert (found["least_pressure"], found["largest_pressure"]) == (
         one.claims.least_pressure,
         one.claims.largest_pressure,
@@ -71,17 +71,17 @@ def test_the_pressures_are_those_in_the_fault_and_not_at_the_valve():
 def test_check_of_a_result_is_that_of_its_certificate(monkeypatch):
     sticking = stored("stick_slip")
     monkeypatch.setattr(type(sticking), "check", lambda _: Verdict.UNDECIDED)
-    assert StickSlipAnswer(fault=FAULT, found=sticking).check() is Verdict.UNDECIDED
+    assert StickSlipGuarantee(fault=FAULT, proof=sticking).check() is Verdict.UNDECIDED
 
 
 def test_a_result_is_saved_as_a_certificate_and_read_again(tmp_path):
     slow = stored("slow_sliding")
-    SlidingAnswer(found=slow, task=slow.task, held=slow.held).save(tmp_path / "proof.json")
+    SlidingGuarantee(proof=slow, task=slow.task, held=slow.held).save(tmp_path / "proof.json")
     assert qd.load_guarantee(tmp_path / "proof.json") == slow
 
 
 def test_without_a_guarantee_there_is_a_reason_and_nothing_else(tmp_path):
-    none = LoopAnswer(fault=FAULT, found=NoGuarantee(reason="the gain is 2", small_gain=None))
+    none = TrackingGuarantee(fault=FAULT, proof=NoProof(reason="the gain is 2", small_gain=None))
     assert (none.verdict, none.reason, none.bounds, none.worst_case) == (Verdict.UNDECIDED, "the gain is 2", {}, {})
     assert none.check() is Verdict.UNDECIDED
     with pytest.raises(CertificateError, match=r"must be proved.*Received none: the gain is 2"):
@@ -89,13 +89,13 @@ def test_without_a_guarantee_there_is_a_reason_and_nothing_else(tmp_path):
     with pytest.raises(CertificateError, match="must be proved"):
         none.controller  # noqa: B018
     assert not list(tmp_path.iterdir())
-    assert (none.found.verdict, dict(none.found.bounds)) == (Verdict.UNDECIDED, {})
+    assert (none.proof.verdict, dict(none.proof.bounds)) == (Verdict.UNDECIDED, {})
 
 
 def test_a_result_about_an_own_plant_has_its_peaks_by_name():
     plant = stored("uncertain_plant")
-    assert isinstance(plant, PlantGuarantee)
-    named = PlantGuarantee(
+    assert isinstance(plant, PlantProof)
+    named = PlantProof(
         part=plant.part, law=plant.law, pieces=plant.pieces, inputs=plant.inputs, claims=plant.claims,
         outputs=tuple(f"y{i}" for i, _ in enumerate(plant.claims.outputs)),
         controls=tuple(f"u{i}" for i, _ in enumerate(plant.claims.controls)),
@@ -109,4 +109,7 @@ def test_worst_slow_sliding_is_given_by_name(monkeypatch):
     slow = stored("slow_sliding")
     seen = WorstSliding(log_rate=0.1, slip_error=2e-6)
     monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_sliding", lambda _: seen)
-    assert SlidingAnswer(found=slow, task=slow.task, held=slow.held).worst_case == {"log_rate": 0.1, "slip_error": 2e-6}
+    assert SlidingGuarantee(proof=slow, task=slow.task, held=slow.held).worst_case == {
+        "log_rate": 0.1,
+        "slip_error": 2e-6,
+    }

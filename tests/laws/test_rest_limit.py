@@ -364,7 +364,7 @@ BEHIND = {
 def test_behind_a_lag_and_rock_a_fault_that_sticks_does_not_wind_up(name):
     """Ahead of its reference the fault rests, and without the limit the pressure falls on. One that moves is free."""
     step, around, stages, substeps = BEHIND[name]
-    found = qd.guarantee(REAL, step=step, **around).found
+    found = qd.guarantee(REAL, step=step, **around).proof
     told = {"actuator": Actuator(stages=stages), "substeps": substeps, "duration": 4000.0, "samples": 500}
     free = replace(found.controller, rest_limit=None)
     runs = {
@@ -384,8 +384,8 @@ def test_behind_a_lag_and_rock_a_fault_that_sticks_does_not_wind_up(name):
 def test_the_compensated_step_is_told_what_is_applied():
     """Deadbeat, p = (−e1/T_s − e2)/(T_sB0) − d, d ← d + a[(e2 − e2⁻)/(T_sB0) − p⁻ − d] with the p⁻ that was applied."""
     made = qd.guarantee(REAL, controller="cta", plant="printed").compensation
-    weight, authority, per_slip = float(made.weight), float(made.authority), float(made.found.rest_limit.per_slip)
-    assert dict(made.limited.sampling.settings)["rest_width"] == made.found.rest_limit.width
+    weight, authority, per_slip = float(made.weight), float(made.authority), float(made.proof.rest_limit.per_slip)
+    assert dict(made.limited.sampling.settings)["rest_width"] == made.proof.rest_limit.width
     law, gain = replace(made.controller, sampling=None), 0.184 * authority
     scheme = Compensated(
         weight=weight, authority=authority, rest_width=15000.0, rest_per_slip=per_slip, rest_resolution=1.0

@@ -15,7 +15,7 @@ from thinned import few
 from quakedesign import assess, simulate
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, Held, guarantee
+from quakedesign.guarantees import Held, TrackingProof, guarantee
 from quakedesign.laws import (
     ErrorModel,
     SampledController,
@@ -57,7 +57,7 @@ def test_a_run_asks_for_the_pressure_of_the_matrices():
 def test_the_whole_task_stays_far_inside_the_guarantee():
     fault = load_fault("real-fault")
     claim = guarantee(uncertain_plant(fault), HELD)
-    assert isinstance(claim, Guarantee)
+    assert isinstance(claim, TrackingProof)
     found = simulate(fault, HELD.controller).metrics
     assert found.max_slip_error <= 6e-6 < claim.claims.slip_error
     assert found.max_slip_rate_error <= 4.5e-6 < claim.claims.slip_rate_error

@@ -126,7 +126,7 @@ def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
         return  # its search is tested in tests/guarantees/search/test_unclocked.py
     if "cta" in path.stem:
         base = replace(family("cta")[0].law, gains=dict(family("cta")[0].law.gains), divisor=stored.task.authority)
-        again = tightened(design_compensated(stored.task, base, stored.held.step).found)
+        again = tightened(design_compensated(stored.task, base, stored.held.step).proof)
         assert again.held.law.root.pull == stored.held.law.root.pull
     else:
         again = design_held(stored.task, stored.held.step, **stored.held.around)

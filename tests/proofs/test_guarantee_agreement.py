@@ -8,7 +8,7 @@ from random_loops import random_loop
 from standalone_guarantee import checker
 from thinned import few
 
-from quakedesign.guarantees import Guarantee, guarantee
+from quakedesign.guarantees import TrackingProof, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 
 
@@ -16,7 +16,7 @@ def bounds_of_both(number):
     """Slip error and slip-rate error of a random loop, by package and checker; None without a guarantee or a law."""
     asked = random_loop(number)
     found = guarantee(*asked) if asked is not None else None
-    if not isinstance(found, Guarantee):
+    if not isinstance(found, TrackingProof):
         return None
     document = json.loads(guarantee_text(found))
     checker.verify(document)

@@ -10,7 +10,7 @@ from standalone_guarantee import checker
 from thinned import few
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, Held, SlowGain, guarantee
+from quakedesign.guarantees import Held, SlowGain, TrackingProof, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.norms import norms
 from quakedesign.guarantees.exact.small_gain import grown
@@ -37,7 +37,7 @@ def claim():
 
 
 def document(held=None):
-    one = claim() if held is None else Guarantee(task=TASK, held=held, claims=claim().claims)
+    one = claim() if held is None else TrackingProof(task=TASK, held=held, claims=claim().claims)
     return json.loads(guarantee_text(one))
 
 

@@ -13,7 +13,7 @@ from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.guarantees import Bounds, Claims, ContinuousPeaks, Guarantee, Held
+from quakedesign.guarantees import Bounds, Claims, ContinuousProof, Held, TrackingProof
 from quakedesign.guarantees.exact import small_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.loop import channels_of
@@ -148,7 +148,7 @@ def some_tasks():
     found[3] = replace(found[3], change=None)
     found[2] = replace(found[2], friction=replace(found[2].friction, rate_slope=F(0)))
     held = some_held(random)
-    raws = [document_of(Guarantee(task=task, held=held, claims=some_claims(random))) for task in found]
+    raws = [document_of(TrackingProof(task=task, held=held, claims=some_claims(random))) for task in found]
     return [(task, checker.read_task(raw)) for task, raw in zip(found, raws, strict=True)]
 
 
@@ -166,7 +166,7 @@ def test_both_derive_the_same_ranges_and_inputs_from_a_fault():
         task = some_task(random)
         friction = replace(task.friction, rate_slope=F(i % 2, 10))
         task = replace(task, friction=friction, amplitude=F(i + 1), change=F(1, 3) if i & 2 else None)
-        found = checker.read_task(document_of(Guarantee(task=task, held=held, claims=some_claims(random))))
+        found = checker.read_task(document_of(TrackingProof(task=task, held=held, claims=some_claims(random))))
         assert (found.name, found.b, found.s, found.w) == ("fault", task.authority, task.slip_chord, task.rate_chord)
         assert (found.beta, found.rest) == (task.beta, task.rest_pressure)
         assert (found.reference_rate, found.reference_force) == (task.reference_rates[0], task.reference_force)
@@ -220,7 +220,7 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             held = replace(held, diffusion=F(i, 7) * held.step)
         elif i % 3 == 0:
             held = off_schedule(held, i // 3)
-        raw = document_of(Guarantee(task=task, held=held, claims=some_claims(random)))
+        raw = document_of(TrackingProof(task=task, held=held, claims=some_claims(random)))
         ours = unless(ParameterError, held.loop, task)
         theirs = unless(checker.Refused, checker.read_loop, raw["loop"], read)
         assert (ours is None) == (theirs is None)
@@ -251,7 +251,7 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
                 assert (theirs.root.pull, theirs.root.slopes, theirs.root.remainder) == given
             more = {"largest_step": UpperBound(1)} if held.pump else {}
             more |= {"least_asked": LowerBound(-1), "largest_asked": UpperBound(1)} if held.pump and held.lag else {}
-            claim = Guarantee(task=task, held=held, claims=replace(some_claims(random), **more))
+            claim = TrackingProof(task=task, held=held, claims=replace(some_claims(random), **more))
             assert parse_guarantee(guarantee_text(claim)) == claim
     assert built > 25
     assert {(True, True, None), (True, False, 0), (True, False, 1)} <= layers
@@ -279,7 +279,7 @@ def test_both_build_the_same_loop_in_continuous_time():
     random, built = Random(3), 0
     for i in range(30):
         (task, read), law = some_tasks()[i % 4], some_continuous(random)
-        claim = ContinuousPeaks(task=task, law=law, claims=some_claims(random))
+        claim = ContinuousProof(task=task, law=law, claims=some_claims(random))
         raw = document_of(claim)
         ours = unless(ParameterError, getattr, claim, "loop")
         theirs = unless(checker.Refused, checker.read_loop, raw["loop"], read)
@@ -381,7 +381,7 @@ def test_the_stress_at_rest_turns_where_friction_reaches_a_bound(growth, change,
         spreads=(zero, zero, zero), friction=friction, shape=tuple(map(F, SHAPES[0])), target_slip=F(2),
         operation_time=F(1), amplitude=zero, change=None, growths=(growth, zero),
     )  # fmt: skip
-    raw = document_of(Guarantee(task=task, held=some_held(Random(6)), claims=some_claims(Random(1))))
+    raw = document_of(TrackingProof(task=task, held=some_held(Random(6)), claims=some_claims(Random(1))))
     assert checker.read_task(raw).rest == task.rest_pressure == rest
 
 
@@ -390,7 +390,7 @@ def test_a_law_of_the_state_has_two_inputs_more():
     """ζ = (0, −1/k4) and η = (−1/k4, k3/k4²), times −k1 and −k2; for a reference without jumps of acceleration."""
     task, read = some_tasks()[1]
     k1, k2, k3, k4 = gains = tuple(map(F, (2, 3, 5, 7)))
-    claim = ContinuousPeaks(task=task, law=exact_integrals(gains, of_state=True), claims=some_claims(Random(1)))
+    claim = ContinuousProof(task=task, law=exact_integrals(gains, of_state=True), claims=some_claims(Random(1)))
     theirs, ours = checker.read_loop(document_of(claim)["loop"], read), claim.loop
     expected = [[0, 0, k / k4, -k * k3 / k4**2] for k in (k1, k2)]
     assert theirs.inputs[2:] == [list(ours.inputs[name]) for name in FORWARD] == expected

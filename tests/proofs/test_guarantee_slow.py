@@ -15,7 +15,7 @@ from standalone_guarantee import checker
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, Held, NoGuarantee, SlowGain, guarantee
+from quakedesign.guarantees import Held, NoProof, SlowGain, TrackingProof, guarantee
 from quakedesign.guarantees.exact import statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import Bounds, grown, slow_gains
@@ -185,7 +185,7 @@ def test_a_claim_that_no_bound_stays_below_is_not_proved(monkeypatch):
         bounds = Bounds(slip_error=share * F(1, 10), slip_rate_error=F(0), push=F(0), small_gain=F(1, 2))
         monkeypatch.setattr(statement, "best_bounds", lambda *_, bounds=bounds: bounds)
         claims = replace(statement.Claims.of(TASK, bounds), slip_error=UpperBound(F(1, 10)))
-        assert Guarantee(task=TASK, held=HELD, claims=claims, slow_gain=SLOW).check() is verdict
+        assert TrackingProof(task=TASK, held=HELD, claims=claims, slow_gain=SLOW).check() is verdict
     raw = document()
     for share, fails in ((1, True), (F(999, 1000), False)):
         slip = share * F(raw["claims"]["slip_error"])
@@ -203,13 +203,13 @@ def test_a_slip_error_that_moves_the_gain_without_end_is_said(monkeypatch):
 
     monkeypatch.setattr(statement, "best_bounds", grows)
     found = guarantee(TASK, HELD, SLOW)
-    assert isinstance(found, NoGuarantee)
+    assert isinstance(found, NoProof)
     assert "moves it further" in found.reason
 
 
 def test_a_loop_that_is_not_stable_at_an_end_of_the_range_has_none():
     wild = replace(HELD, law=replace(LAW, feedback=tuple(9 * v for v in LAW.feedback)))
-    assert isinstance(guarantee(TASK, wild, SLOW), NoGuarantee)
+    assert isinstance(guarantee(TASK, wild, SLOW), NoProof)
     fast = replace(SLOW, growth=F(50))
     assert "not stable" in guarantee(TASK, HELD, fast).reason
 

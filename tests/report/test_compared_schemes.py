@@ -10,7 +10,7 @@ import pytest
 from quakedesign.cli.app import console
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Reference, load_fault
-from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees import NoProof
 from quakedesign.laws import published
 from quakedesign.lyapunov import Verdict
 from quakedesign.report import compare, headline
@@ -49,7 +49,7 @@ def compared(kept):
 
 
 def test_a_search_of_other_sampling_times_is_named_only_where_there_was_one():
-    none = NoGuarantee(reason="the gain is 2", small_gain=None)
+    none = NoProof(reason="the gain is 2", small_gain=None)
     in_continuous_time = undecided(SHORT, published("lab-fault")["elqr"])
     lines = [study._answer(SHORT, replace(in_continuous_time, runs=runs), given=False).lines() for runs in (None, none)]
     assert [len(one) for one in lines] == [1, 2]

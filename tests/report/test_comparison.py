@@ -197,7 +197,7 @@ def test_the_overview_has_lines_at_the_proved_bound_the_worst_case_and_the_limit
     levels = {line.get_label(): line.get_ydata()[0] for line in rate.lines if len(set(line.get_ydata())) == 1}
     answer = designed.answer
     bounds = [value for label, value in levels.items() if "proved" in label]
-    assert bounds == [float(answer.found.peak_slip_rate)]
+    assert bounds == [float(answer.proof.peak_slip_rate)]
     assert [v for label, v in levels.items() if "worst case" in label] == [answer.worst.slip_rate_error]
     assert [v for label, v in levels.items() if "limit of every" in label] == [float(answer.limit.slip_rate_error)]
     assert rate.get_yscale() == slip.get_xscale() == "log"
@@ -209,8 +209,8 @@ def test_the_overview_has_lines_at_the_proved_bound_the_worst_case_and_the_limit
 
 def test_the_overview_is_of_the_design_with_the_smallest_proved_bound(comparison):
     (best,) = comparison.of("designed")
-    claims = replace(best.answer.found.claims, peak_slip_rate=UpperBound(1))
-    answer = replace(best.answer, found=replace(best.answer.found, claims=claims))
+    claims = replace(best.answer.proof.claims, peak_slip_rate=UpperBound(1))
+    answer = replace(best.answer, proof=replace(best.answer.proof, claims=claims))
     worse = replace(best, label="worse", answer=answer)
     both = Comparison(fault=comparison.fault, uncontrolled=comparison.uncontrolled, entries=(worse, best))
     lines = {line.get_label(): line for line in overview(both).axes[0].lines}

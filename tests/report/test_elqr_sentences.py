@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, ContinuousPeaks, NoGuarantee
+from quakedesign.guarantees import Bounds, Claims, ContinuousProof, NoProof
 from quakedesign.linear.sampled_stability import HeldLoop, LargestVaryingStep, VaryingVerdict
 from quakedesign.loop import exact_integrals
 from quakedesign.lyapunov import Verdict
@@ -43,8 +43,8 @@ def test_peaks_of_one_or_no_class():
     claims = replace(
         Claims.of(task, bounds), peak_slip_rate=UpperBound("8.33542235e-5"), slip_error=UpperBound("0.50001")
     )
-    peaks = ContinuousPeaks(task=task, law=law, claims=claims)
-    none = NoGuarantee(reason="small gain 2: too much", small_gain=UpperBound(2))
+    peaks = ContinuousProof(task=task, law=law, claims=claims)
+    none = NoProof(reason="small gain 2: too much", small_gain=UpperBound(2))
     said = peaks_sentence({"rate": peaks, "amplitude": none})
     assert said.endswith("slip rate below 8.34e-05 m/s (slip error 0.501 m) for one of its amplitude and rate")
     assert peaks_sentence({"rate": none}) == "no bound on the slip rate is certified; small gain 2: too much"

@@ -10,7 +10,7 @@ import pytest
 from quakedesign.cli.design_commands import positive
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import ContinuousPeaks
+from quakedesign.guarantees import ContinuousProof
 from quakedesign.laws import SampledLaw, control_law
 from quakedesign.linear.sampled_stability import HeldLoop
 from quakedesign.lyapunov import Verdict
@@ -105,7 +105,7 @@ def test_the_sign_of_the_pressure_is_said(ends, said):
     assert pressure_sentence(*ends) == said
 
 
-PEAKS = object.__new__(ContinuousPeaks)  # that there are some is all that counts here
+PEAKS = object.__new__(ContinuousProof)  # that there are some is all that counts here
 
 
 def test_verdicts_are_graded_by_what_the_proof_leaves_out(slow):

@@ -18,9 +18,9 @@ from quakedesign.cli.app import console as terminal
 from quakedesign.errors import ParameterError, SimulationError, UnsupportedError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.guarantee_result import SlidingAnswer
+from quakedesign.guarantees.guarantee_result import SlidingGuarantee
 from quakedesign.report.figures import cycle, errors, overviews, slow_sliding
 from quakedesign.report.folder import write_folder
 from quakedesign.report.page import accounts, parameter_rows
@@ -48,7 +48,7 @@ SHORT = replace(PATCH, reference=replace(PATCH.reference, target_slip=0.3, opera
 def comparison():
     """A law whose proof is known, over a third of its task, beside a fault that nothing has disturbed yet."""
     guarantee = parse_guarantee(PROOF.read_text())
-    answer = SlidingAnswer(found=guarantee, task=guarantee.task, held=guarantee.held)
+    answer = SlidingGuarantee(proof=guarantee, task=guarantee.task, held=guarantee.held)
     still = simulate_state(SHORT, 1e-9, duration=1e7, inertia=False, method="dop853")
     natural = state_runs.StateRun(fault=SHORT, loading_rate=1e-9, start=sliding(SHORT, 1e-9), trajectory=still)
     with pytest.MonkeyPatch.context() as patched:
@@ -135,7 +135,7 @@ def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(compar
         "no law with a hold over 300 s was found whose loop is stable; a proof was found for a stress of at most 7 kPa"
     )
     guarantee = comparison.entries[0].guarantee
-    none = SlidingAnswer(found=NoGuarantee(reason=why, small_gain=None), task=guarantee.task, held=None)
+    none = SlidingGuarantee(proof=NoProof(reason=why, small_gain=None), task=guarantee.task, held=None)
     monkeypatch.setattr(state_feedback, "answer_sliding", lambda fault, **asked: none)
     monkeypatch.setattr(compared_in, "natural_run", lambda fault: comparison.uncontrolled)
     without, told = compare(SHORT, [design(SHORT, "elqr")]), io.StringIO()

@@ -14,7 +14,7 @@ import pytest
 
 from quakedesign.errors import OutputError, ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoGuarantee, compensated, design_compensated
+from quakedesign.guarantees import NoProof, compensated, design_compensated
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee, save_guarantee
 from quakedesign.guarantees.search.compensated_search import implicit_pull, recovered
 from quakedesign.laws import (
@@ -471,7 +471,7 @@ def test_the_gains_of_a_2_dia_stand_in_powers_and_are_read_off_too(gains, scale,
     real, step, weight, authority = load_fault("real-fault"), F("0.184"), F("0.3"), F("2.25e-8")
     own = control_law("dia").from_values(gains, scale=F(scale), divisor=F(2353, 125000000000))
     claim = compensated(uncertain_plant(real), own, weight, authority, step)
-    if isinstance(claim, NoGuarantee):  # the step is that of the law, proved or not
+    if isinstance(claim, NoProof):  # the step is that of the law, proved or not
         claim = load_guarantee(STORED)
         root = ImplicitRoot(pull=implicit_pull(own, step, authority))
         claim = replace(claim, held=replace(claim.held, law=compensated_law(root, weight, step * authority)))
@@ -499,7 +499,7 @@ def test_a_certificate_of_a_2_dia_is_exported(tmp_path):
         uncertain_plant(real), control_law("dia").base_gains()[0].law, F("0.184"), objective="peak"
     )
     path = tmp_path / "dia.json"
-    save_guarantee(made.found, path)
+    save_guarantee(made.proof, path)
     chosen = certified_choice(real, path)
     found = export_controller(real, chosen.controller, tmp_path / "c")
     assert found.facts["law"] == "2-DIA"

@@ -137,7 +137,7 @@ def test_a_guarantee_counts_healing_beside_the_whole_disturbance():
     """Its task has the disturbance that both are worth: H + N̂Δμ_h(σ' − p) with the least pressure that is claimed."""
     fault = healing(REAL, 2e-5)
     answer = qd.guarantee(fault)
-    found, plain = answer.found, qd.guarantee(REAL).found
+    found, plain = answer.proof, qd.guarantee(REAL).proof
     assert found.healing == F(2, 10**5)
     worth = F(1, 2500 * 5000) * found.healing * (50_000_000 - F(found.claims.least_pressure))
     assert plain.task.amplitude + worth <= found.task.amplitude <= plain.task.amplitude + F(11, 10) * worth

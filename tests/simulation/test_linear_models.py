@@ -80,7 +80,7 @@ def unstable_from(loop, factor):
 @pytest.mark.parametrize("around", [{}, {"lag": F(1, 5)}])
 def test_margins_of_a_sampled_loop_are_where_its_poles_and_its_nyquist_curve_say(around):
     """Up to half the sampling frequency, which python-control leaves out."""
-    law = qd.guarantee(REAL, **around).found.controller
+    law = qd.guarantee(REAL, **around).proof.controller
     loop = qd.loop_transfer(REAL, law)
     found = qd.loop_margins(loop)
     assert found.stable

@@ -14,9 +14,9 @@ import quakedesign as qd
 from quakedesign.cli import main
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
-from quakedesign.guarantees import NoGuarantee
+from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantGuarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantProof
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
 from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
 from quakedesign.guarantees.search.plant_search import linear_part
@@ -161,7 +161,7 @@ def test_pressures_themselves_are_those_of_equilibrium_and_what_is_proved_beside
     pressures = np.array([[0.0, -14.1e6], [1e6, -14.2e6], [2e6, 14.1e6]])
     seen = {"slip_rate": np.zeros((3, 2)), "slip_error": np.zeros(2), "rest": np.ones(2), "times": [7.0]}
     run = SimpleNamespace(pressure=pressures, reversed=False, opened=True, **seen)
-    one = chains.ChainRun(chain=chain, controller="centralised", found=found, run=run)
+    one = chains.ChainRun(chain=chain, controller="centralised", proof=found, run=run)
     unloading, strength = 30e9 / 5000, 0.3353 * 50e6  # per slip, at first [Pa/m], [Pa]
     least = 50e6 - (strength - unloading * 0.27635) / 0.2353
     largest = 50e6 - (strength - unloading * 0.785) / 0.3353
@@ -305,7 +305,7 @@ def law_that_is_proved(chain=CHAIN):
     plant = qd.UncertainPlant.from_blocks(chain)
     part = linear_part(plant, {})
     claims = PlantClaims(outputs=(UpperBound(1),) * 6, controls=(UpperBound(1),) * 3)
-    return PlantGuarantee(part=part, law=law, pieces=8, inputs=(F(0),) * len(part.sectors), claims=claims)
+    return PlantProof(part=part, law=law, pieces=8, inputs=(F(0),) * len(part.sectors), claims=claims)
 
 
 def test_a_certificate_that_does_not_hold_or_is_of_other_blocks_gives_no_law(tmp_path, monkeypatch):
@@ -313,7 +313,7 @@ def test_a_certificate_that_does_not_hold_or_is_of_other_blocks_gives_no_law(tmp
     monkeypatch.setattr(chains, "load_guarantee", lambda _: claim)
     with pytest.raises(CertificateError, match="must hold"):
         chains.chain_law(CHAIN, certificate=path)
-    monkeypatch.setattr(PlantGuarantee, "check", lambda _: Verdict.PROVED)
+    monkeypatch.setattr(PlantProof, "check", lambda _: Verdict.PROVED)
     found = chains.chain_law(CHAIN, certificate=path)
     assert found.law == claim.law
     assert "|slip-rate error 2| <= 1 m/s" in found.sentence()
@@ -379,12 +379,12 @@ def test_inertia_counts_in_the_stress_that_a_guarantee_covers():
 @pytest.mark.parametrize("happened", [(), ("reversed",), ("opened",), ("reversed", "opened")])
 def test_a_run_outside_its_model_is_not_safe(happened):
     run = SimpleNamespace(**{name: name in happened for name in ("reversed", "opened")})
-    assert chains.ChainRun(chain=CHAIN, controller="", found=None, run=run).safe is (happened == ())
+    assert chains.ChainRun(chain=CHAIN, controller="", proof=None, run=run).safe is (happened == ())
 
 
 @pytest.mark.slow
 def test_a_run_of_slow_sliding_says_whether_it_stays_within_what_is_proved(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(PlantGuarantee, "check", lambda _: Verdict.PROVED)  # takes 17 s; decided in the slow tests
+    monkeypatch.setattr(PlantProof, "check", lambda _: Verdict.PROVED)  # takes 17 s; decided in the slow tests
     certificate = SLIDING.with_suffix(".json")
     assert (
         run("simulate", SLIDING, "--certificate", certificate, "--duration", "2 hours", "--out", tmp_path / "run") == 0
@@ -507,7 +507,7 @@ def test_laws_of_slow_sliding_are_compared_side_by_side(designed, capsys):
 
 
 def test_where_nothing_is_proved_of_slow_sliding_no_law_runs(monkeypatch, capsys, tmp_path):
-    none = NoGuarantee(reason="no bounds close", small_gain=None)
+    none = NoProof(reason="no bounds close", small_gain=None)
     monkeypatch.setattr(chains, "guarantee", lambda *_, **__: none)
     assert run("design", SLIDING, *LOADS, "--out", tmp_path / "run") == 1
     told = capsys.readouterr().out
@@ -522,7 +522,7 @@ def test_where_nothing_is_proved_of_slow_sliding_no_law_runs(monkeypatch, capsys
 def test_a_law_of_slow_sliding_with_a_delay_is_neither_run_nor_exported(monkeypatch, capsys, tmp_path):
     claim = load_guarantee(SLIDING.with_suffix(".json"))
     late = replace(claim, law=replace(claim.law, delay=F(1)))
-    monkeypatch.setattr(PlantGuarantee, "check", lambda _: Verdict.PROVED)
+    monkeypatch.setattr(PlantProof, "check", lambda _: Verdict.PROVED)
     monkeypatch.setattr(chains, "load_guarantee", lambda _: late)
     for command in ("simulate", "export"):
         assert run(command, SLIDING, "--certificate", tmp_path / "x.json") == 2
@@ -530,7 +530,7 @@ def test_a_law_of_slow_sliding_with_a_delay_is_neither_run_nor_exported(monkeypa
 
 
 def test_the_law_of_slow_sliding_is_exported_with_its_plan(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(PlantGuarantee, "check", lambda _: Verdict.PROVED)  # takes 16 s; decided in the slow tests
+    monkeypatch.setattr(PlantProof, "check", lambda _: Verdict.PROVED)  # takes 16 s; decided in the slow tests
     certificate = SLIDING.with_suffix(".json")
     assert run("export", SLIDING, "--certificate", certificate, "--out", tmp_path / "c", "--json") == 0
     answer = json.loads(capsys.readouterr().out)
@@ -553,5 +553,5 @@ def test_a_small_event_before_a_large_one_is_no_cycle(monkeypatch):
     monkeypatch.setattr(chains.SlidingChainRun, "events", events)
     run = SimpleNamespace(times=[0.0, 300.0], loading_rate=1e-9, onsets=onsets)
     chain = SimpleNamespace(name="two")
-    free = chains.SlidingChainRun(chain=chain, run=run, inertia=False, found=None, controller="")
+    free = chains.SlidingChainRun(chain=chain, run=run, inertia=False, proof=None, controller="")
     assert free.lines()[-1] == "recurrence interval 100 s, of events with over 10% of the largest slip"

@@ -158,8 +158,8 @@ def test_the_guaranteed_law_slips_as_slowly_as_proved_where_it_is_proved():
     found = guarantees()
     longest = found["2 ms late, lag 1 ms, readings off by 500 nm, rate"]
     assert longest.proved
-    assert longest.found.claims.peak_slip_rate < 6e-3
-    proof = found["1 ms late, lag 1 ms, readings off by 500 nm, amplitude"].found
+    assert longest.proof.claims.peak_slip_rate < 6e-3
+    proof = found["1 ms late, lag 1 ms, readings off by 500 nm, amplitude"].proof
     inside = as_proved(KNOWN, proof)
     assert (inside.delay, inside.jitter, inside.lag) == (1, 0, 1e-3)
     run = guaranteed_in(inside, proof, specimens=4, duration=300.0)
@@ -167,7 +167,7 @@ def test_the_guaranteed_law_slips_as_slowly_as_proved_where_it_is_proved():
     assert run.slip_error[2] <= proof.claims.slip_error
     assert run.peak_slip_rate[2] <= proof.claims.peak_slip_rate
     for delay in (1, 2):  # without a lag, 2 ms late with a law that settles by itself
-        proof = found[f"{delay} ms late, lag 0 ms, readings off by 500 nm, amplitude"].found
+        proof = found[f"{delay} ms late, lag 0 ms, readings off by 500 nm, amplitude"].proof
         run = guaranteed_in(as_proved(KNOWN, proof), proof, specimens=4, duration=60.0)
         assert run.harmless == 4
         assert run.slip_error[2] <= proof.claims.slip_error

@@ -10,7 +10,7 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Disturbance
-from quakedesign.guarantees import Claims, Guarantee, Held, NoGuarantee
+from quakedesign.guarantees import Claims, Held, NoProof, TrackingProof
 from quakedesign.guarantees.exact.limit_theorems import longest_reaction
 from quakedesign.guarantees.search.linear_design import Longest
 from quakedesign.laws import summed_integrals
@@ -45,14 +45,14 @@ def designs(monkeypatch):
         if objective == "tracking":
             assert (step, delay) == (rational(REAL.sampling_time), 0)
             claims = dataclasses.replace(CLAIMS, slip_rate_error=UpperBound(longest["tracking"]))
-            return Guarantee(task=task, held=Held(law=LAW, step=step, delay=delay), claims=claims)
+            return TrackingProof(task=task, held=Held(law=LAW, step=step, delay=delay), claims=claims)
         asked.append((step, delay))
         if step > longest["step"] or delay > longest["delay"]:
-            return NoGuarantee(reason="too long", small_gain=None)
-        return Guarantee(task=task, held=Held(law=LAW, step=step, delay=delay), claims=CLAIMS)
+            return NoProof(reason="too long", small_gain=None)
+        return TrackingProof(task=task, held=Held(law=LAW, step=step, delay=delay), claims=CLAIMS)
 
     def claimed(task, step, **around):
-        return Guarantee(task=task, held=Held(law=LAW, step=step, **around), claims=CLAIMS)
+        return TrackingProof(task=task, held=Held(law=LAW, step=step, **around), claims=CLAIMS)
 
     def longest_step(task, **told):
         tellings.append(told)

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 import quakedesign as qd
-from quakedesign.guarantees import LoopAnswer, NoGuarantee, StickSlipAnswer, guarantee_of, load_guarantee
+from quakedesign.guarantees import NoProof, StickSlipGuarantee, TrackingGuarantee, guarantee_of, load_guarantee
 from quakedesign.guarantees.search import compensated_search as COMPENSATED
 from quakedesign.guarantees.search.compensated_search import recovered, sorted_terms, sticking_loop
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
@@ -26,7 +26,7 @@ GUARANTEE, FEEDBACK, SLIDING = (
     import_module(f"quakedesign.synthesis.{name}") for name in ("guarantee", "state_feedback", "sliding_mode_design")
 )
 ANSWER = import_module("quakedesign.guarantees.stick_slip_answer")
-NONE = NoGuarantee(reason="no polytope", small_gain=None)
+NONE = NoProof(reason="no polytope", small_gain=None)
 
 
 @pytest.fixture(scope="module")
@@ -77,9 +77,9 @@ def test_loops_that_the_theorem_does_not_know_are_proved_without_stick(monkeypat
     sampled = SimpleNamespace(runs=plain, reason="", premises=tuple)
     monkeypatch.setattr(FEEDBACK, "sampled_design", lambda *_, **__: sampled)
     monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
-    monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: SimpleNamespace(found=found, proved=True))
+    monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: SimpleNamespace(proof=found, proved=True))
     assert qd.design(REAL, "elqr", **asked).guarantee is plain
-    assert qd.guarantee(REAL, **asked).found is plain
+    assert qd.guarantee(REAL, **asked).proof is plain
 
 
 def test_a_design_hands_down_what_the_theorem_takes(monkeypatch, sticking):
@@ -92,14 +92,14 @@ def test_a_design_hands_down_what_the_theorem_takes(monkeypatch, sticking):
 
 
 def test_a_guarantee_hands_down_what_the_theorem_takes(monkeypatch, sticking):
-    seen, answer = {}, StickSlipAnswer(fault=REAL, found=sticking)
+    seen, answer = {}, StickSlipGuarantee(fault=REAL, proof=sticking)
     monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda fault, setup, **given: seen.update(given) or answer)
     assert qd.guarantee(REAL, objective="peak", progress=print) is answer
     assert seen == {"objective": "peak", "sliding": None, "progress": print}
 
 
 def test_a_sliding_mode_is_guaranteed_on_the_stick_slip_plant_with_its_base_gains(monkeypatch, sticking):
-    seen, answer = [], StickSlipAnswer(fault=REAL, found=sticking)
+    seen, answer = [], StickSlipGuarantee(fault=REAL, proof=sticking)
     monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, sliding, **__: seen.append(sliding) or answer)
     monkeypatch.setattr(GUARANTEE, "_sampled", None)
     asked = [{}, {"gains": ("7", "6", "2.3", "1.1")}, {"scheme": "stick-slip"}, {"plant": "stick-slip"}]
@@ -118,7 +118,7 @@ def test_a_sliding_mode_is_guaranteed_without_stick_where_that_is_asked_for(monk
 
 
 def test_the_scheme_for_friction_that_sticks_has_no_guarantee_without_stick():
-    said = qd.guarantee(REAL, "cta", scheme="stick-slip", plant="printed").found.reason
+    said = qd.guarantee(REAL, "cta", scheme="stick-slip", plant="printed").proof.reason
     assert said.startswith("the estimate of the scheme stick-slip is cut off at rest")
 
 
@@ -149,8 +149,8 @@ def test_the_controller_of_a_result_is_the_sliding_mode_itself():
     """On both plants, read off stored certificates; it has the scheme of its plant."""
     for name, scheme in (("stick_slip_cta", "stick-slip"), ("guarantee_cta", "compensated")):
         found = load_guarantee(PROOFS / f"{name}_real-fault.json")
-        kind = StickSlipAnswer if scheme == "stick-slip" else LoopAnswer
-        controller = kind(fault=REAL, found=found, compensation=recovered(found)).controller
+        kind = StickSlipGuarantee if scheme == "stick-slip" else TrackingGuarantee
+        controller = kind(fault=REAL, proof=found, compensation=recovered(found)).controller
         assert (controller.name, controller.sampling.scheme) == ("cta", scheme)
 
 
@@ -187,17 +187,17 @@ def test_other_laws_are_guaranteed_without_stick(monkeypatch, given):
 
 
 def test_a_guarantee_takes_the_first_that_is_proved(monkeypatch, sticking, plain):
-    answer = StickSlipAnswer(fault=REAL, found=sticking)
+    answer = StickSlipGuarantee(fault=REAL, proof=sticking)
     monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, **__: answer)
     assert qd.guarantee(REAL) is answer
     assert answer.lines()[-1].startswith(
         "no controller with zero-order hold over T_s = 0.184 s keeps the slip rate below 1"
     )
-    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, **__: replace(answer, found=NONE))
+    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, **__: replace(answer, proof=NONE))
     monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
-    monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: LoopAnswer(fault=fault, found=found))
+    monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: TrackingGuarantee(fault=fault, proof=found))
     found = qd.guarantee(REAL)
-    assert found.found is plain
+    assert found.proof is plain
     assert "not proved on the stick-slip plant: no polytope" in found.lines()
     assert found.to_dict()["stick_slip"] == "no polytope"
     assert not qd.guarantee(REAL, plant="stick-slip").proved
@@ -232,7 +232,7 @@ def test_the_answer_of_a_summary_names_the_plant(sticking, plain):
 def test_a_guarantee_for_aperiodic_sampling_is_searched_on_the_stick_slip_plant(monkeypatch):
     given = []
     monkeypatch.setattr(ANSWER, "design_stick_slip", lambda task, step, **wanted: given.append((step, wanted)) or NONE)
-    monkeypatch.setattr(GUARANTEE, "_sampled", lambda *_: LoopAnswer(fault=REAL, found=NONE))
+    monkeypatch.setattr(GUARANTEE, "_sampled", lambda *_: TrackingGuarantee(fault=REAL, proof=NONE))
     found = qd.guarantee(REAL, step="92 ms", longest_step="184 ms")
     ((step, wanted),) = given
     assert (step, wanted["longest_step"], found.not_at_rest) == (F("0.092"), F("0.184"), "no polytope")
@@ -246,7 +246,7 @@ def test_a_sliding_mode_has_no_aperiodic_proof_on_the_stick_slip_plant():
 
 def test_an_aperiodic_guarantee_states_its_range_and_the_limit_at_its_longest_interval():
     found = load_guarantee(PROOFS / "stick_slip_aperiodic_real-fault.json")
-    answer = StickSlipAnswer(fault=REAL, found=found)
+    answer = StickSlipGuarantee(fault=REAL, proof=found)
     assert "zero-order hold over sampling intervals from 0.092 s to 0.184 s in any order" in answer.lines()[0]
     assert (
         "no controller with zero-order hold over T_s = 0.184 s keeps the slip rate below 101 µm/s" in answer.lines()[-1]
@@ -256,4 +256,4 @@ def test_an_aperiodic_guarantee_states_its_range_and_the_limit_at_its_longest_in
     law = pickle.loads(pickle.dumps(found.controller))
     assert (law.sampling.step, law.sampling.longest) == (F("0.092"), F("0.184"))
     periodic = load_guarantee(PROOFS / "stick_slip_real-fault.json")
-    assert "longest_step" not in StickSlipAnswer(fault=REAL, found=periodic).to_dict()
+    assert "longest_step" not in StickSlipGuarantee(fault=REAL, proof=periodic).to_dict()

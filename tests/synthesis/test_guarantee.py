@@ -23,13 +23,13 @@ def test_texts_with_units_are_the_exact_numbers_of_a_setup():
 @pytest.mark.slow
 def test_texts_with_units_are_the_exact_numbers_of_an_answer():
     told = {"step": "100 ms", "lag": "8 ms", "slip_noise": "0.1 um", "rate_noise": 1e-7}
-    found = qd.guarantee(REAL, gains=GAINS, saturation="20 MPa", withdrawal="15e6", **told).found
+    found = qd.guarantee(REAL, gains=GAINS, saturation="20 MPa", withdrawal="15e6", **told).proof
     held = found.held
     assert (held.step, held.lag, held.slip_noise, held.rate_noise) == (F(1, 10), F(1, 125), F(1, 10**7), F(1, 10**7))
     assert (held.pump.least, held.pump.largest) == (-15 * 10**6, 20 * 10**6)
     same = {"step": held.step, "lag": held.lag, "slip_noise": held.slip_noise, "rate_noise": held.rate_noise}
     setup = LoopSetup(saturation=2 * 10**7, withdrawal=F(15 * 10**6), **same)
-    assert qd.guarantee(REAL, "elqr", setup, gains=GAINS).found == found
+    assert qd.guarantee(REAL, "elqr", setup, gains=GAINS).proof == found
 
 
 @pytest.mark.parametrize(

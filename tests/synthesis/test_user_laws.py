@@ -97,7 +97,7 @@ def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
     assert process_time() - began < 2
     assert again.proved
     assert found.proved
-    assert found.found.claims.slip_rate_error < Fraction("2.5e-4")
+    assert found.proof.claims.slip_rate_error < Fraction("2.5e-4")
     assert found.to_dict()["notes"] == list(LAW.notes)
 
 
@@ -123,8 +123,8 @@ def test_no_search_of_the_stick_slip_plant_is_said_of_laws_that_it_does_not_take
 
 @pytest.mark.slow
 def test_independent_runs_that_stick_stay_below_the_worst_case_found(found):
-    rates = [float(found.found.task.reference_rates[0]) * share for share in (1, 0.05)]
-    runs = [worst_course(found.found, LAW, seed, rate, parts=16) for seed in range(6) for rate in rates]
+    rates = [float(found.proof.task.reference_rates[0]) * share for share in (1, 0.05)]
+    runs = [worst_course(found.proof, LAW, seed, rate, parts=16) for seed in range(6) for rate in rates]
     seen, reached = found.worst_with_stick, np.max(runs, axis=0)
     assert reached[0] < seen.slip_error < 2 * reached[0]
     assert reached[1] < seen.slip_rate_error < 2 * reached[1]
@@ -132,7 +132,7 @@ def test_independent_runs_that_stick_stay_below_the_worst_case_found(found):
 
 @few("name", ["found", "referred"], every=2)
 def test_both_checkers_decide_the_file_and_refuse_a_tighter_claim(name, request, tmp_path):
-    claim = request.getfixturevalue(name).found
+    claim = request.getfixturevalue(name).proof
     path = tmp_path / "law.json"
     save_guarantee(claim, path)
     assert check_files([path], "real-fault")[str(path)][0] == "proved"
@@ -160,7 +160,7 @@ def leaves(value, way=()):
 @pytest.mark.slow
 def test_every_number_of_the_law_is_bound_by_what_is_printed(referred, proof_check):
     """A law of another digit is refused or stated otherwise: the entries that are printed tell them apart."""
-    document = guarantee_document(referred.found)
+    document = guarantee_document(referred.proof)
     stated = proof_check.check(json.dumps(document)).statement
     ways = list(leaves(document["loop"], ("loop",)))
     assert len(ways) >= 4 * 4 + 2 * 4 + 4 + 2 + 10 + 5
@@ -177,7 +177,7 @@ def test_every_number_of_the_law_is_bound_by_what_is_printed(referred, proof_che
 
 
 def test_zero_rows_of_the_reference_are_refused(referred, proof_check):
-    document = guarantee_document(referred.found)
+    document = guarantee_document(referred.proof)
     document["loop"]["of_reference"] = [["0", "0"]] * 5
     with pytest.raises(proof_check.Refused, match="of_reference"):
         proof_check.check(json.dumps(document))
@@ -256,8 +256,8 @@ def worst_course(claim, law, seed, rest=np.inf, parts=4):
 
 
 def test_an_independent_run_with_adverse_disturbances_stays_inside(found):
-    reached = np.max([worst_course(found.found, LAW, seed) for seed in range(6)], axis=0)
-    claims = found.found.claims
+    reached = np.max([worst_course(found.proof, LAW, seed) for seed in range(6)], axis=0)
+    claims = found.proof.claims
     assert reached[0] < claims.slip_error
     assert reached[1] < claims.slip_rate_error
     assert reached[1] > 0.5 * float(claims.slip_rate_error)  # the runs are no idle ones
@@ -268,7 +268,7 @@ def test_none_names_what_fails():
     weak = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([1e8, 1e8, 1e7], step="0.184"))
     assert not weak.proved
     assert "range" in weak.lines()[0]
-    assert weak.found.small_gain > 1
+    assert weak.proof.small_gain > 1
     standing = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2e8], step="0.05"))
     assert "no integral action" in standing.lines()[0]
     wild = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([9e9, 9e9, 1e9], step="0.184"))
@@ -291,12 +291,12 @@ def test_a_law_without_a_guarantee_names_a_factor_of_its_pressure_that_has_one()
     half = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], step="0.184"))
     assert not strong.proved
     assert "largest eigenvalue over a period has modulus" in strong.lines()[0]
-    assert strong.lines()[1] == f"not this law, but the same law with its output times 0.5: {half.found.sentence()}"
+    assert strong.lines()[1] == f"not this law, but the same law with its output times 0.5: {half.proof.sentence()}"
     near = strong.to_dict()["nearest"]
     assert (near["quantity"], near["value"]) == ("pressure_factor", "1/2")
     assert near["peak_slip_rate"] == half.to_dict()["peak_slip_rate"]
     wrong = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], step="0.184"))
-    assert wrong.lines()[1] == f"not this law, but the same law with its output times -1: {half.found.sentence()}"
+    assert wrong.lines()[1] == f"not this law, but the same law with its output times -1: {half.proof.sentence()}"
     of_slip = {"step": "0.184", "inputs": ("slip", "slip_rate")}
     turned = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], **of_slip)).nearest[1]
     assert turned.held.law == qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], **of_slip).law  # what acts on r' turns too
@@ -444,7 +444,7 @@ def test_the_lqg_of_the_page_is_proved_with_a_delay_and_without(stuck, delay):
     assert lqg.count('"20 ms"') == 1
     exec(lqg.replace('"20 ms"', repr(delay)), names)
     assert names["answer"].proved
-    assert names["answer"].found.held.delay == Fraction(delay.split()[0]) / 1000
+    assert names["answer"].proof.held.delay == Fraction(delay.split()[0]) / 1000
 
 
 @pytest.mark.slow

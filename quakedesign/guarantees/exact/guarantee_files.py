@@ -30,10 +30,10 @@ from quakedesign.guarantees.exact.file_entries import (
 )
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope, require_fit
 from quakedesign.guarantees.exact.loop import Held
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, plant_entries, read_plant_guarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantProof, plant_entries, read_plant_guarantee
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
 from quakedesign.guarantees.exact.small_gain import SlowGain
-from quakedesign.guarantees.exact.statement import Claims, ContinuousPeaks, Guarantee, SlidingGuarantee
+from quakedesign.guarantees.exact.statement import Claims, ContinuousProof, SlidingProof, TrackingProof
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import ContinuousLaw, StateLaw
 from quakedesign.loop.loop_setup import Pump
@@ -50,9 +50,9 @@ from quakedesign.sos.exact.strict import Entries, headed, made, need, parse, rea
 from quakedesign.text import shown
 
 if TYPE_CHECKING:
-    from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+    from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
 
-Claim = Union[Guarantee, ContinuousPeaks, SlidingGuarantee, "StickSlipGuarantee"]
+Claim = Union[TrackingProof, ContinuousProof, SlidingProof, "StickSlipProof"]
 """What files about a fault claim."""
 _ZERO = Fraction(0)
 
@@ -159,9 +159,9 @@ class ContinuousFile(TaskEntries):
     claims: Claims
 
 
-def _tracking_entries(claim: Guarantee | ContinuousPeaks) -> Any:
+def _tracking_entries(claim: TrackingProof | ContinuousProof) -> Any:
     task = task_entries(claim.task)
-    if isinstance(claim, ContinuousPeaks):
+    if isinstance(claim, ContinuousProof):
         return written(ContinuousFile(**task, loop=made(ContinuousLoopEntries, claim.law), claims=claim.claims))
     held, law = claim.held, claim.held.law
     noise, jitter, pump = None, None, None
@@ -181,10 +181,10 @@ def _tracking_entries(claim: Guarantee | ContinuousPeaks) -> Any:
     )
 
 
-def _read_tracking(raw: dict[str, Any]) -> Guarantee | ContinuousPeaks:
+def _read_tracking(raw: dict[str, Any]) -> TrackingProof | ContinuousProof:
     if isinstance(raw.get("loop"), dict) and "rates" in raw["loop"]:
         file = read_as(ContinuousFile, raw)
-        claim: Guarantee | ContinuousPeaks = ContinuousPeaks(
+        claim: TrackingProof | ContinuousProof = ContinuousProof(
             task=file.plant(), law=made(ContinuousLaw, file.loop), claims=file.claims
         )
         paced = pumped = False
@@ -197,7 +197,7 @@ def _read_tracking(raw: dict[str, Any]) -> Guarantee | ContinuousPeaks:
         free = bool(held.longest_step)
         need(free == (reach is not None), "reach must be given for aperiodic sampling, and for that alone")
         need(not free or slow_gain is None, "aperiodic sampling must have no slow gain")
-        claim = Guarantee(task=task, held=held, claims=sampled.claims, slow_gain=slow_gain, reach=reach)
+        claim = TrackingProof(task=task, held=held, claims=sampled.claims, slow_gain=slow_gain, reach=reach)
         if reach is not None:
             require_fit(claim.loop, reach)
         paced, pumped = bool(held.ramp), held.pump is not None
@@ -280,7 +280,7 @@ class SlidingFile(Entries):
     claims: SlidingClaims
 
 
-def _sliding_entries(claim: SlidingGuarantee) -> Any:
+def _sliding_entries(claim: SlidingProof) -> Any:
     task, held, law = claim.task, claim.held, claim.held.law
     file = SlidingFile(
         fault=made(SlidingFaultEntries, task, **task.ranges),
@@ -295,14 +295,14 @@ def _sliding_entries(claim: SlidingGuarantee) -> Any:
     return written(file)
 
 
-def _read_sliding(raw: dict[str, Any]) -> SlidingGuarantee:
+def _read_sliding(raw: dict[str, Any]) -> SlidingProof:
     file = read_as(SlidingFile, raw)
     need(file.reference.swing >= 0, "swing must be positive where it is given")
     ranges = {axis: getattr(file.fault, axis) for axis in AXES}
     task = made(SlidingPlant, file.fault, file.reference, ranges=ranges, stress=file.stress)
     measured = tuple((gain, _ZERO) for gain in file.loop.measured)
     law = made(LinearLaw, file.loop, measured=measured, feedback=(file.loop.feedback, _ZERO))
-    claim = SlidingGuarantee(task=task, held=made(Held, file.loop, law=law), cuts=_cuts(file), claims=file.claims)
+    claim = SlidingProof(task=task, held=made(Held, file.loop, law=law), cuts=_cuts(file), claims=file.claims)
     cells(task, claim.cuts)
     model = model_of(task, claim.claims)
     _require_few(loop_of(claim.held, model, task).states if model is not None else ())
@@ -319,15 +319,15 @@ def _cuts(file: SlidingFile) -> Cuts:
 # Any of these files.
 
 
-def guarantee_document(claim: Claim | PlantGuarantee) -> dict[str, Any]:
+def guarantee_document(claim: Claim | PlantProof) -> dict[str, Any]:
     """Content of the file."""
     if not hasattr(claim, "claims"):
         raise ParameterError(f"a claim must be a guarantee. Received {shown(claim)}. Prove one with guarantee.")
-    if isinstance(claim, PlantGuarantee):
+    if isinstance(claim, PlantProof):
         kind, entries = UNCERTAIN_PLANT, plant_entries(claim)
-    elif isinstance(claim, SlidingGuarantee):
+    elif isinstance(claim, SlidingProof):
         kind, entries = SLOW_SLIDING, _sliding_entries(claim)
-    elif isinstance(claim, Guarantee | ContinuousPeaks):
+    elif isinstance(claim, TrackingProof | ContinuousProof):
         kind, entries = GUARANTEE, _tracking_entries(claim)
     else:
         kind, entries = STICK_SLIP, _stick_slip().stick_slip_entries(claim)
@@ -339,12 +339,12 @@ def _stick_slip() -> Any:
     return import_module("quakedesign.guarantees.exact.stick_slip_files")
 
 
-def guarantee_text(claim: Claim | PlantGuarantee) -> str:
+def guarantee_text(claim: Claim | PlantProof) -> str:
     """Text of the file."""
     return json.dumps(guarantee_document(claim), indent=1) + "\n"
 
 
-def load_guarantee(path: str | Path) -> Claim | PlantGuarantee:
+def load_guarantee(path: str | Path) -> Claim | PlantProof:
     """Read a file of `guarantee`; reading verifies nothing, `check` of what is read does.
 
     Parameters
@@ -353,7 +353,7 @@ def load_guarantee(path: str | Path) -> Claim | PlantGuarantee:
 
     Returns
     -------
-    Guarantee, ContinuousPeaks, SlidingGuarantee, StickSlipGuarantee or PlantGuarantee
+    TrackingProof, ContinuousProof, SlidingProof, StickSlipProof or PlantProof
         The first has a ``controller`` for `simulate`, `export_controller` and `loop_transfer`: the law with its T_s and
         its limit at rest, behind the delay, lag and rock that it is proved for.
 
@@ -365,7 +365,7 @@ def load_guarantee(path: str | Path) -> Claim | PlantGuarantee:
     return read_guarantee(read_json(path))
 
 
-def save_guarantee(claim: Claim | PlantGuarantee, path: str | Path) -> None:
+def save_guarantee(claim: Claim | PlantProof, path: str | Path) -> None:
     """Write the file whole."""
     write_whole(Path(path), guarantee_text(claim))
 
@@ -375,7 +375,7 @@ def parse_guarantee(text: str) -> Any:
     return read_guarantee(parse(text))
 
 
-def read_guarantee(raw: Any) -> Claim | PlantGuarantee:
+def read_guarantee(raw: Any) -> Claim | PlantProof:
     """Claim from a parsed file.
 
     Raises
@@ -387,7 +387,7 @@ def read_guarantee(raw: Any) -> Claim | PlantGuarantee:
     try:
         entries = headed(raw, kind if kind in (STICK_SLIP, UNCERTAIN_PLANT, SLOW_SLIDING) else GUARANTEE)
         if kind == STICK_SLIP:
-            return cast("StickSlipGuarantee", _stick_slip().read_stick_slip(entries))
+            return cast("StickSlipProof", _stick_slip().read_stick_slip(entries))
         if kind == UNCERTAIN_PLANT:
             return read_plant_guarantee(entries)
         return _read_sliding(entries) if kind == SLOW_SLIDING else _read_tracking(entries)

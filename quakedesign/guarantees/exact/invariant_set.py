@@ -35,7 +35,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.loop import Channel, Held, channels_of
 from quakedesign.guarantees.exact.norms import absolute, ball, column, majorant, matrix, upper
-from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, unshifted
+from quakedesign.guarantees.exact.small_gain import Bounds, NoProof, unshifted
 from quakedesign.loop import PeriodicLoop
 from quakedesign.plant.ranges import FaultPlant
 
@@ -133,19 +133,19 @@ def _even(lines: tuple[tuple[Basis, ...], ...]) -> bool:
     return len({len(line) for line in lines}) == 1 and 2 <= len(lines[0]) <= MOST_PIECES + 1
 
 
-def reached_bounds(task: FaultPlant, held: Held, reach: InvariantPolytope) -> Bounds | NoGuarantee:
+def reached_bounds(task: FaultPlant, held: Held, reach: InvariantPolytope) -> Bounds | NoProof:
     """Bounds of the theorem, or the condition that fails."""
     loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
     with ctx.workprec(_BITS):
         try:
             outputs = _SampleMap.of(loop, channels, reach).outputs(held.step, held.longest_step, reach)
         except ParameterError as error:
-            return NoGuarantee(reason=str(error), small_gain=None)
+            return NoProof(reason=str(error), small_gain=None)
     largest = dict(zip(loop.outputs, outputs, strict=True))
     shares = [sum((c * largest[y] for y, c in channel.shares.items()), _ZERO) for channel in channels]
     for channel, share, bound in zip(channels, shares, reach.inputs, strict=True):
         if channel.own + share > bound:
-            return NoGuarantee(reason=f"the {channel.name} may be larger than the set is for", small_gain=None)
+            return NoProof(reason=f"the {channel.name} may be larger than the set is for", small_gain=None)
     gains = (share / bound for share, bound in zip(shares, reach.inputs, strict=True) if bound)
     return Bounds(
         slip_error=largest["slip_error"],

@@ -48,7 +48,7 @@ class PlantClaims:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlantGuarantee:
+class PlantProof:
     """Peaks of an uncertain plant under a sampled law, for all t ≥ 0; `check` decides them.
 
     Attributes
@@ -88,7 +88,7 @@ class PlantGuarantee:
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        return f"PlantGuarantee({self.name}: {', '.join(self._peaks())})"
+        return f"PlantProof({self.name}: {', '.join(self._peaks())})"
 
     def _peaks(self) -> list[str]:
         named = [*self.outputs, *(f"{name} less its load" for name in self.controls)]
@@ -269,7 +269,7 @@ class PlantFile(Entries):
     claims: dict[str, UpperBound]
 
 
-def plant_entries(claim: PlantGuarantee) -> dict[str, Any]:
+def plant_entries(claim: PlantProof) -> dict[str, Any]:
     """Content of the file but its format and kind."""
     part, law = claim.part, claim.law
     disturbances = tuple(SizedEntry(entry=entry, size=size) for entry, size in part.disturbances)
@@ -287,7 +287,7 @@ def plant_entries(claim: PlantGuarantee) -> dict[str, Any]:
     return dict(written(file))
 
 
-def read_plant_guarantee(raw: dict[str, Any]) -> PlantGuarantee:
+def read_plant_guarantee(raw: dict[str, Any]) -> PlantProof:
     """Claim from a parsed file without its format and kind.
 
     Raises
@@ -308,10 +308,10 @@ def read_plant_guarantee(raw: dict[str, Any]) -> PlantGuarantee:
     need(len(file.inputs) == len(part.sectors), "inputs must have an entry for each sector")
     sizes = (*part.noise, *part.start, *(size for _, size in part.disturbances), *file.inputs)
     need(min(sizes, default=Fraction(0)) >= 0, "noise, start, sizes of disturbances and inputs must be 0 or more")
-    return PlantGuarantee(part=part, law=law, pieces=file.pieces, inputs=file.inputs, claims=PlantClaims(**claims))
+    return PlantProof(part=part, law=law, pieces=file.pieces, inputs=file.inputs, claims=PlantClaims(**claims))
 
 
-def named(claim: PlantGuarantee, plant: "UncertainPlant") -> PlantGuarantee:
+def named(claim: PlantProof, plant: "UncertainPlant") -> PlantProof:
     """A claim with the names and units of its plant, for people."""
     outputs, controls, units = tuple(plant.outputs or ()), tuple(plant.controls), plant.units
     told = tuple(units.get(name, "") for name in (*outputs, *controls, *plant.disturbances)) if units else ()

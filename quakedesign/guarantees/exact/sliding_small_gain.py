@@ -62,7 +62,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, shortly
 from quakedesign.guarantees.exact.loop import Channel, Gains, Held
 from quakedesign.guarantees.exact.norms import norms
-from quakedesign.guarantees.exact.small_gain import NoGuarantee, channel_bounds
+from quakedesign.guarantees.exact.small_gain import NoProof, channel_bounds
 from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop
 from quakedesign.plant.sliding_plant import Range, SlidingPlant
 
@@ -109,7 +109,7 @@ class SlidingClaims:
             )
 
 
-def cell_bounds(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[str, Any] | NoGuarantee:
+def cell_bounds(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[str, Any] | NoProof:
     """What follows from the claims for a box of constants as one cell, by the names of the claims; ``small_gain`` too.
 
     Raises
@@ -119,12 +119,12 @@ def cell_bounds(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[s
     """
     model = model_of(task, claims)
     if model is None:
-        return NoGuarantee(reason=_left(task, claims), small_gain=None)
+        return NoProof(reason=_left(task, claims), small_gain=None)
     loop = loop_of(held, model, task)
     try:
         gains = norms(loop)
     except ParameterError:
-        return NoGuarantee(reason="even the nominal loop is not stable, or decays too slowly", small_gain=None)
+        return NoProof(reason="even the nominal loop is not stable, or decays too slowly", small_gain=None)
     return bounds_from(task, held, claims, loop, gains, after_a_step(loop))
 
 
@@ -135,14 +135,14 @@ def bounds_from(
     loop: PeriodicLoop,
     gains: Gains,
     phases: Sequence[Fraction],
-) -> dict[str, Any] | NoGuarantee:
+) -> dict[str, Any] | NoProof:
     """The same from the gains of the loop; of floats, what floats make of them.
 
     `phases` are times [s] since a step reached the well, at the beginning of every part that has a gain.
     """
     model = model_of(task, claims)
     if model is None:
-        return NoGuarantee(reason=_left(task, claims), small_gain=None)
+        return NoProof(reason=_left(task, claims), small_gain=None)
     late = settled(loop)
     more = _moved(task, held, claims, model, late)
     gains = _once_settled(_with_what_adds_at_once(loop, model, gains, phases), phases, late)
@@ -153,7 +153,7 @@ def bounds_from(
     small_gain, bounds = channel_bounds(channels, gains)
     if bounds is None:
         whole = UpperBound(Fraction(small_gain))
-        return NoGuarantee(reason=f"small gain {whole:.3g}", small_gain=whole)
+        return NoProof(reason=f"small gain {whole:.3g}", small_gain=whole)
     return {
         "log_rate": bounds["log_rate"] + more["log_rate"],
         "log_state": bounds["log_state"],

@@ -153,7 +153,7 @@ class Bounds:
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class NoGuarantee:
+class NoProof:
     """Result without a guarantee, with its reason.
 
     Attributes
@@ -191,7 +191,7 @@ def certified_bounds(
     root: ImplicitRoot | None = None,
     noise: Mapping[str, Fraction] = NOISELESS,
     jitter: Fraction = _ZERO,
-) -> Bounds | NoGuarantee:
+) -> Bounds | NoProof:
     """Bounds of the theorem for the loop of `held_loop` or `continuous_loop` with the task's model.
 
     `noise` has the bounds of those inputs of the loop that are noise, in SI units, `jitter` that of measurements [s].
@@ -213,7 +213,7 @@ def best_bounds(
     noise: Mapping[str, Fraction] = NOISELESS,
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
-) -> Bounds | NoGuarantee:
+) -> Bounds | NoProof:
     """Bounds of the theorem from the gains; of a disturbance of bounded rate, the better of both classes."""
     classes = [task] if task.change is None else [task, replace(task, change=None)]
     answers = [bounds_from(one, gains, root, step, noise, spread, jitter) for one in classes]
@@ -233,7 +233,7 @@ def bounds_from(
     noise: Mapping[str, Fraction] = NOISELESS,
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
-) -> Bounds | NoGuarantee:
+) -> Bounds | NoProof:
     """Bounds of the theorem from the gains of the nominal loop; for gains in floats an estimate in floats."""
     channels = (*channels_of(task, root, step, noise, spread, jitter), *beside(task, {name for _, name in gains}))
     if ("push", "awaited") in gains:
@@ -321,11 +321,11 @@ def unshifted(task: FaultPlant) -> Fraction:
     return task.amplitude / ((task.beta[0] + task.beta[1]) / 2 if task.friction.rate_slope else 1)
 
 
-def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoGuarantee:
+def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoProof:
     alone = {(i.name, y): c * max(gains[y, i.name]) for i in channels for y, c in i.shares.items()}
     (name, share), whole = max(alone.items(), key=lambda item: item[1]), UpperBound(small_gain)
     what = _WORDS.get(name, _LEFT_OUT)
-    return NoGuarantee(
+    return NoProof(
         reason=f"small gain {whole:.3g}, which must be below 1: the {what} contributes {LowerBound(share):.3g}",
         small_gain=whole,
     )

@@ -19,7 +19,7 @@ from quakedesign.guarantees.exact.loop import Gains, Held
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, cell_bounds, exponential, follows
 from quakedesign.guarantees.exact.small_gain import (
     Bounds,
-    NoGuarantee,
+    NoProof,
     SlowGain,
     best_bounds,
     certified_bounds,
@@ -186,7 +186,7 @@ _FIRST = Fraction(1, 64)  # first ramp time over T_s
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class Guarantee:
+class TrackingProof:
     """Claims about one loop on one task; `check` decides them.
 
     Attributes
@@ -218,7 +218,7 @@ class Guarantee:
         held, claims = self.held, self.claims
         errors = f"|e1| <= {claims.slip_error:.4g} m, |e2| <= {claims.slip_rate_error:.4g} m/s"
         most = f" to {six_digits(held.longest_step)}" if held.longest_step else ""
-        return f"Guarantee({self.task.name} held over {six_digits(held.step)}{most} s: {errors})"
+        return f"TrackingProof({self.task.name} held over {six_digits(held.step)}{most} s: {errors})"
 
     @property
     def peak_slip_rate(self) -> UpperBound:
@@ -275,12 +275,12 @@ class Guarantee:
         """The law for `simulate`, as that of `Held`, with its limit against windup."""
         return replace(self.held.controller, rest_limit=self.rest_limit)
 
-    def bounds(self) -> Bounds | NoGuarantee:
+    def bounds(self) -> Bounds | NoProof:
         """What the theorem gives, computed anew."""
         if self.slow_gain is None:
             return _bounds(self.task, self.held, self.loop, self.reach)
         gains = _slow_gains(self.task, self.held, self.slow_gain)
-        if isinstance(gains, NoGuarantee):
+        if isinstance(gains, NoProof):
             return gains
         return _slow_bounds(self.task, self.held, self.slow_gain, gains, self.claims.slip_error)
 
@@ -338,7 +338,7 @@ def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from 
 
 def guarantee(
     task: FaultPlant, held: Held, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
-) -> Guarantee | NoGuarantee:
+) -> TrackingProof | NoProof:
     """Tightest rounded claims about a loop, or why there are none; for a rate limit, with a sufficient ramp time.
 
     Aperiodic sampling needs `reach`, and excludes `slow_gain`.
@@ -365,9 +365,9 @@ def guarantee(
     return found
 
 
-def _proved(task: FaultPlant, held: Held, slow_gain: SlowGain | None) -> Guarantee | NoGuarantee:
+def _proved(task: FaultPlant, held: Held, slow_gain: SlowGain | None) -> TrackingProof | NoProof:
     claims = _claims(task, held) if slow_gain is None else _slow_claims(task, held, slow_gain)
-    return claims if isinstance(claims, NoGuarantee) else _of_claims(task, held, claims, slow_gain)
+    return claims if isinstance(claims, NoProof) else _of_claims(task, held, claims, slow_gain)
 
 
 def _of_claims(
@@ -376,20 +376,18 @@ def _of_claims(
     claims: Claims,
     slow_gain: SlowGain | None = None,
     reach: InvariantPolytope | None = None,
-) -> Guarantee | NoGuarantee:
+) -> TrackingProof | NoProof:
     """Claims, or the reason why there are none."""
     if not _root_within(task, held, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
-        return NoGuarantee(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
+        return NoProof(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
     if reason := claims.opens(task) or _beyond_the_pump(held, claims):
         slow = held.pump is not None and bool(held.pump.too_slow(claims.largest_step, held.ramp))
-        return NoGuarantee(
-            reason=reason, small_gain=None, needs=claims.largest_step if slow else None, pressed=not slow
-        )
-    return Guarantee(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
+        return NoProof(reason=reason, small_gain=None, needs=claims.largest_step if slow else None, pressed=not slow)
+    return TrackingProof(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
 
 
-def _claims(task: FaultPlant, held: Held) -> Claims | NoGuarantee:
+def _claims(task: FaultPlant, held: Held) -> Claims | NoProof:
     bounds = _bounds(task, held, held.loop(task))
     return bounds if not bounds.proved else _rounded(task, bounds)
 
@@ -398,10 +396,10 @@ def _rounded(task: FaultPlant, bounds: Bounds) -> Claims:
     return Claims.of(task, bounds).rounded()
 
 
-def _slow_claims(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Claims | NoGuarantee:
+def _slow_claims(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Claims | NoProof:
     """Claims that follow from the deviation of the input gain under the claimed slip error (fixed point)."""
     gains, slip_error = _slow_gains(task, held, slow_gain), Fraction(0)
-    if isinstance(gains, NoGuarantee):
+    if isinstance(gains, NoProof):
         return gains
     for turn in range(_TURNS + _LEAPS):
         bounds = _slow_bounds(task, held, slow_gain, gains, slip_error)
@@ -412,14 +410,12 @@ def _slow_claims(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Claims | 
             return claims
         slip_error = above(max(claims.slip_error * MARGIN, _LEAP * slip_error * (turn >= _TURNS)))
     reason = f"the slip error that moves the input gain, beyond {UpperBound(slip_error):.2g} m, moves it further"
-    return NoGuarantee(reason=reason, small_gain=None)
+    return NoProof(reason=reason, small_gain=None)
 
 
-def _slow_gains(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Gains | NoGuarantee:
+def _slow_gains(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Gains | NoProof:
     if held.longest_step:
-        return NoGuarantee(
-            reason="aperiodic sampling has no guarantee with a slowly varying input gain", small_gain=None
-        )
+        return NoProof(reason="aperiodic sampling has no guarantee with a slowly varying input gain", small_gain=None)
     loops = tuple(held.loop(task, model) for model in slow_gain.models(task))
     try:
         return slow_gains(loops, slow_gain.growth)
@@ -429,7 +425,7 @@ def _slow_gains(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Gains | No
 
 def _slow_bounds(
     task: FaultPlant, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
-) -> Bounds | NoGuarantee:
+) -> Bounds | NoProof:
     spread = slow_gain.spread(task, slip_error)
     return best_bounds(task, gains, held.law.root, held.step, held.noise, spread, held.off)
 
@@ -450,22 +446,22 @@ def _beyond_the_pump(held: Held, claims: Claims) -> str:
 
 def _bounds(
     task: FaultPlant, held: Held, loop: PeriodicLoop, reach: InvariantPolytope | None = None
-) -> Bounds | NoGuarantee:
+) -> Bounds | NoProof:
     if reach is not None and not held.longest_step:
-        return NoGuarantee(reason="periodic sampling needs no invariant set", small_gain=None)
+        return NoProof(reason="periodic sampling needs no invariant set", small_gain=None)
     if reach is not None:
         return reached_bounds(task, held, reach)
     if held.longest_step:
-        return NoGuarantee(reason="aperiodic sampling needs an invariant set", small_gain=None)
+        return NoProof(reason="aperiodic sampling needs an invariant set", small_gain=None)
     try:
         return certified_bounds(task, loop, held.law.root, held.noise, held.off)
     except ParameterError:
         return _unstable(held)
 
 
-def _unstable(held: Held) -> NoGuarantee:
+def _unstable(held: Held) -> NoProof:
     over = f"with zero-order hold over {_seconds(held.step)}"
-    return NoGuarantee(reason=f"{over} even the nominal loop is not stable, or decays too slowly", small_gain=None)
+    return NoProof(reason=f"{over} even the nominal loop is not stable, or decays too slowly", small_gain=None)
 
 
 def _off_schedule(measured: Fraction, arrived: Fraction) -> str:
@@ -498,7 +494,7 @@ PREMISES = (
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class ContinuousPeaks:
+class ContinuousProof:
     """Claims about a law in continuous time; `check` decides them.
 
     Attributes
@@ -518,7 +514,7 @@ class ContinuousPeaks:
         """Nominal error loop."""
         return _loop(self.task, self.law)
 
-    def bounds(self) -> Bounds | NoGuarantee:
+    def bounds(self) -> Bounds | NoProof:
         """What the theorem gives, computed anew."""
         return _continuous_bounds(self.task, self.law)
 
@@ -537,7 +533,7 @@ class ContinuousPeaks:
         return sentence_of(self.task, self.claims, WHEN)
 
 
-def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousPeaks | NoGuarantee:
+def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousProof | NoProof:
     """Tightest rounded claims about a law in continuous time, or why there are none.
 
     Raises
@@ -550,8 +546,8 @@ def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousPeaks | 
         return bounds
     claims = Claims.of(task, bounds).rounded()
     if reason := claims.opens(task):
-        return NoGuarantee(reason=reason, small_gain=None)
-    return ContinuousPeaks(task=task, law=law, claims=claims)
+        return NoProof(reason=reason, small_gain=None)
+    return ContinuousProof(task=task, law=law, claims=claims)
 
 
 def _loop(task: FaultPlant, law: ContinuousLaw) -> PeriodicLoop:
@@ -562,13 +558,13 @@ def _loop(task: FaultPlant, law: ContinuousLaw) -> PeriodicLoop:
     return loop
 
 
-def _continuous_bounds(task: FaultPlant, law: ContinuousLaw) -> Bounds | NoGuarantee:
+def _continuous_bounds(task: FaultPlant, law: ContinuousLaw) -> Bounds | NoProof:
     loop = _loop(task, law)
     try:
         return certified_bounds(task, loop)
     except ParameterError:
         reason = f"{WHEN} even the nominal loop is not stable, or decays too slowly"
-        return NoGuarantee(reason=reason, small_gain=None)
+        return NoProof(reason=reason, small_gain=None)
 
 
 # ----------------------------------------------------------------------
@@ -640,7 +636,7 @@ def _rougher(proved: Friction, asked: Friction) -> list[str]:
 
 
 @checked_dataclass(frozen=True, kw_only=True)
-class SlidingGuarantee:
+class SlidingProof:
     """Claims about one loop around slow sliding; `check` decides them.
 
     Attributes
@@ -670,7 +666,7 @@ class SlidingGuarantee:
         return f"during the {LowerBound(self.task.distance):.4g} m of slip of the task"
 
     def __repr__(self) -> str:
-        return f"SlidingGuarantee({self.task.name}: |ln(v/V)| <= {self.claims.log_rate:.4g})"
+        return f"SlidingProof({self.task.name}: |ln(v/V)| <= {self.claims.log_rate:.4g})"
 
     @property
     def controller(self) -> "SampledController":
@@ -686,7 +682,7 @@ class SlidingGuarantee:
         """PROVED if the claims are self-consistent (fixed point) on every cell, in ball arithmetic; else UNDECIDED."""
         for cell in self.cells:
             bounds = cell_bounds(cell, self.held, self.claims)
-            if isinstance(bounds, NoGuarantee) or not follows(bounds, self.claims):
+            if isinstance(bounds, NoProof) or not follows(bounds, self.claims):
                 return Verdict.UNDECIDED
         return Verdict.PROVED
 

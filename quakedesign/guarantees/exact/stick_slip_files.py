@@ -4,7 +4,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.guarantees.exact.file_entries import Powers, TaskEntries, power_entries, powers, task_entries
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip, StickSlipClaims, StickSlipPolytope
 from quakedesign.laws.implicit_root import ImplicitRoot
 from quakedesign.laws.stick_slip_law import StickSlipLaw
@@ -34,14 +34,14 @@ class StickSlipFile(TaskEntries):
     claims: StickSlipClaims
 
 
-def stick_slip_entries(claim: StickSlipGuarantee) -> dict[str, Any]:
+def stick_slip_entries(claim: StickSlipProof) -> dict[str, Any]:
     """Content of the file but its format and kind."""
     held, pull = claim.held, power_entries(claim.held.law.pull)
     loop = made(StickSlipLoopEntries, held, held.law, pull=pull or None, longest=held.longest_step)
     return dict(written(StickSlipFile(**task_entries(claim.task), loop=loop, set=claim.reach, claims=claim.claims)))
 
 
-def read_stick_slip(raw: dict[str, Any]) -> StickSlipGuarantee:
+def read_stick_slip(raw: dict[str, Any]) -> StickSlipProof:
     """Claim from a parsed file without its format and kind.
 
     Raises
@@ -56,4 +56,4 @@ def read_stick_slip(raw: dict[str, Any]) -> StickSlipGuarantee:
     pull = () if loop.pull is None else ImplicitRoot(pull=powers(loop.pull)).pull
     law = made(StickSlipLaw, loop, pull=pull)
     held = made(SampledStickSlip, loop, law=law, longest_step=loop.longest)
-    return StickSlipGuarantee(task=task, held=held, reach=file.set, claims=file.claims)
+    return StickSlipProof(task=task, held=held, reach=file.set, claims=file.claims)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from quakedesign import laws
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.small_gain import NoProof
 from quakedesign.guarantees.exact.stick_slip_set import (
     SampledStickSlip,
     StickSlipClaims,
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StickSlipGuarantee:
+class StickSlipProof:
     """Claims about one loop on the stick–slip plant, from rest; `check` decides them.
 
     Attributes
@@ -50,7 +50,7 @@ class StickSlipGuarantee:
     plant: ClassVar[str] = "stick-slip"
 
     def __repr__(self) -> str:
-        return f"StickSlipGuarantee({self.task.name}: slip rate at most {self.claims.peak_slip_rate:.4g} m/s)"
+        return f"StickSlipProof({self.task.name}: slip rate at most {self.claims.peak_slip_rate:.4g} m/s)"
 
     @property
     def peak_slip_rate(self) -> UpperBound:
@@ -112,12 +112,12 @@ class StickSlipGuarantee:
         stress = self.task.normal_stress - Fraction(self.claims.least_pressure)
         return self.task.area_per_mass[1] * stress
 
-    def bounds(self) -> StickSlipClaims | NoGuarantee:
+    def bounds(self) -> StickSlipClaims | NoProof:
         """What the theorem gives, computed anew."""
         try:
             return stick_slip_bounds(self.task, self.held, self.reach)
         except ParameterError as error:
-            return NoGuarantee(reason=str(error), small_gain=None)
+            return NoProof(reason=str(error), small_gain=None)
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
@@ -155,10 +155,10 @@ class StickSlipGuarantee:
 
 def stick_slip_guarantee(
     task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope
-) -> StickSlipGuarantee | NoGuarantee:
+) -> StickSlipProof | NoProof:
     """Claims that the theorem gives for a polytope, or what of it does not hold."""
     try:
         bounds = stick_slip_bounds(task, held, reach)
     except ParameterError as error:
-        return NoGuarantee(reason=str(error), small_gain=None)
-    return StickSlipGuarantee(task=task, held=held, reach=reach, claims=bounds.rounded())
+        return NoProof(reason=str(error), small_gain=None)
+    return StickSlipProof(task=task, held=held, reach=reach, claims=bounds.rounded())

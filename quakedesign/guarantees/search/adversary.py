@@ -17,7 +17,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.cache import search_once
 from quakedesign.guarantees.exact.loop import Held
 from quakedesign.guarantees.exact.sliding_small_gain import loop_of, model_of
-from quakedesign.guarantees.exact.statement import ContinuousPeaks, Guarantee, SlidingGuarantee
+from quakedesign.guarantees.exact.statement import ContinuousProof, SlidingProof, TrackingProof
 from quakedesign.guarantees.search.estimate import PERIODS, moved, periods_to_forget
 from quakedesign.laws import NOISES
 from quakedesign.laws.implicit_root import root_of
@@ -73,7 +73,7 @@ class WorstFound:
         return None if least is None or largest is None else (least, largest)
 
 
-def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> WorstFound:
+def worst_found(claim: TrackingProof | ContinuousProof, *, sticks: bool = False) -> WorstFound:
     """Adversarial trajectories: disturbance, friction slope, damping and input gain at the ends of their ranges.
 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64 to 512
@@ -93,7 +93,7 @@ def worst_found(claim: Guarantee | ContinuousPeaks, *, sticks: bool = False) -> 
     return WorstFound(slip_error=slip, slip_rate_error=rate, least_pressure=least, largest_pressure=largest)
 
 
-def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
+def _searched(claim: TrackingProof | ContinuousProof, sticks: bool) -> list[float]:
     """Largest slip error [m] and slip-rate error [m/s]; least and largest pressure [Pa] if computed."""
     searches = [_CourseSearch(claim, sticks, 2 * _COURSES)]
     searches[0].follow(searches[0].random(), _SWEEPS)
@@ -104,7 +104,7 @@ def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
             best = searches[1].best(min(_CLIMBING, 2 * len(searches[0].aim)))
             searches.append(_CourseSearch(claim, sticks, len(best), numbers=best))
             searches[2].ascend(switched[:, best])
-            if isinstance(claim, Guarantee) and claim.task.reference_rates[0]:
+            if isinstance(claim, TrackingProof) and claim.task.reference_rates[0]:
                 searches.append(_resting(claim, searches[0]))
                 searches[3].rest_and_push(_ROUNDS)
     if claim.loop.segments and not sticks:
@@ -119,7 +119,7 @@ def _searched(claim: Guarantee | ContinuousPeaks, sticks: bool) -> list[float]:
     return [max(search.largest[k] for search in searches) for k in (0, 1)] + ends
 
 
-def _resting(claim: Guarantee, like: "_CourseSearch") -> "_CourseSearch":
+def _resting(claim: TrackingProof, like: "_CourseSearch") -> "_CourseSearch":
     """Trajectories of the slip-rate error along the fastest reference, longer by a rest ahead of the reference."""
     way = claim.task.reference_rates[0] * claim.held.step
     periods = like.periods + int(np.ceil(min(float(claim.claims.slip_error / way), _MOST_RESTED)))
@@ -221,7 +221,7 @@ class _Limit:
 
     @classmethod
     def of(
-        cls, claim: Guarantee, held: Held, size: int, back: np.ndarray, numbers: np.ndarray | None = None
+        cls, claim: TrackingProof, held: Held, size: int, back: np.ndarray, numbers: np.ndarray | None = None
     ) -> "_Limit | None":
         """Limit at rest of a guarantee along references of given rates [m/s]; None if it has none."""
         limit, law, authority = claim.rest_limit, claim.held.law, float(claim.task.authority)
@@ -283,7 +283,7 @@ class _CourseSearch:
 
     def __init__(
         self,
-        claim: Guarantee | ContinuousPeaks,
+        claim: TrackingProof | ContinuousProof,
         sticks: bool,
         courses: int,
         periods: int | None = None,
@@ -291,7 +291,9 @@ class _CourseSearch:
         numbers: np.ndarray | None = None,
     ) -> None:
         task, loop = claim.task, claim.loop
-        held, off, early = _on_time(claim.held) if isinstance(claim, Guarantee) else (None, Fraction(0), Fraction(0))
+        held, off, early = (
+            _on_time(claim.held) if isinstance(claim, TrackingProof) else (None, Fraction(0), Fraction(0))
+        )
         loop = held.loop(task) if held else loop
         root, noise = (held.law.root, held.noise) if held else (None, {})
         self.limit = float(task.amplitude) if task.change is not None else None
@@ -306,7 +308,7 @@ class _CourseSearch:
         push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
         ends = product(*map(dict.fromkeys, (task.beta, task.slip_chord, task.rate_chord)))
         vertices = [_at(task, flow, push, *map(float, v)) for v in ends]
-        more = claim.held.slack if isinstance(claim, Guarantee) else Fraction(0)
+        more = claim.held.slack if isinstance(claim, TrackingProof) else Fraction(0)
         events = _events(loop, off, early, more) if loop.segments else [_flowing(flow)]
         self.parts = [_pieces(vertices, inputs, event, none=more > 0) for event in events]
         self.punctual = bool(held and (held.law.first or any(held.start)))  # at first
@@ -317,10 +319,10 @@ class _CourseSearch:
         paces = np.where(numbers // 2 % 2, 1, _SLOW)
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.rest_limit = None
-        if self.back is not None and isinstance(claim, Guarantee):
+        if self.back is not None and isinstance(claim, TrackingProof):
             self.rest_limit = _Limit.of(claim, held or claim.held, self.size, self.back, numbers)
         self.allowed = np.ones((courses, len(self.parts[0].steps)), dtype=bool)
-        slow = isinstance(claim, Guarantee) and claim.slow_gain is not None
+        slow = isinstance(claim, TrackingProof) and claim.slow_gain is not None
         if (slow or self.limit is not None) and beta[0] < beta[1]:  # β is slow; it stays at either end
             half = len(vertices) // 2
             self.allowed[numbers % 2 == 0, :half] = self.allowed[numbers % 2 == 1, half : len(vertices)] = False
@@ -665,7 +667,7 @@ class WorstSliding:
     slip_error: float
 
 
-def worst_sliding(claim: SlidingGuarantee) -> WorstSliding:
+def worst_sliding(claim: SlidingProof) -> WorstSliding:
     """Adversarial stresses at the corners of the box of a, b and D_c, on the plant without inertia.
 
     For every corner and every piece at which a course may end, the stress, and the rate of the reference within its
@@ -679,7 +681,7 @@ def worst_sliding(claim: SlidingGuarantee) -> WorstSliding:
     return WorstSliding(log_rate=rate, slip_error=slip)
 
 
-def _searched_sliding(claim: SlidingGuarantee) -> list[float]:
+def _searched_sliding(claim: SlidingProof) -> list[float]:
     gone = dict.fromkeys((Fraction(0), claim.task.distance))
     places = list(product(corners(claim.task), gone))
     found = [_largest_sliding(claim, SlidingPieces(claim, *place)) for place in places]
@@ -689,9 +691,7 @@ def _searched_sliding(claim: SlidingGuarantee) -> list[float]:
     return [max(values) for values in zip(*found, strict=True)]
 
 
-def _largest_sliding(
-    claim: SlidingGuarantee, plant: "SlidingPieces", slopes: tuple[float, ...] = _SLOPES
-) -> list[float]:
+def _largest_sliding(claim: SlidingProof, plant: "SlidingPieces", slopes: tuple[float, ...] = _SLOPES) -> list[float]:
     reached = [plant.largest(*course).tolist() for course in courses(claim, plant, slopes)]
     return [max(values) for values in zip(*reached, strict=True)]
 
@@ -704,7 +704,7 @@ def corners(task: SlidingPlant) -> list[SlidingPlant]:
 
 
 def courses(
-    claim: SlidingGuarantee, plant: "SlidingPieces", slopes: tuple[float, ...] = _SLOPES
+    claim: SlidingProof, plant: "SlidingPieces", slopes: tuple[float, ...] = _SLOPES
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Stresses [Pa] and r′/V − 1 [-] for every piece, shape (pieces, courses): worst for the linear loop."""
     for slope in slopes:
@@ -735,7 +735,7 @@ class SlidingPieces:
     """
 
     def __init__(
-        self, claim: SlidingGuarantee, corner: SlidingPlant, slip: Fraction = Fraction(0), pieces: int = _SLIDING_PIECES
+        self, claim: SlidingProof, corner: SlidingPlant, slip: Fraction = Fraction(0), pieces: int = _SLIDING_PIECES
     ) -> None:
         self._claim, self._corner, self._pieces = claim, corner, pieces
         model: Any = model_of(claim.task, claim.claims)

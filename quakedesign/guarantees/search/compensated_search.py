@@ -22,9 +22,9 @@ from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, to_sympy
 from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.loop import Around, Held
-from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, holds
-from quakedesign.guarantees.exact.statement import Guarantee, guarantee
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.exact.small_gain import Bounds, NoProof, holds
+from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip
 from quakedesign.guarantees.search.estimate import BoundsEstimate, closeness, estimated, spectral_radius
 from quakedesign.guarantees.search.linear_design import (
@@ -140,18 +140,18 @@ class Compensation:
     ----------
     controller : SlidingMode
         A law of samples, see its `sampling`.
-    found : Guarantee, StickSlipGuarantee or NoGuarantee
+    proof : TrackingProof, StickSlipProof or NoProof
         In the scheme ``compensated``, or of the second kind in ``stick-slip``.
     """
 
     controller: SlidingMode
-    found: Guarantee | StickSlipGuarantee | NoGuarantee
+    proof: TrackingProof | StickSlipProof | NoProof
 
     @property
-    def without_stick(self) -> Guarantee | NoGuarantee:
+    def without_stick(self) -> TrackingProof | NoProof:
         """What is guaranteed in the scheme ``compensated``."""
-        assert not isinstance(self.found, StickSlipGuarantee)
-        return self.found
+        assert not isinstance(self.proof, StickSlipProof)
+        return self.proof
 
     @property
     def weight(self) -> Fraction:
@@ -166,7 +166,7 @@ class Compensation:
     @property
     def limited(self) -> SlidingMode:
         """The controller with the limit against windup of its guarantee, if it has one."""
-        limit, sampling = getattr(self.found, "rest_limit", None), self.controller.sampling
+        limit, sampling = getattr(self.proof, "rest_limit", None), self.controller.sampling
         if limit is None or sampling is None:
             return self.controller
         given = ((part.name, getattr(limit, part.name)) for part in fields(limit))
@@ -191,7 +191,7 @@ class Compensation:
         return self.controller.sampling.scheme if self.controller.sampling else GUARANTEED
 
     def _end(self) -> str:
-        root = _root(self.found)
+        root = _root(self.proof)
         if root is None:
             return ""
         low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
@@ -215,9 +215,9 @@ class Compensation:
         }
 
 
-def _root(found: Guarantee | StickSlipGuarantee | NoGuarantee) -> ImplicitRoot | None:
+def _root(found: TrackingProof | StickSlipProof | NoProof) -> ImplicitRoot | None:
     """Implicit step of a proved sliding mode."""
-    if isinstance(found, StickSlipGuarantee):
+    if isinstance(found, StickSlipProof):
         return ImplicitRoot(pull=found.held.law.pull) if found.held.law.pull else None
     return None if not found.proved else found.held.law.root
 
@@ -229,7 +229,7 @@ def compensated(
     authority: Fraction,
     step: Fraction,
     **around: Unpack[Around],
-) -> Guarantee | NoGuarantee:
+) -> TrackingProof | NoProof:
     """Guarantee of given settings: the narrowest lines around the root, of a few, that close the circle.
 
     Raises
@@ -240,10 +240,10 @@ def compensated(
     try:
         pull = implicit_pull(controller, step, authority)
     except UnsupportedError as error:
-        return NoGuarantee(reason=str(error), small_gain=None)
+        return NoProof(reason=str(error), small_gain=None)
     held = _held(ImplicitRoot(pull=pull), weight, authority, step, around)
     first = guarantee(task, held)
-    if isinstance(first, Guarantee):
+    if isinstance(first, TrackingProof):
         return first
     deadbeat = estimated(task, held)
     if deadbeat is None or not deadbeat.bounds.proved:
@@ -258,7 +258,7 @@ def compensated(
         errors = near.bounds.slip_error + held.slip_noise, near.bounds.slip_rate_error + held.rate_noise
         within = holds(root, step, *errors)
         found = guarantee(task, wider) if within else None
-        if isinstance(found, Guarantee):
+        if isinstance(found, TrackingProof):
             return found
     return best_guarantee(task, held)
 
@@ -305,8 +305,8 @@ def _made(
         if errors is not None:
             law = law.scaled(_scale(law, authority, step, errors))
     except UnsupportedError as error:
-        return Compensation(controller=law, found=NoGuarantee(reason=str(error), small_gain=None))
-    return Compensation(controller=law, found=compensated(task, law, weight, authority, step, **around))
+        return Compensation(controller=law, proof=NoProof(reason=str(error), small_gain=None))
+    return Compensation(controller=law, proof=compensated(task, law, weight, authority, step, **around))
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,12 +317,12 @@ class Deadbeat(Kind):
 
     def closest(
         self, task: FaultPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]
-    ) -> Closest | NoGuarantee:
+    ) -> Closest | NoProof:
         """The weight and B0 with which a deadbeat step comes nearest to a guarantee, for any gains."""
         if (none := unpredictable(task, step)) is not None:
             return none
         if around.get("delay", 0) > MOST_DELAY * step:
-            return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
+            return NoProof(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
 
         def cost(x: np.ndarray) -> float:
             if not (0 < x[0] <= 1 and _BESIDE[0] <= x[1] <= _BESIDE[1]):
@@ -344,7 +344,7 @@ class Deadbeat(Kind):
         """The loop with a deadbeat step, of any gains."""
         return _held(_DEADBEAT, *_settled(task, numbers), step, around)
 
-    def proved(self, task: FaultPlant, found: Closest) -> Guarantee | NoGuarantee:
+    def proved(self, task: FaultPlant, found: Closest) -> TrackingProof | NoProof:
         """Of the smallest λ for which the step is deadbeat."""
         return self.made(task, found.held.step, found.numbers, **found.held.around).without_stick
 
@@ -370,14 +370,14 @@ class Deadbeat(Kind):
         if longest is None or longest.guarantee.held.step < step:
             return None
         near = self.closest(task, step, longest.numbers, **around)
-        made = None if isinstance(near, NoGuarantee) else self.made(task, step, near.numbers, **around)
-        return made if made is not None and made.found.proved else None
+        made = None if isinstance(near, NoProof) else self.made(task, step, near.numbers, **around)
+        return made if made is not None and made.proof.proved else None
 
     def at(self, task: FaultPlant, longest: Longest, objective: str = "peak") -> Compensation:
         """Design for the longest T_s and all else of a guarantee: as others are made, else that of the search."""
         held = longest.guarantee.held
         made = design_compensated(task, self.controller, held.step, objective=objective, **held.around)
-        if made.found.proved:
+        if made.proof.proved:
             return made
         return self.made(task, held.step, longest.numbers, **held.around)
 
@@ -387,7 +387,7 @@ def _settled(task: FaultPlant, numbers: np.ndarray) -> tuple[Fraction, Fraction]
     return Fraction(f"{numbers[0]:.3g}"), _short(Fraction(float(numbers[1])) * task.model.gain)
 
 
-def recovered(found: Guarantee | StickSlipGuarantee) -> Compensation:
+def recovered(found: TrackingProof | StickSlipProof) -> Compensation:
     """The sliding mode whose implicit step a guarantee is about, its gains read off the step; of 2-CTA and 2-DIA.
 
     The law with these gains must be exactly that of the guarantee.
@@ -397,7 +397,7 @@ def recovered(found: Guarantee | StickSlipGuarantee) -> Compensation:
     UnsupportedError
         For the step of another law, or of gains that with λ = 1 are not rational.
     """
-    if isinstance(found, StickSlipGuarantee):
+    if isinstance(found, StickSlipProof):
         again = _sticking(found)
         if again is not None:
             return again
@@ -412,7 +412,7 @@ def recovered(found: Guarantee | StickSlipGuarantee) -> Compensation:
             controller = replace(base, gains=dict(base.gains), sampling=sampling)
             known = sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(root.pull)
             if known and compensated_law(root, weight, gain) == law:
-                return Compensation(controller=controller, found=found)
+                return Compensation(controller=controller, proof=found)
     raise UnsupportedError(_NOT_RECOVERED)
 
 
@@ -422,14 +422,14 @@ _NOT_RECOVERED = (
 )
 
 
-def _sticking(found: StickSlipGuarantee) -> Compensation | None:
+def _sticking(found: StickSlipProof) -> Compensation | None:
     """The same on the stick–slip plant."""
     held, law = found.held, found.held.law
     authority = 1 / (held.step * law.target_gain)
     for base in _with_gains(law.pull, held.step, authority) if law.pull else ():
         controller = sticking_controller(base, held)
         if sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(law.pull):
-            return Compensation(controller=controller, found=found)
+            return Compensation(controller=controller, proof=found)
     return None
 
 
@@ -471,9 +471,7 @@ def sticking_loop(controller: SlidingMode, slip_noise: Fraction = Fraction(0)) -
     return SampledStickSlip(law=law, step=step, slip_noise=slip_noise)
 
 
-def design_sticking(
-    task: FaultPlant, controller: SlidingMode, step: Fraction, **wanted: Any
-) -> Compensation | NoGuarantee:
+def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, **wanted: Any) -> Compensation | NoProof:
     """Sliding mode with given base gains and a guarantee on the stick–slip plant.
 
     The estimate and B0 are those with which a deadbeat step has a guarantee; λ = ρ⁶ is the smallest of a ladder for
@@ -490,7 +488,7 @@ def design_sticking(
         As in `design_stick_slip`.
     """
     found = design_stick_slip(task, step, implicit=True, **wanted)
-    if not isinstance(found, StickSlipGuarantee):
+    if not isinstance(found, StickSlipProof):
         return found
     held, claims = found.held, found.claims
     errors = held.errors(task, claims.slip_error, claims.peak_slip_rate)
@@ -498,11 +496,11 @@ def design_sticking(
     try:
         scale = _smallest_scale(controller, authority, step, errors, _SLOPES[:1])
     except UnsupportedError as error:
-        return NoGuarantee(reason=str(error), small_gain=None)
+        return NoProof(reason=str(error), small_gain=None)
     if scale is None:
-        return NoGuarantee(reason="the implicit step is deadbeat for no scale that is tried", small_gain=None)
+        return NoProof(reason="the implicit step is deadbeat for no scale that is tried", small_gain=None)
     law = sticking_controller(controller.scaled(scale), held)
-    return Compensation(controller=law, found=replace(found, held=sticking_loop(law, held.slip_noise)))
+    return Compensation(controller=law, proof=replace(found, held=sticking_loop(law, held.slip_noise)))
 
 
 def sorted_terms(terms: tuple[Power, ...]) -> tuple[Power, ...]:

@@ -11,9 +11,9 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.loop import Around
-from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.exact.statement import Guarantee
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee
+from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.statement import TrackingProof
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
 from quakedesign.guarantees.search.compensated_search import (
     GUARANTEED,
     STICK_SLIP,
@@ -53,7 +53,7 @@ class SampledDesign:
     ----------
     step : Fraction
         T_s of the fault [s].
-    runs : Guarantee or None
+    runs : TrackingProof or None
         Of the loop that runs, at the fault's T_s or a shorter one; None where none was found.
     reason : str
         Why there is no guarantee at the fault's T_s; empty if there is.
@@ -64,7 +64,7 @@ class SampledDesign:
     """
 
     step: Fraction
-    runs: Guarantee | None
+    runs: TrackingProof | None
     reason: str
     longest_step: Fraction = Fraction(0)
     longest_delay: Fraction = Fraction(0)
@@ -140,9 +140,9 @@ def sampled_sliding_mode(
     laws = Deadbeat(law)
     made = design_compensated(task, law, step, objective=objective, **noise)
     longest = longest_step(task, kind=laws, **noise)
-    if not made.found.proved:
+    if not made.proof.proved:
         made = laws.continued(task, step, longest, **noise) or made
-    reason = made.found.reason if not made.found.proved else ""
+    reason = made.proof.reason if not made.proof.proved else ""
     if reason and longest is not None:
         made = laws.at(task, longest, objective)
     if not made.without_stick.proved:
@@ -150,7 +150,7 @@ def sampled_sliding_mode(
     runs = tightened(made.without_stick)
     held = runs.held
     delayed = longest_delay(task, held.step, kind=laws, **noise)
-    return replace(made, found=runs), SampledDesign(
+    return replace(made, proof=runs), SampledDesign(
         step=step,
         runs=runs,
         reason=reason,
@@ -165,27 +165,27 @@ def sampled_sliding_mode(
 
 def guarantee_of(
     task: FaultPlant, law: SlidingMode, **noise: Unpack[Around]
-) -> Guarantee | StickSlipGuarantee | NoGuarantee:
+) -> TrackingProof | StickSlipProof | NoProof:
     """What is guaranteed of a sliding mode as it runs: in the scheme ``compensated``, or in ``stick-slip``."""
     own = law.sampling
     if own is not None and own.scheme == STICK_SLIP:
         if missing := {"authority", "weight", "slip_weight", "rest_slip"} - dict(own.settings).keys():
             reason = f"the scheme {STICK_SLIP} has a guarantee with {', '.join(sorted(missing))} given in its settings"
-            return NoGuarantee(reason=reason, small_gain=None)
+            return NoProof(reason=reason, small_gain=None)
         if unknown := {name for name, value in noise.items() if value} - {"slip_noise"}:
             reason = f"the stick-slip plant is proved without {', '.join(sorted(unknown))}"
-            return NoGuarantee(reason=reason, small_gain=None)
+            return NoProof(reason=reason, small_gain=None)
         try:
             return proved(task, sticking_loop(law, noise.get("slip_noise", Fraction(0))))
         except UnsupportedError as error:
-            return NoGuarantee(reason=str(error), small_gain=None)
+            return NoProof(reason=str(error), small_gain=None)
     if own is None or own.scheme != GUARANTEED:
         scheme, step = ("continuous", Fraction(0)) if own is None else (own.scheme, own.step)
-        return NoGuarantee(reason=_why_none(task, type(law), scheme, step), small_gain=None)
+        return NoProof(reason=_why_none(task, type(law), scheme, step), small_gain=None)
     settings = dict(own.settings)
     if not {"weight", "authority"} <= settings.keys():
         reason = f"the scheme {GUARANTEED} has a guarantee with a weight and an authority. Give both in its settings"
-        return NoGuarantee(reason=reason, small_gain=None)
+        return NoProof(reason=reason, small_gain=None)
     around: Any = {**own.path, **noise}
     return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, **around))
 
@@ -199,7 +199,7 @@ def sliding_mode(
     scheme: str = GUARANTEED,
     objective: str = "tracking",
     **around: Unpack[Around],
-) -> Compensation | NoGuarantee:
+) -> Compensation | NoProof:
     """Design a sliding mode with given base gains, or the first ones known for it, in a scheme.
 
     Parameters
@@ -224,9 +224,9 @@ def sliding_mode(
     require_known(scheme, sorted(schemes()), "scheme")
     known = deadbeat(task, law, gains)
     if scheme != GUARANTEED:
-        return NoGuarantee(reason=_why_none(task, law, scheme, step), small_gain=None)
+        return NoProof(reason=_why_none(task, law, scheme, step), small_gain=None)
     made = design_compensated(task, known.controller, step, objective=objective, **around)
-    return replace(made, found=tightened(made.without_stick))
+    return replace(made, proof=tightened(made.without_stick))
 
 
 def deadbeat(task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...] = ()) -> Deadbeat:

@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from quakedesign.guarantees.exact.loop import GainSpread, Held
 from quakedesign.guarantees.exact.norms import START
-from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, SlowGain, bounds_from
+from quakedesign.guarantees.exact.small_gain import Bounds, NoProof, SlowGain, bounds_from
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop
 from quakedesign.plant.ranges import FaultPlant
@@ -39,7 +39,7 @@ _FEW = 2
 class BoundsEstimate:
     """Bounds, and the slip error [m] per drift of p* [m/s³]."""
 
-    bounds: Bounds | NoGuarantee
+    bounds: Bounds | NoProof
     drift_gain: float
 
 
@@ -96,16 +96,16 @@ def closeness(task: FaultPlant, held: Held) -> tuple[float, Bounds | None]:
     return _closeness(None, least)
 
 
-def closeness_of_bounds(bounds: Bounds | NoGuarantee) -> tuple[float, Bounds | None]:
+def closeness_of_bounds(bounds: Bounds | NoProof) -> tuple[float, Bounds | None]:
     """Closeness of bounds that are computed already."""
     return _closeness(bounds, _small(bounds))
 
 
-def _small(bounds: Bounds | NoGuarantee) -> float:
+def _small(bounds: Bounds | NoProof) -> float:
     return inf if bounds.small_gain is None else float(bounds.small_gain)
 
 
-def _closeness(bounds: Bounds | NoGuarantee | None, least: float) -> tuple[float, Bounds | None]:
+def _closeness(bounds: Bounds | NoProof | None, least: float) -> tuple[float, Bounds | None]:
     return (_small(bounds), bounds) if bounds is not None and bounds.proved else (1 + least, None)
 
 

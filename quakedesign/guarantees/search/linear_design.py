@@ -22,8 +22,8 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.loop import Around, Held
-from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee, SlowGain
-from quakedesign.guarantees.exact.statement import ContinuousPeaks, Guarantee, above, continuous_peaks, guarantee
+from quakedesign.guarantees.exact.small_gain import Bounds, NoProof, SlowGain
+from quakedesign.guarantees.exact.statement import ContinuousProof, TrackingProof, above, continuous_peaks, guarantee
 from quakedesign.guarantees.search.estimate import (
     BoundsEstimate,
     closeness,
@@ -56,7 +56,7 @@ _PARTS = 8
 _SHARE = 0.5  # growth α as a share of the slowest decay rate
 
 
-def best_guarantee(task: FaultPlant, held: Held) -> Guarantee | NoGuarantee:
+def best_guarantee(task: FaultPlant, held: Held) -> TrackingProof | NoProof:
     """Guarantee with a slowly varying input gain if friction has one and it helps, else with an arbitrary gain.
 
     With aperiodic sampling, a guarantee by an invariant set.
@@ -72,10 +72,10 @@ def best_guarantee(task: FaultPlant, held: Held) -> Guarantee | NoGuarantee:
 
 
 @overload
-def tightened(found: Guarantee) -> Guarantee: ...
+def tightened(found: TrackingProof) -> TrackingProof: ...
 @overload
-def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee: ...
-def tightened(found: Guarantee | NoGuarantee) -> Guarantee | NoGuarantee:
+def tightened(found: TrackingProof | NoProof) -> TrackingProof | NoProof: ...
+def tightened(found: TrackingProof | NoProof) -> TrackingProof | NoProof:
     """Guarantee with a slowly varying input gain in place of one with an arbitrary gain, if one is found."""
     if not found.proved or found.slow_gain is not None or found.reach is not None:
         return found
@@ -146,15 +146,15 @@ def closest(
     near: np.ndarray | None = None,
     measured: str = MEASURED[0],
     **around: Unpack[Around],
-) -> Closest | NoGuarantee:
-    """The law that comes nearest to a guarantee, or one well within it; `NoGuarantee` if there is no law at all.
+) -> Closest | NoProof:
+    """The law that comes nearest to a guarantee, or one well within it; `NoProof` if there is no law at all.
 
     The search begins near the numbers of another law if given, else near numbers of good laws of the family.
     """
     if around.get("delay", 0) > MOST_DELAY * step:
-        return NoGuarantee(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
+        return NoProof(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
     laws = _Laws.of(task, step, measured, around)
-    if isinstance(laws, NoGuarantee):
+    if isinstance(laws, NoProof):
         return laws
     least, x = inf, np.array(laws.family.starts[0])
     starts = sorted(laws.family.starts, key=lambda start: laws.close(np.array(start))[0])
@@ -167,13 +167,13 @@ def closest(
 
 def nearby(
     task: FaultPlant, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], **around: Unpack[Around]
-) -> Guarantee | NoGuarantee:
+) -> TrackingProof | NoProof:
     """Design for the smallest certified slip-rate error, sought near the numbers of a law for another T_s or delay.
 
     Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_held` uses it at its end only.
     """
     laws = _Laws.of(task, step, measured, around)
-    if isinstance(laws, NoGuarantee):
+    if isinstance(laws, NoProof):
         return laws
     found = best_guarantee(task, laws.held(laws.least_peak_near(near)))
     return found if found.proved else best_guarantee(task, laws.held(near))
@@ -187,7 +187,7 @@ def design_held(
     room: float | None = None,
     measured: str = MEASURED[0],
     **around: Unpack[Around],
-) -> Guarantee | NoGuarantee:
+) -> TrackingProof | NoProof:
     """Feedback with a disturbance estimate, its two gains and its weight chosen over certified bounds.
 
     Where the slip alone is measured, a steady-state Kalman observer of slip, slip rate and disturbance, its two gains
@@ -224,7 +224,7 @@ def design_held(
             f"{float(step):.4g} s, the delay {float(delay):.4g} s and the lag {float(lag):.4g} s. Shorten the delay."
         )
     laws = _Laws.of(task, step, measured, around)
-    if isinstance(laws, NoGuarantee):
+    if isinstance(laws, NoProof):
         return laws
     behind_rock, starts = bool(laws.template.diffusion), laws.family.starts
     least, x = 10 * _FAILED, np.array(starts[0])
@@ -250,7 +250,7 @@ def design_held(
     return found if not without.proved else _with_noise(without, noise)
 
 
-def _with_noise(without: Guarantee, noise: Mapping[str, Fraction]) -> Guarantee | NoGuarantee:
+def _with_noise(without: TrackingProof, noise: Mapping[str, Fraction]) -> TrackingProof | NoProof:
     """Guarantee with noise of a law that is proved without noise: the small gain does not depend on noise."""
     held = replace(without.held, **noise)  # type: ignore[arg-type]
     found = best_guarantee(without.task, held)
@@ -273,14 +273,14 @@ class _Laws:
     question: tuple[Any, ...]
 
     @classmethod
-    def of(cls, task: FaultPlant, step: Fraction, measured: str, around: Around) -> "_Laws | NoGuarantee":
+    def of(cls, task: FaultPlant, step: Fraction, measured: str, around: Around) -> "_Laws | NoProof":
         """Laws for a T_s [s] and a loop setup, or the reason why there are none."""
         require_surroundings(around)
         require_step(step)
         if (none := unpredictable(task, step)) is not None:
             return none
         if reason := why_no_law(step, measured, around):
-            return NoGuarantee(reason=reason, small_gain=None)
+            return NoProof(reason=reason, small_gain=None)
         require_known(measured, MEASURED, "measured")
         middle = (step + (around.get("longest_step") or step)) / 2  # for which a law predicts that is told no time
         family = family_of(task, middle, measured, around)
@@ -330,7 +330,7 @@ class _Laws:
         except LinAlgError:  # of a Riccati equation
             return inf, None
 
-    def without_bounds(self, x: np.ndarray) -> NoGuarantee | None:
+    def without_bounds(self, x: np.ndarray) -> NoProof | None:
         """Why a law has no bounds; None where it has, or is none."""
         seen = self.seen(x)
         return seen.bounds if seen is not None and not seen.bounds.proved else None
@@ -392,14 +392,14 @@ def _hopeless(cost: float) -> bool:
     return _HOPELESS * _FAILED < cost < 9 * _FAILED
 
 
-def unpredictable(task: FaultPlant, step: Fraction) -> NoGuarantee | None:
+def unpredictable(task: FaultPlant, step: Fraction) -> NoProof | None:
     """No law of samples, where the errors of the model outgrow within a period what a prediction can hold."""
     require_ordinary(step=step)
     rate, slip = float(task.model.rate), max(float(task.model.slip), 0.0)
     growth = float(step) * (hypot(rate, 2 * sqrt(slip)) - rate) / 2
     if growth <= _MOST_GROWTH:
         return None
-    return NoGuarantee(reason=f"errors grow by e^{growth:.3g} within T_s = {float(step):.4g} s", small_gain=None)
+    return NoProof(reason=f"errors grow by e^{growth:.3g} within T_s = {float(step):.4g} s", small_gain=None)
 
 
 def search_near(
@@ -471,7 +471,7 @@ def _drift_cost(found: BoundsEstimate | None, limit: float) -> float:
 # ----------------------------------------------------------------------
 # How long a sampling time and a delay may be for a designed loop to have a guarantee.
 
-Attempt = Callable[[Fraction], Guarantee | NoGuarantee]
+Attempt = Callable[[Fraction], TrackingProof | NoProof]
 _ATTEMPTS = 12
 _NEAR = Fraction(1, 16)  # relative width of the final bracket of the longest time
 _CLOSE = Fraction(1, 16)  # the same where designs are continued
@@ -494,7 +494,7 @@ _ANY_RATE = Fraction(10**30)  # [Pa/s]
 class Longest:
     """A guarantee at nearly the longest time that has one, and the numbers of its law."""
 
-    guarantee: Guarantee
+    guarantee: TrackingProof
     numbers: np.ndarray
 
 
@@ -507,10 +507,10 @@ class Kind(ABC):
 
     @abstractmethod
     def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
-        """`Closest` to a guarantee, or `NoGuarantee`; near the numbers of another law if they are given."""
+        """`Closest` to a guarantee, or `NoProof`; near the numbers of another law if they are given."""
 
     @abstractmethod
-    def proved(self, task: FaultPlant, found: Closest) -> Guarantee | NoGuarantee:
+    def proved(self, task: FaultPlant, found: Closest) -> TrackingProof | NoProof:
         """Proof about a law that is near enough."""
 
     @abstractmethod
@@ -528,14 +528,14 @@ class Linear(Kind):
         """By a search over the numbers of the family."""
         return closest(task, step, near=near, measured=self.measured, **around)
 
-    def proved(self, task: FaultPlant, found: Closest) -> Guarantee | NoGuarantee:
+    def proved(self, task: FaultPlant, found: Closest) -> TrackingProof | NoProof:
         """With a slow input gain where that helps."""
         return best_guarantee(task, found.held)
 
     def leanest(self, task: FaultPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
         """That with the smallest change of pressure near the smallest peak."""
         laws = _Laws.of(task, step, self.measured, around)
-        if isinstance(laws, NoGuarantee):
+        if isinstance(laws, NoProof):
             return None
         peak = min((laws.least_peak(start) for start in laws.family.starts), key=lambda reached: reached[0])[1]
         return laws.held(laws.least_pressure(peak)[1])
@@ -576,7 +576,7 @@ def continued(
     *,
     measured: str = MEASURED[0],
     **around: Unpack[Around],
-) -> Guarantee | None:
+) -> TrackingProof | None:
     """Design for a T_s [s] near one for a longer T_s, where a search at T_s alone found none; None without one."""
     if longest is None or longest.guarantee.held.step < step:
         return None
@@ -584,7 +584,7 @@ def continued(
     return found if found.proved else None
 
 
-def design_at(task: FaultPlant, longest: Longest) -> Guarantee:
+def design_at(task: FaultPlant, longest: Longest) -> TrackingProof:
     """Design for a small slip-rate error at T_s and all else of a guarantee, which stays where there is none."""
     held = longest.guarantee.held
     found = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), **held.around)
@@ -598,7 +598,7 @@ def longest_delay(
     measured: str = MEASURED[0],
     kind: Kind | None = None,
     **around: Unpack[Around],
-) -> Guarantee | None:
+) -> TrackingProof | None:
     """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
 
     def ask(delay: Fraction) -> Asked:
@@ -610,7 +610,7 @@ def longest_delay(
 
 def farthest_rock(
     task: FaultPlant, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
-) -> Guarantee | None:
+) -> TrackingProof | None:
     """A guarantee through nearly the largest L²/D of rock that has one; None where none is found."""
 
     def ask(time: Fraction) -> Asked:
@@ -628,7 +628,7 @@ def nearest_setup(
     kind: Kind | None = None,
     pressed: bool = False,
     **around: Unpack[Around],
-) -> tuple[str, Guarantee] | None:
+) -> tuple[str, TrackingProof] | None:
     """Of a loop without a guarantee: a quantity that fails, and a guarantee with nearly the most of it that has one.
 
     With `pressed` the pressure fails: it exceeds the pump, or opens the fault. Then the quantity is the smallest
@@ -684,7 +684,7 @@ def _narrowed(task: FaultPlant, share: Fraction) -> tuple[Fraction, Fraction, Fr
     return first, second, third
 
 
-def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, around: Around) -> tuple[str, Guarantee] | None:
+def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, around: Around) -> tuple[str, TrackingProof] | None:
     """The smallest pump, or the largest disturbance, for which a law of little pressure is proved."""
     pump, held = around.get("pump"), laws.leanest(task, step, **around)
     if held is None:
@@ -696,7 +696,7 @@ def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, around: Around) 
             wider = replace(pump, least=min(pump.limits[0], low), largest=max(pump.limits[1], high))
             return SATURATION, replace(found, held=replace(found.held, pump=wider))
 
-    def attempt(amplitude: Fraction) -> Guarantee | NoGuarantee:
+    def attempt(amplitude: Fraction) -> TrackingProof | NoProof:
         return best_guarantee(replace(task, amplitude=amplitude), held)
 
     if not task.amplitude:
@@ -716,7 +716,7 @@ def _ramped(pump: Pump | None, ramp: Fraction) -> Pump | None:
     return None if limited == Pump() else limited
 
 
-def with_lowest_rate(found: Guarantee) -> Guarantee:
+def with_lowest_rate(found: TrackingProof) -> TrackingProof:
     """The same guarantee of the slowest pump that makes the largest change within the ramp."""
     held, step = found.held, found.claims.largest_step
     if held.pump is None or step is None or not held.ramp:
@@ -750,9 +750,9 @@ def _farthest(
         Number of times at most.
     """
 
-    def search(time: Fraction, near: np.ndarray | None) -> Closest | NoGuarantee:
+    def search(time: Fraction, near: np.ndarray | None) -> Closest | NoProof:
         task, step, around = ask(time)
-        found: Closest | NoGuarantee = laws.closest(task, step, near, **around)
+        found: Closest | NoProof = laws.closest(task, step, near, **around)
         return found
 
     good: Closest | None = None
@@ -761,7 +761,7 @@ def _farthest(
         found = search(time, None if good is None else good.numbers)
         if attempts < _ATTEMPTS and good is not None and bad is None and not _within(found):
             found = search(time, None)
-        small = None if isinstance(found, NoGuarantee) else found.small_gain
+        small = None if isinstance(found, NoProof) else found.small_gain
         if isinstance(found, Closest) and _within(found):
             good, at = found, time
         else:
@@ -785,7 +785,7 @@ def _farthest(
     return None
 
 
-def _within(found: Closest | NoGuarantee) -> bool:
+def _within(found: Closest | NoProof) -> bool:
     return isinstance(found, Closest) and found.closeness < 1
 
 
@@ -817,7 +817,7 @@ def _time_between(
 
 def reached(
     attempt: Attempt, first: Fraction, *, most: Fraction | None = None, attempts: int = _ATTEMPTS
-) -> tuple[Guarantee, ...]:
+) -> tuple[TrackingProof, ...]:
     """Guarantees at growing times: twice the first and so on or half of it, then by bisection.
 
     It ends without any where half the time brings the small gain too little nearer to 1.
@@ -832,7 +832,7 @@ def reached(
     attempts : int
         Number of times at most.
     """
-    found: list[Guarantee] = []
+    found: list[TrackingProof] = []
     time, good, bad, small_gain = first, None, None, None
     for _ in range(attempts):
         answer = attempt(time)
@@ -872,7 +872,7 @@ CLASSES = ("amplitude", "rate")
 
 def certified_peaks(
     fault: Fault, controller: ExtendedLQR, *, disturbance_class: str = "amplitude"
-) -> ContinuousPeaks | NoGuarantee:
+) -> ContinuousProof | NoProof:
     """Bounds of slip, slip rate and pressure in continuous time, of everything that reference and disturbance cause.
 
     Parameters
@@ -901,7 +901,7 @@ def certified_peaks(
     needed = 1 + any(law.of_reference)
     if len(law.states) < needed:
         few = f"too few integrals for feedback of the {controller.feedback}: {needed} needed, {len(law.states)} in use"
-        return NoGuarantee(reason=few, small_gain=None)
+        return NoProof(reason=few, small_gain=None)
     found, limits = (
         continuous_peaks(uncertain_plant(fault, rate_limited=disturbance_class == "rate"), law),
         controller.limits,
@@ -912,4 +912,4 @@ def certified_peaks(
     if limits.lowest < low and high < limits.highest:
         return found
     reason = f"the pressure may reach a limit of the law, from {low.quantity('Pa')} to {high.quantity('Pa')}"
-    return NoGuarantee(reason=reason, small_gain=None)
+    return NoProof(reason=reason, small_gain=None)

@@ -13,13 +13,13 @@ from quakedesign.exact import UpperBound, rational
 from quakedesign.guarantees.exact.plant_guarantee import (
     MOST_PIECES,
     PlantClaims,
-    PlantGuarantee,
+    PlantProof,
     named,
     peaks,
     row_bounds,
 )
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, PlantLoop, ResponseBounds, response_bounds
-from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.small_gain import NoProof
 from quakedesign.guarantees.exact.statement import MARGIN, above
 from quakedesign.plant.plant_values import Row
 from quakedesign.plant.user_plant import UncertainPlant
@@ -46,7 +46,7 @@ def linear_part(plant: UncertainPlant, bounds: dict[str, Fraction]) -> LinearPar
     )
 
 
-def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = None) -> PlantGuarantee | NoGuarantee:
+def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = None) -> PlantProof | NoProof:
     """Peaks of a plant under a law, or why none are proved; `pieces` of a flow by its size unless given.
 
     Raises
@@ -65,14 +65,14 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
             )
         loop = part.loop(law)
         if reason := _unstable(part, loop):
-            return NoGuarantee(reason=reason, small_gain=None)
+            return NoProof(reason=reason, small_gain=None)
         cut = pieces or pieces_of(loop)
         try:
             found = response_bounds(loop, cut)
         except ParameterError as error:
-            return NoGuarantee(reason=str(error), small_gain=None)
+            return NoProof(reason=str(error), small_gain=None)
         inputs = _numbers(plant, part, found)
-        if isinstance(inputs, NoGuarantee):
+        if isinstance(inputs, NoProof):
             return inputs
         rows = row_bounds(part, found, inputs)[len(part.outputs) :]
         reached = {name: rows[list(plant.sectors).index(name)] for name in free}
@@ -83,7 +83,7 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
             bounds[name] = _rounded(reached[name] * _WIDER)
     name = free[0]
     reason = f"the argument of {name} moves further for every bound, up to {UpperBound(bounds[name]):.3g}"
-    return NoGuarantee(reason=reason, small_gain=None)
+    return NoProof(reason=reason, small_gain=None)
 
 
 def _first_bounds(plant: UncertainPlant) -> dict[str, Fraction]:
@@ -98,7 +98,7 @@ def _first_bounds(plant: UncertainPlant) -> dict[str, Fraction]:
 
 def _claimed(
     plant: UncertainPlant, part: LinearPart, law: MatrixLaw, pieces: int, found: ResponseBounds, inputs: Row
-) -> PlantGuarantee | NoGuarantee:
+) -> PlantProof | NoProof:
     bounds = peaks(part, found, inputs)
     if bounds is None:
         rows = row_bounds(part, found, inputs)[len(part.outputs) :]
@@ -108,14 +108,14 @@ def _claimed(
             for name, s, row in zip(names, part.sectors, rows, strict=False)
             if s.within is not None and row >= s.within
         ]
-        return NoGuarantee(reason="; ".join(beyond) or "the numbers of the small gain do not close", small_gain=None)
+        return NoProof(reason="; ".join(beyond) or "the numbers of the small gain do not close", small_gain=None)
     claimed = tuple(UpperBound(above(v * MARGIN)) for v in bounds)
     count = len(part.outputs)
     claims = PlantClaims(outputs=claimed[:count], controls=claimed[count:])
-    return named(PlantGuarantee(part=part, law=law, pieces=pieces, inputs=inputs, claims=claims), plant)
+    return named(PlantProof(part=part, law=law, pieces=pieces, inputs=inputs, claims=claims), plant)
 
 
-def _numbers(plant: UncertainPlant, part: LinearPart, found: ResponseBounds) -> Row | NoGuarantee:
+def _numbers(plant: UncertainPlant, part: LinearPart, found: ResponseBounds) -> Row | NoProof:
     """W of the theorem, from floats; or the small gain and the sector that makes most of it."""
     count, names = len(part.outputs), [*plant.sectors, *plant.gains]
     halves = np.array([float(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors])
@@ -128,7 +128,7 @@ def _numbers(plant: UncertainPlant, part: LinearPart, found: ResponseBounds) -> 
     radius = max(abs(np.linalg.eigvals(matrix)))
     if radius * _ROOM >= 1:
         alone = int(np.argmax(np.diag(matrix)))
-        return NoGuarantee(
+        return NoProof(
             reason=f"small gain {radius:.3g}, which must be below 1: {names[alone]} contributes "
             f"{matrix[alone, alone]:.3g} by itself",
             small_gain=UpperBound(rational(f"{radius:.6g}")),

@@ -16,11 +16,11 @@ from scipy.optimize import minimize
 from quakedesign.errors import CertificateError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import BlockChain
-from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee, named
+from quakedesign.guarantees.exact.plant_guarantee import PlantProof, named
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
 from quakedesign.guarantees.exact.sliding_blocks import MPA, BlockClaims, SlidingBlocks
 from quakedesign.guarantees.exact.sliding_small_gain import exponential
-from quakedesign.guarantees.exact.small_gain import NoGuarantee
+from quakedesign.guarantees.exact.small_gain import NoProof
 from quakedesign.guarantees.search.block_design import estimate, middle, rounded
 from quakedesign.guarantees.search.plant_search import linear_part, plant_guarantee
 from quakedesign.plant.block_plant import measured_by
@@ -41,7 +41,7 @@ _HALVINGS = 20  # of a range of stresses
 
 def sliding_block_guarantee(
     blocks: SlidingBlocks, step: Fraction, *, decentralised: bool = False
-) -> PlantGuarantee | NoGuarantee:
+) -> PlantProof | NoProof:
     """Design a law for blocks in slow sliding and prove it, or say why none is proved.
 
     Parameters
@@ -59,14 +59,14 @@ def sliding_block_guarantee(
     law, claims, small = search.closed(minimize(search.log_rate, x, method="Nelder-Mead", options=options).x)
     if claims is None or law is None:
         if small >= _LOST / 2:
-            return NoGuarantee(
+            return NoProof(
                 reason="no law is found whose loop forgets soon enough: with fewer wells than blocks, modes that no "
                 "well reaches must decay within some 60 T_s. Run limits, which says whether wells are missing; "
                 "else lengthen T_s",
                 small_gain=None,
             )
         reason = f"no bounds of slip rate and state close: small gain {small:.3g}. Reduce the stress"
-        return NoGuarantee(reason=reason, small_gain=UpperBound(rational(f"{small:.6g}")))
+        return NoProof(reason=reason, small_gain=UpperBound(rational(f"{small:.6g}")))
     for _ in range(3):
         claims = _grown(claims, _ROOM)
         plant, rate = blocks.plant(claims), blocks.log_rate(claims)
@@ -75,10 +75,10 @@ def sliding_block_guarantee(
         found = plant_guarantee(plant, law, _PIECES)
         if found.proved and max(found.claims.controls) * MPA < claims.push:
             return replace(found, notes=(_slip_rates(blocks, rate),))
-    return NoGuarantee(reason="the bounds that an estimate finds are not proved", small_gain=None)
+    return NoProof(reason="the bounds that an estimate finds are not proved", small_gain=None)
 
 
-def covered_stress(chain: BlockChain, claim: PlantGuarantee) -> tuple[Fraction, Fraction, UpperBound, PlantGuarantee]:
+def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Fraction, UpperBound, PlantProof]:
     """Lag [s] and largest shear stress [Pa] for which a guarantee is one of these blocks, and its bound of |ln(v/V)|.
 
     Last the guarantee with the names of these blocks.

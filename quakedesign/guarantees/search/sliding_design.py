@@ -27,8 +27,8 @@ from quakedesign.guarantees.exact.sliding_small_gain import (
     loop_of,
     model_of,
 )
-from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.exact.statement import SlidingGuarantee
+from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.statement import SlidingProof
 from quakedesign.guarantees.search.estimate import gains_of, short, spectral_radius
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
 from quakedesign.laws import LinearLaw
@@ -67,27 +67,25 @@ _AXES = tuple(_ENDS)
 _NAMES = tuple(SlidingClaims.__dataclass_fields__)
 
 
-def proved_sliding(
-    task: SlidingPlant, held: Held, *, log_rate: Fraction = LOG_RATES[0]
-) -> SlidingGuarantee | NoGuarantee:
+def proved_sliding(task: SlidingPlant, held: Held, *, log_rate: Fraction = LOG_RATES[0]) -> SlidingProof | NoProof:
     """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or why there are none."""
     corner = worst_corner(task)
     claims = _claims(corner, held, log_rate)
     if claims is None or (corner != task and _excess(corner, held, claims) >= _NEAR):
-        return NoGuarantee(reason=_too_much(task, log_rate), small_gain=None)
+        return NoProof(reason=_too_much(task, log_rate), small_gain=None)
     try:
         cuts = _cut(task, held, claims, [MOST_CELLS - 1])
-        by_estimate = SlidingGuarantee(task=task, held=held, cuts=cuts, claims=claims)
+        by_estimate = SlidingProof(task=task, held=held, cuts=cuts, claims=claims)
         smaller = replace(by_estimate, claims=_smallest_claims(by_estimate))
         if smaller.check() is Verdict.PROVED:
             return smaller
         _cut(corner, held, claims, [0], exactly=True)  # no cuts of a box help where this does not do
         return replace(by_estimate, cuts=_cut(task, held, claims, [MOST_CELLS - 1], exactly=True))
     except ParameterError:
-        return NoGuarantee(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box", small_gain=None)
+        return NoProof(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box", small_gain=None)
 
 
-def _smallest_claims(found: SlidingGuarantee) -> SlidingClaims:
+def _smallest_claims(found: SlidingProof) -> SlidingClaims:
     """What claims that follow from themselves on every cell come to if followed from again and again.
 
     By the estimate times what the bounds are more than it, measured on the worst cell. All that is bounded grows with
@@ -97,14 +95,14 @@ def _smallest_claims(found: SlidingGuarantee) -> SlidingClaims:
     for _ in range(_MEASURED):
         worst = max(found.cells, key=lambda cell: _excess(cell, found.held, claims))
         bounds, estimate = cell_bounds(worst, found.held, claims), _estimate(worst, found.held, claims)
-        if isinstance(bounds, NoGuarantee) or estimate is None:
+        if isinstance(bounds, NoProof) or estimate is None:
             break
         room = {name: _SPARE * float(bounds[name]) / float(estimate[name]) for name in _NAMES}
         claims = _followed(found, claims, room)
     return claims
 
 
-def _followed(found: SlidingGuarantee, claims: SlidingClaims, room: Mapping[str, float]) -> SlidingClaims:
+def _followed(found: SlidingProof, claims: SlidingClaims, room: Mapping[str, float]) -> SlidingClaims:
     """Claims that follow by the estimate, with room, until they hardly change."""
     for _ in range(_SHRINKING):
         every = [_estimate(cell, found.held, claims) for cell in found.cells]
@@ -144,7 +142,7 @@ def designed_sliding(
     log_rate: Fraction = LOG_RATES[0],
     near: np.ndarray | None = None,
     **around: Unpack[Around],
-) -> Held | NoGuarantee:
+) -> Held | NoProof:
     """The law with the smallest estimated bounds at the least stable corner of the box, |ln(v/V)| up to `log_rate`.
 
     The search begins `near` the numbers of a law as well, if they are told.
@@ -158,7 +156,7 @@ def designed_sliding(
         f"no law with zero-order hold over {float(step):g} s was found whose loop is stable and forgets within some "
         f"hundred periods, D_c/V = {ageing:.3g} s{path}"
     )
-    return NoGuarantee(reason=reason, small_gain=None)
+    return NoProof(reason=reason, small_gain=None)
 
 
 def _path(around: Around) -> dict[str, Fraction]:
@@ -317,7 +315,7 @@ def _estimate_of(loop: PeriodicLoop, task: SlidingPlant, held: Held, claims: Sli
     if len(phases) != count:
         phases = tuple(ends) if ends and loop.fading else (max(phases),) * count
     found = bounds_from(task, held, claims, loop, gains, phases)
-    return None if isinstance(found, NoGuarantee) else found
+    return None if isinstance(found, NoProof) else found
 
 
 def _cut(task: SlidingPlant, held: Held, claims: SlidingClaims, left: list[int], *, exactly: bool = False) -> Cuts:
@@ -369,7 +367,7 @@ def _too_much(task: SlidingPlant, log_rate: Fraction) -> str:
 # Times in D_c/V, the loop hardly depends on V: a proof for a share of the rock's L²/D is nearly one for that share of
 # V.
 
-Prove = Callable[[SlidingPlant, Held, Fraction], SlidingGuarantee | NoGuarantee]
+Prove = Callable[[SlidingPlant, Held, Fraction], SlidingProof | NoProof]
 """Of a task, a law as it runs and a bound of |ln(v/V)|."""
 
 PATH = {"diffusion": "L^2/D", "lag": "the lag"}
@@ -539,5 +537,5 @@ def _slower(fault: Fault, task: SlidingPlant, reach: WellReach, around: Around, 
     )
 
 
-def _under(proof: SlidingGuarantee) -> str:
+def _under(proof: SlidingProof) -> str:
     return f" under a stress of at most {float(proof.task.stress):.3g} Pa (a law designed for it alone may stand more)"

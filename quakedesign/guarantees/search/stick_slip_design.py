@@ -14,8 +14,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from quakedesign.cache import search_once
 from quakedesign.errors import ParameterError
-from quakedesign.guarantees.exact.small_gain import NoGuarantee
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee, stick_slip_guarantee
+from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import (
     COMBINATIONS,
     SLICES,
@@ -700,11 +700,9 @@ class _Growing:
 # From a fault to gains with a proof.
 
 
-def proved(
-    task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda said, done: None
-) -> StickSlipGuarantee | NoGuarantee:
+def proved(task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda said, done: None) -> StickSlipProof | NoProof:
     """Guarantee of a law with a polytope that is searched for it, or what speaks against one."""
-    fresh = list[StickSlipGuarantee | NoGuarantee]()
+    fresh = list[StickSlipProof | NoProof]()
 
     def search() -> dict[str, Any]:
         with np.errstate(all="ignore"):  # floats that overflow propose nothing
@@ -715,17 +713,17 @@ def proved(
     if fresh:
         return fresh[0]
     if "reason" in kept:
-        return NoGuarantee(reason=kept["reason"], small_gain=None)
+        return NoProof(reason=kept["reason"], small_gain=None)
     return stick_slip_guarantee(task, held, read_as(StickSlipPolytope, kept["set"]))
 
 
-def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlipGuarantee | NoGuarantee:
-    found: StickSlipGuarantee | NoGuarantee
-    found = NoGuarantee(reason="no polytope was found that the loop never leaves", small_gain=None)
+def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlipProof | NoProof:
+    found: StickSlipProof | NoProof
+    found = NoProof(reason="no polytope was found that the loop never leaves", small_gain=None)
     try:
         points = _Reach.of(task, held).hull(tell)
         if points is None:
-            return NoGuarantee(reason="the states that disturbances reach grow without bound", small_gain=None)
+            return NoProof(reason="the states that disturbances reach grow without bound", small_gain=None)
         normals = _normals(points, _FACETS)
         heights = (normals @ points.T).max(axis=1)
         growing = _Growing(task, held, normals, heights, np.zeros((len(normals), 5)), heights, points)
@@ -736,9 +734,9 @@ def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlip
             if found.proved:
                 break
     except ParameterError as error:
-        return NoGuarantee(reason=str(error), small_gain=None)
+        return NoProof(reason=str(error), small_gain=None)
     except (ArithmeticError, ValueError, LinAlgError, QhullError):
-        return NoGuarantee(reason="numbers of the loop are too far apart for a search in floats", small_gain=None)
+        return NoProof(reason="numbers of the loop are too far apart for a search in floats", small_gain=None)
     return found
 
 
@@ -752,7 +750,7 @@ def design_stick_slip(
     healing: Fraction = Fraction(0),
     implicit: bool = False,
     tell: Tell = lambda said, done: None,
-) -> StickSlipGuarantee | NoGuarantee:
+) -> StickSlipProof | NoProof:
     """Gains with a guarantee on the stick–slip plant: the first tuning of an objective that has one.
 
     Parameters
@@ -767,7 +765,7 @@ def design_stick_slip(
     longest_step : Fraction
         Of aperiodic sampling, as of `SampledStickSlip` [s].
     healing : Fraction
-        Δμ_h [-], proved as a larger disturbance, see `StickSlipGuarantee.covered_healing`.
+        Δμ_h [-], proved as a larger disturbance, see `StickSlipProof.covered_healing`.
     implicit : bool
         Whether the law is a deadbeat implicit step; of it one tuning serves both objectives.
     tell : callable
@@ -775,17 +773,17 @@ def design_stick_slip(
     """
     if not task.amplitude and not healing:
         reason = "the stick-slip theorem needs a disturbance above 0 m/s^2: give amplitude in [disturbance]"
-        return NoGuarantee(reason=reason, small_gain=None)
+        return NoProof(reason=reason, small_gain=None)
     if longest_step and implicit:
-        return NoGuarantee(reason="a sliding mode that sticks is proved for periodic sampling alone", small_gain=None)
-    none = list[StickSlipGuarantee | NoGuarantee]()
+        return NoProof(reason="a sliding mode that sticks is proved for periodic sampling alone", small_gain=None)
+    none = list[StickSlipProof | NoProof]()
     longer = float(longest_step / step) if longest_step else 1.0
     for *shares, gain in DEADBEAT if implicit else (APERIODIC if longest_step else TUNINGS)[objective]:
         try:
             held = tuned(task, step, (*shares, gain * longer), slip_noise, implicit=implicit)
             held = replace(held, longest_step=longest_step)
         except (ParameterError, ArithmeticError, ValueError):
-            return NoGuarantee(reason="no gains of this size are floats", small_gain=None)
+            return NoProof(reason="no gains of this size are floats", small_gain=None)
         found = _healed(task, held, healing, tell)
         if found.proved:
             return found
@@ -793,9 +791,7 @@ def design_stick_slip(
     return none[0]
 
 
-def _healed(
-    task: FaultPlant, held: SampledStickSlip, healing: Fraction, tell: Tell
-) -> StickSlipGuarantee | NoGuarantee:
+def _healed(task: FaultPlant, held: SampledStickSlip, healing: Fraction, tell: Tell) -> StickSlipProof | NoProof:
     """With as much more disturbance as healing stands for under the least pressure, which is known afterwards."""
     least = task.rest_pressure[0] - _LOWER * task.normal_stress
     for _ in range(_GUESSES):
@@ -804,7 +800,7 @@ def _healed(
         if not found.proved or found.covered_healing(task.amplitude) >= healing:
             return replace(found, healing=healing) if found.proved else found
         least = Fraction(found.claims.least_pressure) - _LOWER * task.normal_stress
-    return NoGuarantee(reason="the pressure falls too far for this healing", small_gain=None)
+    return NoProof(reason="the pressure falls too far for this healing", small_gain=None)
 
 
 # ----------------------------------------------------------------------
@@ -833,7 +829,7 @@ class WorstStickSlip:
         return max(self.slip_behind, self.slip_ahead)
 
 
-def worst_stick_slip(found: StickSlipGuarantee, *, periods: int = 60) -> WorstStickSlip:
+def worst_stick_slip(found: StickSlipProof, *, periods: int = 60) -> WorstStickSlip:
     """Worst case of courses from rest that are continued, period by period, from the states that lie farthest out.
 
     For each facet of the invariant polytope the state that is farthest in its direction is kept. β is constant in a

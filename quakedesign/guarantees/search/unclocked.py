@@ -10,8 +10,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.invariant_set import SOONEST, InvariantPolytope, reduced
 from quakedesign.guarantees.exact.loop import Held, channels_of
-from quakedesign.guarantees.exact.small_gain import Bounds, NoGuarantee
-from quakedesign.guarantees.exact.statement import Guarantee, guarantee
+from quakedesign.guarantees.exact.small_gain import Bounds, NoProof
+from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
 from quakedesign.guarantees.search.estimate import BoundsEstimate, gains_of, short
 from quakedesign.plant.ranges import FaultPlant
 
@@ -29,9 +29,9 @@ _SEED = 5
 _DIGITS = 7
 
 
-def unclocked_guarantee(task: FaultPlant, held: Held) -> Guarantee | NoGuarantee:
+def unclocked_guarantee(task: FaultPlant, held: Held) -> TrackingProof | NoProof:
     """Guarantee with a set that is found for it, or what speaks against one."""
-    found: Guarantee | NoGuarantee = NoGuarantee(reason="no set was found that the loop never leaves", small_gain=None)
+    found: TrackingProof | NoProof = NoProof(reason="no set was found that the loop never leaves", small_gain=None)
     for raised in _RAISED:
         reach = _reach(task, held, raised)
         if not isinstance(reach, InvariantPolytope):
@@ -52,7 +52,7 @@ def unclocked_estimate(task: FaultPlant, held: Held) -> BoundsEstimate | None:
     largest, columns = sides.largest(loop, loop.own), loop.columns(sides, _FEW)
     share, bounds = loop.solved(loop.own, largest, columns)
     if bounds is None:
-        return BoundsEstimate(NoGuarantee(reason="", small_gain=UpperBound(Fraction(share))), 1.0)
+        return BoundsEstimate(NoProof(reason="", small_gain=UpperBound(Fraction(share))), 1.0)
     slip, rate, push = (Fraction(float(v)) for v in largest + (bounds - loop.own) @ columns)
     found = Bounds(slip_error=slip, slip_rate_error=rate, push=push, small_gain=Fraction(share))
     return BoundsEstimate(found, max(gains["slip_error", "drift"]))
@@ -222,11 +222,11 @@ def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pus
     return np.asarray(np.array([after for _, after in found])[choice, row])
 
 
-def _reach(task: FaultPlant, held: Held, raised: float) -> InvariantPolytope | NoGuarantee | None:
+def _reach(task: FaultPlant, held: Held, raised: float) -> InvariantPolytope | NoProof | None:
     """A set in numbers of few digits, for inputs that it makes no larger than it is for."""
     loop = _Floats.of(task, held)
     if not loop.fits:
-        return NoGuarantee(reason="the law has too many states for a set that the loop never leaves", small_gain=None)
+        return NoProof(reason="the law has too many states for a set that the loop never leaves", small_gain=None)
     bounds, sides, found = loop.own, loop.sides(loop.own, _MANY), None
     if sides is None:
         return None
@@ -242,7 +242,7 @@ def _reach(task: FaultPlant, held: Held, raised: float) -> InvariantPolytope | N
         if more is None:
             gain = UpperBound(Fraction(share))
             reason = f"small gain {gain:.3g}, which must be below 1, of intervals up to the longest"
-            return NoGuarantee(reason=reason, small_gain=gain)
+            return NoProof(reason=reason, small_gain=gain)
         bounds = np.maximum(more, loop.own) * raised
         again = loop.force and turn < _ANEW  # what the inputs do to each other's sets is seen by then
         following = loop.sides(bounds, _MANY, raised) if again else _Sides.still(loop, sides.facets, bounds, raised)

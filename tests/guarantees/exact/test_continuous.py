@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, ContinuousPeaks, NoGuarantee
+from quakedesign.guarantees import Bounds, Claims, ContinuousProof, NoProof
 from quakedesign.guarantees.exact import statement as continuous
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee, save_guarantee
 from quakedesign.loop import exact_integrals
@@ -18,8 +18,8 @@ from quakedesign.plant import uncertain_plant
 TASK = uncertain_plant(load_fault("real-fault"))
 LAW = exact_integrals(tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5"))))
 BOUNDS = Bounds(slip_error=F(1, 3), slip_rate_error=F(1, 7), push=F(1, 9), small_gain=F(1, 2))
-NONE = NoGuarantee(reason="none", small_gain=None)
-PEAKS = ContinuousPeaks(task=TASK, law=LAW, claims=Claims.of(TASK, BOUNDS))
+NONE = NoProof(reason="none", small_gain=None)
+PEAKS = ContinuousProof(task=TASK, law=LAW, claims=Claims.of(TASK, BOUNDS))
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_peaks_are_the_bounds_a_little_wider_or_none(monkeypatch):
 
 def test_a_loop_that_is_not_seen_to_be_stable_has_no_peaks():
     found = continuous.continuous_peaks(TASK, exact_integrals((F(1), F(1), F(1), F(1))))
-    assert isinstance(found, NoGuarantee)
+    assert isinstance(found, NoProof)
     assert "even the nominal loop is not stable" in found.reason
 
 

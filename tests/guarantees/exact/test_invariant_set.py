@@ -16,7 +16,7 @@ from standalone_guarantee import checker
 from thinned import few
 
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.guarantees import NoGuarantee, guarantee
+from quakedesign.guarantees import NoProof, guarantee
 from quakedesign.guarantees.exact import invariant_set as reach
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.invariant_set import _SampleMap, reduced
@@ -286,7 +286,7 @@ def test_a_set_is_for_samples_by_no_clock_alone():
     assert "no others have one" in standalone(raw)
     assert package(raw) == "invalid"
     known = claim()
-    assert isinstance(guarantee(known.task, known.held), NoGuarantee)
+    assert isinstance(guarantee(known.task, known.held), NoProof)
 
 
 @pytest.mark.parametrize("more", [{"delay": F(1, 1000)}, {"longest_step": F(1, 1000)}, {"initial_slip": F(1)}])
@@ -477,7 +477,7 @@ def test_a_slow_gain_which_is_of_a_clock_proves_nothing_without_one():
     known, slow = claim(), SlowGain(parts=4, growth=F(1, 2))
     for longest in (known.held.longest_step, F(1000)):
         found = guarantee(known.task, replace(known.held, longest_step=longest), slow)
-        assert isinstance(found, NoGuarantee)
+        assert isinstance(found, NoProof)
     assert replace(known, slow_gain=slow).check() is Verdict.UNDECIDED
     assert replace(known, slow_gain=slow, reach=None).check() is Verdict.UNDECIDED
 

@@ -21,7 +21,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, read_guarantee, save_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantGuarantee, named
+from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantProof, named
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw, response_bounds
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.plant import uncertain_plant
@@ -426,7 +426,7 @@ def test_a_statement_about_blocks_says_first_of_which_plant_and_how_much_of_a_fo
     plant, task = qd.UncertainPlant.from_blocks(REAL.with_box("ten-percent"), 2), REAL.reference
     law = MatrixLaw(step=Fraction(1, 10), delay=Fraction(0), update=(), measured=(), output=((), ()), feedback=((), ()))
     claims = PlantClaims(outputs=(UpperBound(1),) * 4, controls=(UpperBound(1),) * 2)
-    bare = PlantGuarantee(part=linear_part(plant, {}), law=law, pieces=1, inputs=(), claims=claims)
+    bare = PlantProof(part=linear_part(plant, {}), law=law, pieces=1, inputs=(), claims=claims)
     found = named(bare, plant)
     before, after = found.sentence().split(" for all t >= 0: ")
     assert "without stick (friction continues to negative slip rates)" in before

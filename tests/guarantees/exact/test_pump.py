@@ -9,7 +9,7 @@ import pytest
 
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.guarantees import NoGuarantee, guarantee
+from quakedesign.guarantees import NoProof, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.loop.loop_setup import Pump
@@ -46,7 +46,7 @@ def test_a_claim_may_touch_a_limit_and_not_pass_it(name, off):
     narrow = replace(tight, **{name: getattr(tight, name) + F(off, 10**9)})
     assert stored(pump=narrow).check() is Verdict.UNDECIDED
     found = guarantee(proved.task, replace(proved.held, pump=narrow))
-    assert isinstance(found, NoGuarantee)
+    assert isinstance(found, NoProof)
     assert found.reason.startswith("pressures from -14.3 MPa to 14.2 MPa may be commanded, but the pump supplies")
 
 
@@ -77,7 +77,7 @@ def test_a_pump_is_blamed_for_what_it_does_not_do_within_a_whole_period(rate, sl
     """From one sample to the next the loop asks for some MPa; 0.2 MPa/s for T_s = 184 ms makes 37 kPa of them."""
     known = stored()
     found = guarantee(known.task, replace(known.held, pump=Pump(rate=F(rate))))
-    assert isinstance(found, NoGuarantee) is slow
+    assert isinstance(found, NoProof) is slow
     if slow:
         step, said = known.held.step, found.reason
         assert said.endswith(f"which a pump of 200 kPa/s does not make in {LowerBound(step).quantity('s')}")

@@ -17,7 +17,7 @@ from quakedesign.errors import QuakedesignError
 from quakedesign.exact import UpperBound
 from quakedesign.fault.friction import rate_and_state as friction_laws
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document
-from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantGuarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantProof
 from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
 from quakedesign.guarantees.search import sliding_block_design
 
@@ -194,7 +194,7 @@ def test_a_pressure_beyond_its_claim_proves_nothing(monkeypatch):
         def closed(self, _):
             return object(), CLAIMS, 0.5
 
-    found = object.__new__(PlantGuarantee)
+    found = object.__new__(PlantProof)
     object.__setattr__(found, "claims", PlantClaims(outputs=(), controls=(UpperBound(1),)))  # MPa, beyond 0.2
     monkeypatch.setattr(sliding_block_design, "_WeightSearch", Search)
     monkeypatch.setattr(sliding_block_design, "plant_guarantee", lambda *_: found)

@@ -11,7 +11,7 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, Guarantee, Held, NoGuarantee, SlowGain, guarantee
+from quakedesign.guarantees import Bounds, Claims, Held, NoProof, SlowGain, TrackingProof, guarantee
 from quakedesign.guarantees.exact import small_gain as module
 from quakedesign.guarantees.exact import statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
@@ -32,7 +32,7 @@ BY_HAND = FaultPlant(  # N̂ from 1/2 to 3/2, b = 2, β from 1 to 3, r′ up to 
 TASK = uncertain_plant(load_fault("real-fault"))
 HELD = Held(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10), slip_noise=F(1, 10**6))
 BOUNDS = Bounds(slip_error=F(1, 2), slip_rate_error=F(1, 7), push=TASK.authority, small_gain=F(1, 2))
-NONE = NoGuarantee(reason="none", small_gain=None)
+NONE = NoProof(reason="none", small_gain=None)
 GAINS = {("slip_error", "aged"): (F(1),)}
 
 
@@ -118,7 +118,7 @@ def claims_of(slip_error, kept=BOUNDS):
 def test_bounds_are_asked_for_the_spread_of_the_slip_error_that_is_claimed(asked):
     answers, questions = asked
     answers.append(BOUNDS)
-    claim = Guarantee(task=TASK, held=HELD, claims=claims_of(F(1, 3)), slow_gain=SLOW)
+    claim = TrackingProof(task=TASK, held=HELD, claims=claims_of(F(1, 3)), slow_gain=SLOW)
     assert claim.bounds() is BOUNDS
     spread = SLOW.spread(TASK, F(1, 3))
     assert questions == [(TASK, {key: 2 * v for key, v in GAINS.items()}, None, F(1, 10), HELD.noise, spread, F(0))]
@@ -136,7 +136,7 @@ def test_bounds_are_asked_for_the_spread_of_the_slip_error_that_is_claimed(asked
 def test_the_claim_on_which_the_spread_rests_exceeds_the_bound(asked, monkeypatch, slow, claimed, verdict):
     asked[0].append(BOUNDS)
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: BOUNDS)
-    assert Guarantee(task=TASK, held=HELD, claims=claims_of(claimed), slow_gain=slow).check() is verdict
+    assert TrackingProof(task=TASK, held=HELD, claims=claims_of(claimed), slow_gain=slow).check() is verdict
     assert len(asked[1]) == (slow is not None)
 
 
@@ -157,7 +157,7 @@ def test_claims_are_those_that_their_own_spread_gives(asked, found):
     assert all(v > slip for v, slip in zip(claims[:-1], tried, strict=False))
     assert claims[-1] <= tried[-1]
     assert [given[5] for given in questions] == [SLOW.spread(TASK, slip) for slip in tried]
-    assert result == Guarantee(
+    assert result == TrackingProof(
         task=TASK, held=HELD, slow_gain=SLOW,
         claims=replace(Claims.of(TASK, BOUNDS).rounded(), slip_error=UpperBound(claims[-1])),
     )  # fmt: skip
@@ -180,7 +180,7 @@ def test_loops_that_are_not_stable_have_no_bounds(asked, monkeypatch):
         raise ParameterError("not stable.")
 
     monkeypatch.setattr(module, "norms", refuse)
-    claim = Guarantee(task=TASK, held=HELD, claims=claims_of(F(1)), slow_gain=SLOW)
+    claim = TrackingProof(task=TASK, held=HELD, claims=claims_of(F(1)), slow_gain=SLOW)
     for found in (claim.bounds(), guarantee(TASK, HELD, SLOW)):
         assert (
             found.reason == "with zero-order hold over 0.1 s even the nominal loop is not stable, or decays too slowly"
@@ -189,7 +189,7 @@ def test_loops_that_are_not_stable_have_no_bounds(asked, monkeypatch):
 
 
 def test_the_file_names_a_slow_gain_where_there_is_one():
-    claim = Guarantee(task=TASK, held=HELD, claims=claims_of(F(1)))
+    claim = TrackingProof(task=TASK, held=HELD, claims=claims_of(F(1)))
     assert "slow_gain" not in json.loads(guarantee_text(claim))
     written = json.loads(guarantee_text(replace(claim, slow_gain=SLOW)))
     assert written["slow_gain"] == {"parts": 2, "growth": "1/9"}

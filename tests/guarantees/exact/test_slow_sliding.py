@@ -17,7 +17,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError, UnsupportedError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import friction_law, load_fault
-from quakedesign.guarantees import Held, NoGuarantee, SlidingClaims, SlidingGuarantee, cell_bounds
+from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof, cell_bounds
 from quakedesign.guarantees.exact import sliding_small_gain as small_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
@@ -70,7 +70,7 @@ def claims(log_rate="1/2", log_state="1/18", slip_error="4e-5", push=380000, ask
     return SlidingClaims(**{name: UpperBound(F(value)) for name, value in given.items()})
 
 
-CLAIM = SlidingGuarantee(task=task(), held=LAGGED, cuts=(None,), claims=claims())
+CLAIM = SlidingProof(task=task(), held=LAGGED, cuts=(None,), claims=claims())
 
 
 @pytest.mark.parametrize("chords", [small_gain.chords, standalone.sector], ids=["package", "standalone"])
@@ -476,7 +476,7 @@ def test_both_checkers_find_the_same_bounds(path):
     one = task("0.002", ramp=F("11.9"))
     one = replace(one, ranges={**one.ranges, "coefficient": (F("0.599"), F("0.601"))})
     ours, (theirs, small) = paired(one, Held(law=STIFF, step=F(200), **path), claims("1/4", "1/10"))
-    assert not isinstance(ours, NoGuarantee)
+    assert not isinstance(ours, NoProof)
     for name, value in theirs.items():
         assert float(ours[name]) == pytest.approx(float(value), rel=1e-3), name
     assert float(ours["small_gain"]) == pytest.approx(float(small), rel=1e-3)

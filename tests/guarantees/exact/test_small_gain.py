@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, NoGuarantee
+from quakedesign.guarantees import Bounds, NoProof
 from quakedesign.guarantees.exact.loop import channels_of
 from quakedesign.guarantees.exact.small_gain import bounds_from, spectral_radius
 from quakedesign.laws import ImplicitRoot, Power
@@ -110,7 +110,7 @@ def test_the_root_of_a_noisy_step_may_lie_wider_by_the_noise():
 def test_a_loop_through_the_implicit_step_can_fail_by_itself():
     root = ImplicitRoot(pull=PULL, slopes=(F(0), F(1)))
     found = bounds_from(TASK, gains(root=(F("0.4"), 2, 13)), root, STEP)
-    assert isinstance(found, NoGuarantee)
+    assert isinstance(found, NoProof)
     assert found.small_gain >= 1
     assert found.reason.startswith("small gain")
     assert found.reason.endswith("the range of the implicit step's slope contributes 1.08")  # 0.4/2/0.184
@@ -130,7 +130,7 @@ def test_a_small_gain_of_one_proves_nothing():
     """Only the slip error's share of the acceleration, exactly 1."""
     one = gains(acceleration=(1 / TASK.half_ranges["slip_error"], 0, 0), drift=(0, 0, 0))
     found = bounds_from(TASK, one, None, STEP)
-    assert isinstance(found, NoGuarantee)
+    assert isinstance(found, NoProof)
     assert found.small_gain == 1
 
 
@@ -140,7 +140,7 @@ def test_the_reason_is_the_largest_share_in_the_worst_part_of_the_period():
     parts = {key: v if len(v) == 2 else v * 2 for key, v in parts.items()}
     parts["slip_error", "acceleration"] = (F(0), 3 / share)
     found = bounds_from(TASK, parts, None, STEP)
-    assert isinstance(found, NoGuarantee)
+    assert isinstance(found, NoProof)
     assert found.reason.endswith("the range of friction's slope in slip contributes 3")
     assert 3 + 2 * TASK.half_ranges["push"] <= found.small_gain <= F(1001, 1000) * (3 + 2 * TASK.half_ranges["push"])
 

@@ -8,7 +8,7 @@ import pytest
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, Guarantee, Held, NoGuarantee, guarantee
+from quakedesign.guarantees import Bounds, Claims, Held, NoProof, TrackingProof, guarantee
 from quakedesign.guarantees.exact import statement
 from quakedesign.guarantees.exact import statement as continuous
 from quakedesign.guarantees.exact.statement import above, sentence_of
@@ -30,7 +30,7 @@ CLAIMS = Claims(
     largest_step=UpperBound(F(5, 3)),
 )
 BOUNDS = Bounds(slip_error=F(0), slip_rate_error=F(1, 7), push=3 * TASK.authority, small_gain=F(1, 2))
-NONE = NoGuarantee(reason="none", small_gain=None)
+NONE = NoProof(reason="none", small_gain=None)
 HELD = Held(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10))
 SIGN = ImplicitRoot(pull=(Power(factor=(F(1, 3), F(1, 3)), exponent=F(0), argument="slip"),),
                     slopes=(F(0), F(0)), remainder=F(0))  # fmt: skip
@@ -118,7 +118,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
         states=("z",), update=((F(1),),), measured=((F(1), F(0)),), output=(F(1),), feedback=(F(1), F(0)), root=None
     )
     both = Held(law=replace(alone, feedback=(F(1), F(1))), step=F(1), slip_noise=F(1, 3), rate_noise=F(2, 3))
-    said = Guarantee(task=TASK, held=both, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, held=both, claims=CLAIMS).sentence()
     told = "with zero-order hold over 1 s, with any noise of at most 0.333333 m in the measured slip, "
     assert told + "with any noise of at most 0.666666 m/s in the measured slip rate, for every" in said
     assert (both.noise, replace(both, slip_noise=F(0)).noise) == (
@@ -129,7 +129,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     around = ("delay", "lag", "diffusion", "slip_noise", "rate_noise", "initial_slip", "initial_slip_rate")
     around += ("jitter", "delay_jitter", "averaging", "longest_step")
     assert (quiet.noise, quiet.around) == ({}, dict.fromkeys(around, 0) | {"pump": None})
-    said = Guarantee(task=TASK, held=quiet, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, held=quiet, claims=CLAIMS).sentence()
     assert "with zero-order hold over 1 s, with the slip alone measured, for every" in said
     assert Held(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
     with pytest.raises(ParameterError, match="needs a law that measures the slip rate"):
@@ -148,10 +148,10 @@ def test_claims_are_shown_as_the_exact_numbers():
 
 def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     held = Held(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
-    said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, held=held, claims=CLAIMS).sentence()
     where = "on the plant without stick, from rest, with zero-order hold over 0.1 s"
     assert said.startswith(f"{where}, with a delay of 0.02 s, through a lag of 0.03 s, for every disturbance")
-    assert Guarantee(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith(f"{where}, for every")
+    assert TrackingProof(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith(f"{where}, for every")
     assert "never exceeds 286 mm/s, the slip stays within 334 mm of the reference" in said
     assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa, commanded" in said
 
@@ -176,23 +176,23 @@ def test_a_law_runs_once_a_step_without_delay_and_lag_unless_it_has_an_implicit_
 )
 def test_claims_are_proved_where_the_bounds_give_them_and_the_root_is_as_said(held, found, verdict, monkeypatch):
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: found)
-    assert Guarantee(task=TASK, held=held, claims=Claims.of(TASK, BOUNDS)).check() is verdict
+    assert TrackingProof(task=TASK, held=held, claims=Claims.of(TASK, BOUNDS)).check() is verdict
 
 
 def test_a_root_beyond_its_lines_at_the_claims_is_undecided(monkeypatch):
     """w = e2 − sign(e1 + w)/3 is 0 for e1 = 0 where |e2| ≤ 1/3."""
     wide = replace(BOUNDS, slip_rate_error=F(1, 2))
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: wide)
-    assert Guarantee(task=TASK, held=ROOTED, claims=Claims.of(TASK, wide)).check() is Verdict.UNDECIDED
-    assert Guarantee(task=TASK, held=HELD, claims=Claims.of(TASK, wide)).check() is Verdict.PROVED
+    assert TrackingProof(task=TASK, held=ROOTED, claims=Claims.of(TASK, wide)).check() is Verdict.UNDECIDED
+    assert TrackingProof(task=TASK, held=HELD, claims=Claims.of(TASK, wide)).check() is Verdict.PROVED
     told = replace(BOUNDS, slip_rate_error=F(1, 3) - F(1, 10**9))
     for noise, verdict in ((F(0), Verdict.PROVED), (F(1, 10**6), Verdict.UNDECIDED)):
-        loud = Guarantee(task=TASK, held=replace(ROOTED, rate_noise=noise), claims=Claims.of(TASK, told))
+        loud = TrackingProof(task=TASK, held=replace(ROOTED, rate_noise=noise), claims=Claims.of(TASK, told))
         monkeypatch.setattr(statement, "certified_bounds", lambda *_: told)
         assert loud.check() is verdict
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: wide)
     none = guarantee(TASK, ROOTED)
-    assert isinstance(none, NoGuarantee)
+    assert isinstance(none, NoProof)
     assert "leaves its range at errors up to 0 m and 0.501 m/s" in none.reason
 
 
@@ -203,14 +203,14 @@ def test_a_root_that_is_told_another_slip_may_leave_its_line(monkeypatch):
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: bounds)
     for noise, verdict in ((F(0), Verdict.PROVED), (F(1, 3), Verdict.PROVED), (F(1, 2), Verdict.UNDECIDED)):
         held = Held(law=compensated(sign, F(1, 2), F(1)), step=F(1), slip_noise=noise)
-        assert Guarantee(task=TASK, held=held, claims=Claims.of(TASK, bounds)).check() is verdict
+        assert TrackingProof(task=TASK, held=held, claims=Claims.of(TASK, bounds)).check() is verdict
 
 
 def test_a_guarantee_claims_the_bounds_a_little_wider_or_has_none(monkeypatch):
     for held in (HELD, ROOTED):
         monkeypatch.setattr(statement, "certified_bounds", lambda *_: BOUNDS)
         claims = Claims.of(TASK, BOUNDS).rounded()
-        assert guarantee(TASK, held) == Guarantee(task=TASK, held=held, claims=claims)
+        assert guarantee(TASK, held) == TrackingProof(task=TASK, held=held, claims=claims)
         monkeypatch.setattr(statement, "certified_bounds", lambda *_: NONE)
         assert guarantee(TASK, held) is NONE
 
@@ -228,7 +228,7 @@ def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monk
     asked = []
     monkeypatch.setattr(statement, "certified_bounds", lambda *given: asked.append(given) or NONE)
     late = replace(ROOTED, delay=F(1, 3), lag=F(1, 5), rate_noise=F(1, 9))
-    claim = Guarantee(task=TASK, held=late, claims=CLAIMS)
+    claim = TrackingProof(task=TASK, held=late, claims=CLAIMS)
     assert claim.bounds() is NONE
     assert asked == [(TASK, claim.loop, SIGN, {"rate_noise": F(1, 9)}, F(0))]
     assert tuple(claim.loop.sampled) == ("root", "rate_noise")
@@ -243,23 +243,23 @@ def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
     bounds = replace(BOUNDS, push=(TASK.normal_stress - off - TASK.rest_pressure[1]) * TASK.authority)
     assert wide.verdict(TASK, bounds) is (Verdict.PROVED if proved else Verdict.UNDECIDED)
     monkeypatch.setattr(statement, "_bounds", lambda *_: bounds)
-    found = Guarantee(task=TASK, held=HELD, claims=wide)
+    found = TrackingProof(task=TASK, held=HELD, claims=wide)
     assert found.check() is (Verdict.PROVED if proved else Verdict.UNDECIDED)
     law = ContinuousLaw(states=(), rates=(), measured=(), output=(), feedback=(F(-1), F(-1)))
     monkeypatch.setattr(continuous, "_continuous_bounds", lambda *_: bounds)
-    assert continuous.ContinuousPeaks(task=TASK, law=law, claims=wide).check() is found.check()
+    assert continuous.ContinuousProof(task=TASK, law=law, claims=wide).check() is found.check()
     for none in (guarantee(TASK, HELD), continuous.continuous_peaks(TASK, law)):
-        assert isinstance(none, NoGuarantee)
+        assert isinstance(none, NoProof)
         assert none.reason.endswith("the effective normal stress is 50 MPa: the fault may open")
 
 
 def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     held = replace(HELD, jitter=F(1, 300), delay_jitter=F(1, 150))
-    said = Guarantee(task=TASK, held=held, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, held=held, claims=CLAIMS).sentence()
     told = "hold over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s of when"
     assert told in said
     assert "5.67 Pa, commanded changes of at most 1.67 Pa a sample" in said
-    late = Guarantee(task=TASK, held=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
+    late = TrackingProof(task=TASK, held=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
     assert "with zero-order hold over 0.1 s, each pressure within 0.00666666 s of when it is due, for every" in late
     assert (held.noise, HELD.noise) == ({"slip_noise": 0, "rate_noise": 0}, {})
     assert tuple(held.loop(TASK).sampled) == ("slip_noise", "rate_noise")
@@ -268,11 +268,14 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     paced = replace(held, pump=Pump(rate=F(5)), ramp=F(1, 50))
     assert paced.instants == Instants(measured=F(1, 300), arrived=F(1, 100), ramp=F(1, 50))
     assert (HELD.instants, replace(HELD, pump=Pump(least=F(-1), largest=F(1))).instants) == (None, None)
-    assert "with a pump of 5 Pa/s, whose limits are never" in Guarantee(task=TASK, held=paced, claims=CLAIMS).sentence()
+    assert (
+        "with a pump of 5 Pa/s, whose limits are never"
+        in TrackingProof(task=TASK, held=paced, claims=CLAIMS).sentence()
+    )
     mean = replace(HELD, averaging=F(1, 30), jitter=F(1, 300))
     assert (mean.off, mean.instants) == (F(1, 50), Instants(measured=F(1, 50), arrived=F(1, 300)))
     assert tuple(mean.noise) == ("slip_noise", "rate_noise")
-    said = Guarantee(task=TASK, held=mean, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, held=mean, claims=CLAIMS).sentence()
     assert "hold over 0.1 s, each measurement a mean over 0.0333333 s around its time, each measurement within" in said
     for name in ("jitter", "delay_jitter", "averaging", "ramp"):
         with pytest.raises(ParameterError, match="jitter, delay jitter, averaging and ramp must be 0 or more"):
@@ -290,14 +293,14 @@ def test_what_comes_late_may_leave_a_root_its_lines(monkeypatch):
     told = replace(BOUNDS, slip_rate_error=F(1, 3) - F(1, 10**12))
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: told)
     for jitter, verdict in ((F(0), Verdict.PROVED), (F(1, 10), Verdict.UNDECIDED)):
-        late = Guarantee(task=TASK, held=replace(ROOTED, jitter=jitter), claims=Claims.of(TASK, told))
+        late = TrackingProof(task=TASK, held=replace(ROOTED, jitter=jitter), claims=Claims.of(TASK, told))
         assert late.check() is verdict
 
 
 @pytest.mark.parametrize("changes", [{"jitter": F(1, 50)}, {"delay_jitter": F(1, 50)}, {"ramp": F(1, 50)}])
 def test_a_limit_at_rest_waits_for_what_is_late(changes):
     held = replace(HELD, law=replace(HELD.law, applied=(F(0), F(0))))
-    plain = Guarantee(task=TASK, held=held, claims=Claims.of(TASK, BOUNDS))
+    plain = TrackingProof(task=TASK, held=held, claims=Claims.of(TASK, BOUNDS))
     later = replace(plain, held=replace(plain.held, **changes))
     moved = later.rest_limit.width - plain.rest_limit.width
     assert float(moved) == pytest.approx(float(plain.rest_limit.per_slip * TASK.reference_rates[0]) / 50, rel=0.01)

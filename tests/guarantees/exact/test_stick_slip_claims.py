@@ -20,10 +20,10 @@ from quakedesign.fault import fault_toml
 from quakedesign.guarantees import guarantee_document, load_guarantee, read_guarantee
 from quakedesign.guarantees.exact import stick_slip_set
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipGuarantee, stick_slip_guarantee
+from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip, gap, ranges, stick_slip_bounds, stop_bounds
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip, worst_stick_slip
-from quakedesign.guarantees.stick_slip_answer import StickSlipAnswer
+from quakedesign.guarantees.stick_slip_answer import StickSlipGuarantee
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.lyapunov import Verdict
@@ -377,7 +377,7 @@ def test_healing_counts_the_largest_area_per_mass_and_is_part_of_the_answer(proo
     assert low < high
     stress = 50 * 10**6 - F(proof.claims.least_pressure)
     assert wide.covered_healing() == wide.task.amplitude / (high * stress)
-    answer = StickSlipAnswer(fault=qd.load_fault("real-fault"), found=proof)
+    answer = StickSlipGuarantee(fault=qd.load_fault("real-fault"), proof=proof)
     assert answer.to_dict()["covered_healing"] == float(proof.covered_healing()) <= proof.covered_healing()
     assert (
         answer.lines()[1]
@@ -390,7 +390,7 @@ def test_limit_and_worst_case_take_only_the_disturbance_beside_healing(proof):
     half = replace(proof, healing=F(proof.covered_healing()) / 2)
     assert half.disturbance == proof.task.amplitude / 2
     without = replace(proof, task=replace(proof.task, amplitude=half.disturbance))
-    answers = [StickSlipAnswer(fault=qd.load_fault("real-fault"), found=found) for found in (half, without, proof)]
+    answers = [StickSlipGuarantee(fault=qd.load_fault("real-fault"), proof=found) for found in (half, without, proof)]
     limits = [answer.least_slip_rate for answer in answers]
     assert limits[0] == limits[1] < limits[2]
     seen, milder, harder = (worst_stick_slip(found, periods=12).peak_slip_rate for found in (half, without, proof))
@@ -399,7 +399,7 @@ def test_limit_and_worst_case_take_only_the_disturbance_beside_healing(proof):
 
 @pytest.mark.parametrize("share", [-1, 1 + F(1, 10**6)])
 def test_healing_stands_for_a_part_of_the_disturbance(proof, share, monkeypatch):
-    monkeypatch.setattr(StickSlipGuarantee, "bounds", lambda found: found.claims)
+    monkeypatch.setattr(StickSlipProof, "bounds", lambda found: found.claims)
     most = F(proof.covered_healing())
     assert replace(proof, healing=most).check() is Verdict.PROVED
     assert replace(proof, healing=share * most).check() is Verdict.UNDECIDED
@@ -407,7 +407,7 @@ def test_healing_stands_for_a_part_of_the_disturbance(proof, share, monkeypatch)
 
 def test_a_file_is_for_faults_whose_healing_it_covers(monkeypatch):
     """It covers 6.22e-5 without a disturbance, so 3.11e-5 beside half of the disturbance."""
-    monkeypatch.setattr(StickSlipGuarantee, "check", lambda _: Verdict.PROVED)
+    monkeypatch.setattr(StickSlipProof, "check", lambda _: Verdict.PROVED)
     real = qd.load_fault("real-fault")
     half = real.with_disturbance(replace(real.disturbance, amplitude=real.disturbance.amplitude / 2))
     certified_choice(replace(half, friction=replace(half.friction, healing=3.1e-5)), FILE)
@@ -416,7 +416,7 @@ def test_a_file_is_for_faults_whose_healing_it_covers(monkeypatch):
 
 
 def test_check_says_of_a_fault_that_heals_whether_that_is_covered(monkeypatch, tmp_path):
-    monkeypatch.setattr(StickSlipGuarantee, "check", lambda _: Verdict.PROVED)
+    monkeypatch.setattr(StickSlipProof, "check", lambda _: Verdict.PROVED)
     real = qd.load_fault("real-fault")
     half = real.with_disturbance(replace(real.disturbance, amplitude=real.disturbance.amplitude / 2))
 
@@ -436,7 +436,7 @@ def test_check_says_of_a_fault_that_heals_whether_that_is_covered(monkeypatch, t
 
 
 def test_a_run_of_its_file_knows_what_is_proved_and_on_which_plant(proof, monkeypatch):
-    monkeypatch.setattr(StickSlipGuarantee, "check", lambda _: Verdict.PROVED)
+    monkeypatch.setattr(StickSlipProof, "check", lambda _: Verdict.PROVED)
     choice = certified_choice(qd.load_fault("real-fault"), FILE)
     assert choice.claim.claims == proof.claims
     assert choice.noise(0) == EXACT
@@ -460,7 +460,9 @@ def test_what_the_theorem_does_not_know_is_refused(given):
 @pytest.mark.parametrize("disturbance_class", ["amplitude", "rate"])
 def test_a_disturbance_of_bounded_rate_is_one_of_bounded_amplitude(disturbance_class, proof, monkeypatch):
     module = import_module("quakedesign.synthesis.guarantee")
-    monkeypatch.setattr(module, "answer_stick_slip", lambda fault, *_, **__: StickSlipAnswer(fault=fault, found=proof))
+    monkeypatch.setattr(
+        module, "answer_stick_slip", lambda fault, *_, **__: StickSlipGuarantee(fault=fault, proof=proof)
+    )
     fault = qd.load_fault("real-fault")
     answer = qd.guarantee(fault, plant="stick-slip", disturbance_class=disturbance_class)
     assert "for every disturbance of at most 0.00032 m/s^2" in answer.lines()[0]
@@ -493,9 +495,9 @@ def test_what_a_design_for_the_stick_slip_plant_does_not_take_is_refused(given):
 def test_the_real_fault_is_designed_and_proved_anew():
     answer = qd.guarantee(qd.load_fault("real-fault"), plant="stick-slip")
     assert answer.proved
-    assert answer.found.claims.peak_slip_rate < F("1.9e-4")
-    assert answer.found.check() is Verdict.PROVED
-    assert answer.worst.peak_slip_rate < answer.found.claims.peak_slip_rate
+    assert answer.proof.claims.peak_slip_rate < F("1.9e-4")
+    assert answer.proof.check() is Verdict.PROVED
+    assert answer.worst.peak_slip_rate < answer.proof.claims.peak_slip_rate
     assert "stick-slip" in answer.to_dict()["plant"]
 
 
@@ -523,7 +525,7 @@ def test_a_run_with_noise_stays_within_the_claims():
 )
 def test_further_loops_are_designed_and_proved_to_reach_what_was_asked(name, given, rate, slip):
     answer = qd.guarantee(qd.load_fault(name), plant="stick-slip", **given)
-    claims = answer.found.claims
+    claims = answer.proof.claims
     assert answer.proved
     assert claims.peak_slip_rate < rate
     assert max(claims.slip_behind, claims.slip_ahead) < slip

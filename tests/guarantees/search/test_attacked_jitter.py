@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from thinned import few
 
-from quakedesign.guarantees import NoGuarantee, guarantee, worst_found
+from quakedesign.guarantees import NoProof, guarantee, worst_found
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.adversary import _events, _on_time
 from quakedesign.guarantees.search.estimate import estimated
@@ -159,7 +159,7 @@ def test_a_pump_is_as_slow_as_it_may_be_where_it_has_a_ramp_that_closes():
     assert claim.held.pump.rate * claim.held.ramp >= claim.claims.largest_step
     slower = replace(claim.held, pump=Pump(rate=F(1_000_000)), ramp=F(0))
     none = guarantee(claim.task, slower, claim.slow_gain)
-    assert isinstance(none, NoGuarantee)
+    assert isinstance(none, NoProof)
     assert "jitter or rise of the pressure contributes" in none.reason
     narrow = replace(claim, held=replace(claim.held, pump=Pump(rate=claim.held.pump.rate * F(9, 10))))
     assert narrow.check() is Verdict.UNDECIDED

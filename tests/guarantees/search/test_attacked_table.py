@@ -58,11 +58,11 @@ def designed(row):
     if kind in GAINS:
         law = control_law(kind).from_values(GAINS[kind], scale=F(1), divisor=task.authority)
         made = design_compensated(task, law, step, **around)
-        claim = tightened(made.found)
+        claim = tightened(made.proof)
         held = attacker.sliding(made.controller, made.weight, made.authority, claim, float(task.authority))
     else:
         claim = design_held(task, step, **around)
-        claim = beside_searches(fault, claim).found if kind == "rate" else claim  # claims with room for stick
+        claim = beside_searches(fault, claim).proof if kind == "rate" else claim  # claims with room for stick
         held = attacker.numbers(claim, force=task.amplitude if kind == "rate" else None)
     return claim, held if claim.slow_gain else replace(held, slope=0.0)  # any course of the gain where none is slow
 

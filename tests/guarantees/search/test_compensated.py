@@ -14,8 +14,8 @@ from quakedesign import simulate
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import (
-    Guarantee,
-    NoGuarantee,
+    NoProof,
+    TrackingProof,
     compensated,
     design_compensated,
     guarantee_of,
@@ -53,7 +53,7 @@ def loop(row):
     """Controller, weight, authority and guarantee."""
     if row in ("cta", "dia"):
         found = designed(row)
-        return found.controller, found.weight, found.authority, found.found
+        return found.controller, found.weight, found.authority, found.proof
     controller = law("cta", CTA, row)
     return controller, *SETTINGS, compensated(TASK, controller, *SETTINGS, STEP)
 
@@ -66,7 +66,7 @@ ROWS = {"cta": (3e-4, 4.2e-5), "dia": (3e-4, 4.2e-5), "1/10": (3.6e-4, 5e-5), "1
 def test_sliding_modes_are_guaranteed_within_the_targets(row):
     *_, claim = loop(row)
     rate, slip = ROWS[row]
-    assert isinstance(claim, Guarantee)
+    assert isinstance(claim, TrackingProof)
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= rate
     assert claim.claims.slip_error <= slip
@@ -99,9 +99,9 @@ def test_no_course_with_noise_violates_a_guarantee(row, courses):
     """Slip and slip rate told within 1 um and 10 um/s, along random courses and along the nominal response."""
     noise = {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
     made = design_compensated(TASK, law(row, CTA if row == "cta" else DIA, 1), STEP, **noise)
-    held, claim = attacked(made.controller, made.weight, made.authority, made.found)
+    held, claim = attacked(made.controller, made.weight, made.authority, made.proof)
     assert claim.check() is Verdict.PROVED
-    assert designed(row).found.claims.slip_rate_error < claim.claims.slip_rate_error <= F(4, 10**4)
+    assert designed(row).proof.claims.slip_rate_error < claim.claims.slip_rate_error <= F(4, 10**4)
     hear = attacker.noisy(held, courses, 240, seed=8)
     largest, _ = attacker.run(held, 40, 6, attacker.switching(held, courses, 240, seed=3), courses, hear=hear)
     response, off = attacker.responses(held, 40, 6, size=1e-6)[1], np.zeros((2, 240))
@@ -156,7 +156,7 @@ def test_the_worst_found_is_below_the_bound_and_no_less_than_the_attacker_s(row,
 
 def test_a_smaller_peak_is_an_objective_too():
     peak, tracking = (
-        design_compensated(TASK, law("cta", CTA, 1), STEP, objective=name).found for name in ("peak", "tracking")
+        design_compensated(TASK, law("cta", CTA, 1), STEP, objective=name).proof for name in ("peak", "tracking")
     )
     assert peak.claims.slip_rate_error < tracking.claims.slip_rate_error <= peak.claims.slip_rate_error * F(126, 100)
     with pytest.raises(ParameterError, match="tracking, peak"):
@@ -167,7 +167,7 @@ def test_a_smaller_peak_is_an_objective_too():
 
 def test_a_scale_that_is_too_small_says_what_fails():
     found = compensated(TASK, law("cta", CTA, "1/1000000"), *SETTINGS, STEP)
-    assert isinstance(found, NoGuarantee)
+    assert isinstance(found, NoProof)
     assert found.reason.startswith("the root of the implicit step leaves its range at errors up to")
 
 
@@ -181,9 +181,9 @@ def test_a_run_of_the_design_stays_far_inside_its_guarantee():
         settled_from=100.0,
         compiled=False,
     ).metrics
-    assert run.max_slip_error <= 6e-6 < found.found.claims.slip_error
-    assert run.max_slip_rate_error <= 4.5e-6 < found.found.claims.slip_rate_error
-    assert run.peak_slip_rate <= found.found.claims.peak_slip_rate
+    assert run.max_slip_error <= 6e-6 < found.proof.claims.slip_error
+    assert run.max_slip_rate_error <= 4.5e-6 < found.proof.claims.slip_rate_error
+    assert run.peak_slip_rate <= found.proof.claims.peak_slip_rate
 
 
 def test_the_pull_is_read_off_the_scheme():
@@ -216,15 +216,15 @@ def test_a_law_with_a_feed_forward_has_none():
     ahead = law("cta", CTA, 1).with_feedforward(feed_forward("nominal", fault, DIVISOR))
     with pytest.raises(UnsupportedError, match="feed-forward"):
         implicit_pull(ahead, STEP, SETTINGS[1])
-    for found in (compensated(TASK, ahead, *SETTINGS, STEP), design_compensated(TASK, ahead, STEP).found):
-        assert isinstance(found, NoGuarantee)
+    for found in (compensated(TASK, ahead, *SETTINGS, STEP), design_compensated(TASK, ahead, STEP).proof):
+        assert isinstance(found, NoProof)
         assert "feed-forward" in found.reason
 
 
 def test_published_gains_are_too_weak_for_a_deadbeat_step():
     """λ = 500 on k3 = 4.51e-4: T_s²B0λ(k3 − k4)/(μ0N̂0) = 4e-8 m/s is far less than the error of a period."""
     found = compensated(TASK, published("real-fault")["cta"], *SETTINGS, STEP)
-    assert isinstance(found, NoGuarantee)
+    assert isinstance(found, NoProof)
     assert found.reason.startswith("the root of the implicit step leaves its range")
 
 
@@ -247,4 +247,4 @@ def test_the_guarantee_of_a_law_of_samples_is_that_of_its_own_numbers():
     settings = ("weight", weight), ("authority", authority)
     sampled = replace(made, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="compensated", settings=settings))
     assert guarantee_of(TASK, sampled) == tightened(compensated(TASK, made, *SETTINGS, STEP))
-    assert guarantee_of(TASK, designed("cta").controller) == tightened(designed("cta").found)
+    assert guarantee_of(TASK, designed("cta").controller) == tightened(designed("cta").proof)

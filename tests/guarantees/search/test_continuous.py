@@ -12,7 +12,7 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Disturbance
-from quakedesign.guarantees import CLASSES, ContinuousPeaks, NoGuarantee, certified_peaks, worst_found
+from quakedesign.guarantees import CLASSES, ContinuousProof, NoProof, certified_peaks, worst_found
 from quakedesign.laws import published
 from quakedesign.laws.elqr import ExtendedLQR, PressureLimits
 from quakedesign.lyapunov import Verdict
@@ -134,7 +134,7 @@ def test_along_the_whole_reference_the_published_law_stays_within_what_is_certif
 
 def test_a_constant_disturbance_is_of_the_class_amplitude_only(real, designed):
     constant = real.with_disturbance(Disturbance(constant=-2e-4))
-    assert isinstance(certified_peaks(constant, designed), ContinuousPeaks)
+    assert isinstance(certified_peaks(constant, designed), ContinuousProof)
     with pytest.raises(ParameterError, match="needs a disturbance that is 0 at t = 0"):
         certified_peaks(constant, designed, disturbance_class="rate")
 
@@ -161,7 +161,7 @@ def test_limits_count_only_where_the_pressure_reaches_them(real, designed, peaks
     assert certified_peaks(real, wide) == peaks["amplitude"]
     for limits in (PressureLimits(lowest=low, highest=high + 1), PressureLimits(lowest=low - 1, highest=high)):
         found = certified_peaks(real, replace(designed, limits=limits))
-        assert isinstance(found, NoGuarantee)
+        assert isinstance(found, NoProof)
         assert "may reach a limit of the law" in found.reason
 
 

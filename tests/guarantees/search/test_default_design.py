@@ -14,7 +14,7 @@ from quakedesign.cli.design_commands import positive
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, design_held, guarantee
+from quakedesign.guarantees import NoProof, TrackingProof, design_held, guarantee
 from quakedesign.guarantees.search.linear_design import reached
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
@@ -69,7 +69,7 @@ def test_a_law_has_one_bound_however_it_is_asked_for(monkeypatch):
     assert found.slow_gain is not None
     assert found.claims.slip_rate_error < guarantee(found.task, found.held).claims.slip_rate_error * F(3, 4)
     monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_found", lambda *_, **__: None)
-    assert qd.guarantee(REAL).found == assess(REAL, designed("real").controller).guarantee == found
+    assert qd.guarantee(REAL).proof == assess(REAL, designed("real").controller).guarantee == found
 
 
 @pytest.mark.slow
@@ -84,7 +84,7 @@ def test_both_objectives_are_what_they_are_called(unreached):
 @pytest.mark.slow
 def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works(monkeypatch):
     design = designed("slow")
-    assert not isinstance(design_held(uncertain_plant(SLOW), F(1, 10)), Guarantee)
+    assert not isinstance(design_held(uncertain_plant(SLOW), F(1, 10)), TrackingProof)
     step = design.controller.step
     assert F(2, 100) < step < F(1, 10)
     assert design.guarantee.check() is Verdict.PROVED
@@ -139,7 +139,7 @@ def test_an_independent_simulator_does_not_leave_the_guarantee_of_the_shorter_st
 
 
 def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
-    fails = NoGuarantee(reason="small gain 1.2", small_gain=None)
+    fails = NoProof(reason="small gain 1.2", small_gain=None)
     monkeypatch.setattr("quakedesign.guarantees.search.defaults.design_held", lambda *_, **__: fails)
     monkeypatch.setattr("quakedesign.guarantees.search.defaults.longest_step", lambda *_, **__: None)
     design = qd.design(REAL, "elqr", plant="printed")
@@ -159,7 +159,7 @@ def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
 )
 def test_unusual_faults_are_designed_or_refused_with_a_reason(fault):
     found = design_held(uncertain_plant(fault), F(repr(fault.sampling_time)))
-    if isinstance(found, Guarantee):
+    if isinstance(found, TrackingProof):
         assert found.check() is Verdict.PROVED
     else:
         assert found.reason
@@ -173,7 +173,7 @@ def searched(longest, first, most=None):
     def attempt(time):
         asked.append(time)
         if time > longest:
-            return NoGuarantee(reason="too long", small_gain=None)
+            return NoProof(reason="too long", small_gain=None)
         return replace(claim, held=replace(claim.held, step=time))
 
     found = reached(attempt, first, most=most)
@@ -201,7 +201,7 @@ def test_times_that_bring_a_loop_no_nearer_to_a_guarantee_are_not_halved_on(smal
     def attempt(time):
         asked.append(time)
         gain = next(told)
-        return NoGuarantee(reason="too long", small_gain=None if gain is None else UpperBound(F(gain)))
+        return NoProof(reason="too long", small_gain=None if gain is None else UpperBound(F(gain)))
 
     assert reached(attempt, F(1), attempts=5) == ()
     assert asked == [F(1, 2**n) for n in range(tried)]

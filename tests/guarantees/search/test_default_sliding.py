@@ -16,7 +16,7 @@ import quakedesign as qd
 from quakedesign.cli.design_commands import positive
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, design_compensated
+from quakedesign.guarantees import NoProof, TrackingProof, design_compensated
 from quakedesign.laws import Sampling
 from quakedesign.loop import simulation_scheme
 from quakedesign.lyapunov import Verdict, load_certificate
@@ -81,7 +81,7 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     assert found.claims.slip_rate_error <= F(4, 10**4)
     assert found.claims.slip_error <= F(6, 10**5)
     assert design.controller.sampling.step == found.held.step == STEP
-    assert design.compensation.found is found
+    assert design.compensation.proof is found
     settings = dict(design.controller.sampling.settings)
     limit = {f"rest_{part.name}": getattr(found.rest_limit, part.name) for part in fields(found.rest_limit)}
     assert settings == {name: design.gains[name] for name in ("weight", "authority")} | limit
@@ -208,7 +208,7 @@ def test_a_guarantee_needs_no_certificate_in_continuous_time(unproved, unreached
 def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works(unproved):
     design = qd.design(SLOW, "cta")
     base = replace(design.controller, gains=dict(design.controller.gains), sampling=None)
-    assert isinstance(design_compensated(uncertain_plant(SLOW), base, F(1, 10)).found, NoGuarantee)
+    assert isinstance(design_compensated(uncertain_plant(SLOW), base, F(1, 10)).proof, NoProof)
     step = design.controller.sampling.step
     assert F(2, 100) < step < F(1, 10)
     assert (design.verdict, design.guarantee.check(), design.guarantee.held.step) == (Verdict.PROVED,) * 2 + (step,)
@@ -219,7 +219,7 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
 
 @pytest.mark.slow
 def test_where_no_step_has_a_guarantee_it_is_the_design_in_continuous_time(monkeypatch):
-    fails = NoGuarantee(reason="small gain 1.2", small_gain=None)
+    fails = NoProof(reason="small gain 1.2", small_gain=None)
     known = load_certificate(CERTIFICATE)
     monkeypatch.setattr(DESIGN, "find_certificate", lambda *_, **__: known)
     monkeypatch.setattr(COMPENSATED, "compensated", lambda *_, **__: fails)
@@ -254,5 +254,5 @@ UNUSUAL = {
 @pytest.mark.parametrize("name", UNUSUAL)
 def test_unusual_faults_are_designed_with_a_guarantee_that_holds(unproved, name):
     design = qd.design(UNUSUAL[name], "dia")
-    assert isinstance(design.guarantee, Guarantee)
+    assert isinstance(design.guarantee, TrackingProof)
     assert design.guarantee.check() is design.verdict is Verdict.PROVED

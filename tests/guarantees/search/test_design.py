@@ -13,7 +13,7 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, LoopAnswer, NoGuarantee, design_held, guarantee, worst_found
+from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, design_held, guarantee, worst_found
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.adversary import WorstFound
 from quakedesign.guarantees.search.linear_design import _with_noise, closest
@@ -69,7 +69,7 @@ def aligned(held, periods, pieces, k):
 @few("row", ROWS, every=5)
 def test_designs_are_guaranteed_within_the_targets(row):
     claim, (*_, rate, slip) = designed(row), ROWS[row]
-    assert isinstance(claim, Guarantee)
+    assert isinstance(claim, TrackingProof)
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= rate
     assert claim.claims.slip_error <= slip
@@ -124,7 +124,7 @@ def test_courses_along_the_nominal_response_come_close_and_stay_below(row):
 def test_where_stick_leaves_the_bounds_the_answer_says_so():
     claim = designed("real peak")
     beyond = WorstFound(slip_error=1.01 * float(claim.claims.slip_error), slip_rate_error=0.0)
-    found = LoopAnswer(fault=load_fault("real-fault"), found=claim, stick_search=beyond)
+    found = TrackingGuarantee(fault=load_fault("real-fault"), proof=claim, stick_search=beyond)
     assert found.lines()[-1].startswith("on the stick-slip plant a course was found that exceeds the bounds")
     within = replace(found, stick_search=replace(beyond, slip_error=0.99 * float(claim.claims.slip_error)))
     assert not within.leaves_with_stick
@@ -170,8 +170,8 @@ def test_a_delay_is_attacked_too(delay):
     task = uncertain_plant(load_fault("real-fault"))
     claim = guarantee(task, replace(designed("real peak").held, delay=delay))
     if delay == F("0.03"):
-        assert isinstance(claim, Guarantee)
-    if isinstance(claim, NoGuarantee):
+        assert isinstance(claim, TrackingProof)
+    if isinstance(claim, NoProof):
         assert "small gain" in claim.reason
         assert claim.small_gain >= 1
         return
@@ -191,7 +191,7 @@ def test_sharper_claims_are_not_proved():
 
 def test_a_step_far_too_long_has_no_guarantee_and_says_why():
     found = design_held(uncertain_plant(load_fault("real-fault")), F(2), objective="peak")
-    assert isinstance(found, NoGuarantee)
+    assert isinstance(found, NoProof)
     assert "is not stable" in found.reason
 
 
@@ -205,7 +205,7 @@ def test_a_step_in_which_errors_outgrow_all_numbers_has_none_either():
     """The pole (√(w² + 4s) − w)/2 with s = 0.4493 1/s² and w = 1.6 1/s is 0.2437 1/s, for an hour: e^877."""
     task = uncertain_plant(load_fault("real-fault"))
     for found in (design_held(task, F(3600)), closest(task, F(3600))):
-        assert isinstance(found, NoGuarantee)
+        assert isinstance(found, NoProof)
         assert found.reason == "errors grow by e^877 within T_s = 3600 s"
 
 
@@ -227,7 +227,7 @@ def test_designs_say_what_is_guaranteed_of_them_as_they_run():
         )
     ]
     held, unstable, sliding = (design.guarantee for design in made)
-    assert isinstance(held, Guarantee)
+    assert isinstance(held, TrackingProof)
     assert held.check() is Verdict.PROVED
     assert unstable.check() is sliding.check() is Verdict.UNDECIDED
     assert unstable.sentence().startswith("none: with zero-order hold over 0.184 s even the nominal loop is not stable")
@@ -260,7 +260,7 @@ def test_the_worst_found_with_stick_is_that_of_an_attacker_who_lets_the_fault_re
     """Ahead of its reference the fault rests for 60 to 90 periods, and the law follows: in 64 periods 7 % less."""
     name, controller = fault_and_law
     answer = qd.guarantee(load_fault(name), controller=controller)
-    claim = answer.compensation.found if answer.compensation else answer.found
+    claim = answer.compensation.proof if answer.compensation else answer.proof
     found, (slip, rate) = worst_found(claim, sticks=True), BY_ASCENT[fault_and_law]
     assert 0.99 * slip <= found.slip_error <= claim.claims.slip_error
     assert 0.99 * rate <= found.slip_rate_error <= claim.claims.slip_rate_error
@@ -275,7 +275,7 @@ def test_noise_is_blamed_for_what_it_does_to_a_law_that_is_proved_without(noise,
     without = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
     bounds = {name: F(bound) for name, bound in noise.items()}
     found = _with_noise(without, bounds)
-    assert isinstance(found, Guarantee) is proved
+    assert isinstance(found, TrackingProof) is proved
     if proved:
         assert found.held.noise == bounds | {"rate_noise": F(0)} or found.held.noise == bounds
         return
@@ -287,7 +287,7 @@ def test_noise_is_blamed_for_what_it_does_to_a_law_that_is_proved_without(noise,
 def test_the_first_words_are_that_nothing_is_guaranteed_at_the_step_that_was_asked_for(monkeypatch):
     """Where a design for a shorter one is: it comes second."""
     shorter = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
-    none = NoGuarantee(reason="small gain 2", small_gain=None)
+    none = NoProof(reason="small gain 2", small_gain=None)
     monkeypatch.setattr(state_feedback, "design_held", lambda *_, **__: none)
     monkeypatch.setattr(state_feedback, "longest_step", lambda *_, **__: shorter)
     monkeypatch.setattr(state_feedback, "design_at", lambda *_: shorter)

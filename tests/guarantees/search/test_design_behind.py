@@ -60,7 +60,7 @@ def test_it_is_compared_behind_its_path_without_what_acts_at_once(asked, monkeyp
     runs = []
     monkeypatch.setattr(comparison, "natural_earthquake", lambda fault, plant: Mock(spec=qd.Trajectory))
     monkeypatch.setattr(comparison, "simulate", lambda fault, law, **more: runs.append(law))
-    monkeypatch.setattr(comparison, "attacked", lambda fault, found: SimpleNamespace(found=found, compensation=None))
+    monkeypatch.setattr(comparison, "attacked", lambda fault, found: SimpleNamespace(proof=found, compensation=None))
     monkeypatch.setattr(comparison, "replace", lambda entry, **more: entry)
     design = qd.design(REAL, "elqr", lag=LAG)
     found = comparison.compared(

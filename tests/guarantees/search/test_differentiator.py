@@ -12,7 +12,7 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import LoopAnswer, NoGuarantee, design_held
+from quakedesign.guarantees import NoProof, TrackingGuarantee, design_held
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.guarantees.search.lqg import measured_by
 from quakedesign.loop.sensing.differentiator import least_bound
@@ -82,7 +82,7 @@ def test_the_acceleration_is_what_all_claims_allow_at_once():
 
 def test_the_answer_tells_the_least_bound_of_the_differentiator():
     claim = designed(("peak", NOISE))
-    found = LoopAnswer(fault=REAL, found=claim)
+    found = TrackingGuarantee(fault=REAL, proof=claim)
     bound = least_bound(claim.slip_acceleration, NOISE, STEP)
     assert F(found.to_dict()["differentiator_bound"]) == bound
     assert found.to_dict()["measured"] == "differentiator"
@@ -93,7 +93,7 @@ def test_the_answer_tells_the_least_bound_of_the_differentiator():
 @pytest.mark.slow
 def test_given_gains_are_told_as_designed_ones_are():
     found = qd.guarantee(REAL, gains=GAINS, step="50 ms", measured="differentiator")
-    assert found.found.claims.slip_rate_error <= F("1.7e-4")
+    assert found.proof.claims.slip_rate_error <= F("1.7e-4")
     assert found.to_dict()["measured"] == "differentiator"
     plain = qd.guarantee(REAL, gains=GAINS, step="50 ms")
     assert (plain.differentiator_bound, plain.to_dict()["measured"]) == (None, "slip-and-rate")
@@ -105,8 +105,8 @@ def test_given_gains_are_told_as_designed_ones_are():
     "around", [{"initial_slip": "1 um"}, {"jitter": "1 ms"}, {"lag": "0.1 s"}, {"diffusion": "2 s"}]
 )
 def test_where_it_is_not_known_what_it_tells_nothing_is_proved(around, gains):
-    found = qd.guarantee(REAL, gains=gains, measured="differentiator", **around).found
-    assert isinstance(found, NoGuarantee)
+    found = qd.guarantee(REAL, gains=gains, measured="differentiator", **around).proof
+    assert isinstance(found, NoProof)
     assert "a differentiator needs zero initial errors" in found.reason
 
 

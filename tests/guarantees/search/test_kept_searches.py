@@ -6,7 +6,7 @@ import pytest
 
 from quakedesign import cache
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee
+from quakedesign.guarantees import NoProof, TrackingProof
 from quakedesign.guarantees.search import adversary
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search import linear_design as longest_times
@@ -31,12 +31,12 @@ def test_what_a_search_proposes_is_decided_each_time(task, monkeypatch):
     longest = longest_times.longest_step(task)
     assert longest is None or longest.guarantee.check() is Verdict.PROVED
     found = design.design_held(task, STEP)
-    assert isinstance(found, Guarantee)
+    assert isinstance(found, TrackingProof)
     assert found.check() is Verdict.PROVED
     monkeypatch.setattr(design, "search_once", lambda _search, *question: [-1.0, [-3.0 for _ in question[-2]]])
     assert longest_times.longest_step(task) is None
     found = design.design_held(task, STEP)
-    assert isinstance(found, NoGuarantee) or found.check() is Verdict.PROVED
+    assert isinstance(found, NoProof) or found.check() is Verdict.PROVED
 
 
 def test_a_design_is_searched_once(task, tmp_path, monkeypatch):

@@ -10,7 +10,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, design_held, guarantee
+from quakedesign.guarantees import NoProof, TrackingProof, design_held, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search import linear_design as longest_times
 from quakedesign.guarantees.search.linear_design import (
@@ -50,14 +50,14 @@ def searched(monkeypatch):
             tried.append((step, much, None if near is None else float(near[0])))
             small = float(step * (1 + much) / longest) ** 1.2
             if len(tried) in misses and near is None:
-                return NoGuarantee(reason="none", small_gain=None)
+                return NoProof(reason="none", small_gain=None)
             held = SimpleNamespace(step=step, **around)
             return Closest(small if small < 1 else 1 + small, np.array([float(step)]), held)
 
         def best(task, held):
             if held.step > proved * longest:
-                return NoGuarantee(reason="too long", small_gain=None)
-            found = object.__new__(Guarantee)
+                return NoProof(reason="too long", small_gain=None)
+            found = object.__new__(TrackingProof)
             object.__setattr__(found, "held", held)
             return found
 
@@ -115,7 +115,7 @@ def test_a_search_near_another_law_that_finds_none_begins_anew(task, monkeypatch
 
     def stuck(task, step, *, near=None, **around):
         found = plain(task, step, near=near, **around)
-        return found if near is None else NoGuarantee(reason="stuck", small_gain=None)
+        return found if near is None else NoProof(reason="stuck", small_gain=None)
 
     monkeypatch.setattr(longest_times, "closest", stuck)
     assert nearest_setup(task, F(1), delay=F(4))[1].held.delay >= F(1, 2)
@@ -145,7 +145,7 @@ def test_a_design_that_is_missed_at_its_step_is_continued_from_a_longer_one(task
 @pytest.mark.slow
 def test_every_command_proves_what_the_longest_step_says(task, longest):
     step = F("0.9")
-    assert isinstance(design_held(task, step), NoGuarantee)  # by itself it is missed
+    assert isinstance(design_held(task, step), NoProof)  # by itself it is missed
     assert qd.guarantee(REAL, step=step).proved
     none = qd.guarantee(REAL, step=F(3))
     assert not none.proved

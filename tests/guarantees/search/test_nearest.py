@@ -10,7 +10,7 @@ from thinned import few
 
 import quakedesign as qd
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, LoopAnswer, NoGuarantee, best_guarantee
+from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, best_guarantee
 from quakedesign.guarantees.search.compensated_search import design_compensated
 from quakedesign.guarantees.search.defaults import deadbeat, sampled_sliding_mode
 from quakedesign.guarantees.search.estimate import closeness
@@ -64,12 +64,12 @@ REAL_REST = (
 def test_the_largest_disturbance_that_does_not_open_the_fault_is_named():
     pushed = replace(REAL, disturbance=replace(REAL.disturbance, amplitude=2000 * REAL.disturbance.amplitude))
     found = qd.guarantee(pushed, step=F("0.1"))
-    assert found.found.reason.endswith(": the fault may open")
+    assert found.proof.reason.endswith(": the fault may open")
     name, near = found.nearest
     assert (name, near.check()) == ("amplitude", Verdict.PROVED)
     assert 0 < near.task.amplitude < uncertain_plant(pushed).amplitude
     more = best_guarantee(replace(near.task, amplitude=near.task.amplitude * F(9, 8)), near.held)
-    assert isinstance(more, NoGuarantee)
+    assert isinstance(more, NoProof)
     assert more.pressed
     assert lines(found)[0].startswith("with a disturbance of at most 0.")
     assert found.to_dict()["nearest"]["value"] == str(near.task.amplitude)
@@ -84,7 +84,7 @@ def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_muc
     leaner = best_guarantee(task, Linear().leanest(task, step)).claims.pressures[-1]
     assert low < leaner[0] <= leaner[1] < high
     pump = Pump(least=(low + leaner[0]) / 2, largest=(high + leaner[1]) / 2)
-    assert isinstance(best_guarantee(task, replace(usual.held, pump=pump)), NoGuarantee)
+    assert isinstance(best_guarantee(task, replace(usual.held, pump=pump)), NoProof)
     assert design_held(task, step, pump=pump).check() is Verdict.PROVED
 
 
@@ -94,7 +94,7 @@ def test_the_share_of_the_box_that_will_do_is_named():
     name, near = nearest_setup(uncertain_plant(wide), F("0.85"))
     assert (name, near.check()) == ("box", Verdict.PROVED)
     assert 0 < near.task.spreads[0] == near.task.spreads[2] < F(1, 10)
-    found = LoopAnswer(fault=wide, found=NoGuarantee(reason="x", small_gain=None), nearest=("box", near))
+    found = TrackingGuarantee(fault=wide, proof=NoProof(reason="x", small_gain=None), nearest=("box", near))
     assert "with the box of +-" in lines(found)[0]
     paper = replace(near, task=replace(near.task, spreads=(F(0), F(0), F(0))))
     assert lines(replace(found, nearest=("box", paper)))[0].startswith("with the box paper: ")
@@ -129,7 +129,7 @@ def test_the_longest_step_of_sliding_modes_is_within_a_tenth_of_the_best_of_all_
     for weight, ratio in product(np.linspace(0.02, 0.6, 30), ratios):
         held = sliding.held(task, np.array([weight, ratio]), longer)
         assert closeness(task, held)[0] >= 1
-    assert isinstance(design_compensated(task, sliding.controller, longer).found, NoGuarantee)
+    assert isinstance(design_compensated(task, sliding.controller, longer).proof, NoProof)
 
 
 @pytest.mark.slow
@@ -141,6 +141,6 @@ def test_every_command_says_the_same_longest_step_of_sliding_modes(sliding, task
     assert (found.proved, found.shorter.held.step) == (False, longest)
     assert found.lines()[0].startswith("not guaranteed at T_s = 2 s")
     between = qd.guarantee(REAL, controller="cta", step=F("0.7"))  # which the usual weights miss
-    assert isinstance(design_compensated(task, sliding.controller, F("0.7")).found, NoGuarantee)
-    assert isinstance(between.found, Guarantee)
+    assert isinstance(design_compensated(task, sliding.controller, F("0.7")).proof, NoProof)
+    assert isinstance(between.proof, TrackingProof)
     assert between.compensation.controller.sampling.step == F("0.7")

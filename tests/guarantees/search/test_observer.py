@@ -13,7 +13,7 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, best_guarantee, design_held, guarantee, worst_found
+from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, worst_found
 from quakedesign.guarantees.search.linear_design import Longest, closest, design_at
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.loop.sensing.measurement import Measurement
@@ -44,7 +44,7 @@ def within(largest, claim):
 
 def test_the_slip_alone_is_enough_for_the_target():
     claim = designed("slip alone")
-    assert isinstance(claim, Guarantee)
+    assert isinstance(claim, TrackingProof)
     assert claim.held.law.of_slip_alone
     assert (claim.held.slip_noise, claim.check()) == (NOISE, Verdict.PROVED)
     assert claim.claims.slip_rate_error <= F(4, 10**4)
@@ -181,7 +181,7 @@ def test_a_delay_is_designed_for_with_the_slip_alone():
 
 
 def test_near_the_longest_time_a_design_is_sought_for_what_a_guarantee_measures(monkeypatch):
-    claim, told, none = designed("slip alone"), [], NoGuarantee(reason="none", small_gain=None)
+    claim, told, none = designed("slip alone"), [], NoProof(reason="none", small_gain=None)
     monkeypatch.setattr(
         "quakedesign.guarantees.search.linear_design.nearby", lambda *a, **k: told.append((a[:2], k)) or none
     )

@@ -165,8 +165,8 @@ def test_where_the_way_has_taken_normal_stress_the_same_stress_does_more():
 def test_on_a_preset_the_search_comes_to_what_an_adversary_with_inertia_found():
     """1.220 V, by an ascent along the adjoint of the plant with inertia; 1.202 V before the way counted."""
     found = answer_sliding(load_fault("crustal-patch"), diffusion=F(833))
-    assert 1.2195 < math.exp(worst_sliding(found.found).log_rate)
-    assert worst_sliding(found.found).log_rate < found.found.claims.log_rate
+    assert 1.2195 < math.exp(worst_sliding(found.proof).log_rate)
+    assert worst_sliding(found.proof).log_rate < found.proof.claims.log_rate
 
 
 def followed(stress, corner, pieces=4):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Guarantee, NoGuarantee, best_guarantee, design_held, guarantee, tightened
+from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, tightened
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search import unclocked
@@ -69,7 +69,7 @@ def test_a_disturbance_of_bounded_rate_has_less():
 
 def test_a_range_that_is_too_wide_has_none_with_its_small_gain():
     none = found(longest_step=F(1, 200))
-    assert isinstance(none, NoGuarantee)
+    assert isinstance(none, NoProof)
     assert "small gain" in none.reason or "no set" in none.reason
     assert unclocked_estimate(stored().task, replace(stored().held, longest_step=F(1, 20))) is None
 
@@ -78,7 +78,7 @@ def test_the_estimate_of_a_search_is_near_what_is_proved():
     guessed = unclocked_estimate(stored().task, stored().held).bounds
     assert float(guessed.slip_rate_error) == pytest.approx(float(stored().claims.slip_rate_error), rel=0.3)
     none = unclocked_estimate(stored().task, replace(stored().held, longest_step=F(1, 250)))
-    assert none is None or isinstance(none.bounds, NoGuarantee)
+    assert none is None or isinstance(none.bounds, NoProof)
 
 
 @pytest.mark.slow
@@ -86,7 +86,7 @@ def test_a_design_has_a_law_for_the_middle_of_the_range(monkeypatch):
     monkeypatch.setattr(design, "_FEWER", 12)
     task, around = uncertain_plant(load_fault("lab-fault")), {"longest_step": F(1, 500)}
     claim = design_held(task, F(1, 1000), objective="peak", **around)
-    assert isinstance(claim, Guarantee)
+    assert isinstance(claim, TrackingProof)
     assert claim.claims.slip_rate_error < F("1.6") * stored().claims.slip_rate_error
     assert claim.held.longest_step == F(1, 500)
 
