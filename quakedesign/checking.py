@@ -33,8 +33,6 @@ from quakedesign.symbolic.terms import written
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
-    from quakedesign.guarantees.exact.guarantee_files import Claim
-    from quakedesign.plant import FaultPlant, SlidingPlant
 
 
 __all__ = ["check_files"]
@@ -104,16 +102,15 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     about = entry_lines(guarantees.guarantee_document(claim))
     lines = [f'fault "{claim.task.name}", by the data in the file', claim.sentence(), *about]
     if fault is not None:
-        task, healing = _task(claim, fault), rational(fault.friction.rest_excess)
-        covers = isinstance(claim, guarantees.StickSlipProof) and healing > 0
-        if covers and task.amplitude <= claim.task.amplitude:  # type: ignore[union-attr]
-            covered = claim.covered_healing(task.amplitude)  # type: ignore[union-attr]
-            if covered < healing:
+        task, healing = plants.plant_like(claim.task, fault, wide=True), rational(fault.friction.rest_excess)
+        covers = claim.covers_healing and healing > 0
+        if covers:
+            task, uncovered = claim.beside_healing(task, healing)
+            if uncovered is not None:
                 raise CertificateError(
-                    f'healing of "{fault.name}" must be covered beside its disturbance, up to {covered:.3g}. Received '
-                    f"{UpperBound(healing):.3g}"
+                    f'healing of "{fault.name}" must be covered beside its disturbance, up to {uncovered:.3g}. '
+                    f"Received {UpperBound(healing):.3g}"
                 )
-            task = replace(task, amplitude=claim.task.amplitude)  # healing and a larger disturbance count alike
         if claim.task != replace(task, name=claim.task.name):
             raise CertificateError(f'the data are not those of "{fault.name}"')
         lines.append(f'the data are those of "{fault.name}"{_other_step(claim, fault)}')
@@ -135,22 +132,15 @@ def _plant(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     ]
 
 
-def _task(claim: "Claim", fault: "Fault") -> "FaultPlant | SlidingPlant":
-    """What a claim of the kind would be about on a fault."""
-    if not isinstance(claim, guarantees.SlidingProof):
-        return plants.uncertain_plant(fault, rate_limited=claim.task.change is not None)
-    low, high = claim.task.ranges["direct_effect"]
-    return plants.slow_sliding_plant(fault, claim.task.stress, (high - low) / (high + low))
-
-
-def _other_step(claim: "Claim", fault: "Fault") -> str:
+def _other_step(claim: Any, fault: "Fault") -> str:
     """The box, and that a loop is not sampled as the fault is, where it is so."""
-    if isinstance(claim, guarantees.SlidingProof):
+    if claim.slides:
         return ""
     text = f", box {fault.box.name}"
-    if isinstance(claim, guarantees.ContinuousProof) or float(claim.held.step) == fault.sampling_time:
+    step = float(claim.held.step) if claim.sampled else fault.sampling_time
+    if step == fault.sampling_time:
         return text
-    return f"{text}; NOT at its T_s = {fault.sampling_time:g} s, but at {float(claim.held.step):.4g} s"
+    return f"{text}; NOT at its T_s = {fault.sampling_time:g} s, but at {step:.4g} s"
 
 
 def _polynomial(raw: Any) -> tuple[str, list[str]]:

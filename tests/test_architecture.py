@@ -454,17 +454,17 @@ BUDGETS = {
     "sos": 6334,
     "laws": 3105,
     "loop": 4229,
-    "plant": 1356,
-    "guarantees": 13087,
+    "plant": 1446,
+    "guarantees": 13195,
     "lyapunov": 6958,
     "linear": 2390,
-    "synthesis": 1928,
+    "synthesis": 1933,
     "rocq": 843,
     "simulation": 9756,
     "identification": 4042,
     "studies": 4220,
-    "report": 4132,
-    "cli": 3502,
+    "report": 4102,
+    "cli": 3503,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

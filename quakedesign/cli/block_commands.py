@@ -87,13 +87,14 @@ def _facts(found: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | N
     if not found.proved:
         return {"verdict": "undecided", "reason": found.reason}
     proved = {} if one is None else one.proved_facts()
-    return {**found.to_dict(), "notes": [*found.notes, *_scope(found, chain)], **proved}
+    facts = {"verdict": "proved", "sentence": found.sentence(), **found.to_dict()}
+    return {**facts, "notes": [*found.notes, *_scope(found, chain)], **proved}
 
 
 def _lines(found: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> list[str]:
     """What is proved and what it depends on, with a run if there is one; else why nothing is proved."""
     if found.proved:
-        conditions = [*found.lines(), *_scope(found, chain)]
+        conditions = [*found.statement(), *_scope(found, chain)]
         return conditions if one is None else one.screen(conditions)
     far = "the command limits gives the pressures that every controller of this file needs with its diffusivity"
     return [found.sentence(), *([far] if chain.diffusivity else [])]
@@ -145,21 +146,21 @@ def guarantee_chain(
     output: Output,
 ) -> int:
     """The command `guarantee`; `sliding` are lag and stress of blocks in slow sliding."""
-    from quakedesign.guarantees.exact.guarantee_files import save_guarantee
     from quakedesign.synthesis import guarantee
 
     law = block_law(controller, "elqr")
     if out is not None:
         new_file(out, "certificate file", force=force)
     if sliding is None:
-        found: Any = guarantee(chain, law, step=step)
+        result = guarantee(chain, law, step=step)
     else:
         with progress() as tell:
             tell("design and proof", 0.0)
-            found = guarantee(chain, law, step=step, **sliding)
+            result = guarantee(chain, law, step=step, **sliding)
+    found = result.proof
     if out is not None and found.proved:
         with made_folder(out.parent):
-            save_guarantee(found, out)
+            result.save(out)
     unwritten = [f"{out} is not written, as nothing is proved"] if out is not None and not found.proved else []
     written = None if out is None or not found.proved else str(out)
     from quakedesign.studies.chains import ChainRun
@@ -244,7 +245,7 @@ def export_chain(
     if not found.proved:
         output.show(_facts(found, chain), [*_lines(found, chain), "nothing is exported, as no law is proved"])
         return 1
-    step = block_step(chain, found.law, remarks=(*found.lines(), *_scope(found, chain)))
+    step = block_step(chain, found.law, remarks=(*found.statement(), *_scope(found, chain)))
     exported = write_step(step, folder, fmu=fmu, force=force)
     files = {"files": [str(folder / name) for name in (FILES if fmu else FILES[:2])], "premises": []}
     answer = exported.to_dict() | files

@@ -262,7 +262,7 @@ def blocks(
     for path in files.values() if out is not None and out.exists() else ():
         new_file(path, "certificate file", force=force)
     answer = one_block(loaded, range(least, most + 1), wells=wells, coupling=coupling, step=step)
-    for count, found in answer.found.items():
+    for count, found in answer.proofs.items():
         if files and found.proved:
             with made_folder(files[count].parent):
                 save_guarantee(found, files[count])

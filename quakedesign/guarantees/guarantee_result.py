@@ -4,7 +4,7 @@ One class for loops on a moving reference, and one for rate-and-state faults in 
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import exp
@@ -19,10 +19,10 @@ from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS
 from quakedesign.guarantees.exact.limit_theorems import SlidingPush, SmallestPeak, longest_diffusion, smallest_peak
 from quakedesign.guarantees.exact.loop import Around, Held
-from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.statement import SlidingProof, TrackingProof, guarantee
 from quakedesign.guarantees.loop_result import Guarantee
-from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding, worst_found, worst_sliding
+from quakedesign.guarantees.search.adversary import WorstCase, worst_found, worst_sliding
 from quakedesign.guarantees.search.compensated_search import Compensation
 from quakedesign.guarantees.search.linear_design import AMPLITUDE, BOX, SATURATION
 from quakedesign.guarantees.search.lqg import measured_by, sliding_model
@@ -74,7 +74,7 @@ class TrackingGuarantee(Guarantee):
     ----------
     fault : Fault
     proof : TrackingProof or NoProof
-    worst, stick_search : WorstFound or None
+    worst, stick_search : WorstCase or None
         Of a search on the same loop, and on the stick–slip plant; None without a guarantee.
     shorter : TrackingProof or None
         For a design without a guarantee at its step: one near the longest step that has one.
@@ -97,8 +97,8 @@ class TrackingGuarantee(Guarantee):
 
     fault: Fault
     proof: TrackingProof | NoProof
-    worst: WorstFound | None = None
-    stick_search: WorstFound | None = None
+    worst: WorstCase | None = None
+    stick_search: WorstCase | None = None
     shorter: TrackingProof | None = None
     asked_step: Fraction | None = None
     nearest: tuple[str, TrackingProof] | None = None
@@ -109,7 +109,7 @@ class TrackingGuarantee(Guarantee):
     given: bool = False
 
     @cached_property
-    def worst_with_stick(self) -> WorstFound | None:
+    def worst_with_stick(self) -> WorstCase | None:
         """Worst case found on the stick–slip plant (lower bound); of a given law searched for here, some seconds.
 
         None for a law that uses the slip, the slip rate or the reference itself, or that is unstable by itself.
@@ -148,7 +148,7 @@ class TrackingGuarantee(Guarantee):
                 ends = [quantity(end, "Pa", 4) for end in seen.pressures or ()]
                 lines.append(
                     f"worst case found{name}: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
-                    f"{quantity(seen.slip_rate_error, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
+                    f"{quantity(seen.slip_rate, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
                 )
         lines += [*filter(None, [self.stick_slip_gap]), *self._told(), *self.task_lines()]
         if self.leaves_with_stick:
@@ -259,7 +259,7 @@ class TrackingGuarantee(Guarantee):
         (least, largest), ends = claims.pressures[-1], seen.pressures
         if ends is not None and not least <= ends[0] <= ends[1] <= largest:
             return True
-        return seen.slip_error > claims.slip_error or seen.slip_rate_error > claims.slip_rate_error
+        return seen.slip_error > claims.slip_error or seen.slip_rate > claims.slip_rate_error
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
@@ -277,15 +277,15 @@ class TrackingGuarantee(Guarantee):
                 **({} if self.notes is None else {"notes": list(self.notes)}),
                 **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             }
-        bounds, held = self.proof.bounds(), self.proof.held
+        bounds, held = self.proof.recomputed(), self.proof.held
         small = None if not bounds.proved else float_above(bounds.small_gain)
         return {
             "verdict": "proved",
             "sentence": self.proof.sentence(),
             **self.proof.claims.to_dict(),
             "small_gain": small,
-            "worst_found": self.worst and asdict(self.worst),
-            "worst_found_with_stick": self.worst_with_stick and asdict(self.worst_with_stick),
+            "worst_found": _seen(self.worst),
+            "worst_found_with_stick": _seen(self.worst_with_stick),
             "grows_at_rest": self.grows_at_rest,
             "rest_limit": _rest_limit(self.proof.rest_limit),
             "limit": _limit(self.limit),
@@ -384,10 +384,15 @@ def _with_room(seen: TrackingGuarantee, found: TrackingProof) -> TrackingGuarant
     if not anyhow.proved or worst is None:
         return seen
     left = ["slip_error"] if worst.slip_error > found.claims.slip_error else []
-    left += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate_error > found.claims.slip_rate_error else []
+    left += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate > found.claims.slip_rate_error else []
     claims = replace(found.claims, **{name: getattr(anyhow.claims, name) for name in left})
     wider = replace(seen, proof=replace(found, claims=claims))
     return seen if wider.leaves_with_stick or wider.proof.check() is not Verdict.PROVED else wider
+
+
+def _seen(worst: WorstCase | None) -> dict[str, float | None] | None:
+    names = ("slip_error", "slip_rate_error", "least_pressure", "largest_pressure")
+    return None if worst is None else {name: getattr(worst, name) for name in names}
 
 
 def _limit(limit: SmallestPeak | None) -> dict[str, str | None] | None:
@@ -438,7 +443,7 @@ class SlidingGuarantee(Guarantee):
     compensation: None = None
 
     @cached_property
-    def worst(self) -> WorstSliding | None:
+    def worst(self) -> WorstCase | None:
         """Worst case found (lower bound); some tenths of a second for every corner of the box."""
         return worst_sliding(self.proof) if self.proof.proved else None
 
@@ -446,30 +451,13 @@ class SlidingGuarantee(Guarantee):
         """For people."""
         if self.worst is None:
             return [self.proof.sentence()]
-        seen = f"slip error {quantity(self.worst.slip_error, 'm')}, slip rate {exp(self.worst.log_rate):.4g} V"
+        seen = f"slip error {quantity(self.worst.slip_error, 'm')}, slip rate {exp(self.worst.log_rate or 0):.4g} V"
         return [f"proved: {self.proof.sentence()}", f"worst case found without inertia: {seen}"]
-
-    def limit_lines(self) -> list[str]:
-        """Performance limits at the same T_s; none is known."""
-        return []
-
-    def task_lines(self) -> list[str]:
-        """What is said of the task, whatever law it is for; nothing."""
-        return []
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        if not self.proof.proved:
-            return {"verdict": "undecided", "sentence": self.proof.sentence(), "reason": self.proof.reason}
-        held = self.proof.held
-        return {
-            "verdict": "proved",
-            "sentence": self.proof.sentence(),
-            **self.proof.to_dict(),
-            **{name: str(getattr(held, name)) for name in ("step", "diffusion", "lag", "delay", "slip_noise")},
-            "measured": "slip",
-            "worst_found": self.worst and asdict(self.worst),
-        }
+        seen = self.worst and {"log_rate": self.worst.log_rate, "slip_error": self.worst.slip_error}
+        return super().to_dict() | ({"worst_found": seen} if self.proved else {})
 
 
 def answer_sliding(
@@ -550,7 +538,7 @@ def answer_sliding(
         remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, **around, **pumped))
         if remedy and answer.held is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
-            answer = replace(answer, proof=NoProof(reason=none, small_gain=None))
+            answer = replace(answer, proof=NoProof(reason=none))
     if not answer.proof.proved and not remedy:
         remedy = _with_less_noise(task, held_over, around, prove)
     if not answer.proof.proved:
@@ -644,4 +632,4 @@ def _held_by(pump: Pump | None, found: SlidingProof | NoProof) -> SlidingProof |
     if pump is None or not found.proved:
         return found
     too_much = pump.exceeded(*found.valve_pressures)
-    return NoProof(reason=too_much, small_gain=None) if too_much else found
+    return NoProof(reason=too_much) if too_much else found

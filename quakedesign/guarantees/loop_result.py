@@ -1,22 +1,47 @@
-"""Interface of all results of `quakedesign.guarantee` about a fault."""
+"""Interface of all results of `quakedesign.guarantee`, and that about an uncertain plant."""
 
-from dataclasses import asdict, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from quakedesign.errors import CertificateError
-from quakedesign.exact import Bound
+from quakedesign.exact import Bound, LowerBound
 from quakedesign.guarantees.exact.guarantee_files import save_guarantee
+from quakedesign.guarantees.exact.plant_guarantee import PlantProof
+from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.search.adversary import WorstCase
+from quakedesign.guarantees.search.compensated_search import Compensation
 from quakedesign.lyapunov.exact.claim import Verdict
 
 
 class Guarantee:
-    """Base of results with a guarantee, or the reason why there is none, in `found`; the worst case in `worst`."""
+    """What is guaranteed of a loop, or the reason why nothing is; base of the results for each plant.
+
+    Attributes
+    ----------
+    proof : Proof or NoProof
+    worst : WorstCase or None
+        Largest values that a search reaches on the same loop; None without a proof, and where none is searched.
+    worst_with_stick : WorstCase or None
+        The same on the stick–slip plant, for a proof on the plant without stick.
+    compensation : Compensation or None
+        Of a sliding mode: its gains, scale and settings in the scheme that is guaranteed.
+    not_at_rest, stick_slip_gap : str
+        Why there is no proof on the stick–slip plant, and what is not searched there.
+    least_slip_rate : LowerBound or None
+        Slip rate, or its error [m/s], that the fault reaches at this T_s under every controller.
+    """
 
     __slots__ = ()
     proof: Any
-    worst: Any
-    compensation: Any
+    compensation: Compensation | None
+    not_at_rest: str = ""
+
+    @property
+    def worst(self) -> WorstCase | None:
+        """Worst case found on the same loop (lower bound)."""
+        return None
 
     @property
     def proved(self) -> bool:
@@ -34,51 +59,72 @@ class Guarantee:
         return "" if self.proved else self.proof.reason
 
     @property
-    def bounds(self) -> dict[str, Bound]:
-        """Proved bounds by name, in SI units; empty without a guarantee.
+    def bounds(self) -> Mapping[str, Bound]:
+        """Proved bounds by name; empty without a guarantee.
 
         Every fault has ``slip_error`` [m], ``peak_slip_rate`` [m/s], ``least_pressure`` and ``largest_pressure`` [Pa]
-        in the fault; tracking also ``slip_rate_error`` [m/s].
+        in the fault; tracking also ``slip_rate_error`` [m/s]. An uncertain plant has its outputs and controls, in its
+        own units.
         """
-        if not self.proved:
-            return {}
-        found, claims = self.proof, self.proof.claims
-        least, largest = found.pressures if hasattr(found, "pressures") else claims.pressures[0]
-        named = {part.name: getattr(claims, part.name) for part in fields(claims)}
-        named |= {"slip_error": claims.slip_error, "peak_slip_rate": found.peak_slip_rate}
-        named |= {"slip_rate_error": getattr(found, "slip_rate_error", None)}
-        named |= {"least_pressure": least, "largest_pressure": largest}
-        return {name: bound for name, bound in named.items() if bound is not None}
+        named: Mapping[str, Bound] = self.proof.bounds
+        return named
 
     @property
     def worst_case(self) -> dict[str, float]:
         """Largest values that the search reaches by name, in SI units: lower bounds of the worst case; else empty."""
-        worst = self.worst
-        if worst is None:
-            return {}
-        return {name: size for name, size in asdict(worst).items() if size is not None} | {
-            "slip_error": worst.slip_error
-        }
+        return {} if self.worst is None else {k: size for k, size in asdict(self.worst).items() if size is not None}
+
+    @property
+    def worst_with_stick(self) -> WorstCase | None:
+        """Worst case found on the stick–slip plant (lower bound)."""
+        return None
+
+    @property
+    def stick_slip_gap(self) -> str:
+        """What is neither proved nor searched on the stick–slip plant."""
+        return ""
+
+    @property
+    def least_slip_rate(self) -> LowerBound | None:
+        """Performance limit [m/s] at the same T_s; None if unknown."""
+        return None
 
     def sentence(self) -> str:
         """What is guaranteed and for what, or why nothing is."""
         return str(self.proof.sentence())
 
+    def lines(self) -> list[str]:
+        """For people: the guarantee first, then the worst case found."""
+        return [f"proved: {self.sentence()}" if self.proved else self.sentence()]
+
+    def limit_lines(self) -> list[str]:
+        """Performance limits at the same T_s, as text; empty if unknown."""
+        return []
+
+    def task_lines(self) -> list[str]:
+        """What is said of the task, whatever law it is for."""
+        return []
+
     def check(self) -> Verdict:
         """Decide the guarantee again in exact arithmetic; UNDECIDED without one."""
         return Verdict(self.proof.check())
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, SI; exact numbers as texts."""
+        found = {"verdict": str(self.verdict), "sentence": self.sentence()}
+        return found | (self.proof.to_dict() if self.proved else {"reason": self.reason})
+
     @property
     def controller(self) -> Any:
-        """The law for `simulate`, `export_controller` and `loop_transfer`.
+        """The law for `simulate`, `export_controller` and `loop_transfer`; of an uncertain plant its state space.
 
         Raises
         ------
         CertificateError
             Without a guarantee.
         """
-        found, sliding = self._proof(), self.compensation
-        return found.controller if sliding is None else sliding.limited
+        proof, sliding = self._proof(), self.compensation
+        return proof.controller if sliding is None else sliding.limited
 
     def save(self, path: str | Path) -> None:
         """Write the certificate for `load_guarantee`, ``quakedesign check`` and ``proofs/check.py``.
@@ -98,3 +144,25 @@ class Guarantee:
                 f"a result must be proved to have a law and a certificate. Received {self.sentence()}."
             )
         return self.proof
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantGuarantee(Guarantee):
+    """Guarantee of an uncertain plant, or of several blocks.
+
+    Attributes
+    ----------
+    proof : PlantProof or NoProof
+    """
+
+    proof: PlantProof | NoProof
+    compensation: None = None
+
+    def lines(self) -> list[str]:
+        """The guarantee, then what was changed in the law."""
+        return self.proof.statement() if self.proof.proved else super().lines()
+
+    @property
+    def controller(self) -> Any:
+        """The law in exact numbers, `MatrixLaw`."""
+        return self._proof().law

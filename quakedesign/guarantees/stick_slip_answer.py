@@ -9,19 +9,19 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees.exact.limit_theorems import smallest_stick_slip_rate
-from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
 from quakedesign.guarantees.loop_result import Guarantee
+from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.guarantees.search.compensated_search import Compensation, design_sticking
-from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip, design_stick_slip, worst_stick_slip
+from quakedesign.guarantees.search.stick_slip_design import design_stick_slip, worst_stick_slip
 from quakedesign.laws import SlidingMode
-from quakedesign.laws.stick_slip_law import GAIN_UNITS
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.text import quantity
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class StickSlipGuarantee(Guarantee):
     """Guarantee of one loop on the stick–slip plant, or why there is none.
 
@@ -29,7 +29,7 @@ class StickSlipGuarantee(Guarantee):
     ----------
     fault : Fault
     proof : StickSlipProof or NoProof
-    worst : WorstStickSlip or None
+    worst : WorstCase or None
         Largest values that a search reaches on the same loop: lower bounds of the worst case; None without a guarantee.
     compensation : Compensation or None
         Of a sliding mode: its gains, scale and settings in the scheme ``stick-slip``.
@@ -37,7 +37,7 @@ class StickSlipGuarantee(Guarantee):
 
     fault: Fault
     proof: StickSlipProof | NoProof
-    worst: WorstStickSlip | None = None
+    worst: WorstCase | None = None
     compensation: Compensation | None = None
 
     @property
@@ -69,39 +69,26 @@ class StickSlipGuarantee(Guarantee):
             "slip",
         ]
         if self.worst is not None:
+            ends = [quantity(end or 0.0, "m") for end in (self.worst.slip_behind, self.worst.slip_ahead)]
             parts.append(
-                f"worst case found: slip rate {quantity(self.worst.peak_slip_rate, 'm/s')}, slip "
-                f"{quantity(self.worst.slip_behind, 'm')} behind and {quantity(self.worst.slip_ahead, 'm')} ahead of "
-                "the reference"
+                f"worst case found: slip rate {quantity(self.worst.slip_rate, 'm/s')}, slip {ends[0]} behind and "
+                f"{ends[1]} ahead of the reference"
             )
         parts += self.limit_lines()
         return parts if self.compensation is None else [*parts, self.compensation.sentence()]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        if not self.proof.proved:
-            return {"verdict": "undecided", "sentence": self.proof.sentence(), "reason": self.proof.reason}
-        worst, law = self.worst, self.proof.held.law
+        if not self.proved:
+            return super().to_dict()
+        worst, least = self.worst, self.least_slip_rate
+        seen = worst and {"slip_rate": worst.peak_slip_rate} | {
+            name: getattr(worst, name) for name in ("slip_error", "slip_behind", "slip_ahead")
+        }
         return {
-            "verdict": "proved",
-            "sentence": self.proof.sentence(),
-            "plant": self.proof.plant,
-            "slip_error": self.proof.claims.slip_error.exact,
-            **self.proof.claims.to_dict(),
-            "covered_healing": float(self.proof.covered_healing()),
-            "healing": str(self.proof.healing),
-            "worst_found": worst
-            and {
-                "slip_error": worst.slip_error,
-                "slip_rate": worst.peak_slip_rate,
-                "slip_behind": worst.slip_behind,
-                "slip_ahead": worst.slip_ahead,
-            },
-            "limit": None if (least := self.least_slip_rate) is None else {"slip_rate": least.exact},
-            "step": str(self.proof.held.step),
-            **({"longest_step": str(self.proof.held.longest_step)} if self.proof.held.longest_step else {}),
-            **{name: str(size) for name, size in self.proof.held.noise.items()},
-            "law": {name: str(getattr(law, name)) for name in GAIN_UNITS},
+            **super().to_dict(),
+            "worst_found": seen,
+            "limit": None if least is None else {"slip_rate": least.exact},
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
         }
 

@@ -1,3 +1,4 @@
+from .of_fault import plant_like as plant_like
 from .of_fault import slow_sliding_plant as slow_sliding_plant
 from .of_fault import static_friction as static_friction
 from .of_fault import uncertain_plant as uncertain_plant

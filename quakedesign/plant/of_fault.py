@@ -1,5 +1,6 @@
 """Uncertain plants of a fault: on a moving reference, and in slow sliding for rate-and-state friction."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import sympy as sp
@@ -80,6 +81,20 @@ def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fracti
         state_law=state_law,
         regularised=regularised,
     )
+
+
+def plant_like(plant: FaultPlant | SlidingPlant, fault: Fault, *, wide: bool = False) -> FaultPlant | SlidingPlant:
+    """Plant of a fault of the same kind as a given one: of its class of disturbances, or under its stress.
+
+    In slow sliding constants of friction are those of the fault, with the given plant's ramp of the planned pressure,
+    which belongs to its law. With `wide` they are as uncertain as the given plant's, with the fault's own ramp.
+    """
+    if isinstance(plant, FaultPlant):
+        return uncertain_plant(fault, rate_limited=plant.change is not None)
+    low, high = plant.ranges["direct_effect"]
+    if wide:
+        return slow_sliding_plant(fault, plant.stress, (high - low) / (high + low))
+    return replace(slow_sliding_plant(fault, plant.stress), ramp=plant.ramp)
 
 
 def _near(expression: sp.Expr) -> Fraction:

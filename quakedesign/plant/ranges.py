@@ -11,6 +11,7 @@ ranges. r stands still outside [0, t_op].
 """
 
 from collections.abc import Iterable
+from dataclasses import fields
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise, product
@@ -18,8 +19,9 @@ from math import comb
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
-from quakedesign.exact import apart, shortly
+from quakedesign.exact import apart, shortly, six_digits
 from quakedesign.laws import NominalModel
+from quakedesign.text import duration, quantity
 
 Range = tuple[Fraction, Fraction]
 _HALVINGS = 7
@@ -246,6 +248,19 @@ class FaultPlant:
         """Bound of b·|dp*/dt| [m/s³], β being at least 1."""
         return max(map(abs, self.slip_chord)) * self.reference_rates[0]
 
+    @property
+    def course(self) -> str:
+        """How far the reference moves and in which time, for people."""
+        return f", which moves {quantity(float(self.target_slip), 'm')} in {duration(float(self.operation_time))}"
+
+    def differences(self, other: "FaultPlant") -> list[str]:
+        """Differences of another plant that a proof for this one does not cover, with both values, SI; empty if none.
+
+        Constants of the fault and its reference must be the same; friction, ranges and disturbance must lie within
+        those of this plant. The name is not compared.
+        """
+        return [*_other(self, other), *_wider_than_needed(self, other), *_rougher(self.friction, other.friction)]
+
 
 def _hull(values: Iterable[Fraction]) -> Range:
     listed = list(values)
@@ -277,3 +292,58 @@ def _range_of(shape: tuple[Fraction, ...]) -> Range:
     for _ in range(_HALVINGS):
         rows = [half for row in rows for half in _halves(row)]
     return _hull(v for row in rows for v in row)
+
+
+# ----------------------------------------------------------------------
+# Differences of a plant that a proof for another does not cover.
+
+_SAME = {
+    "density": "kg/m^3",
+    "shear_modulus": "Pa",
+    "length": "m",
+    "damping": "kg/s",
+    "normal_stress": "Pa",
+    "target_slip": "m",
+    "operation_time": "s",
+}
+_SPREADS = ("stiffness", "damping", "authority")
+
+
+def _other(proved: FaultPlant, asked: FaultPlant) -> list[str]:
+    """Constants that are not the same."""
+    pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(asked, name)) for name, unit in _SAME.items()}
+    pairs["static friction [-]"] = proved.friction.static, asked.friction.static
+    for name, unit, *both in zip(("slip", "rate"), ("1/s^2", "1/s"), proved.growths, asked.growths, strict=True):
+        pairs[f"disturbance per {name} [{unit}]"] = both[0], both[1]
+    found = [
+        f"{name} {six_digits(one)} there, {six_digits(other)} here"
+        for name, (one, other) in pairs.items()
+        if one != other
+    ]
+    return found + ([] if proved.shape == asked.shape else ["the shape of the reference"])
+
+
+def _wider_than_needed(proved: FaultPlant, asked: FaultPlant) -> list[str]:
+    """Ranges and disturbances beyond those of the proof."""
+    pairs = {f"spread of {name} [-]": both for name, *both in zip(_SPREADS, proved.spreads, asked.spreads, strict=True)}
+    pairs["disturbance [m/s^2]"] = [proved.amplitude, asked.amplitude]
+    if proved.change is not None and asked.change is not None:
+        pairs["change of the disturbance [m/s^3]"] = [proved.change, asked.change]
+    found = [
+        f"{name} up to {six_digits(one)} there, {six_digits(other)} here"
+        for name, (one, other) in pairs.items()
+        if other > one
+    ]
+    jumps = proved.change is not None and asked.change is None
+    return found + (["a disturbance of the class rate there, one that may jump here"] if jumps else [])
+
+
+def _rougher(proved: Friction, asked: Friction) -> list[str]:
+    """Bounds of friction that reach beyond those of the proof."""
+    beyond = {part.name: getattr(asked, part.name) > getattr(proved, part.name) for part in fields(Friction)}
+    beyond |= {"static": False, "least": asked.least < proved.least}
+    names = [name for name, wider in beyond.items() if wider]
+    return [
+        f"friction: {name} {six_digits(getattr(proved, name))} there, {six_digits(getattr(asked, name))} here"
+        for name in names
+    ]

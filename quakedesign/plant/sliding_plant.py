@@ -98,6 +98,11 @@ class SlidingPlant:
         if not holds:
             raise ParameterError(f"{name} of {self.name} must be {condition}. Received {value}. Correct the value.")
 
+    @property
+    def course(self) -> str:
+        """For people; nothing, as the reference slides throughout."""
+        return ""
+
     def differences(self, asked: "SlidingPlant") -> list[str]:
         """Differences to another task that a proof for this one does not cover, with both values, SI.
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quakedesign.fault import Fault
-from quakedesign.guarantees import SlidingProof, TrackingProof
 from quakedesign.report.drawing import (
     INDUCED,
     NATURAL,
@@ -31,7 +30,6 @@ from quakedesign.report.drawing import (
     style,
     with_diverged,
 )
-from quakedesign.report.summary import worst_slip_rate
 from quakedesign.simulation.slow_sliding import SlidingRun
 from quakedesign.studies.facts import Plane, StabilityRegions, stability_regions
 from quakedesign.studies.runs import StateRun
@@ -363,9 +361,9 @@ def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":
     peak = entry.guaranteed.peak_slip_rate
     yield float(peak), f"proved: at most {peak.quantity('m/s')}", (0, (10, 3)), PROVED
     if entry.answer.worst is not None:
-        worst = worst_slip_rate(entry.answer.worst, entry.guaranteed)
+        worst = entry.answer.worst.slip_rate
         yield worst, f"worst case found: {quantity(worst, 'm/s')}", "dotted", INDUCED
-    least = getattr(entry.answer, "least_slip_rate", None)
+    least = entry.answer.least_slip_rate
     if least is not None:
         yield float(least), f"limit of every controller: {least.quantity('m/s')}", "dashdot", "#777777"
 
@@ -426,8 +424,8 @@ def _proved_bounds(slip: Any, rate: Any, entries: "Sequence[Entry]") -> None:
     bounds: dict[tuple[float, float], tuple[str, str]] = {}
     for entry in entries:
         found = entry.guaranteed
-        if found is not None and not isinstance(found, SlidingProof):
-            label = "proved for the plant without stick" if isinstance(found, TrackingProof) else "proved"
+        if found is not None and found.slip_rate_error is not None:
+            label = f"proved {found.scope}".rstrip()
             ends = float(found.claims.slip_error), float(found.slip_rate_error)
             bounds.setdefault(ends, (colour(entry.design.name), label))
     named = set[str]()

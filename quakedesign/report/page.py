@@ -20,7 +20,6 @@ from markupsafe import Markup, escape
 
 from quakedesign.fault import Fault, fault_toml
 from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, WIDTHS
-from quakedesign.guarantees import SlidingProof
 from quakedesign.laws import LinearLaw
 from quakedesign.laws.stick_slip_controller import StickSlipController
 from quakedesign.laws.stick_slip_law import StickSlipLaw
@@ -183,7 +182,7 @@ def _account(entry: "Entry") -> Account:
 def _slowly(entry: "Entry") -> list[str]:
     """How a guarantee of slow sliding is found; nothing for others."""
     found = entry.guaranteed
-    if not isinstance(found, SlidingProof):
+    if found is None or not found.cells:
         return []
     cells = "one cell" if len(found.cells) == 1 else f"{len(found.cells)} cells"
     return [

@@ -27,7 +27,7 @@ from quakedesign.synthesis import Design
 from quakedesign.text import lasting, quantity
 
 if TYPE_CHECKING:
-    from quakedesign.guarantees import SlidingProof, StickSlipProof
+    from quakedesign.guarantees import FaultProof
     from quakedesign.simulation.recorder import Metrics
     from quakedesign.studies.runs import StateRun
 
@@ -51,7 +51,7 @@ def grade(entry: "Entry") -> str:
     return f"{reach}; UNSTABLE with zero-order hold over T_s" if _unstable_if_held(entry) else reach
 
 
-def _guaranteed(found: "TrackingProof | SlidingProof | StickSlipProof") -> str:
+def _guaranteed(found: "FaultProof") -> str:
     return f"guaranteed: slip rate <= {found.peak_slip_rate:.3g} m/s, slip error <= {found.claims.slip_error:.3g} m"
 
 
@@ -327,10 +327,10 @@ def part_of_task(run: Trajectory, fault: Fault) -> str:
 def _verdict(design: Design, run: Trajectory | None) -> list[str]:
     """Of the sampled loop or in continuous time, with the reason where it is not positive."""
     if design.verdict is Verdict.PROVED:
-        lasts = "for all t >= 0" if design.runs is None or not design.runs.proved else design.runs.lasts
-        plant, proved = "for the loop that ran", getattr(design.runs, "plant", TrackingProof.plant)
-        slides = bool(design.fault.friction.state_names)  # forward throughout, on either plant
-        if run is not None and run.provenance["plant"] != proved and not slides:
+        ran: FaultProof | None = design.runs if design.runs is not None and design.runs.proved else None
+        lasts, proved = (ran.lasts, ran.plant) if ran else ("for all t >= 0", TrackingProof.plant)
+        plant = "for the loop that ran"
+        if run is not None and proved and run.provenance["plant"] != proved:
             other = "stick-slip plant" if proved == STICK_SLIP else "plant without stick"
             plant = f"for this sampled loop on the {other}"
         return [f"proved {plant}, {lasts}" if _sampled(design) else "proved in continuous time"]

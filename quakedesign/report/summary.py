@@ -3,22 +3,20 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import exp, isnan
+from math import isnan
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from quakedesign.exact import Bound, LowerBound, UpperBound
+from quakedesign.exact import Bound, UpperBound
 from quakedesign.fault.fault_toml import beyond_rates, mean_rate
-from quakedesign.guarantees import SlidingProof, StickSlipProof, TrackingProof
-from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
-from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
 from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines, steady_start_sentence
 from quakedesign.studies.comparison import pressure_extremes
 from quakedesign.studies.facts import box_sentence
 from quakedesign.studies.runs import StateRun
-from quakedesign.text import PREFIXES, duration, plain, power_of, quantity
+from quakedesign.text import PREFIXES, plain, power_of, quantity
 
 if TYPE_CHECKING:
+    from quakedesign.guarantees import FaultProof, Guarantee
     from quakedesign.studies.comparison import Compared, Entry, Run
 
 WIDTH = 80
@@ -76,7 +74,7 @@ def _answer(comparison: "Compared", best: "Entry | None") -> str:
 
 def guaranteed_sentence(
     first: str,
-    found: TrackingProof | SlidingProof | StickSlipProof,
+    found: "FaultProof",
     earthquake: float | None,
     magnitude: float,
     law: str = "",
@@ -90,25 +88,12 @@ def guaranteed_sentence(
         ratio = UpperBound(100 * Fraction(rate) / Fraction(earthquake))
         size = "" if isnan(magnitude) else f", magnitude {magnitude:.1f}"
         share = f" ({ratio:.2g} % of the natural earthquake's {quantity(earthquake, 'm/s')}{size})"
-    plant = "on the plant without stick" if isinstance(found, TrackingProof) else ""
-    under = ", ".join(filter(None, (plant, law)))
-    under = f"{under[:1].upper()}{under[1:]}{',' if plant else ''} the" if under else "The"
-    sticks = ", whether the fault slides or sticks" if isinstance(found, StickSlipProof) else ""
-    slow, task = "", ""
-    if isinstance(found, SlidingProof):
-        stress = LowerBound(found.task.stress).quantity("Pa")
-        slow = f" {found.lasts}, under every shear stress disturbance of at most {stress}"
-    else:
-        moved, time = quantity(float(found.task.target_slip), "m"), duration(float(found.task.operation_time))
-        task = f", which moves {moved} in {time}"
+    under = ", ".join(filter(None, (found.scope, law)))
+    under = f"{under[:1].upper()}{under[1:]}{',' if found.scope else ''} the" if under else "The"
     return (
-        f"{first}. {under} slip rate never exceeds {rate.quantity('m/s')}{share}{sticks}{slow}, and the slip stays "
-        f"within {found.claims.slip_error.quantity('m')} of the reference{task}"
+        f"{first}. {under} slip rate never exceeds {rate.quantity('m/s')}{share}{found.motion}, and the slip stays "
+        f"within {found.claims.slip_error.quantity('m')} of the reference{found.task.course}"
     )
-
-
-def _without_stick(entry: "Entry") -> bool:
-    return isinstance(entry.guaranteed, TrackingProof)
 
 
 def _conditions(designed: Sequence["Entry"], best: "Entry | None") -> str:
@@ -133,18 +118,17 @@ def _uncontrolled(run: "Run") -> Row:
 def _row(entry: "Entry") -> Row:
     found, run = entry.guaranteed, entry.run
     worst = entry.answer.worst if entry.answer else None
-    rate = None if worst is None else worst_slip_rate(worst, found)
     seen = pressure_extremes(run) if run else None
-    pressure: tuple[Bound | float, Bound | float] | None = seen
-    if isinstance(found, SlidingProof):
-        pressure = found.valve_pressures
-    elif isinstance(found, TrackingProof | StickSlipProof):
-        pressure = found.claims.pressures[-1]
+    pressure: tuple[Bound | float, Bound | float] | None = found.valve_pressures if found else seen
     label = entry.label.removesuffix(" (designed)").removesuffix(" (given)").replace(" (published)", " published")
     return Row(
         name=label,
         outcome=run.outcome.kind if run else "not run",
-        slip_rate=(found.peak_slip_rate if found else None, rate, run.outcome.peak_slip_rate if run else None),
+        slip_rate=(
+            found.peak_slip_rate if found else None,
+            worst.slip_rate if worst else None,
+            run.outcome.peak_slip_rate if run else None,
+        ),
         slip=(
             found.claims.slip_error if found else None,
             None if worst is None else worst.slip_error,
@@ -152,16 +136,6 @@ def _row(entry: "Entry") -> Row:
         ),
         pressure=pressure,
     )
-
-
-def worst_slip_rate(
-    worst: WorstFound | WorstSliding | WorstStickSlip, found: TrackingProof | SlidingProof | StickSlipProof | None
-) -> float:
-    """Slip rate [m/s] of the worst case found; its error if only that is computed."""
-    if isinstance(worst, WorstSliding):
-        assert isinstance(found, SlidingProof)
-        return float(found.task.rate) * exp(worst.log_rate)
-    return worst.peak_slip_rate if isinstance(worst, WorstStickSlip) else worst.slip_rate_error
 
 
 def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
@@ -184,10 +158,9 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
             yield f"{entry.label}: {entry.answer.lines()[0] if unproved and entry.answer else grade(entry)}"
         if assumed := entry.design.details.get("assumed"):
             yield f"{entry.label} assumes {assumed}"
-    if others := [
-        e.design.title for e in designed if _without_stick(e) and best is not None and not _without_stick(best)
-    ]:
-        yield f"{', '.join(others)}: proved on the plant without stick"
+    others = [(e.design.title, e.guaranteed.scope) for e in designed if e.guaranteed and e.guaranteed.scope]
+    if others and best is not None and best.guaranteed is not None and not best.guaranteed.scope:
+        yield f"{', '.join(title for title, _ in others)}: proved {others[0][1]}"
     yield from _alike(designed)
     published: dict[str, list[str]] = {}
     for entry in comparison.of("published"):
@@ -201,16 +174,16 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
         yield from best.answer.limit_lines()
 
 
-def _with_stick(answer: object) -> Iterator[str]:
+def _with_stick(answer: "Guarantee") -> Iterator[str]:
     """Worst case found on the stick–slip plant, why there is no proof on it, and what is not searched there."""
-    seen, why = getattr(answer, "worst_with_stick", None), getattr(answer, "not_at_rest", "")
+    seen, why = answer.worst_with_stick, answer.not_at_rest
     if seen is not None:
         yield (
             f"worst case found on the stick-slip plant: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
-            f"{quantity(seen.slip_rate_error, 'm/s')}{f'; no proof there: {why}' if why else ''}"
+            f"{quantity(seen.slip_rate, 'm/s')}{f'; no proof there: {why}' if why else ''}"
         )
-    if gap := getattr(answer, "stick_slip_gap", ""):
-        yield gap
+    if answer.stick_slip_gap:
+        yield answer.stick_slip_gap
 
 
 def _published(said: str) -> str:
@@ -226,9 +199,9 @@ def _published(said: str) -> str:
 
 def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
     """Why two sliding modes have the same bounds."""
-    sliding = [entry for entry in designed if entry.answer is not None and entry.answer.compensation is not None]
-    same = [entry for entry in sliding if entry.guaranteed and sliding[0].guaranteed]
-    if len(same) > 1 and all(e.guaranteed.claims == same[0].guaranteed.claims for e in same):  # type: ignore[union-attr]
+    sliding = [(e, e.guaranteed, e.answer.compensation) for e in designed if e.answer and e.answer.compensation]
+    same = [entry for entry, proof, law in sliding if proof and law.deadbeat]
+    if len(same) > 1 and len({str(proof.claims) for _, proof, law in sliding if proof and law.deadbeat}) == 1:
         names = " and ".join(entry.design.title for entry in same)
         yield (
             f"{names} act identically in this loop: within the proved errors both compute the same pressures; in "

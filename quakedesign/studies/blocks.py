@@ -21,16 +21,16 @@ class BlocksAnswer:
     fault: Fault
     wells: str  # ``"one"`` or ``"each"``
     step: Fraction  # T_s [s]
-    found: Mapping[int, PlantProof | NoProof]  # By the number of blocks
+    proofs: Mapping[int, PlantProof | NoProof]  # By the number of blocks
 
     @property
     def proved(self) -> bool:
         """Whether all numbers of blocks have a guarantee."""
-        return all(one.proved for one in self.found.values())
+        return all(one.proved for one in self.proofs.values())
 
     def peaks(self, blocks: int) -> tuple[Any, Any] | None:
         """Largest slip error [m] and slip-rate error [m/s] of all blocks, as they are proved."""
-        one = self.found[blocks]
+        one = self.proofs[blocks]
         if not one.proved:
             return None
         outputs = one.claims.outputs
@@ -45,7 +45,7 @@ class BlocksAnswer:
             f"from rest, with zero-order hold over {UpperBound(self.step):.6g} s, each block its own friction of the "
             "box, for all t >= 0:",
         ]
-        for blocks, one in self.found.items():
+        for blocks, one in self.proofs.items():
             ends = self.peaks(blocks)
             if not one.proved or ends is None:
                 parts.append(f"{blocks:3} blocks: {one.sentence()}")
@@ -60,7 +60,7 @@ class BlocksAnswer:
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI."""
         rows = []
-        for blocks, one in self.found.items():
+        for blocks, one in self.proofs.items():
             ends = self.peaks(blocks)
             known: dict[str, Any] = {"blocks": blocks, "verdict": "proved" if one.proved else "undecided"}
             known |= {"reason": None if one.proved else one.reason}
@@ -91,9 +91,9 @@ def one_block(
         T_s; the fault's unless given.
     """
     setup = LoopSetup(step=rational(fault.sampling_time) if step is None else step)
-    found: dict[int, Any] = {}
+    proofs: dict[int, PlantProof | NoProof] = {}
     for count in blocks:
         plant = UncertainPlant.from_blocks(fault, count, wells=wells, coupling=coupling)
-        found[count] = guarantee(plant, setup=setup)
+        proofs[count] = guarantee(plant, setup=setup).proof
     assert setup.step is not None
-    return BlocksAnswer(fault=fault, wells=wells, step=setup.step, found=found)
+    return BlocksAnswer(fault=fault, wells=wells, step=setup.step, proofs=proofs)

@@ -20,6 +20,7 @@ from quakedesign.guarantees.exact.plant_loop import MatrixLaw
 from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
+from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import UncertainPlant, uncertain_plant
 from quakedesign.plant.block_plant import inverse_of
@@ -259,7 +260,7 @@ def table_row(law: str, rate: Fraction, slip: Fraction, worst: Sequence[float], 
 def chain_law(
     chain: BlockChain, controller: str = BLOCK_LAWS[0], certificate: str | Path | None = None, **sliding: Any
 ) -> Any:
-    """Guarantee of a law for several blocks: designed, or that of a certificate, which is checked anew.
+    """Proof about a law for several blocks: designed, or that of a certificate, which is checked anew.
 
     Parameters
     ----------
@@ -276,10 +277,11 @@ def chain_law(
         For a file that does not hold, or is about another plant.
     """
     if certificate is None:
-        return guarantee(chain, controller, **sliding)
-    claim = load_guarantee(certificate)
+        return guarantee(chain, controller, **sliding).proof
+    claim: Any = load_guarantee(certificate)
+    several = claim.kind == UNCERTAIN_PLANT
     if chain.ages:
-        if not isinstance(claim, PlantProof):
+        if not several:
             raise CertificateError(
                 f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of "
                 "guarantee."
@@ -287,7 +289,7 @@ def chain_law(
         found: Any = covered_stress(chain, claim)[-1]
     else:
         plant = UncertainPlant.from_blocks(chain)
-        if not isinstance(claim, PlantProof) or claim.part != linear_part(plant, {}):
+        if not several or claim.part != linear_part(plant, {}):
             raise CertificateError(
                 f"a certificate must be about the fault. Received {certificate}, about another plant than "
                 f"{plant.name}. Give a file of guarantee {chain.name} --out FILE."
@@ -355,10 +357,10 @@ class SlidingChainRun:
 
     def row(self) -> list[str]:
         """As of `ChainRun`; slip rates themselves, and pressures beside the plan."""
-        if self.run is None or self.proof is None:
+        if self.run is None or self.proof is None or not self.proof.proved:
             return [self.controller, "none", *[""] * 5]
         rate = SlidingReference(task=self.chain.fault.reference).first_rate * exponential(self.log_rate)
-        slip = max(self.proof.claims.outputs[: len(self.chain.blocks)])  # type: ignore[union-attr]
+        slip = max(self.proof.claims.outputs[: len(self.chain.blocks)])
         worst = self.run.slip_rate.max(), self.errors["slip_error"].max()
         return table_row(self.controller, rate, slip, worst, self.run.pressure)
 
@@ -386,7 +388,8 @@ class SlidingChainRun:
     @property
     def within(self) -> bool:
         """Whether all errors of a run under a law are within what is proved of their blocks and wells."""
-        assert isinstance(self.proof, PlantProof)
+        assert self.proof is not None
+        assert self.proof.proved
         N, claims, errors = len(self.chain.blocks), self.proof.claims, self.errors
         lines = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
         proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]

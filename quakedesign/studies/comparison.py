@@ -16,21 +16,19 @@ from quakedesign.fault import Fault, require_fault
 from quakedesign.guarantees import (
     CLASSES,
     ContinuousProof,
+    FaultProof,
+    Guarantee,
     NoProof,
-    SlidingProof,
-    StickSlipGuarantee,
-    StickSlipProof,
-    TrackingGuarantee,
-    TrackingProof,
     attacked,
 )
-from quakedesign.guarantees.guarantee_result import SlidingGuarantee, given_answer
+from quakedesign.guarantees.guarantee_result import given_answer
 from quakedesign.guarantees.stick_slip_answer import attacked_stick_slip
 from quakedesign.laws import Controller, published
 from quakedesign.linear.riccati import vertex_poles
 from quakedesign.linear.sampled_stability import HeldLoop
 from quakedesign.loop import simulation_scheme
 from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
 from quakedesign.lyapunov.exact.fault_bounds import equilibrium_pressure, sectors
 from quakedesign.lyapunov.exact.premises import Variant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
@@ -77,7 +75,7 @@ class Entry:
         For a designed linear law that is proved: peaks in continuous time by class; no class without any.
     given : bool
         Whether the law is given, not designed.
-    answer : TrackingGuarantee, SlidingGuarantee, StickSlipGuarantee or None
+    answer : Guarantee or None
         For a designed or given law: guarantee with zero-order hold over T_s, see `Design.guarantee`, and worst case
         found.
     """
@@ -92,7 +90,7 @@ class Entry:
     held: HeldLoop | None = None
     peaks: Mapping[str, ContinuousProof] = field(default_factory=dict)
     given: bool = False
-    answer: TrackingGuarantee | SlidingGuarantee | StickSlipGuarantee | None = None
+    answer: Guarantee | None = None
 
     @property
     def kind(self) -> str:
@@ -100,12 +98,12 @@ class Entry:
         return "given" if self.given else self.origin
 
     @property
-    def guarantee(self) -> TrackingProof | SlidingProof | StickSlipProof | NoProof | None:
+    def guarantee(self) -> FaultProof | NoProof | None:
         """Guarantee of the loop with zero-order hold over T_s."""
         return self.answer.proof if self.answer else None
 
     @property
-    def guaranteed(self) -> TrackingProof | SlidingProof | StickSlipProof | None:
+    def guaranteed(self) -> FaultProof | None:
         """The guarantee, if there is one."""
         found = self.guarantee
         return found if found is not None and found.proved else None
@@ -220,13 +218,11 @@ def behind_path(fault: Fault) -> dict[str, str]:
     return {name: why for name in designable(fault) if name != "elqr"}
 
 
-def _answer(
-    fault: Fault, design: Design, *, given: bool
-) -> TrackingGuarantee | SlidingGuarantee | StickSlipGuarantee | None:
-    found = design.guarantee
-    if isinstance(found, SlidingProof):
+def _answer(fault: Fault, design: Design, *, given: bool) -> Guarantee | None:
+    found: Any = design.guarantee
+    if design.sliding is not None:
         return design.sliding
-    if isinstance(found, StickSlipProof):
+    if found.proved and found.kind == STICK_SLIP:
         return attacked_stick_slip(fault, found, design.compensation)
     if given:
         notes = getattr(design.controller, "notes", None)
@@ -299,7 +295,7 @@ def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
     wanted = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
     classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
     peaks = {kind: design.certified_peaks(kind) for kind in classes}
-    proved = {kind: found for kind, found in peaks.items() if isinstance(found, ContinuousProof)}
+    proved = {kind: found for kind, found in peaks.items() if found.proved}
     return replace(entry, growth_per_step=growth, held=held, peaks=proved)
 
 

@@ -19,10 +19,7 @@ from quakedesign.errors import CertificateError, ParameterError, SimulationError
 from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, Fault
 from quakedesign.fault.model import require_positive
-from quakedesign.guarantees import ContinuousProof, SlidingProof, TrackingProof, load_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantProof
-from quakedesign.guarantees.exact.statement import differences
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
+from quakedesign.guarantees import FaultProof, SlidingProof, load_guarantee
 from quakedesign.guarantees.search.compensated_search import recovered
 from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_model
 from quakedesign.laws import Controller, Sampling, control_law, published
@@ -44,9 +41,10 @@ from quakedesign.loop.sensing import (
 )
 from quakedesign.loop.sensing.measurement import EXACT, Measurement
 from quakedesign.lyapunov import Verdict
+from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
 from quakedesign.lyapunov.exact.fault_bounds import least_authority
 from quakedesign.lyapunov.exact.premises import Premise
-from quakedesign.plant import slow_sliding_plant, uncertain_plant
+from quakedesign.plant import plant_like, slow_sliding_plant
 from quakedesign.simulation import (
     Load,
     PressureCourse,
@@ -543,7 +541,7 @@ class Choice:
     # Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law
     lipschitz: Fraction | None = None
     # What is proved of the law, where it comes from a certificate file
-    claim: TrackingProof | SlidingProof | StickSlipProof | None = None
+    claim: FaultProof | None = None
 
     def noise(self, seed: int) -> Measurement:
         """Bounds of the measurement errors in the guarantee of the controller; none without one."""
@@ -569,13 +567,13 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
     UnsupportedError
         For a sliding mode whose gains cannot be read off its implicit step.
     """
-    claim = load_guarantee(path)
-    if isinstance(claim, PlantProof):
+    claim: Any = load_guarantee(path)
+    if claim.kind == UNCERTAIN_PLANT:
         raise CertificateError(
             f"the certificate of a law must be about a fault. Received {path}, about an uncertain plant. Give a "
             f"file of guarantee {fault.name} --out FILE."
         )
-    if isinstance(claim, ContinuousProof) or isinstance(claim, SlidingProof) != bool(fault.friction.state_names):
+    if not claim.sampled or claim.slides != bool(fault.friction.state_names):
         raise CertificateError(
             "the law of a certificate runs once per sample, and is about friction with a state where that of the fault "
             f"has one. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."
@@ -585,10 +583,8 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
             f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
             f"{'; '.join(apart)}. Give the fault that it is about, or prove a new one with guarantee."
         )
-    if isinstance(claim, StickSlipProof) and claim.held.law.pull:
-        controller: Controller = recovered(claim).controller
-    elif isinstance(claim, TrackingProof) and claim.held.law.root is not None:
-        controller = recovered(claim).limited
+    if claim.root is not None:
+        controller: Controller = recovered(claim).limited
     else:
         controller = claim.controller
         if type(controller) is SampledController:  # the file does not tell a designed e-LQR from a law of a user
@@ -598,17 +594,17 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
     return Choice(controller=controller, claim=claim)
 
 
-def _apart(fault: Fault, claim: TrackingProof | SlidingProof | StickSlipProof) -> list[str]:
+def _apart(fault: Fault, claim: Any) -> list[str]:
     """What of a fault a certificate does not cover; the planned pressure of slow sliding is that of the certificate."""
-    if isinstance(claim, SlidingProof):
-        return claim.task.differences(replace(slow_sliding_plant(fault, claim.task.stress), ramp=claim.task.ramp))
-    task = uncertain_plant(fault, rate_limited=claim.task.change is not None)
-    if isinstance(claim, StickSlipProof) and task.amplitude <= claim.task.amplitude:
-        covered = claim.covered_healing(task.amplitude)
-        if covered < rational(fault.friction.rest_excess):
-            return [f"healing beside this disturbance up to {covered:.3g} there, {fault.friction.rest_excess:.3g} here"]
-        task = replace(task, amplitude=claim.task.amplitude)  # healing and a larger disturbance count alike
-    return differences(claim.task, task)
+    task: Any = plant_like(claim.task, fault)
+    if claim.covers_healing:
+        task, uncovered = claim.beside_healing(task, rational(fault.friction.rest_excess))
+        if uncovered is not None:
+            return [
+                f"healing beside this disturbance up to {uncovered:.3g} there, {fault.friction.rest_excess:.3g} here"
+            ]
+    differences: list[str] = claim.task.differences(task)
+    return differences
 
 
 def optional_choice(fault: Fault, name: str, gains: tuple[str, ...], **more: Any) -> Choice | None:
@@ -708,14 +704,15 @@ def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Cont
     setup = IDEAL.with_given(**path)
     Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **setup.path))
     found: Any = guarantee(fault, name, setup)
-    if not isinstance(found.proof, TrackingProof):
+    if not found.proved:
         text = ", ".join(f"{part} {time:g} s" for part, time in path.items())
         sooner = f"--step '{float(found.shorter.held.step):g} s', where it has, " if found.shorter else ""
         raise ParameterError(
             f"designed gains must have a proof behind what is around them. Received {name} with {text}, "
             f"T_s = {fault.sampling_time:g} s: {found.proof.reason}. Give {sooner}gains as numbers, or see limits."
         )
-    return found.compensation.limited if found.compensation else found.proof.controller
+    law: Controller = found.controller
+    return law
 
 
 def run_single(

@@ -18,8 +18,8 @@ from quakedesign.guarantees import (
     OBJECTIVES,
     Compensation,
     ContinuousProof,
+    FaultProof,
     NoProof,
-    SlidingProof,
     StickSlipProof,
     TrackingProof,
 )
@@ -64,7 +64,7 @@ class Design:
         What synthesis decided: exact numbers as texts.
     setup : LoopSetup
         For which a sampled law is designed.
-    runs : TrackingProof, SlidingProof, StickSlipProof or NoProof, optional
+    runs : FaultProof or NoProof, optional
         What was proved of the loop that runs while it was designed; None to find it when `guarantee` is asked for.
     sliding : SlidingGuarantee, optional
         For friction with a state: the law as it runs, with its rock, and the task that it is designed for.
@@ -81,7 +81,7 @@ class Design:
     domain: Domain | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
     setup: LoopSetup = IDEAL
-    runs: TrackingProof | SlidingProof | StickSlipProof | NoProof | None = None
+    runs: FaultProof | NoProof | None = None
     sliding: SlidingGuarantee | None = None
     disturbance_class: str = CLASSES[0]
 
@@ -153,11 +153,11 @@ class Design:
         """
         law = self.controller
         if law is None:
-            return NoProof(reason=f"no gains of {self.title} are known", small_gain=None)
+            return NoProof(reason=f"no gains of {self.title} are known")
         return method_of(type(law)).certified_peaks(self.fault, law, disturbance_class)
 
     @property
-    def guarantee(self) -> TrackingProof | SlidingProof | StickSlipProof | NoProof:
+    def guarantee(self) -> FaultProof | NoProof:
         """Guarantee of the sampled law with zero-order hold, or the reason why there is none.
 
         A law of samples has its own T_s, a sliding mode of samples its own scheme; the integrals of
@@ -167,7 +167,7 @@ class Design:
         if self.runs is not None:
             return self.runs
         if law is None:
-            return NoProof(reason=f"no gains of {self.title} are known", small_gain=None)
+            return NoProof(reason=f"no gains of {self.title} are known")
         task = uncertain_plant(self.fault, rate_limited=self.disturbance_class == "rate")
         return method_of(type(law)).guarantee(self.fault, task, law, self.setup)
 
@@ -175,7 +175,7 @@ class Design:
     def compensation(self) -> Compensation | None:
         """A sampled sliding mode with its guarantee; None for another law."""
         law, found = self.controller, self.guarantee
-        if law is None or law.sampling is None or isinstance(found, SlidingProof):
+        if law is None or law.sampling is None or self.sliding is not None:
             return None
         return method_of(type(law)).compensation(law, found)
 

@@ -10,14 +10,22 @@ from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.exact import exact_text, rational
 from quakedesign.fault import BlockChain, Fault, with_accepted_fit
 from quakedesign.fault.units import exact_value
-from quakedesign.guarantees import CLASSES, OBJECTIVES, NoProof, StickSlipProof, TrackingGuarantee, TrackingProof
+from quakedesign.guarantees import (
+    CLASSES,
+    OBJECTIVES,
+    Guarantee,
+    NoProof,
+    PlantGuarantee,
+    StickSlipProof,
+    TrackingGuarantee,
+    TrackingProof,
+)
 from quakedesign.guarantees.exact.limit_theorems import hopeless, too_slow
-from quakedesign.guarantees.exact.plant_guarantee import PlantProof
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
-from quakedesign.guarantees.guarantee_result import SlidingGuarantee, answer_sliding
+from quakedesign.guarantees.guarantee_result import answer_sliding
 from quakedesign.guarantees.search.linear_design import nearest_setup
 from quakedesign.guarantees.search.sliding_block_design import sliding_block_guarantee
-from quakedesign.guarantees.stick_slip_answer import StickSlipGuarantee, answer_stick_slip
+from quakedesign.guarantees.stick_slip_answer import answer_stick_slip
 from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
@@ -96,7 +104,7 @@ def guarantee(
     progress: Callable[[str, float], None] | None = None,
     accept_poor_fit: bool = False,
     **given: Quantity | None,
-) -> TrackingGuarantee | SlidingGuarantee | StickSlipGuarantee | PlantProof | NoProof:
+) -> Guarantee:
     """Prove bounds of slip, slip rate and pressure of the sampled loop, as the command `guarantee` does.
 
     The controller is designed for the loop setup unless gains are given.
@@ -146,12 +154,10 @@ def guarantee(
 
     Returns
     -------
-    TrackingGuarantee, SlidingGuarantee or StickSlipGuarantee
-        All have ``verdict``, ``bounds`` and ``worst_case`` (by name, SI units), ``reason``, ``sentence()``,
-        ``check()``, ``controller`` for `simulate`, `loop_transfer` and `export_controller`, ``save(path)`` of the
-        certificate and ``to_dict()``; ``lines()`` are what the command prints. Of an `UncertainPlant` or blocks the
-        guarantee, `PlantProof`, or `NoProof` itself, with ``verdict``, ``bounds``, ``reason``, ``sentence()``
-        and ``check()``.
+    Guarantee
+        With ``verdict``, ``bounds`` and ``worst_case`` (by name, SI units), ``reason``, ``sentence()``, ``check()``,
+        ``controller`` for `simulate`, `loop_transfer` and `export_controller`, ``save(path)`` of the certificate and
+        ``to_dict()``; ``lines()`` are what the command prints, and ``proof`` is what is proved in exact numbers.
 
     Raises
     ------
@@ -177,7 +183,8 @@ def guarantee(
                 )
             blocks = SlidingBlocks(chain=fault, lag=setup.lag, stress=exact_value(stress, "Pa", "stress"))
             assert setup.step is not None
-            return sliding_block_guarantee(blocks, setup.step, decentralised=controller == BLOCK_LAWS[1])
+            proof = sliding_block_guarantee(blocks, setup.step, decentralised=controller == BLOCK_LAWS[1])
+            return PlantGuarantee(proof=proof)
         fault = UncertainPlant.from_blocks(fault)
     if isinstance(fault, UncertainPlant):
         usual = plant in (None, PRINTED) and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])
@@ -188,7 +195,8 @@ def guarantee(
                 "an uncertain plant is guaranteed with a law or gains alone. Received controller, objective, scheme, "
                 "class, plant, stress or spread. Omit these."
             )
-        return guarantee_plant(fault, law, gains, setup, decentralised=controller == BLOCK_LAWS[1])
+        proof = guarantee_plant(fault, law, gains, setup, decentralised=controller == BLOCK_LAWS[1])
+        return PlantGuarantee(proof=proof)
     fault = with_accepted_fit(fault, accept_poor_fit)
     if law is not None and not isinstance(law, Controller):
         raise ParameterError(
@@ -284,12 +292,12 @@ def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Want
     beyond = hopeless(task, most, delay, setup.diffusion)
     if beyond and not wanted.gains:
         near = nearest_setup(task, step, **around) if law.name == "elqr" else None
-        return TrackingGuarantee(fault=fault, proof=NoProof(reason=beyond, small_gain=None), nearest=near)
+        return TrackingGuarantee(fault=fault, proof=NoProof(reason=beyond), nearest=near)
     result = method_of(law).sampled(fault, task, law, step, wanted)
     slow = "" if wanted.gains else too_slow(task, most, max(step, setup.longest_step), delay)
     if not slow or result.proved:
         return result
-    return replace(result, proof=NoProof(reason=slow, small_gain=None))
+    return replace(result, proof=NoProof(reason=slow))
 
 
 def _exact_texts(gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]") -> tuple[str, ...]:

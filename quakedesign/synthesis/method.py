@@ -20,10 +20,9 @@ from quakedesign.guarantees import (
     OBJECTIVES,
     Compensation,
     ContinuousProof,
+    FaultProof,
     Held,
     NoProof,
-    SlidingProof,
-    StickSlipProof,
     TrackingGuarantee,
     TrackingProof,
     best_guarantee,
@@ -135,7 +134,7 @@ class GainProblem(Generic[Designed]):
         controller: Controller,
         certificate: Certificate | None = None,
         *,
-        runs: TrackingProof | SlidingProof | StickSlipProof | NoProof | None = None,
+        runs: FaultProof | NoProof | None = None,
         premises: tuple[Premise, ...] = (),
         **more: Any,
     ) -> Designed:
@@ -248,17 +247,15 @@ class DesignMethod(Generic[L]):
         known = linear_about_a_reference(controller)
         return tuple(linear_premises(fault, controller, certificate)) if known else (), None
 
-    def guarantee(
-        self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup
-    ) -> TrackingProof | StickSlipProof | NoProof:
+    def guarantee(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> FaultProof | NoProof:
         """Guarantee of the sampled law on a task of the fault, with the noise of a loop setup."""
-        return NoProof(reason=f"no analysis of {controller.title} under a held pressure is known here", small_gain=None)
+        return NoProof(reason=f"no analysis of {controller.title} under a held pressure is known here")
 
     def certified_peaks(self, fault: Fault, controller: L, disturbance_class: str) -> ContinuousProof | NoProof:
         """Certified peaks of slip, slip rate and pressure in continuous time."""
-        return NoProof(reason=f"no bound of peaks of {controller.title} is known here", small_gain=None)
+        return NoProof(reason=f"no bound of peaks of {controller.title} is known here")
 
-    def compensation(self, controller: L, found: TrackingProof | StickSlipProof | NoProof) -> Compensation | None:
+    def compensation(self, controller: L, found: FaultProof | NoProof) -> Compensation | None:
         """Sampled sliding mode with its guarantee; None for other laws."""
         return None
 
@@ -279,7 +276,7 @@ class DesignMethod(Generic[L]):
     ) -> TrackingGuarantee:
         """Guarantee of given gains, or of a design, with sampling every T_s [s]."""
         reason = f"no analysis of {law.title} under a held pressure is known here"
-        return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason, small_gain=None))
+        return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason))
 
     def given(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> TrackingGuarantee:
         """Guarantee of a given controller in a loop setup.
@@ -362,7 +359,7 @@ class Samples(DesignMethod[SampledController]):
         try:
             steady_states(still, law.output, (Fraction(0),) * len(law.states), Fraction(1))
         except ParameterError:
-            return NoProof(reason=_STANDING, small_gain=None)
+            return NoProof(reason=_STANDING)
         held = Held(law=law, step=step, **around)
         found = best_guarantee(task, held)
         if found.proved or found.small_gain is not None or held.longest_step:

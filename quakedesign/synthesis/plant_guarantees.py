@@ -9,7 +9,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import rational, shortly
 from quakedesign.guarantees.exact.plant_guarantee import PlantProof
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
-from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.search.block_design import block_law
 from quakedesign.guarantees.search.plant_search import escaping, plant_guarantee
 from quakedesign.laws.user_law import exact_matrix, integrating
@@ -56,7 +56,6 @@ def guarantee_plant(
         return NoProof(
             reason=f"a mode escapes{'' if seen else ', which is not measured'}: with every uncertain term at its "
             f"steepest the states ({shape}) grow by {radius:.4g} a sample",
-            small_gain=None,
         )
     found = plant_guarantee(around, exact)
     return replace(found, notes=notes) if found.proved else found

@@ -10,6 +10,7 @@ from quakedesign.exact import rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees import (
     Compensation,
+    FaultProof,
     NoProof,
     StickSlipProof,
     TrackingGuarantee,
@@ -98,7 +99,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SlidingMode, setup: LoopSetup
-    ) -> TrackingProof | StickSlipProof | NoProof:
+    ) -> FaultProof | NoProof:
         """In the scheme ``compensated`` or ``stick-slip``, and in no other."""
         return guarantee_of(task, controller, **setup.noise)
 
@@ -106,7 +107,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         """Given base gains, or the first ones known."""
         return deadbeat(task, law, gains).controller
 
-    def compensation(self, controller: SlidingMode, found: TrackingProof | StickSlipProof | NoProof) -> Compensation:
+    def compensation(self, controller: SlidingMode, found: FaultProof | NoProof) -> Compensation:
         """With the weight and the authority of its scheme."""
         return Compensation(controller=controller, proof=found)
 
@@ -173,7 +174,7 @@ def _compensated(
         without = {"not_at_rest": sticking.reason}
     made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, **problem.setup.noise)
     if found.runs is None:
-        none = NoProof(reason=f"run in the scheme compensated, {found.reason}", small_gain=None)
+        none = NoProof(reason=f"run in the scheme compensated, {found.reason}")
         return _scaled(problem, base, certificate, runs=none)
     details = {
         "objective": problem.objective,

@@ -11,9 +11,9 @@ from quakedesign.guarantees import (
     CLASSES,
     OBJECTIVES,
     ContinuousProof,
+    FaultProof,
     Held,
     NoProof,
-    StickSlipProof,
     TrackingGuarantee,
     TrackingProof,
     attacked,
@@ -72,7 +72,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: ExtendedLQR, setup: LoopSetup
-    ) -> TrackingProof | StickSlipProof | NoProof:
+    ) -> FaultProof | NoProof:
         """With integrals summed over the T_s of the fault."""
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
             return super().guarantee(fault, task, controller, setup)
@@ -102,7 +102,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         if wanted.gains:
             summed = summed_integrals(_four(wanted.gains), step)
             if differs and (reason := why_no_law(step, setup.measured, around)):
-                return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason, small_gain=None))
+                return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason))
             summed = told_by_differences(summed, step) if differs else summed
             given = best_guarantee(task, Held(law=summed, step=step, **around))
             if given.proved:
@@ -161,7 +161,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     around: Any = setup.around()
     most = rational(fault.effective_normal_stress)
     if beyond := hopeless(task, most, around.get("delay", Fraction(0)), setup.diffusion):
-        return problem.undecided(law.name, beyond, NoProof(reason=beyond, small_gain=None))
+        return problem.undecided(law.name, beyond, NoProof(reason=beyond))
     found = sampled_design(task, step, problem.objective, measured=setup.measured, **around)
     if found.runs is None:
         return problem.undecided(law.name, found.reason)

@@ -157,7 +157,7 @@ def entry(*, verdict="proved", runs=None, premises=(), harmless=True):
         ({"premises": [("sampling_time", True), ("start", False)]}, True),  # of the run and its start
         ({"verdict": "undecided"}, False),
         ({"verdict": "refuted"}, False),
-        ({"runs": NoProof(reason="small gain", small_gain=None)}, False),
+        ({"runs": NoProof(reason="small gain")}, False),
         ({"harmless": False}, False),
         *(
             ({"premises": [(name, False), ("start", True)]}, False)

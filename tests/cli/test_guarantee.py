@@ -191,7 +191,7 @@ def test_everything_else_is_designed_for(monkeypatch, name, least, most):
 def test_where_no_controller_renews_its_pressure_so_slowly_the_answer_says_so(monkeypatch, step, slow):
     """17.9 s on real-fault: a constant push needs 50 MPa by then."""
     fault = load_fault("real-fault")
-    none = TrackingGuarantee(fault=fault, proof=NoProof(reason="small gain 7", small_gain=None))
+    none = TrackingGuarantee(fault=fault, proof=NoProof(reason="small gain 7"))
     monkeypatch.setattr(StateFeedback, "sampled", lambda *_: none)
     said = qd.guarantee(fault, step=step).proof.reason
     assert said.startswith("no controller that withdraws at most 50 MPa can hold the fault with T_s") is slow
@@ -333,7 +333,7 @@ def test_noise_that_is_none_is_refused_in_a_line(call, options, said):
 
 
 def test_gains_that_know_nothing_of_the_rock_say_what_fails(call, monkeypatch):
-    none = NoProof(reason="a design through rock is another test's", small_gain=None)
+    none = NoProof(reason="a design through rock is another test's")
     family = import_module("quakedesign.synthesis.state_feedback")
     for name, found in (("design_held", none), ("longest_step", None), ("nearest_setup", None)):
         monkeypatch.setattr(family, name, lambda *_, a=found, **__: a)

@@ -26,7 +26,7 @@ LAW = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(Fraction
 HELD = Held(law=LAW, step=Fraction(300))
 CLAIMS = SlidingClaims(**{name: UpperBound(Fraction(1)) for name in SlidingClaims.__dataclass_fields__})
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
-NONE = NoProof(reason="too much", small_gain=None)
+NONE = NoProof(reason="too much")
 LAGGED = ("guarantee", "creeping-patch", "--lag", "200 s", "--step", "4000 s")
 
 
@@ -120,7 +120,7 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
     assert found.reason == (
         "too much; a proof was found for a stress of at most 20 kPa: give --stress '20 kPa'; somewhat more may do"
     )
-    none = NoProof(reason="no law whose loop is stable", small_gain=None)
+    none = NoProof(reason="no law whose loop is stable")
     with monkeypatch.context() as patched:
         found_below = lambda task, step, **around: HELD if task.stress < 35_000 else none  # noqa: E731
         patched.setattr(sliding_answer, "designed_sliding", found_below)

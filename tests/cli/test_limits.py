@@ -24,7 +24,7 @@ def _quick(monkeypatch):
     monkeypatch.setattr("quakedesign.studies.performance_limits.natural_peak", lambda _fault: 0.05)
     monkeypatch.setattr(
         "quakedesign.studies.performance_limits.design_held",
-        lambda *_, **__: NoProof(reason="none", small_gain=None),
+        lambda *_, **__: NoProof(reason="none"),
     )
     for name in ("longest_step", "longest_delay", "farthest_rock"):
         monkeypatch.setattr(f"quakedesign.studies.performance_limits.{name}", lambda *_, **__: None)
@@ -134,7 +134,7 @@ def test_a_stress_or_noise_that_does_not_apply_is_refused(given, said, capsys):
 
 def test_where_no_design_stands_a_stress_the_reason_is_told(capsys, monkeypatch):
     """A sampling time that suits no law would else look like a missing option."""
-    none = NoProof(reason="T_s near 0.51 s suits", small_gain=None)
+    none = NoProof(reason="T_s near 0.51 s suits")
     answer = SlidingGuarantee(proof=none, task=None, held=None)
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch") == 2
@@ -159,7 +159,7 @@ def test_both_sides_are_of_the_stress_that_the_design_behind_the_well_stands(mon
     known = {Fraction(800): near, Fraction(900): replace(near, task=replace(near.task, stress=near.task.stress / 2))}
 
     def answered(fault, *, diffusion, lag=0, **asked):
-        found = known.get(diffusion, NoProof(reason="too far", small_gain=None))
+        found = known.get(diffusion, NoProof(reason="too far"))
         return SlidingGuarantee(proof=found, task=near.task, held=None)
 
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", answered)
@@ -223,7 +223,7 @@ def test_designs_are_proved_with_the_whole_setup(monkeypatch, capsys):
     """A well of 2 m at 0.5 m²/s is L²/D = 8 s; a mean over 0.02 s comes 0.01 s later."""
     told = {}
     for name in ("design_held", "longest_step"):
-        none = NoProof(reason="none", small_gain=None) if name == "design_held" else None
+        none = NoProof(reason="none") if name == "design_held" else None
         monkeypatch.setattr(
             f"quakedesign.studies.performance_limits.{name}",
             lambda *_, n=name, a=none, **around: told.__setitem__(n, around) or a,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import TrackingGuarantee, WorstFound, attacked, guarantee
+from quakedesign.guarantees import TrackingGuarantee, WorstCase, attacked, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 
@@ -26,8 +26,8 @@ def between(name, share=F(1, 2)):
 
 def stuck(monkeypatch, slip, rate):
     """Answer where a search on the sticking fault ends at these errors."""
-    seen = WorstFound(slip_error=slip, slip_rate_error=rate)
-    quiet = WorstFound(slip_error=0.0, slip_rate_error=0.0)
+    seen = WorstCase(slip_error=slip, slip_rate_error=rate)
+    quiet = WorstCase(slip_error=0.0, slip_rate_error=0.0)
     monkeypatch.setattr(MODULE, "worst_found", lambda _, sticks=False: seen if sticks else quiet)
     return attacked(load_fault("real-fault"), SLOW)
 

@@ -9,11 +9,10 @@ import pytest
 import quakedesign as qd
 from quakedesign.errors import CertificateError
 from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.guarantees import NoProof, TrackingProof
+from quakedesign.guarantees import NoProof, PlantGuarantee, TrackingProof
 from quakedesign.guarantees.exact.plant_guarantee import PlantProof
 from quakedesign.guarantees.guarantee_result import SlidingGuarantee, TrackingGuarantee
-from quakedesign.guarantees.search.adversary import WorstSliding
-from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
+from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.guarantees.stick_slip_answer import StickSlipGuarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 
@@ -32,7 +31,7 @@ def stored(kind):
 def test_each_kind_of_result_has_the_bounds_of_its_claims_in_si():
     sticking, slow = stored("stick_slip"), stored("slow_sliding")
     printed = qd.guarantee(FAULT, law=qd.SampledLaw.from_pid(3e8, 1e8, 2e8, N=40, step="50 ms"))
-    seen = WorstStickSlip(slip_behind=1e-6, slip_ahead=3e-6, peak_slip_rate=2e-6)
+    seen = WorstCase(slip_error=3e-6, slip_behind=1e-6, slip_ahead=3e-6, peak_slip_rate=2e-6)
     stick_slip = StickSlipGuarantee(fault=FAULT, proof=sticking, worst=seen)
     sliding = SlidingGuarantee(proof=slow, task=slow.task, held=slow.held)
     common = {"slip_error", "peak_slip_rate", "least_pressure", "largest_pressure"}
@@ -81,7 +80,7 @@ def test_a_result_is_saved_as_a_certificate_and_read_again(tmp_path):
 
 
 def test_without_a_guarantee_there_is_a_reason_and_nothing_else(tmp_path):
-    none = TrackingGuarantee(fault=FAULT, proof=NoProof(reason="the gain is 2", small_gain=None))
+    none = TrackingGuarantee(fault=FAULT, proof=NoProof(reason="the gain is 2"))
     assert (none.verdict, none.reason, none.bounds, none.worst_case) == (Verdict.UNDECIDED, "the gain is 2", {}, {})
     assert none.check() is Verdict.UNDECIDED
     with pytest.raises(CertificateError, match=r"must be proved.*Received none: the gain is 2"):
@@ -89,7 +88,7 @@ def test_without_a_guarantee_there_is_a_reason_and_nothing_else(tmp_path):
     with pytest.raises(CertificateError, match="must be proved"):
         none.controller  # noqa: B018
     assert not list(tmp_path.iterdir())
-    assert (none.proof.verdict, dict(none.proof.bounds)) == (Verdict.UNDECIDED, {})
+    assert (none.proof.check(), dict(none.proof.bounds)) == (Verdict.UNDECIDED, {})
 
 
 def test_a_result_about_an_own_plant_has_its_peaks_by_name():
@@ -102,12 +101,14 @@ def test_a_result_about_an_own_plant_has_its_peaks_by_name():
     )  # fmt: skip
     assert list(named.bounds.values()) == [*plant.claims.outputs, *plant.claims.controls]
     assert list(named.bounds)[-1] == f"u{len(plant.claims.controls) - 1}"
-    assert (named.verdict, named.reason) == (Verdict.PROVED, "")
+    result = PlantGuarantee(proof=named)
+    assert (result.verdict, result.reason, result.bounds) == (Verdict.PROVED, "", named.bounds)
+    assert result.controller is named.law
 
 
 def test_worst_slow_sliding_is_given_by_name(monkeypatch):
     slow = stored("slow_sliding")
-    seen = WorstSliding(log_rate=0.1, slip_error=2e-6)
+    seen = WorstCase(log_rate=0.1, slip_error=2e-6)
     monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_sliding", lambda _: seen)
     assert SlidingGuarantee(proof=slow, task=slow.task, held=slow.held).worst_case == {
         "log_rate": 0.1,

@@ -170,7 +170,7 @@ def test_a_claim_one_per_cent_smaller_is_refused(name):
 
 @pytest.mark.slow
 def test_the_package_refuses_such_claims_too():
-    bounds = read_guarantee(stored()).bounds()
+    bounds = read_guarantee(stored()).recomputed()
     for name in CLAIMS:
         smaller = read_guarantee(changed(stored(), (("claims", name), times("99/100"))))
         assert not smaller.claims.follow(bounds)
@@ -309,7 +309,7 @@ CONDITIONS = [
 def test_what_the_theorem_needs_is_asked_for_by_both(reason, theirs, change):
     document = changed(box(), change)
     assert refused(document, reason)
-    assert theirs in read_guarantee(document).bounds().reason
+    assert theirs in read_guarantee(document).recomputed().reason
 
 
 @pytest.mark.parametrize("path", [PATH, APERIODIC], ids=["periodic", "aperiodic"])

@@ -135,7 +135,7 @@ def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(compar
         "no law with a hold over 300 s was found whose loop is stable; a proof was found for a stress of at most 7 kPa"
     )
     guarantee = comparison.entries[0].guarantee
-    none = SlidingGuarantee(proof=NoProof(reason=why, small_gain=None), task=guarantee.task, held=None)
+    none = SlidingGuarantee(proof=NoProof(reason=why), task=guarantee.task, held=None)
     monkeypatch.setattr(state_feedback, "answer_sliding", lambda fault, **asked: none)
     monkeypatch.setattr(compared_in, "natural_run", lambda fault: comparison.uncontrolled)
     without, told = compare(SHORT, [design(SHORT, "elqr")]), io.StringIO()

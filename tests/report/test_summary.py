@@ -9,6 +9,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.exact import UpperBound
+from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.report.summary import Row, Summary, summary, summary_lines
 from quakedesign.text import plain, power_of, quantity
 
@@ -83,16 +84,24 @@ def test_without_a_proof_the_scale_is_that_of_the_runs():
 
 def entry(label, peak=None, slip=None, *, compensation=None, origin="designed", given=False):
     claims = SimpleNamespace(slip_error=slip and UpperBound(slip))
-    task = SimpleNamespace(target_slip=Fraction(1, 20), operation_time=Fraction(432000))
     found = peak and SimpleNamespace(
-        peak_slip_rate=UpperBound(peak), claims=claims, task=task, sentence=lambda: f"the sentence of {label}"
+        peak_slip_rate=UpperBound(peak),
+        claims=claims,
+        task=SimpleNamespace(course=", which moves 50 mm in 5 days"),
+        sentence=lambda: f"the sentence of {label}",
+        scope="",
+        motion="",
+        valve_pressures=(-1e6, 2e6),
     )
     outcome = SimpleNamespace(kind="tracked", peak_slip_rate=1e-6)
     metrics, provenance = SimpleNamespace(max_slip_error=1e-7), {"scheme": "continuous"}
     run = SimpleNamespace(outcome=outcome, metrics=metrics, pressure=None, provenance=provenance)
-    worst = SimpleNamespace(slip_error=1e-6, slip_rate_error=2e-6)
+    worst = WorstCase(slip_error=1e-6, slip_rate_error=2e-6)
     answer = SimpleNamespace(
         worst=worst if found else None,
+        worst_with_stick=None,
+        not_at_rest="",
+        stick_slip_gap="",
         compensation=compensation,
         lines=lambda: [f"none: the reason of {label}"],
         limit_lines=lambda: ["no controller does better"],
@@ -146,7 +155,7 @@ def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthqu
 
 def test_the_worst_case_on_the_stick_slip_plant_is_reported_with_why_nothing_is_proved_there(monkeypatch):
     one = entry("A (designed)", "3e-4", "1e-5")
-    one.answer.worst_with_stick = SimpleNamespace(slip_error=1.2e-6, slip_rate_error=3e-5)
+    one.answer.worst_with_stick = WorstCase(slip_error=1.2e-6, slip_rate_error=3e-5)
     one.answer.not_at_rest = "T_s is too long"
     (note,) = (note for note in summary(compared(monkeypatch, one)).notes if "stick-slip" in note)
     assert note == (
@@ -273,10 +282,14 @@ def test_friction_that_is_extrapolated_to_the_rate_of_the_task_is_said(monkeypat
     assert said.startswith("V = 1e-06 m/s is above the rates for which friction is known, 1e-20 to 1e-07")
 
 
-def test_two_sliding_modes_with_the_same_bounds_say_why(monkeypatch):
-    one, other = (entry(f"{name} (designed)", 3e-4, 1e-5, compensation="c") for name in ("2-CTA", "2-DIA"))
+def test_two_sliding_modes_with_deadbeat_steps_and_the_same_bounds_say_why(monkeypatch):
+    law = SimpleNamespace(deadbeat=True)
+    one, other = (entry(f"{name} (designed)", 3e-4, 1e-5, compensation=law) for name in ("2-CTA", "2-DIA"))
     other.guaranteed.claims = one.guaranteed.claims
     assert any("2-CTA and 2-DIA act identically" in note for note in summary(compared(monkeypatch, one, other)).notes)
+    law.deadbeat = False
+    assert not any("act identically" in note for note in summary(compared(monkeypatch, one, other)).notes)
+    law.deadbeat = True
     other.guaranteed.claims = SimpleNamespace(slip_error=UpperBound(1))
     assert not any("act identically" in note for note in summary(compared(monkeypatch, one, other)).notes)
 

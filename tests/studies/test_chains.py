@@ -14,7 +14,7 @@ import quakedesign as qd
 from quakedesign.cli import main
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
-from quakedesign.guarantees import NoProof
+from quakedesign.guarantees import NoProof, PlantGuarantee
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
 from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantProof
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
@@ -75,17 +75,17 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
             outputs=tuple(UpperBound(F(i, 10**5)) for i in range(1, 7)), controls=(UpperBound(10),) * 3
         )
 
-        def lines(self):
+        def statement(self):
             return [f"proved: {self.sentence()}"]
 
         def sentence(self):
             return "a sentence"
 
         def to_dict(self):
-            return {"verdict": "proved", "sentence": self.sentence(), "notes": list(self.notes)}
+            return {"notes": list(self.notes)}
 
     for place in ("synthesis", "studies.chains"):
-        monkeypatch.setattr(f"quakedesign.{place}.guarantee", lambda *_, **__: Proved())
+        monkeypatch.setattr(f"quakedesign.{place}.guarantee", lambda *_, **__: SimpleNamespace(proof=Proved()))
     assert run("guarantee", PATH) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "the load of a pressure is the pressure that balances the blocks on the reference" in told
@@ -463,7 +463,7 @@ def designed(monkeypatch):
 
     def guarantee(chain, controller, **sliding):
         told.append((controller, sliding))
-        return found
+        return PlantGuarantee(proof=found)
 
     monkeypatch.setattr(chains, "guarantee", guarantee)
     return told
@@ -507,8 +507,8 @@ def test_laws_of_slow_sliding_are_compared_side_by_side(designed, capsys):
 
 
 def test_where_nothing_is_proved_of_slow_sliding_no_law_runs(monkeypatch, capsys, tmp_path):
-    none = NoProof(reason="no bounds close", small_gain=None)
-    monkeypatch.setattr(chains, "guarantee", lambda *_, **__: none)
+    none = NoProof(reason="no bounds close")
+    monkeypatch.setattr(chains, "guarantee", lambda *_, **__: PlantGuarantee(proof=none))
     assert run("design", SLIDING, *LOADS, "--out", tmp_path / "run") == 1
     told = capsys.readouterr().out
     assert "no bounds close" in told

@@ -48,7 +48,7 @@ def designs(monkeypatch):
             return TrackingProof(task=task, held=Held(law=LAW, step=step, delay=delay), claims=claims)
         asked.append((step, delay))
         if step > longest["step"] or delay > longest["delay"]:
-            return NoProof(reason="too long", small_gain=None)
+            return NoProof(reason="too long")
         return TrackingProof(task=task, held=Held(law=LAW, step=step, delay=delay), claims=CLAIMS)
 
     def claimed(task, step, **around):

@@ -9,7 +9,7 @@ import pytest
 
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, TrackingProof
+from quakedesign.guarantees import NoProof
 from quakedesign.laws import published
 from quakedesign.laws.feed_forward import feed_forward
 from quakedesign.loop import Actuator, Lag, simulation_scheme
@@ -168,14 +168,14 @@ def designs_in_place_of_searches(monkeypatch, found):
 
 def test_a_design_is_for_what_stands_around_it_in_the_run(monkeypatch):
     law = single.Controller
-    proved = SimpleNamespace(proof=Mock(spec=TrackingProof, controller=law), compensation=None)
+    proved = SimpleNamespace(proved=True, controller=law)
     asked = designs_in_place_of_searches(monkeypatch, proved)
     assert choice(LAB, "elqr", ("designed",), path={"lag": 0.02, "delay": 0.05}, step=0.025).controller is law
     assert asked == [(0.025, "elqr", LoopSetup(lag=F(1, 50), delay=F(1, 20)))]
     with pytest.raises(ParameterError, match="delay must be 0 to 100 sampling periods"):
         choice(LAB, "elqr", ("designed",), path={"delay": 3.0}, step=0.025)
     assert len(asked) == 1
-    limited = SimpleNamespace(proof=proved.proof, compensation=SimpleNamespace(limited="limited"))
+    limited = SimpleNamespace(proved=True, controller="limited")
     designs_in_place_of_searches(monkeypatch, limited)
     assert single._designed_behind(LAB, "cta", {"lag": 0.02}) == "limited"
 
@@ -183,7 +183,7 @@ def test_a_design_is_for_what_stands_around_it_in_the_run(monkeypatch):
 def test_a_design_without_a_proof_behind_its_path_is_refused_with_the_reason(monkeypatch):
     sooner = SimpleNamespace(held=SimpleNamespace(step=F(1, 200)))
     for shorter, said in ((sooner, "Give --step '0.005 s'"), (None, "Give gains as numbers")):
-        none = SimpleNamespace(proof=NoProof(reason="nothing holds", small_gain=None), shorter=shorter)
+        none = SimpleNamespace(proved=False, proof=NoProof(reason="nothing holds"), shorter=shorter)
         designs_in_place_of_searches(monkeypatch, none)
         with pytest.raises(ParameterError, match=f"elqr with lag 0.02 s, T_s = 0.001 s: nothing holds. {said}"):
             choice(LAB, "elqr", ("designed",), path={"lag": 0.02})

@@ -26,7 +26,7 @@ GUARANTEE, FEEDBACK, SLIDING = (
     import_module(f"quakedesign.synthesis.{name}") for name in ("guarantee", "state_feedback", "sliding_mode_design")
 )
 ANSWER = import_module("quakedesign.guarantees.stick_slip_answer")
-NONE = NoProof(reason="no polytope", small_gain=None)
+NONE = NoProof(reason="no polytope")
 
 
 @pytest.fixture(scope="module")

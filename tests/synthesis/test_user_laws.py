@@ -87,7 +87,7 @@ def referred():
 @pytest.fixture
 def stuck(monkeypatch):
     """A quick search that finds the same on the stick-slip plant whatever the law."""
-    seen = guarantee_result.WorstFound(slip_error=1e-3, slip_rate_error=2e-5)
+    seen = guarantee_result.WorstCase(slip_error=1e-3, slip_rate_error=2e-5)
     monkeypatch.setattr(guarantee_result, "worst_found", lambda claim, sticks=False: seen)
 
 

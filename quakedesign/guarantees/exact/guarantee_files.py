@@ -5,6 +5,7 @@ units.
 """
 
 import json
+from collections.abc import Callable
 from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
@@ -323,15 +324,13 @@ def guarantee_document(claim: Claim | PlantProof) -> dict[str, Any]:
     """Content of the file."""
     if not hasattr(claim, "claims"):
         raise ParameterError(f"a claim must be a guarantee. Received {shown(claim)}. Prove one with guarantee.")
-    if isinstance(claim, PlantProof):
-        kind, entries = UNCERTAIN_PLANT, plant_entries(claim)
-    elif isinstance(claim, SlidingProof):
-        kind, entries = SLOW_SLIDING, _sliding_entries(claim)
-    elif isinstance(claim, TrackingProof | ContinuousProof):
-        kind, entries = GUARANTEE, _tracking_entries(claim)
-    else:
-        kind, entries = STICK_SLIP, _stick_slip().stick_slip_entries(claim)
-    return {"format": 1, "kind": kind, **entries}
+    writers: dict[str, Callable[[Any], dict[str, Any]]] = {
+        UNCERTAIN_PLANT: plant_entries,
+        SLOW_SLIDING: _sliding_entries,
+        GUARANTEE: _tracking_entries,
+        STICK_SLIP: lambda stick_slip: _stick_slip().stick_slip_entries(stick_slip),
+    }
+    return {"format": 1, "kind": claim.kind, **writers[claim.kind](claim)}
 
 
 def _stick_slip() -> Any:

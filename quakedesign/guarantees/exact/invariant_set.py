@@ -35,7 +35,8 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.loop import Channel, Held, channels_of
 from quakedesign.guarantees.exact.norms import absolute, ball, column, majorant, matrix, upper
-from quakedesign.guarantees.exact.small_gain import Bounds, NoProof, unshifted
+from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.small_gain import Bounds, unshifted
 from quakedesign.loop import PeriodicLoop
 from quakedesign.plant.ranges import FaultPlant
 
@@ -140,12 +141,12 @@ def reached_bounds(task: FaultPlant, held: Held, reach: InvariantPolytope) -> Bo
         try:
             outputs = _SampleMap.of(loop, channels, reach).outputs(held.step, held.longest_step, reach)
         except ParameterError as error:
-            return NoProof(reason=str(error), small_gain=None)
+            return NoProof(reason=str(error))
     largest = dict(zip(loop.outputs, outputs, strict=True))
     shares = [sum((c * largest[y] for y, c in channel.shares.items()), _ZERO) for channel in channels]
     for channel, share, bound in zip(channels, shares, reach.inputs, strict=True):
         if channel.own + share > bound:
-            return NoProof(reason=f"the {channel.name} may be larger than the set is for", small_gain=None)
+            return NoProof(reason=f"the {channel.name} may be larger than the set is for")
     gains = (share / bound for share, bound in zip(shares, reach.inputs, strict=True) if bound)
     return Bounds(
         slip_error=largest["slip_error"],

@@ -12,20 +12,18 @@ radius of M is below 1 (Collatz and Wielandt), W(t) is finite, and W(t) ≤ (1 �
 P_s, those with a bound strictly within it; as they are continuous and within it at first, they never leave it. ∎
 """
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import zip_longest
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from msgspec import Meta
 
 from quakedesign.errors import ParameterError
-from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.files import write_whole
+from quakedesign.exact import Bound, LowerBound, UpperBound
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds, response_bounds
+from quakedesign.guarantees.exact.proof import Proof
 from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad
@@ -48,7 +46,7 @@ class PlantClaims:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlantProof:
+class PlantProof(Proof):
     """Peaks of an uncertain plant under a sampled law, for all t ≥ 0; `check` decides them.
 
     Attributes
@@ -72,9 +70,7 @@ class PlantProof:
         What was changed when the law became one in exact numbers.
     """
 
-    proved: ClassVar[Literal[True]] = True
-    verdict: ClassVar[Verdict] = Verdict.PROVED
-    reason: ClassVar[str] = ""
+    kind: ClassVar[str] = UNCERTAIN_PLANT
     part: LinearPart
     law: MatrixLaw
     pieces: int
@@ -98,7 +94,7 @@ class PlantProof:
         return [f"|{name}| <= {_told(bound, unit)}" for name, bound, unit in zip(named, bounds, units, strict=True)]
 
     @property
-    def bounds(self) -> dict[str, UpperBound]:
+    def bounds(self) -> Mapping[str, Bound]:
         """Peaks by the names of outputs and controls, in the units of the plant."""
         return dict(zip((*self.outputs, *self.controls), (*self.claims.outputs, *self.claims.controls), strict=True))
 
@@ -112,19 +108,8 @@ class PlantProof:
         holds = found is not None and all(a <= b for a, b in zip(found, claimed, strict=True))
         return Verdict.PROVED if holds else Verdict.UNDECIDED
 
-    def save(self, path: str | Path) -> None:
-        """Write the certificate for `load_guarantee`, ``quakedesign check`` and ``proofs/check.py``.
-
-        Raises
-        ------
-        OutputError
-            When the folder cannot be written.
-        """
-        content = {"format": 1, "kind": UNCERTAIN_PLANT} | plant_entries(self)
-        write_whole(Path(path), json.dumps(content, indent=1) + "\n")
-
-    def lines(self) -> list[str]:
-        """What is printed."""
+    def statement(self) -> list[str]:
+        """The statement, and what was changed in the law, for people."""
         return [f"proved: {self.sentence()}", *self.notes]
 
     def sentence(self) -> str:
@@ -150,8 +135,6 @@ class PlantProof:
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts."""
         return {
-            "verdict": "proved",
-            "sentence": self.sentence(),
             "peaks": {name: bound.exact for name, bound in self.bounds.items()},
             "step": str(self.law.step),
             "delay": str(self.law.delay),

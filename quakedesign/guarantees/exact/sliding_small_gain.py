@@ -62,7 +62,8 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, shortly
 from quakedesign.guarantees.exact.loop import Channel, Gains, Held
 from quakedesign.guarantees.exact.norms import norms
-from quakedesign.guarantees.exact.small_gain import NoProof, channel_bounds
+from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.small_gain import channel_bounds
 from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop
 from quakedesign.plant.sliding_plant import Range, SlidingPlant
 
@@ -119,12 +120,12 @@ def cell_bounds(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[s
     """
     model = model_of(task, claims)
     if model is None:
-        return NoProof(reason=_left(task, claims), small_gain=None)
+        return NoProof(reason=_left(task, claims))
     loop = loop_of(held, model, task)
     try:
         gains = norms(loop)
     except ParameterError:
-        return NoProof(reason="even the nominal loop is not stable, or decays too slowly", small_gain=None)
+        return NoProof(reason="even the nominal loop is not stable, or decays too slowly")
     return bounds_from(task, held, claims, loop, gains, after_a_step(loop))
 
 
@@ -142,7 +143,7 @@ def bounds_from(
     """
     model = model_of(task, claims)
     if model is None:
-        return NoProof(reason=_left(task, claims), small_gain=None)
+        return NoProof(reason=_left(task, claims))
     late = settled(loop)
     more = _moved(task, held, claims, model, late)
     gains = _once_settled(_with_what_adds_at_once(loop, model, gains, phases), phases, late)

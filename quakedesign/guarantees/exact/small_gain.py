@@ -8,19 +8,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from fractions import Fraction
 from itertools import chain
-from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 from flint import arb, ctx
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
-from quakedesign.exact import Bound, LowerBound, UpperBound, shortly
+from quakedesign.exact import LowerBound, UpperBound, shortly
 from quakedesign.guarantees.exact.loop import NOISELESS, Channel, Gains, GainSpread, beside, channels_of, through_layer
 from quakedesign.guarantees.exact.norms import ball, flow_norms, norms
+from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.laws import ImplicitRoot, NominalModel, Power
 from quakedesign.loop import PeriodicLoop
-from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
@@ -150,39 +149,6 @@ class Bounds:
     small_gain: Fraction
     asked: Fraction | None = None
     stepped: Fraction | None = None
-
-
-@checked_dataclass(frozen=True, slots=True, kw_only=True)
-class NoProof:
-    """Result without a guarantee, with its reason.
-
-    Attributes
-    ----------
-    reason : str
-        Names the quantity that fails.
-    small_gain : UpperBound or None
-        At least 1; None where something else fails, such as the stability of the nominal loop.
-    needs : Fraction, optional
-        Change of the pressure between samples that the pump would have to make [Pa].
-    pressed : bool
-        Whether only the pressure fails: it exceeds a pump limit, or opens the fault.
-    """
-
-    proved: ClassVar[Literal[False]] = False
-    verdict: ClassVar[Verdict] = Verdict.UNDECIDED
-    bounds: ClassVar[Mapping[str, Bound]] = MappingProxyType({})
-    reason: str
-    small_gain: UpperBound | None
-    needs: Fraction | None = None
-    pressed: bool = False
-
-    def check(self) -> Verdict:
-        """UNDECIDED."""
-        return Verdict.UNDECIDED
-
-    def sentence(self) -> str:
-        """For people."""
-        return f"none: {self.reason}"
 
 
 def certified_bounds(

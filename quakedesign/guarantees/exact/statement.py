@@ -1,34 +1,36 @@
 """Guarantees as statements that check themselves: fault, loop, and bounds on its outputs.
 
 Chapters: claims and their check; guarantee of a sampled loop; peaks of the idealised loop in continuous
-time; test whether a guarantee covers a task; guarantee of slow sliding over the cells of a parameter box.
+time; guarantee of slow sliding over the cells of a parameter box.
 """
 
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from fractions import Fraction
 from functools import cached_property
 from math import ceil, floor, log10
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
-from quakedesign.exact import LowerBound, UpperBound, six_digits
+from quakedesign.exact import Bound, LowerBound, UpperBound, six_digits
 from quakedesign.guarantees.exact import small_gain
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope, reached_bounds
 from quakedesign.guarantees.exact.loop import Gains, Held
+from quakedesign.guarantees.exact.proof import NoProof, Proof
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, cell_bounds, exponential, follows
 from quakedesign.guarantees.exact.small_gain import (
     Bounds,
-    NoProof,
     SlowGain,
     best_bounds,
     certified_bounds,
     slow_gains,
 )
-from quakedesign.laws import RestLimit
+from quakedesign.laws import ImplicitRoot, RestLimit
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop
+from quakedesign.lyapunov.exact.certificate_files import GUARANTEE, SLOW_SLIDING
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant.ranges import FaultPlant, Friction
+from quakedesign.plant.ranges import FaultPlant
 from quakedesign.plant.sliding_plant import Cuts, SlidingPlant, cells
 
 if TYPE_CHECKING:
@@ -90,6 +92,12 @@ class Claims:
             largest_asked=None if asked is None else UpperBound(high + asked),
             largest_step=None if bounds.stepped is None else UpperBound(bounds.stepped / task.authority),
         )
+
+    @property
+    def by_name(self) -> Mapping[str, Bound]:
+        """Those that are claimed, SI."""
+        named = {part.name: getattr(self, part.name) for part in fields(self)}
+        return {name: bound for name, bound in named.items() if bound is not None}
 
     @property
     def pressures(self) -> tuple[tuple[LowerBound, UpperBound], ...]:
@@ -186,8 +194,8 @@ _FIRST = Fraction(1, 64)  # first ramp time over T_s
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class TrackingProof:
-    """Claims about one loop on one task; `check` decides them.
+class TrackingProof(Proof):
+    """Claims about one loop on one task, on the plant without stick; `check` decides them.
 
     Attributes
     ----------
@@ -198,21 +206,16 @@ class TrackingProof:
         Slowly varying input gain of the proof; None for an arbitrary input gain.
     reach : InvariantPolytope, optional
         Invariant set for aperiodic sampling; None for periodic sampling.
-    covers, lasts, plant : str
-        Conditions, time range, and the plant of `simulate` to which it applies.
     """
 
-    proved: ClassVar[Literal[True]] = True
+    kind: ClassVar[str] = GUARANTEE
+    plant: ClassVar[str] = "printed"
+    scope: ClassVar[str] = "on the plant without stick"
     task: FaultPlant
     held: Held
     claims: Claims
     slow_gain: SlowGain | None = None
     reach: InvariantPolytope | None = None
-    covers: ClassVar[str] = (
-        "every friction law of the box and every disturbance up to the stated size, on the plant without stick"
-    )
-    lasts: ClassVar[str] = "for all t >= 0"
-    plant: ClassVar[str] = "printed"
 
     def __repr__(self) -> str:
         held, claims = self.held, self.claims
@@ -229,6 +232,21 @@ class TrackingProof:
     def slip_rate_error(self) -> UpperBound:
         """Bound of the slip-rate error [m/s], for all t ≥ 0."""
         return self.claims.slip_rate_error
+
+    @property
+    def valve_pressures(self) -> tuple[LowerBound, UpperBound]:
+        """Least and largest pressure at the valve [Pa]."""
+        return self.claims.pressures[-1]
+
+    @property
+    def bounds(self) -> Mapping[str, Bound]:
+        """Claims by name, SI; pressures are those in the fault, and `least_asked` to `largest_asked` at the valve."""
+        return self.claims.by_name
+
+    @property
+    def root(self) -> ImplicitRoot | None:
+        """Implicit step of the law."""
+        return self.held.law.root
 
     @property
     def loop(self) -> PeriodicLoop:
@@ -275,8 +293,8 @@ class TrackingProof:
         """The law for `simulate`, as that of `Held`, with its limit against windup."""
         return replace(self.held.controller, rest_limit=self.rest_limit)
 
-    def bounds(self) -> Bounds | NoProof:
-        """What the theorem gives, computed anew."""
+    def recomputed(self) -> Bounds | NoProof:
+        """Bounds that the theorem gives."""
         if self.slow_gain is None:
             return _bounds(self.task, self.held, self.loop, self.reach)
         gains = _slow_gains(self.task, self.held, self.slow_gain)
@@ -286,7 +304,7 @@ class TrackingProof:
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
-        bounds = self.bounds()
+        bounds = self.recomputed()
         if not bounds.proved or not _root_within(self.task, self.held, self.claims):
             return Verdict.UNDECIDED
         if _beyond_the_pump(self.held, self.claims):
@@ -294,6 +312,10 @@ class TrackingProof:
         if self.slow_gain is not None and not bounds.slip_error < self.claims.slip_error:
             return Verdict.UNDECIDED
         return self.claims.verdict(self.task, bounds)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact claims as texts, SI."""
+        return self.claims.to_dict()
 
     def sentence(self) -> str:
         """Statement of the guarantee as text."""
@@ -380,7 +402,7 @@ def _of_claims(
     """Claims, or the reason why there are none."""
     if not _root_within(task, held, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
-        return NoProof(reason=f"the root of the implicit step leaves its range at {errors}", small_gain=None)
+        return NoProof(reason=f"the root of the implicit step leaves its range at {errors}")
     if reason := claims.opens(task) or _beyond_the_pump(held, claims):
         slow = held.pump is not None and bool(held.pump.too_slow(claims.largest_step, held.ramp))
         return NoProof(reason=reason, small_gain=None, needs=claims.largest_step if slow else None, pressed=not slow)
@@ -410,12 +432,12 @@ def _slow_claims(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Claims | 
             return claims
         slip_error = above(max(claims.slip_error * MARGIN, _LEAP * slip_error * (turn >= _TURNS)))
     reason = f"the slip error that moves the input gain, beyond {UpperBound(slip_error):.2g} m, moves it further"
-    return NoProof(reason=reason, small_gain=None)
+    return NoProof(reason=reason)
 
 
 def _slow_gains(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Gains | NoProof:
     if held.longest_step:
-        return NoProof(reason="aperiodic sampling has no guarantee with a slowly varying input gain", small_gain=None)
+        return NoProof(reason="aperiodic sampling has no guarantee with a slowly varying input gain")
     loops = tuple(held.loop(task, model) for model in slow_gain.models(task))
     try:
         return slow_gains(loops, slow_gain.growth)
@@ -448,11 +470,11 @@ def _bounds(
     task: FaultPlant, held: Held, loop: PeriodicLoop, reach: InvariantPolytope | None = None
 ) -> Bounds | NoProof:
     if reach is not None and not held.longest_step:
-        return NoProof(reason="periodic sampling needs no invariant set", small_gain=None)
+        return NoProof(reason="periodic sampling needs no invariant set")
     if reach is not None:
         return reached_bounds(task, held, reach)
     if held.longest_step:
-        return NoProof(reason="aperiodic sampling needs an invariant set", small_gain=None)
+        return NoProof(reason="aperiodic sampling needs an invariant set")
     try:
         return certified_bounds(task, loop, held.law.root, held.noise, held.off)
     except ParameterError:
@@ -461,7 +483,7 @@ def _bounds(
 
 def _unstable(held: Held) -> NoProof:
     over = f"with zero-order hold over {_seconds(held.step)}"
-    return NoProof(reason=f"{over} even the nominal loop is not stable, or decays too slowly", small_gain=None)
+    return NoProof(reason=f"{over} even the nominal loop is not stable, or decays too slowly")
 
 
 def _off_schedule(measured: Fraction, arrived: Fraction) -> str:
@@ -494,7 +516,7 @@ PREMISES = (
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class ContinuousProof:
+class ContinuousProof(Proof):
     """Claims about a law in continuous time; `check` decides them.
 
     Attributes
@@ -504,7 +526,8 @@ class ContinuousProof:
     claims : Claims
     """
 
-    proved: ClassVar[Literal[True]] = True
+    kind: ClassVar[str] = GUARANTEE
+    sampled: ClassVar[bool] = False
     task: FaultPlant
     law: ContinuousLaw
     claims: Claims
@@ -514,13 +537,18 @@ class ContinuousProof:
         """Nominal error loop."""
         return _loop(self.task, self.law)
 
-    def bounds(self) -> Bounds | NoProof:
-        """What the theorem gives, computed anew."""
+    @property
+    def bounds(self) -> Mapping[str, Bound]:
+        """Claims by name, SI."""
+        return self.claims.by_name
+
+    def recomputed(self) -> Bounds | NoProof:
+        """Bounds that the theorem gives."""
         return _continuous_bounds(self.task, self.law)
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
-        bounds = self.bounds()
+        bounds = self.recomputed()
         return self.claims.verdict(self.task, bounds) if bounds.proved else Verdict.UNDECIDED
 
     def to_dict(self) -> dict[str, Any]:
@@ -546,7 +574,7 @@ def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousProof | 
         return bounds
     claims = Claims.of(task, bounds).rounded()
     if reason := claims.opens(task):
-        return NoProof(reason=reason, small_gain=None)
+        return NoProof(reason=reason)
     return ContinuousProof(task=task, law=law, claims=claims)
 
 
@@ -564,71 +592,7 @@ def _continuous_bounds(task: FaultPlant, law: ContinuousLaw) -> Bounds | NoProof
         return certified_bounds(task, loop)
     except ParameterError:
         reason = f"{WHEN} even the nominal loop is not stable, or decays too slowly"
-        return NoProof(reason=reason, small_gain=None)
-
-
-# ----------------------------------------------------------------------
-# Whether a guarantee covers a task.
-
-_SAME = {
-    "density": "kg/m^3",
-    "shear_modulus": "Pa",
-    "length": "m",
-    "damping": "kg/s",
-    "normal_stress": "Pa",
-    "target_slip": "m",
-    "operation_time": "s",
-}
-_SPREADS = ("stiffness", "damping", "authority")
-
-
-def differences(proved: FaultPlant, asked: FaultPlant) -> list[str]:
-    """Differences of a task that a proof does not cover, with both values, SI; empty if none.
-
-    Constants of the fault and its reference must be the same; friction, ranges and disturbance must lie within those
-    of the proof. The name is not compared.
-    """
-    return [*_other(proved, asked), *_wider_than_needed(proved, asked), *_rougher(proved.friction, asked.friction)]
-
-
-def _other(proved: FaultPlant, asked: FaultPlant) -> list[str]:
-    """Constants that are not the same."""
-    pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(asked, name)) for name, unit in _SAME.items()}
-    pairs["static friction [-]"] = proved.friction.static, asked.friction.static
-    for name, unit, *both in zip(("slip", "rate"), ("1/s^2", "1/s"), proved.growths, asked.growths, strict=True):
-        pairs[f"disturbance per {name} [{unit}]"] = both[0], both[1]
-    found = [
-        f"{name} {six_digits(one)} there, {six_digits(other)} here"
-        for name, (one, other) in pairs.items()
-        if one != other
-    ]
-    return found + ([] if proved.shape == asked.shape else ["the shape of the reference"])
-
-
-def _wider_than_needed(proved: FaultPlant, asked: FaultPlant) -> list[str]:
-    """Ranges and disturbances beyond those of the proof."""
-    pairs = {f"spread of {name} [-]": both for name, *both in zip(_SPREADS, proved.spreads, asked.spreads, strict=True)}
-    pairs["disturbance [m/s^2]"] = [proved.amplitude, asked.amplitude]
-    if proved.change is not None and asked.change is not None:
-        pairs["change of the disturbance [m/s^3]"] = [proved.change, asked.change]
-    found = [
-        f"{name} up to {six_digits(one)} there, {six_digits(other)} here"
-        for name, (one, other) in pairs.items()
-        if other > one
-    ]
-    jumps = proved.change is not None and asked.change is None
-    return found + (["a disturbance of the class rate there, one that may jump here"] if jumps else [])
-
-
-def _rougher(proved: Friction, asked: Friction) -> list[str]:
-    """Bounds of friction that reach beyond those of the proof."""
-    beyond = {part.name: getattr(asked, part.name) > getattr(proved, part.name) for part in fields(Friction)}
-    beyond |= {"static": False, "least": asked.least < proved.least}
-    names = [name for name, wider in beyond.items() if wider]
-    return [
-        f"friction: {name} {six_digits(getattr(proved, name))} there, {six_digits(getattr(asked, name))} here"
-        for name in names
-    ]
+        return NoProof(reason=reason)
 
 
 # ----------------------------------------------------------------------
@@ -636,7 +600,7 @@ def _rougher(proved: Friction, asked: Friction) -> list[str]:
 
 
 @checked_dataclass(frozen=True, kw_only=True)
-class SlidingProof:
+class SlidingProof(Proof):
     """Claims about one loop around slow sliding; `check` decides them.
 
     Attributes
@@ -648,17 +612,25 @@ class SlidingProof:
     claims : SlidingClaims
     """
 
-    proved: ClassVar[Literal[True]] = True
+    kind: ClassVar[str] = SLOW_SLIDING
+    slides: ClassVar[bool] = True
     task: SlidingPlant
     held: Held
     cuts: Cuts
     claims: SlidingClaims
 
     @property
-    def covers(self) -> str:
-        """Short statement of the conditions."""
+    def motion(self) -> str:
+        """During which slip, and under which stress, for people."""
         stress = LowerBound(self.task.stress).quantity("Pa")
-        return f"the stated constants of friction and every shear stress disturbance up to {stress}, {self.lasts}"
+        return f" {self.lasts}, under every shear stress disturbance of at most {stress}"
+
+    @property
+    def bounds(self) -> Mapping[str, Bound]:
+        """Claims by name, SI; pressures are those in the fault."""
+        claims, (least, largest) = self.claims, self.pressures
+        named = {part.name: getattr(claims, part.name) for part in fields(claims)}
+        return named | {"peak_slip_rate": self.peak_slip_rate, "least_pressure": least, "largest_pressure": largest}
 
     @property
     def lasts(self) -> str:
@@ -717,6 +689,8 @@ class SlidingProof:
             "asked_pressure": [least.exact, largest.exact],
             "stress": str(self.task.stress),
             "cells": len(self.cells),
+            **{name: str(getattr(self.held, name)) for name in ("step", "diffusion", "lag", "delay", "slip_noise")},
+            "measured": "slip",
         }
 
     def sentence(self) -> str:

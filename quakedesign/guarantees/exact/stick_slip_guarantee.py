@@ -1,19 +1,24 @@
 """A guarantee on the stick–slip plant as a statement that checks itself."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from quakedesign import laws
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.exact import Bound, LowerBound, UpperBound
+from quakedesign.guarantees.exact.proof import NoProof, Proof
+from quakedesign.guarantees.exact.statement import SlidingProof, TrackingProof
 from quakedesign.guarantees.exact.stick_slip_set import (
     SampledStickSlip,
     StickSlipClaims,
     StickSlipPolytope,
     stick_slip_bounds,
 )
+from quakedesign.laws import ImplicitRoot
+from quakedesign.laws.stick_slip_law import GAIN_UNITS
+from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.ranges import FaultPlant
 
@@ -22,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StickSlipProof:
+class StickSlipProof(Proof):
     """Claims about one loop on the stick–slip plant, from rest; `check` decides them.
 
     Attributes
@@ -33,21 +38,16 @@ class StickSlipProof:
     claims : StickSlipClaims
     healing : Fraction
         Δμ_h [-] that a part of the task's disturbance stands for, see `covered_healing`; files do not state it.
-    covers, lasts, plant : str
-        For what it holds, for how long, and the plant of `simulate` that it is about.
     """
 
-    proved: ClassVar[Literal[True]] = True
+    kind: ClassVar[str] = STICK_SLIP
+    plant: ClassVar[str] = "stick-slip"
+    covers_healing: ClassVar[bool] = True
     task: FaultPlant
     held: SampledStickSlip
     reach: StickSlipPolytope
     claims: StickSlipClaims
     healing: Fraction = Fraction(0)
-    covers: ClassVar[str] = (
-        "every friction law of the box and every disturbance up to the stated size, whether the fault slides or sticks"
-    )
-    lasts: ClassVar[str] = "for all t >= 0"
-    plant: ClassVar[str] = "stick-slip"
 
     def __repr__(self) -> str:
         return f"StickSlipProof({self.task.name}: slip rate at most {self.claims.peak_slip_rate:.4g} m/s)"
@@ -61,6 +61,27 @@ class StickSlipProof:
     def slip_rate_error(self) -> UpperBound:
         """Slip rate less that of the reference, absolute value [m/s]: both are at least 0."""
         return UpperBound(max(self.claims.peak_slip_rate, self.task.reference_rates[0]))
+
+    @property
+    def motion(self) -> str:
+        """In which states, for people."""
+        return ", whether the fault slides or sticks"
+
+    @property
+    def bounds(self) -> Mapping[str, Bound]:
+        """Claims by name, SI."""
+        named = {part.name: getattr(self.claims, part.name) for part in fields(self.claims)}
+        return named | {"slip_error": self.claims.slip_error, "slip_rate_error": self.slip_rate_error}
+
+    @property
+    def valve_pressures(self) -> tuple[LowerBound, UpperBound]:
+        """Least and largest pressure [Pa]."""
+        return self.claims.pressures[-1]
+
+    @property
+    def root(self) -> ImplicitRoot | None:
+        """Implicit step of a sliding mode."""
+        return ImplicitRoot(pull=self.held.law.pull) if self.held.law.pull else None
 
     @property
     def controller(self) -> "StickSlipController":
@@ -101,6 +122,13 @@ class StickSlipProof:
             )
         return LowerBound((most - disturbance) / self._per_healing)
 
+    def beside_healing(self, task: FaultPlant, healing: Fraction) -> tuple[FaultPlant, LowerBound | None]:
+        """Task whose disturbance and healing the claims cover as one disturbance; the healing covered if it is less."""
+        if task.amplitude > self.task.amplitude:
+            return task, None
+        covered = self.covered_healing(task.amplitude)
+        return replace(task, amplitude=self.task.amplitude), covered if covered < healing else None
+
     @property
     def disturbance(self) -> Fraction:
         """Bound of the disturbance [m/s²] beside `healing`."""
@@ -112,19 +140,34 @@ class StickSlipProof:
         stress = self.task.normal_stress - Fraction(self.claims.least_pressure)
         return self.task.area_per_mass[1] * stress
 
-    def bounds(self) -> StickSlipClaims | NoProof:
-        """What the theorem gives, computed anew."""
+    def recomputed(self) -> StickSlipClaims | NoProof:
+        """Claims that the theorem gives."""
         try:
             return stick_slip_bounds(self.task, self.held, self.reach)
         except ParameterError as error:
-            return NoProof(reason=str(error), small_gain=None)
+            return NoProof(reason=str(error))
 
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
-        bounds = self.bounds()
+        bounds = self.recomputed()
         sound = isinstance(bounds, StickSlipClaims) and self.claims.follow(bounds)
         sound = sound and self.healing >= 0 and self.disturbance >= 0
         return Verdict.PROVED if sound else Verdict.UNDECIDED
+
+    def to_dict(self) -> dict[str, Any]:
+        """Exact numbers as texts, SI."""
+        held = self.held
+        return {
+            "plant": self.plant,
+            "slip_error": self.claims.slip_error.exact,
+            **self.claims.to_dict(),
+            "covered_healing": float(self.covered_healing()),
+            "healing": str(self.healing),
+            "step": str(held.step),
+            **({"longest_step": str(held.longest_step)} if held.longest_step else {}),
+            **{name: str(size) for name, size in held.noise.items()},
+            "law": {name: str(getattr(held.law, name)) for name in GAIN_UNITS},
+        }
 
     def sentence(self) -> str:
         """What is guaranteed, for people; bounds rounded outward, what it is guaranteed for inward."""
@@ -160,5 +203,9 @@ def stick_slip_guarantee(
     try:
         bounds = stick_slip_bounds(task, held, reach)
     except ParameterError as error:
-        return NoProof(reason=str(error), small_gain=None)
+        return NoProof(reason=str(error))
     return StickSlipProof(task=task, held=held, reach=reach, claims=bounds.rounded())
+
+
+FaultProof = TrackingProof | SlidingProof | StickSlipProof
+"""What is proved of a sampled law on a fault."""

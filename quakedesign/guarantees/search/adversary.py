@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import product
+from math import exp
 from typing import Any
 
 import numpy as np
@@ -48,23 +49,36 @@ _NEARLY = Fraction(31, 32)  # largest shift over the time between two events, so
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class WorstFound:
-    """Largest errors that were reached.
+class WorstCase:
+    """Largest values that a search reached, absolute values: lower bounds of the worst case.
 
     Attributes
     ----------
     slip_error : float
         [m].
-    slip_rate_error : float
-        [m/s].
+    slip_rate_error, peak_slip_rate : float or None
+        [m/s]; the first on a moving reference without stick, the second for others.
+    log_rate : float or None
+        Of ln(v/V) in slow sliding [-].
+    slip_behind, slip_ahead : float or None
+        Slip behind and ahead of the reference on the stick–slip plant [m].
     least_pressure, largest_pressure : float or None
-        At the valve [Pa]; computed only on the stick–slip plant with a law that has a limit at rest, else None.
+        At the valve [Pa]; computed only on the stick–slip plant with a law that has a limit at rest.
     """
 
     slip_error: float
-    slip_rate_error: float
+    slip_rate_error: float | None = None
+    peak_slip_rate: float | None = None
+    log_rate: float | None = None
+    slip_behind: float | None = None
+    slip_ahead: float | None = None
     least_pressure: float | None = None
     largest_pressure: float | None = None
+
+    @property
+    def slip_rate(self) -> float:
+        """Slip rate [m/s]; its error if only that is computed."""
+        return self.peak_slip_rate or self.slip_rate_error or 0.0
 
     @property
     def pressures(self) -> tuple[float, float] | None:
@@ -73,7 +87,7 @@ class WorstFound:
         return None if least is None or largest is None else (least, largest)
 
 
-def worst_found(claim: TrackingProof | ContinuousProof, *, sticks: bool = False) -> WorstFound:
+def worst_found(claim: TrackingProof | ContinuousProof, *, sticks: bool = False) -> WorstCase:
     """Adversarial trajectories: disturbance, friction slope, damping and input gain at the ends of their ranges.
 
     Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64 to 512
@@ -90,7 +104,7 @@ def worst_found(claim: TrackingProof | ContinuousProof, *, sticks: bool = False)
     """
     slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     least, largest = pressures or (None, None)
-    return WorstFound(slip_error=slip, slip_rate_error=rate, least_pressure=least, largest_pressure=largest)
+    return WorstCase(slip_error=slip, slip_rate_error=rate, least_pressure=least, largest_pressure=largest)
 
 
 def _searched(claim: TrackingProof | ContinuousProof, sticks: bool) -> list[float]:
@@ -651,23 +665,7 @@ _NEWTON = 4
 _AXES = ("direct_effect", "evolution_effect", "critical_slip")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorstSliding:
-    """Largest errors that were reached, absolute values.
-
-    Attributes
-    ----------
-    log_rate : float
-        Of ln(v/V) [-].
-    slip_error : float
-        [m].
-    """
-
-    log_rate: float
-    slip_error: float
-
-
-def worst_sliding(claim: SlidingProof) -> WorstSliding:
+def worst_sliding(claim: SlidingProof) -> WorstCase:
     """Adversarial stresses at the corners of the box of a, b and D_c, on the plant without inertia.
 
     For every corner and every piece at which a course may end, the stress, and the rate of the reference within its
@@ -678,7 +676,7 @@ def worst_sliding(claim: SlidingProof) -> WorstSliding:
     none. A rate below V counts by its logarithm as one above it.
     """
     rate, slip = search_once(lambda: _searched_sliding(claim), "worst sliding", claim)
-    return WorstSliding(log_rate=rate, slip_error=slip)
+    return WorstCase(log_rate=rate, slip_error=slip, peak_slip_rate=float(claim.task.rate) * exp(rate))
 
 
 def _searched_sliding(claim: SlidingProof) -> list[float]:

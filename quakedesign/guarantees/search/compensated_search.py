@@ -22,9 +22,10 @@ from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, to_sympy
 from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.loop import Around, Held
-from quakedesign.guarantees.exact.small_gain import Bounds, NoProof, holds
+from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.small_gain import Bounds, holds
 from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
+from quakedesign.guarantees.exact.stick_slip_guarantee import FaultProof, StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip
 from quakedesign.guarantees.search.estimate import BoundsEstimate, closeness, estimated, spectral_radius
 from quakedesign.guarantees.search.linear_design import (
@@ -140,17 +141,17 @@ class Compensation:
     ----------
     controller : SlidingMode
         A law of samples, see its `sampling`.
-    proof : TrackingProof, StickSlipProof or NoProof
+    proof : FaultProof or NoProof
         In the scheme ``compensated``, or of the second kind in ``stick-slip``.
     """
 
     controller: SlidingMode
-    proof: TrackingProof | StickSlipProof | NoProof
+    proof: FaultProof | NoProof
 
     @property
     def without_stick(self) -> TrackingProof | NoProof:
         """What is guaranteed in the scheme ``compensated``."""
-        assert not isinstance(self.proof, StickSlipProof)
+        assert isinstance(self.proof, TrackingProof | NoProof)
         return self.proof
 
     @property
@@ -187,15 +188,21 @@ class Compensation:
         )
 
     @property
+    def deadbeat(self) -> bool:
+        """Whether its implicit step ends at e1 + T_s·w = 0 within the proved errors, as that of every such law."""
+        root = self.proof.root if self.proof.proved else None
+        return root is not None and set(root.slopes) == {1} and not root.remainder
+
+    @property
     def _scheme(self) -> str:
         return self.controller.sampling.scheme if self.controller.sampling else GUARANTEED
 
     def _end(self) -> str:
-        root = _root(self.proof)
+        root = self.proof.root if self.proof.proved else None
         if root is None:
             return ""
         low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
-        if low == high == 1 and not root.remainder:
+        if self.deadbeat:
             deadbeat = "; within the proved errors its implicit step is deadbeat, e1 + T_s·w = 0"
             return f"{deadbeat}: its pressures are those of every law with a deadbeat step"
         return (
@@ -213,13 +220,6 @@ class Compensation:
             "divisor": str(law.divisor),
             **{name: str(value) for name, value in _settings(law).items() if name in _NAMED},
         }
-
-
-def _root(found: TrackingProof | StickSlipProof | NoProof) -> ImplicitRoot | None:
-    """Implicit step of a proved sliding mode."""
-    if isinstance(found, StickSlipProof):
-        return ImplicitRoot(pull=found.held.law.pull) if found.held.law.pull else None
-    return None if not found.proved else found.held.law.root
 
 
 def compensated(
@@ -240,10 +240,10 @@ def compensated(
     try:
         pull = implicit_pull(controller, step, authority)
     except UnsupportedError as error:
-        return NoProof(reason=str(error), small_gain=None)
+        return NoProof(reason=str(error))
     held = _held(ImplicitRoot(pull=pull), weight, authority, step, around)
     first = guarantee(task, held)
-    if isinstance(first, TrackingProof):
+    if first.proved:
         return first
     deadbeat = estimated(task, held)
     if deadbeat is None or not deadbeat.bounds.proved:
@@ -258,7 +258,7 @@ def compensated(
         errors = near.bounds.slip_error + held.slip_noise, near.bounds.slip_rate_error + held.rate_noise
         within = holds(root, step, *errors)
         found = guarantee(task, wider) if within else None
-        if isinstance(found, TrackingProof):
+        if found is not None and found.proved:
             return found
     return best_guarantee(task, held)
 
@@ -305,7 +305,7 @@ def _made(
         if errors is not None:
             law = law.scaled(_scale(law, authority, step, errors))
     except UnsupportedError as error:
-        return Compensation(controller=law, proof=NoProof(reason=str(error), small_gain=None))
+        return Compensation(controller=law, proof=NoProof(reason=str(error)))
     return Compensation(controller=law, proof=compensated(task, law, weight, authority, step, **around))
 
 
@@ -322,7 +322,7 @@ class Deadbeat(Kind):
         if (none := unpredictable(task, step)) is not None:
             return none
         if around.get("delay", 0) > MOST_DELAY * step:
-            return NoProof(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
+            return NoProof(reason=f"the delay is longer than {MOST_DELAY} periods")
 
         def cost(x: np.ndarray) -> float:
             if not (0 < x[0] <= 1 and _BESIDE[0] <= x[1] <= _BESIDE[1]):
@@ -496,9 +496,9 @@ def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, *
     try:
         scale = _smallest_scale(controller, authority, step, errors, _SLOPES[:1])
     except UnsupportedError as error:
-        return NoProof(reason=str(error), small_gain=None)
+        return NoProof(reason=str(error))
     if scale is None:
-        return NoProof(reason="the implicit step is deadbeat for no scale that is tried", small_gain=None)
+        return NoProof(reason="the implicit step is deadbeat for no scale that is tried")
     law = sticking_controller(controller.scaled(scale), held)
     return Compensation(controller=law, proof=replace(found, held=sticking_loop(law, held.slip_noise)))
 

@@ -11,7 +11,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.loop import Around
-from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.statement import TrackingProof
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
 from quakedesign.guarantees.search.compensated_search import (
@@ -171,21 +171,21 @@ def guarantee_of(
     if own is not None and own.scheme == STICK_SLIP:
         if missing := {"authority", "weight", "slip_weight", "rest_slip"} - dict(own.settings).keys():
             reason = f"the scheme {STICK_SLIP} has a guarantee with {', '.join(sorted(missing))} given in its settings"
-            return NoProof(reason=reason, small_gain=None)
+            return NoProof(reason=reason)
         if unknown := {name for name, value in noise.items() if value} - {"slip_noise"}:
             reason = f"the stick-slip plant is proved without {', '.join(sorted(unknown))}"
-            return NoProof(reason=reason, small_gain=None)
+            return NoProof(reason=reason)
         try:
             return proved(task, sticking_loop(law, noise.get("slip_noise", Fraction(0))))
         except UnsupportedError as error:
-            return NoProof(reason=str(error), small_gain=None)
+            return NoProof(reason=str(error))
     if own is None or own.scheme != GUARANTEED:
         scheme, step = ("continuous", Fraction(0)) if own is None else (own.scheme, own.step)
-        return NoProof(reason=_why_none(task, type(law), scheme, step), small_gain=None)
+        return NoProof(reason=_why_none(task, type(law), scheme, step))
     settings = dict(own.settings)
     if not {"weight", "authority"} <= settings.keys():
         reason = f"the scheme {GUARANTEED} has a guarantee with a weight and an authority. Give both in its settings"
-        return NoProof(reason=reason, small_gain=None)
+        return NoProof(reason=reason)
     around: Any = {**own.path, **noise}
     return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, **around))
 
@@ -224,7 +224,7 @@ def sliding_mode(
     require_known(scheme, sorted(schemes()), "scheme")
     known = deadbeat(task, law, gains)
     if scheme != GUARANTEED:
-        return NoProof(reason=_why_none(task, law, scheme, step), small_gain=None)
+        return NoProof(reason=_why_none(task, law, scheme, step))
     made = design_compensated(task, known.controller, step, objective=objective, **around)
     return replace(made, proof=tightened(made.without_stick))
 

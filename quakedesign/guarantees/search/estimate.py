@@ -15,7 +15,8 @@ from scipy.linalg import expm
 
 from quakedesign.guarantees.exact.loop import GainSpread, Held
 from quakedesign.guarantees.exact.norms import START
-from quakedesign.guarantees.exact.small_gain import Bounds, NoProof, SlowGain, bounds_from
+from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain, bounds_from
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop
 from quakedesign.plant.ranges import FaultPlant

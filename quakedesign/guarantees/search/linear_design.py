@@ -22,7 +22,8 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.loop import Around, Held
-from quakedesign.guarantees.exact.small_gain import Bounds, NoProof, SlowGain
+from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain
 from quakedesign.guarantees.exact.statement import ContinuousProof, TrackingProof, above, continuous_peaks, guarantee
 from quakedesign.guarantees.search.estimate import (
     BoundsEstimate,
@@ -152,7 +153,7 @@ def closest(
     The search begins near the numbers of another law if given, else near numbers of good laws of the family.
     """
     if around.get("delay", 0) > MOST_DELAY * step:
-        return NoProof(reason=f"the delay is longer than {MOST_DELAY} periods", small_gain=None)
+        return NoProof(reason=f"the delay is longer than {MOST_DELAY} periods")
     laws = _Laws.of(task, step, measured, around)
     if isinstance(laws, NoProof):
         return laws
@@ -280,7 +281,7 @@ class _Laws:
         if (none := unpredictable(task, step)) is not None:
             return none
         if reason := why_no_law(step, measured, around):
-            return NoProof(reason=reason, small_gain=None)
+            return NoProof(reason=reason)
         require_known(measured, MEASURED, "measured")
         middle = (step + (around.get("longest_step") or step)) / 2  # for which a law predicts that is told no time
         family = family_of(task, middle, measured, around)
@@ -399,7 +400,7 @@ def unpredictable(task: FaultPlant, step: Fraction) -> NoProof | None:
     growth = float(step) * (hypot(rate, 2 * sqrt(slip)) - rate) / 2
     if growth <= _MOST_GROWTH:
         return None
-    return NoProof(reason=f"errors grow by e^{growth:.3g} within T_s = {float(step):.4g} s", small_gain=None)
+    return NoProof(reason=f"errors grow by e^{growth:.3g} within T_s = {float(step):.4g} s")
 
 
 def search_near(
@@ -901,7 +902,7 @@ def certified_peaks(
     needed = 1 + any(law.of_reference)
     if len(law.states) < needed:
         few = f"too few integrals for feedback of the {controller.feedback}: {needed} needed, {len(law.states)} in use"
-        return NoProof(reason=few, small_gain=None)
+        return NoProof(reason=few)
     found, limits = (
         continuous_peaks(uncertain_plant(fault, rate_limited=disturbance_class == "rate"), law),
         controller.limits,
@@ -912,4 +913,4 @@ def certified_peaks(
     if limits.lowest < low and high < limits.highest:
         return found
     reason = f"the pressure may reach a limit of the law, from {low.quantity('Pa')} to {high.quantity('Pa')}"
-    return NoProof(reason=reason, small_gain=None)
+    return NoProof(reason=reason)

@@ -19,7 +19,7 @@ from quakedesign.guarantees.exact.plant_guarantee import (
     row_bounds,
 )
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, PlantLoop, ResponseBounds, response_bounds
-from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.statement import MARGIN, above
 from quakedesign.plant.plant_values import Row
 from quakedesign.plant.user_plant import UncertainPlant
@@ -65,12 +65,12 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
             )
         loop = part.loop(law)
         if reason := _unstable(part, loop):
-            return NoProof(reason=reason, small_gain=None)
+            return NoProof(reason=reason)
         cut = pieces or pieces_of(loop)
         try:
             found = response_bounds(loop, cut)
         except ParameterError as error:
-            return NoProof(reason=str(error), small_gain=None)
+            return NoProof(reason=str(error))
         inputs = _numbers(plant, part, found)
         if isinstance(inputs, NoProof):
             return inputs
@@ -83,7 +83,7 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
             bounds[name] = _rounded(reached[name] * _WIDER)
     name = free[0]
     reason = f"the argument of {name} moves further for every bound, up to {UpperBound(bounds[name]):.3g}"
-    return NoProof(reason=reason, small_gain=None)
+    return NoProof(reason=reason)
 
 
 def _first_bounds(plant: UncertainPlant) -> dict[str, Fraction]:
@@ -108,7 +108,7 @@ def _claimed(
             for name, s, row in zip(names, part.sectors, rows, strict=False)
             if s.within is not None and row >= s.within
         ]
-        return NoProof(reason="; ".join(beyond) or "the numbers of the small gain do not close", small_gain=None)
+        return NoProof(reason="; ".join(beyond) or "the numbers of the small gain do not close")
     claimed = tuple(UpperBound(above(v * MARGIN)) for v in bounds)
     count = len(part.outputs)
     claims = PlantClaims(outputs=claimed[:count], controls=claimed[count:])

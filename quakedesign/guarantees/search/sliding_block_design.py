@@ -18,9 +18,9 @@ from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import BlockChain
 from quakedesign.guarantees.exact.plant_guarantee import PlantProof, named
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
+from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sliding_blocks import MPA, BlockClaims, SlidingBlocks
 from quakedesign.guarantees.exact.sliding_small_gain import exponential
-from quakedesign.guarantees.exact.small_gain import NoProof
 from quakedesign.guarantees.search.block_design import estimate, middle, rounded
 from quakedesign.guarantees.search.plant_search import linear_part, plant_guarantee
 from quakedesign.plant.block_plant import measured_by
@@ -63,7 +63,6 @@ def sliding_block_guarantee(
                 reason="no law is found whose loop forgets soon enough: with fewer wells than blocks, modes that no "
                 "well reaches must decay within some 60 T_s. Run limits, which says whether wells are missing; "
                 "else lengthen T_s",
-                small_gain=None,
             )
         reason = f"no bounds of slip rate and state close: small gain {small:.3g}. Reduce the stress"
         return NoProof(reason=reason, small_gain=UpperBound(rational(f"{small:.6g}")))
@@ -75,7 +74,7 @@ def sliding_block_guarantee(
         found = plant_guarantee(plant, law, _PIECES)
         if found.proved and max(found.claims.controls) * MPA < claims.push:
             return replace(found, notes=(_slip_rates(blocks, rate),))
-    return NoProof(reason="the bounds that an estimate finds are not proved", small_gain=None)
+    return NoProof(reason="the bounds that an estimate finds are not proved")
 
 
 def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Fraction, UpperBound, PlantProof]:

@@ -18,6 +18,7 @@ from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, sliding_step
 from quakedesign.guarantees.exact.loop import Around, Held
+from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sliding_small_gain import (
     SlidingClaims,
     after_a_step,
@@ -27,7 +28,6 @@ from quakedesign.guarantees.exact.sliding_small_gain import (
     loop_of,
     model_of,
 )
-from quakedesign.guarantees.exact.small_gain import NoProof
 from quakedesign.guarantees.exact.statement import SlidingProof
 from quakedesign.guarantees.search.estimate import gains_of, short, spectral_radius
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
@@ -72,7 +72,7 @@ def proved_sliding(task: SlidingPlant, held: Held, *, log_rate: Fraction = LOG_R
     corner = worst_corner(task)
     claims = _claims(corner, held, log_rate)
     if claims is None or (corner != task and _excess(corner, held, claims) >= _NEAR):
-        return NoProof(reason=_too_much(task, log_rate), small_gain=None)
+        return NoProof(reason=_too_much(task, log_rate))
     try:
         cuts = _cut(task, held, claims, [MOST_CELLS - 1])
         by_estimate = SlidingProof(task=task, held=held, cuts=cuts, claims=claims)
@@ -82,7 +82,7 @@ def proved_sliding(task: SlidingPlant, held: Held, *, log_rate: Fraction = LOG_R
         _cut(corner, held, claims, [0], exactly=True)  # no cuts of a box help where this does not do
         return replace(by_estimate, cuts=_cut(task, held, claims, [MOST_CELLS - 1], exactly=True))
     except ParameterError:
-        return NoProof(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box", small_gain=None)
+        return NoProof(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box")
 
 
 def _smallest_claims(found: SlidingProof) -> SlidingClaims:
@@ -156,7 +156,7 @@ def designed_sliding(
         f"no law with zero-order hold over {float(step):g} s was found whose loop is stable and forgets within some "
         f"hundred periods, D_c/V = {ageing:.3g} s{path}"
     )
-    return NoProof(reason=reason, small_gain=None)
+    return NoProof(reason=reason)
 
 
 def _path(around: Around) -> dict[str, Fraction]:

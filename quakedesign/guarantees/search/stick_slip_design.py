@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from quakedesign.cache import search_once
 from quakedesign.errors import ParameterError
-from quakedesign.guarantees.exact.small_gain import NoProof
+from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import (
     COMBINATIONS,
@@ -34,6 +34,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
     sliding_rows,
     stop_bounds,
 )
+from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.guarantees.search.estimate import short
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.ranges import FaultPlant
@@ -713,17 +714,17 @@ def proved(task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda said, d
     if fresh:
         return fresh[0]
     if "reason" in kept:
-        return NoProof(reason=kept["reason"], small_gain=None)
+        return NoProof(reason=kept["reason"])
     return stick_slip_guarantee(task, held, read_as(StickSlipPolytope, kept["set"]))
 
 
 def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlipProof | NoProof:
     found: StickSlipProof | NoProof
-    found = NoProof(reason="no polytope was found that the loop never leaves", small_gain=None)
+    found = NoProof(reason="no polytope was found that the loop never leaves")
     try:
         points = _Reach.of(task, held).hull(tell)
         if points is None:
-            return NoProof(reason="the states that disturbances reach grow without bound", small_gain=None)
+            return NoProof(reason="the states that disturbances reach grow without bound")
         normals = _normals(points, _FACETS)
         heights = (normals @ points.T).max(axis=1)
         growing = _Growing(task, held, normals, heights, np.zeros((len(normals), 5)), heights, points)
@@ -734,9 +735,9 @@ def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlip
             if found.proved:
                 break
     except ParameterError as error:
-        return NoProof(reason=str(error), small_gain=None)
+        return NoProof(reason=str(error))
     except (ArithmeticError, ValueError, LinAlgError, QhullError):
-        return NoProof(reason="numbers of the loop are too far apart for a search in floats", small_gain=None)
+        return NoProof(reason="numbers of the loop are too far apart for a search in floats")
     return found
 
 
@@ -773,9 +774,9 @@ def design_stick_slip(
     """
     if not task.amplitude and not healing:
         reason = "the stick-slip theorem needs a disturbance above 0 m/s^2: give amplitude in [disturbance]"
-        return NoProof(reason=reason, small_gain=None)
+        return NoProof(reason=reason)
     if longest_step and implicit:
-        return NoProof(reason="a sliding mode that sticks is proved for periodic sampling alone", small_gain=None)
+        return NoProof(reason="a sliding mode that sticks is proved for periodic sampling alone")
     none = list[StickSlipProof | NoProof]()
     longer = float(longest_step / step) if longest_step else 1.0
     for *shares, gain in DEADBEAT if implicit else (APERIODIC if longest_step else TUNINGS)[objective]:
@@ -783,7 +784,7 @@ def design_stick_slip(
             held = tuned(task, step, (*shares, gain * longer), slip_noise, implicit=implicit)
             held = replace(held, longest_step=longest_step)
         except (ParameterError, ArithmeticError, ValueError):
-            return NoProof(reason="no gains of this size are floats", small_gain=None)
+            return NoProof(reason="no gains of this size are floats")
         found = _healed(task, held, healing, tell)
         if found.proved:
             return found
@@ -800,36 +801,14 @@ def _healed(task: FaultPlant, held: SampledStickSlip, healing: Fraction, tell: T
         if not found.proved or found.covered_healing(task.amplitude) >= healing:
             return replace(found, healing=healing) if found.proved else found
         least = Fraction(found.claims.least_pressure) - _LOWER * task.normal_stress
-    return NoProof(reason="the pressure falls too far for this healing", small_gain=None)
+    return NoProof(reason="the pressure falls too far for this healing")
 
 
 # ----------------------------------------------------------------------
 # Falsification: the worst case that a search finds.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorstStickSlip:
-    """Largest values that disturbances and parameters of the class were seen to reach.
-
-    Attributes
-    ----------
-    slip_behind, slip_ahead : float
-        Slip behind and ahead of the reference [m].
-    peak_slip_rate : float
-        [m/s].
-    """
-
-    slip_behind: float
-    slip_ahead: float
-    peak_slip_rate: float
-
-    @property
-    def slip_error(self) -> float:
-        """Larger of both [m]."""
-        return max(self.slip_behind, self.slip_ahead)
-
-
-def worst_stick_slip(found: StickSlipProof, *, periods: int = 60) -> WorstStickSlip:
+def worst_stick_slip(found: StickSlipProof, *, periods: int = 60) -> WorstCase:
     """Worst case of courses from rest that are continued, period by period, from the states that lie farthest out.
 
     For each facet of the invariant polytope the state that is farthest in its direction is kept. β is constant in a
@@ -859,4 +838,4 @@ def worst_stick_slip(found: StickSlipProof, *, periods: int = 60) -> WorstStickS
         points[:, 0] -= float(found.held.slip_noise)
         extremes = np.maximum(extremes, [-points[:, 0].min(), points[:, 0].max(), points[:, 1].max()])
     behind, ahead, rate = (float(v) for v in extremes)
-    return WorstStickSlip(slip_behind=behind, slip_ahead=ahead, peak_slip_rate=rate)
+    return WorstCase(slip_error=max(behind, ahead), slip_behind=behind, slip_ahead=ahead, peak_slip_rate=rate)

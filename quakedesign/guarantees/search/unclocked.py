@@ -10,7 +10,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.invariant_set import SOONEST, InvariantPolytope, reduced
 from quakedesign.guarantees.exact.loop import Held, channels_of
-from quakedesign.guarantees.exact.small_gain import Bounds, NoProof
+from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.small_gain import Bounds
 from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
 from quakedesign.guarantees.search.estimate import BoundsEstimate, gains_of, short
 from quakedesign.plant.ranges import FaultPlant
@@ -31,7 +32,7 @@ _DIGITS = 7
 
 def unclocked_guarantee(task: FaultPlant, held: Held) -> TrackingProof | NoProof:
     """Guarantee with a set that is found for it, or what speaks against one."""
-    found: TrackingProof | NoProof = NoProof(reason="no set was found that the loop never leaves", small_gain=None)
+    found: TrackingProof | NoProof = NoProof(reason="no set was found that the loop never leaves")
     for raised in _RAISED:
         reach = _reach(task, held, raised)
         if not isinstance(reach, InvariantPolytope):
@@ -226,7 +227,7 @@ def _reach(task: FaultPlant, held: Held, raised: float) -> InvariantPolytope | N
     """A set in numbers of few digits, for inputs that it makes no larger than it is for."""
     loop = _Floats.of(task, held)
     if not loop.fits:
-        return NoProof(reason="the law has too many states for a set that the loop never leaves", small_gain=None)
+        return NoProof(reason="the law has too many states for a set that the loop never leaves")
     bounds, sides, found = loop.own, loop.sides(loop.own, _MANY), None
     if sides is None:
         return None

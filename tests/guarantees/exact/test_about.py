@@ -6,7 +6,6 @@ from fractions import Fraction as F
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees.exact.statement import differences
 from quakedesign.plant import uncertain_plant
 
 TASK = uncertain_plant(load_fault("real-fault", box="ten-percent"), rate_limited=True)
@@ -35,8 +34,8 @@ def rubbed(**changes):
     ],
 )
 def test_what_asks_for_no_more_is_covered(task):
-    assert differences(TASK, task) == []
-    assert differences(replace(TASK, change=None), task) == []
+    assert TASK.differences(task) == []
+    assert replace(TASK, change=None).differences(task) == []
 
 
 @pytest.mark.parametrize(
@@ -63,5 +62,5 @@ def test_what_asks_for_no_more_is_covered(task):
     ],
 )
 def test_what_asks_for_more_is_named_alone(task, said):
-    (found,) = differences(TASK, task)
+    (found,) = TASK.differences(task)
     assert found.startswith(said)

@@ -18,7 +18,7 @@ from quakedesign.plant import uncertain_plant
 TASK = uncertain_plant(load_fault("real-fault"))
 LAW = exact_integrals(tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5"))))
 BOUNDS = Bounds(slip_error=F(1, 3), slip_rate_error=F(1, 7), push=F(1, 9), small_gain=F(1, 2))
-NONE = NoProof(reason="none", small_gain=None)
+NONE = NoProof(reason="none")
 PEAKS = ContinuousProof(task=TASK, law=LAW, claims=Claims.of(TASK, BOUNDS))
 
 

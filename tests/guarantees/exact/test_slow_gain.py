@@ -32,7 +32,7 @@ BY_HAND = FaultPlant(  # N̂ from 1/2 to 3/2, b = 2, β from 1 to 3, r′ up to 
 TASK = uncertain_plant(load_fault("real-fault"))
 HELD = Held(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10), slip_noise=F(1, 10**6))
 BOUNDS = Bounds(slip_error=F(1, 2), slip_rate_error=F(1, 7), push=TASK.authority, small_gain=F(1, 2))
-NONE = NoProof(reason="none", small_gain=None)
+NONE = NoProof(reason="none")
 GAINS = {("slip_error", "aged"): (F(1),)}
 
 
@@ -119,7 +119,7 @@ def test_bounds_are_asked_for_the_spread_of_the_slip_error_that_is_claimed(asked
     answers, questions = asked
     answers.append(BOUNDS)
     claim = TrackingProof(task=TASK, held=HELD, claims=claims_of(F(1, 3)), slow_gain=SLOW)
-    assert claim.bounds() is BOUNDS
+    assert claim.recomputed() is BOUNDS
     spread = SLOW.spread(TASK, F(1, 3))
     assert questions == [(TASK, {key: 2 * v for key, v in GAINS.items()}, None, F(1, 10), HELD.noise, spread, F(0))]
 
@@ -181,7 +181,7 @@ def test_loops_that_are_not_stable_have_no_bounds(asked, monkeypatch):
 
     monkeypatch.setattr(module, "norms", refuse)
     claim = TrackingProof(task=TASK, held=HELD, claims=claims_of(F(1)), slow_gain=SLOW)
-    for found in (claim.bounds(), guarantee(TASK, HELD, SLOW)):
+    for found in (claim.recomputed(), guarantee(TASK, HELD, SLOW)):
         assert (
             found.reason == "with zero-order hold over 0.1 s even the nominal loop is not stable, or decays too slowly"
         )

@@ -30,7 +30,7 @@ CLAIMS = Claims(
     largest_step=UpperBound(F(5, 3)),
 )
 BOUNDS = Bounds(slip_error=F(0), slip_rate_error=F(1, 7), push=3 * TASK.authority, small_gain=F(1, 2))
-NONE = NoProof(reason="none", small_gain=None)
+NONE = NoProof(reason="none")
 HELD = Held(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10))
 SIGN = ImplicitRoot(pull=(Power(factor=(F(1, 3), F(1, 3)), exponent=F(0), argument="slip"),),
                     slopes=(F(0), F(0)), remainder=F(0))  # fmt: skip
@@ -229,7 +229,7 @@ def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monk
     monkeypatch.setattr(statement, "certified_bounds", lambda *given: asked.append(given) or NONE)
     late = replace(ROOTED, delay=F(1, 3), lag=F(1, 5), rate_noise=F(1, 9))
     claim = TrackingProof(task=TASK, held=late, claims=CLAIMS)
-    assert claim.bounds() is NONE
+    assert claim.recomputed() is NONE
     assert asked == [(TASK, claim.loop, SIGN, {"rate_noise": F(1, 9)}, F(0))]
     assert tuple(claim.loop.sampled) == ("root", "rate_noise")
     assert [segment.duration for segment in claim.loop.segments] == [F(1, 3), F(2, 3)]

@@ -139,7 +139,7 @@ def test_an_independent_simulator_does_not_leave_the_guarantee_of_the_shorter_st
 
 
 def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
-    fails = NoProof(reason="small gain 1.2", small_gain=None)
+    fails = NoProof(reason="small gain 1.2")
     monkeypatch.setattr("quakedesign.guarantees.search.defaults.design_held", lambda *_, **__: fails)
     monkeypatch.setattr("quakedesign.guarantees.search.defaults.longest_step", lambda *_, **__: None)
     design = qd.design(REAL, "elqr", plant="printed")
@@ -173,7 +173,7 @@ def searched(longest, first, most=None):
     def attempt(time):
         asked.append(time)
         if time > longest:
-            return NoProof(reason="too long", small_gain=None)
+            return NoProof(reason="too long")
         return replace(claim, held=replace(claim.held, step=time))
 
     found = reached(attempt, first, most=most)

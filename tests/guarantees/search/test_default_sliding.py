@@ -219,7 +219,7 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
 
 @pytest.mark.slow
 def test_where_no_step_has_a_guarantee_it_is_the_design_in_continuous_time(monkeypatch):
-    fails = NoProof(reason="small gain 1.2", small_gain=None)
+    fails = NoProof(reason="small gain 1.2")
     known = load_certificate(CERTIFICATE)
     monkeypatch.setattr(DESIGN, "find_certificate", lambda *_, **__: known)
     monkeypatch.setattr(COMPENSATED, "compensated", lambda *_, **__: fails)

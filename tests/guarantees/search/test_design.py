@@ -15,7 +15,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, design_held, guarantee, worst_found
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.search.adversary import WorstFound
+from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.guarantees.search.linear_design import _with_noise, closest
 from quakedesign.laws import published
 from quakedesign.laws.elqr import ExtendedLQR
@@ -123,7 +123,7 @@ def test_courses_along_the_nominal_response_come_close_and_stay_below(row):
 
 def test_where_stick_leaves_the_bounds_the_answer_says_so():
     claim = designed("real peak")
-    beyond = WorstFound(slip_error=1.01 * float(claim.claims.slip_error), slip_rate_error=0.0)
+    beyond = WorstCase(slip_error=1.01 * float(claim.claims.slip_error), slip_rate_error=0.0)
     found = TrackingGuarantee(fault=load_fault("real-fault"), proof=claim, stick_search=beyond)
     assert found.lines()[-1].startswith("on the stick-slip plant a course was found that exceeds the bounds")
     within = replace(found, stick_search=replace(beyond, slip_error=0.99 * float(claim.claims.slip_error)))
@@ -287,7 +287,7 @@ def test_noise_is_blamed_for_what_it_does_to_a_law_that_is_proved_without(noise,
 def test_the_first_words_are_that_nothing_is_guaranteed_at_the_step_that_was_asked_for(monkeypatch):
     """Where a design for a shorter one is: it comes second."""
     shorter = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
-    none = NoProof(reason="small gain 2", small_gain=None)
+    none = NoProof(reason="small gain 2")
     monkeypatch.setattr(state_feedback, "design_held", lambda *_, **__: none)
     monkeypatch.setattr(state_feedback, "longest_step", lambda *_, **__: shorter)
     monkeypatch.setattr(state_feedback, "design_at", lambda *_: shorter)

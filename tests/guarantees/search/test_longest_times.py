@@ -50,13 +50,13 @@ def searched(monkeypatch):
             tried.append((step, much, None if near is None else float(near[0])))
             small = float(step * (1 + much) / longest) ** 1.2
             if len(tried) in misses and near is None:
-                return NoProof(reason="none", small_gain=None)
+                return NoProof(reason="none")
             held = SimpleNamespace(step=step, **around)
             return Closest(small if small < 1 else 1 + small, np.array([float(step)]), held)
 
         def best(task, held):
             if held.step > proved * longest:
-                return NoProof(reason="too long", small_gain=None)
+                return NoProof(reason="too long")
             found = object.__new__(TrackingProof)
             object.__setattr__(found, "held", held)
             return found
@@ -115,7 +115,7 @@ def test_a_search_near_another_law_that_finds_none_begins_anew(task, monkeypatch
 
     def stuck(task, step, *, near=None, **around):
         found = plain(task, step, near=near, **around)
-        return found if near is None else NoProof(reason="stuck", small_gain=None)
+        return found if near is None else NoProof(reason="stuck")
 
     monkeypatch.setattr(longest_times, "closest", stuck)
     assert nearest_setup(task, F(1), delay=F(4))[1].held.delay >= F(1, 2)

@@ -94,7 +94,7 @@ def test_the_share_of_the_box_that_will_do_is_named():
     name, near = nearest_setup(uncertain_plant(wide), F("0.85"))
     assert (name, near.check()) == ("box", Verdict.PROVED)
     assert 0 < near.task.spreads[0] == near.task.spreads[2] < F(1, 10)
-    found = TrackingGuarantee(fault=wide, proof=NoProof(reason="x", small_gain=None), nearest=("box", near))
+    found = TrackingGuarantee(fault=wide, proof=NoProof(reason="x"), nearest=("box", near))
     assert "with the box of +-" in lines(found)[0]
     paper = replace(near, task=replace(near.task, spreads=(F(0), F(0), F(0))))
     assert lines(replace(found, nearest=("box", paper)))[0].startswith("with the box paper: ")

@@ -181,7 +181,7 @@ def test_a_delay_is_designed_for_with_the_slip_alone():
 
 
 def test_near_the_longest_time_a_design_is_sought_for_what_a_guarantee_measures(monkeypatch):
-    claim, told, none = designed("slip alone"), [], NoProof(reason="none", small_gain=None)
+    claim, told, none = designed("slip alone"), [], NoProof(reason="none")
     monkeypatch.setattr(
         "quakedesign.guarantees.search.linear_design.nearby", lambda *a, **k: told.append((a[:2], k)) or none
     )

@@ -82,7 +82,7 @@ def test_where_a_well_is_too_far_a_slower_task_and_a_nearer_well_are_named():
     assert "(but V = 2.17e-09 m/s is below the rates for which friction is known" in said
 
     def unproved(task, held, log_rate):
-        return NoProof(reason="", small_gain=None)
+        return NoProof(reason="")
 
     assert what_would_do(FAULT, TASK, reach, around, unproved, spread=Fraction(0)).startswith("a smaller spread")
 
@@ -102,7 +102,7 @@ def test_where_the_slip_noise_is_too_large_a_smaller_one_is_named(monkeypatch):
 
         def up_to(task, held, log_rate, most=most, tried=tried):
             tried.append(held.slip_noise)
-            return proved(task, held, log_rate) if held.slip_noise <= most else NoProof(reason="", small_gain=None)
+            return proved(task, held, log_rate) if held.slip_noise <= most else NoProof(reason="")
 
         assert what_would_do(FAULT, TASK, reach, around, up_to, spread=Fraction(0)).startswith(said)
         assert tried[0] == Fraction(1, 10**7)

@@ -13,7 +13,7 @@ import pytest
 from quakedesign import simulate
 from quakedesign.cli import main
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import WorstFound, guarantee, worst_found
+from quakedesign.guarantees import WorstCase, guarantee, worst_found
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.estimate import estimated
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -114,7 +114,7 @@ def test_a_search_leaves_from_the_corners_and_the_floats_of_a_design_know_the_st
         assert claim.claims.slip_rate_error / 1.6 <= seen.slip_rate_error <= claim.claims.slip_rate_error
         assert seen.slip_error <= claim.claims.slip_error
     assert claim.claims.slip_error <= 1.6 * errors[False].slip_error
-    guessed, bounds = estimated(claim.task, claim.held).bounds, started("fast", slow=False).bounds()
+    guessed, bounds = estimated(claim.task, claim.held).bounds, started("fast", slow=False).recomputed()
     assert float(guessed.slip_rate_error) == pytest.approx(float(bounds.slip_rate_error), rel=0.01)
     assert float(guessed.slip_error) == pytest.approx(float(bounds.slip_error), rel=0.01)
 
@@ -130,7 +130,7 @@ def called(capsys, *arguments):
 
 @pytest.mark.slow
 def test_the_command_says_from_where(capsys, monkeypatch):
-    seen = WorstFound(slip_error=1e-5, slip_rate_error=1e-4)
+    seen = WorstCase(slip_error=1e-5, slip_rate_error=1e-4)
     monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_found", lambda *_, **__: seen)
     code, said = called(
         capsys, "real-fault", *GAINS, "--initial-slip", "0.01 mm", "--initial-slip-rate", "0.04 mm/s", "--json"

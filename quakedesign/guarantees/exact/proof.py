@@ -1,0 +1,123 @@
+"""What every proof of a loop offers, whatever its plant: `Proof`, and `NoProof` with a reason where there is none."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from fractions import Fraction
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal
+
+from quakedesign.arguments import checked_dataclass
+from quakedesign.exact import Bound, LowerBound, UpperBound
+from quakedesign.laws.implicit_root import ImplicitRoot
+from quakedesign.lyapunov.exact.claim import Verdict
+
+
+class Proof(ABC):
+    """Claims about one loop that check themselves; base of one class for each theorem.
+
+    Attributes
+    ----------
+    kind : str
+        Of its certificate file (proofs/FORMAT.md).
+    plant : str
+        Plant of `simulate` that it is about; empty where only one applies.
+    scope : str
+        What sets its plant apart, for people; empty for the plant that exists.
+    motion : str
+        What the slip rate is bounded for, for people.
+    lasts : str
+        For how long.
+    covers_healing : bool
+        Whether friction at rest may exceed friction in slip, see `StickSlipProof.beside_healing`.
+    slides : bool
+        Whether it is about slow sliding with friction that has a state.
+    sampled : bool
+        Whether its law runs once per sample.
+    root : ImplicitRoot or None
+        Implicit step of its law.
+    slip_rate_error : UpperBound or None
+        [m/s]; None where it is not claimed.
+    """
+
+    __slots__ = ()
+    proved: ClassVar[Literal[True]] = True
+    kind: ClassVar[str]
+    plant: ClassVar[str] = ""
+    scope: ClassVar[str] = ""
+    covers_healing: ClassVar[bool] = False
+    slides: ClassVar[bool] = False
+    sampled: ClassVar[bool] = True
+
+    @abstractmethod
+    def check(self) -> Verdict:
+        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
+
+    @abstractmethod
+    def sentence(self) -> str:
+        """Statement of the claims and of all that they depend on, as text."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Exact claims as texts, SI."""
+
+    @property
+    @abstractmethod
+    def bounds(self) -> Mapping[str, Bound]:
+        """Claimed bounds by name, in SI units."""
+
+    @property
+    def lasts(self) -> str:
+        """For how long."""
+        return "for all t >= 0"
+
+    @property
+    def motion(self) -> str:
+        """What the slip rate is bounded for."""
+        return ""
+
+    @property
+    def cells(self) -> tuple[Any, ...]:
+        """Parts of a box of constants for which the claims are proved one by one; none where it is not divided."""
+        return ()
+
+    @property
+    def root(self) -> ImplicitRoot | None:
+        """Implicit step of the law."""
+        return None
+
+    @property
+    def slip_rate_error(self) -> UpperBound | None:
+        """Bound of the slip-rate error [m/s]."""
+        return None
+
+
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
+class NoProof:
+    """Result without a proof, with its reason.
+
+    Attributes
+    ----------
+    reason : str
+        Names the quantity that fails.
+    small_gain : UpperBound or None
+        At least 1; None where something else fails, such as the stability of the nominal loop.
+    needs : Fraction, optional
+        Change of the pressure between samples that the pump would have to make [Pa].
+    pressed : bool
+        Whether only the pressure fails: it exceeds a pump limit, or opens the fault.
+    """
+
+    proved: ClassVar[Literal[False]] = False
+    bounds: ClassVar[Mapping[str, LowerBound | UpperBound]] = MappingProxyType({})
+    reason: str
+    small_gain: UpperBound | None = None
+    needs: Fraction | None = None
+    pressed: bool = False
+
+    def check(self) -> Verdict:
+        """UNDECIDED."""
+        return Verdict.UNDECIDED
+
+    def sentence(self) -> str:
+        """For people."""
+        return f"none: {self.reason}"
