@@ -1,4 +1,4 @@
-"""What the public names of a room are called with: every argument is of the type that its annotation says."""
+"""Type checks of arguments of public functions and classes, from their annotations."""
 
 import ast
 import dataclasses

@@ -1,4 +1,4 @@
-"""Kept on the disk of one user for the next command: compiled code, runs, figures, what searches found. No verdict.
+"""Disk cache of one user: compiled code, runs, figures and results of searches; no verdicts.
 
 What is kept is found by its content alone: the question, the sources of this package, the versions of Python and of the
 libraries, and the machine. So nothing is ever out of date. A search only proposes, here as elsewhere: what it proposed

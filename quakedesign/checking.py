@@ -1,4 +1,4 @@
-"""Re-checking files for people: a verdict and what exactly was verified."""
+"""Re-checking certificate files: a verdict and the statement that was verified."""
 
 from collections.abc import Sequence
 from dataclasses import replace

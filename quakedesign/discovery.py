@@ -1,4 +1,4 @@
-"""What stands one a file in a folder, found by looking into it; and what users add, found by its module."""
+"""Discovery of extensions: one file each in a folder of the package, or a module of a user."""
 
 import sys
 from collections.abc import Collection, Iterator, Mapping

@@ -1,4 +1,4 @@
-"""The exceptions of quakedesign: one small tree, each message says what, expected, received, remedy."""
+"""Exceptions of quakedesign: each message gives quantity, condition, value and remedy."""
 
 import re
 from collections.abc import Iterable

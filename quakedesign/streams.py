@@ -1,4 +1,4 @@
-"""What a process begins with: streams that may be closed, a width that may be absurd, memory that may not do."""
+"""Standard streams, terminal width and memory at the start of a process."""
 
 import errno
 import io

@@ -1,4 +1,4 @@
-"""Text of users as it may be shown: what a terminal would obey is written out, what is too long is shortened."""
+"""Text for terminals: control characters written out, long text shortened, quantities with prefixes."""
 
 import re
 from bisect import bisect

@@ -1,4 +1,4 @@
-"""What all commands share: the application, output and progress."""
+"""Application, output and progress that all commands share."""
 
 import json
 import logging

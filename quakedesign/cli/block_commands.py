@@ -1,4 +1,4 @@
-"""What the commands about one fault do with a file of several blocks."""
+"""Commands about one fault, for files of several blocks."""
 
 import os
 from collections.abc import Collection

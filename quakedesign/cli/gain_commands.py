@@ -1,4 +1,4 @@
-"""Commands `synthesise` and `map`, about gains with a proof."""
+"""Commands `synthesise` and `map`: gains with a proof."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Commands `simulate`, `sampling`, `export` and `campaign`, about one closed loop."""
+"""Commands `simulate`, `sampling`, `export` and `campaign`: runs of one closed loop."""
 
 from collections.abc import Sequence
 from dataclasses import fields

@@ -1,4 +1,4 @@
-"""Faults of several blocks in a row with springs between neighbours, and wells along them; their files.
+"""Faults of several blocks in a row, coupled by springs, with wells along them; their files.
 
 A fault file with ``[[block]]`` tables. Without a diffusivity the pressure along the fault is steady: linear between two
 wells, constant beyond the last ones, taken at the middle of each block. With a diffusivity D the pressure diffuses

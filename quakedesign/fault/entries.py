@@ -1,4 +1,4 @@
-"""Entries of a fault file, declared once by fields of dataclasses, and the tables that contain them.
+"""Entries of fault files, declared once as fields of dataclasses, and the tables that contain them.
 
 The metadata of a field are its `unit`, `symbol`, `example`, `default` and `text`; without a text, the description is
 that of the docstring. Reading, writing, template, JSON Schema and reference page use the same entries.

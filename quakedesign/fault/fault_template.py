@@ -1,4 +1,4 @@
-"""Commented fault file to start from, and the JSON Schema of fault files, both of the same entries."""
+"""Commented template of a fault file, and the JSON Schema of fault files, from the same entries."""
 
 import inspect
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""Quantities with units, at the boundary only."""
+"""Quantities with units: parsing, conversion to SI, and output."""
 
 import re
 from decimal import Decimal

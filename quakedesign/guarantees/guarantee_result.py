@@ -1,4 +1,4 @@
-"""Results of a guarantee: proved bounds or a reason, reported with the worst case found.
+"""Results of `quakedesign.guarantee` without stick and in slow sliding: proof, worst case found, limits.
 
 One class for loops on a moving reference, and one for rate-and-state faults in slow sliding.
 """

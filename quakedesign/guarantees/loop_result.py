@@ -1,4 +1,4 @@
-"""Interface of all results of `quakedesign.guarantee`, and that about an uncertain plant."""
+"""Interface of all results of `quakedesign.guarantee`, and the result for an uncertain plant."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass

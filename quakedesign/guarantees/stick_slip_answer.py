@@ -1,4 +1,4 @@
-"""Result of a guarantee on the stick–slip plant, with the worst case that a search finds."""
+"""Results of `quakedesign.guarantee` on the stick–slip plant: proof, worst case found, limits."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Whether a fit explains a record: tests of what it takes for granted, and a verdict in words.
+"""Whether a fit explains a record: tests of its assumptions, and a verdict.
 
 The noise to compare with is measured where no friction law is needed: from sample to sample, and about a line in the
 steady beginning.

@@ -1,4 +1,4 @@
-"""Noise that samples share with their neighbours: white noise and an Ornstein-Uhlenbeck process.
+"""Correlated noise of records: white noise and an Ornstein–Uhlenbeck process.
 
 Servos, filters, screws and the rock itself wander; least squares that takes such noise for independent is too sure.
 The process fades with time or with displacement, whichever has the larger restricted likelihood.

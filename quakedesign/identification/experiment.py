@@ -1,4 +1,4 @@
-"""What every experiment offers to a fit: friction at the instants of a record, and its slopes in the parameters."""
+"""Interface of experiments for the fit: friction at the samples of a record, and its derivatives."""
 
 import math
 from abc import ABC, abstractmethod

@@ -1,4 +1,4 @@
-"""Fault files whose friction and box hold every law that a record allows.
+"""Fault files whose friction and box cover every law that a record allows.
 
 The plant is x″ = −N̂[μ(x)(σ′ − p) − μ(0)σ′] − k̂x − …, so multiplying μ by a number and dividing N̂ by it changes
 nothing. A law of the record's box with the static friction s is therefore, on a fault with N̂, the same as s₀/s times

@@ -1,4 +1,4 @@
-"""What a record tells of a friction law, and what it does not."""
+"""Result of an identification: parameters, intervals, verdict, and what to measure next."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Identification of friction parameters from a record: the experiment, the fit with what is chosen in it, regions."""
+"""Identification of friction parameters from a record: choice of the experiment, fit, confidence region."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What drives an experiment: load point and normal load as straight pieces, with rates from the data or given.
+"""Loading of an experiment: load point and normal stress as piecewise linear functions of time.
 
 Noise of a transducer that is followed sample by sample would drive the simulated spring.
 """

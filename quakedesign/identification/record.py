@@ -1,4 +1,4 @@
-"""Laboratory records: what columns mean in SI, their noise, and means of neighbouring samples in place of many."""
+"""Laboratory records: columns in SI, noise, and means of neighbouring samples."""
 
 import heapq
 import re

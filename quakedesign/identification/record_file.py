@@ -1,4 +1,4 @@
-"""Files as laboratories write them: text of any dialect, xlook's text and binary, MATLAB arrays.
+"""Laboratory files: text of any dialect, xlook's text and binary formats, MATLAB arrays.
 
 A file becomes columns with the names, units and numbers that it has. What they mean is decided in
 `quakedesign.identification.record`.

@@ -1,4 +1,4 @@
-"""Several steps of one experiment: each by itself, and one law for all of them.
+"""Several velocity steps of one experiment: each fitted alone, and one law fitted to all.
 
 The common fit shares the parameters of the law and the stiffness. Level, trend, beginning and delays are those of each
 step, and so is its noise: samples count in its deviations.

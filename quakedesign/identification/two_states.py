@@ -1,4 +1,4 @@
-"""Friction with two states: a second effect that evolves over another slip, for records that one does not explain."""
+"""Friction with two states: a second evolution effect with another critical slip."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar

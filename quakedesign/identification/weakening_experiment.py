@@ -1,4 +1,4 @@
-"""Friction that weakens with slip: at a measured slip, or on a block that a stiff spring draws."""
+"""Experiments with slip-weakening friction: at a measured slip, or with a block behind a stiff spring."""
 
 from dataclasses import dataclass
 from functools import cached_property

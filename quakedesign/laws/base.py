@@ -1,4 +1,4 @@
-"""Base classes of laws: closed loop for proofs, and controllers of a fault."""
+"""Base classes of control laws: closed loop for proofs, and controllers of a fault."""
 
 import tomllib
 from abc import ABC, abstractmethod

@@ -1,4 +1,4 @@
-"""Control laws by name, discovered in this folder; and the gains of the paper."""
+"""Control laws by name, discovered in this folder, and the published gains."""
 
 import tomllib
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Gains carried from one fault to a similar one, with exponents inferred from the terms of the law.
+"""Gains scaled from one fault to a similar one, with exponents from the terms of the law.
 
 A law keeps its effect if every one of its terms scales as what it adds to: the pressure with λ_p, an integral state's
 rate with that state over time. Slip errors scale with λ_δ, slip-rate errors with λ_δ/λ_t. These conditions are linear

@@ -1,4 +1,4 @@
-"""The end of an implicit step as a third signal of a law: w solves w = e2 − q(e1 + T_s·w, w), q odd and never falling.
+"""Implicit step of a sampled law: w solves w = e2 − q(e1 + T_s·w, w), with q odd and non-decreasing.
 
 q is a sum of signed powers with factors that are not negative, of the slip error and the slip-rate error at the end of
 the step or of such sums again, so that it is monotone by construction; ⌈x⌋⁰ is the set-valued sign. F(w) = w − e2 + q

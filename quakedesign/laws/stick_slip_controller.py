@@ -1,4 +1,4 @@
-"""The sampled law for friction that sticks as a controller that simulations run."""
+"""Controller for simulations of the sampled law for the stick–slip plant."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

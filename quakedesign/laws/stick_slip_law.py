@@ -1,4 +1,4 @@
-"""A sampled law for friction that sticks: its predicted slip rate is never negative, and it uses the measured slip."""
+"""Sampled law for the stick–slip plant: its predicted slip rate is never negative."""
 
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Sampled linear laws of a user: from matrices, gains or a PID, and from files that may come from anybody.
+"""Sampled linear laws of users: from matrices, gains or a PID, and from untrusted files.
 
 Chapters: the law; an integrator that rounding has moved; files.
 """

@@ -1,4 +1,4 @@
-"""Frequency-domain and linear limits of the e-LQR: what no certificate can exceed, and what measuring shows."""
+"""Frequency-domain limits of the e-LQR: margins that no certificate can exceed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""From the uncertainty of a fault to the bounds of the linear design, every term by name (ERRATA 6 to 11, 24)."""
+"""Bounds of the linear design from the uncertainty of a fault, term by term (ERRATA 6 to 11, 24)."""
 
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Verdict on a given gain K of a fault, with the files that prove it.
+"""Verdict on a given gain K for a fault, with the files that prove it.
 
 Definiteness of a matrix is written as a sum of squares (proofs/FORMAT.md).
 """

@@ -1,4 +1,4 @@
-"""Loop setup: everything between a control law and the fault, stated once.
+"""Loop setup: sampling, delay, actuator, diffusion path and noise between a law and the fault.
 
 `LoopSetup` is read by the guarantee, the simulation, the command line and the documentation: each field carries its
 unit, its help text and its JSON key.

@@ -1,4 +1,4 @@
-"""Exact values that uncertain plants are made of, for what decides about them."""
+"""Exact values of uncertain plants: matrices, sectors, loads."""
 
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Ranges and inputs of the error loop from the data of a fault, by rational inequalities.
+"""Plant of a fault on a moving reference: ranges and inputs of its error loop, by rational inequalities.
 
 About p*(t), the pressure of equilibrium at rest at the reference r(t), the error e = x − (r, r′) satisfies
 

@@ -1,4 +1,4 @@
-"""Slow-sliding task of a rate-and-state fault in rationals, and cells of its parameter box.
+"""Plant of a rate-and-state fault in slow sliding, in rationals, and cells of its parameter box.
 
 Quantities are per unit of area. Bisection of the box of constants gives cells that cover it, whatever the
 cuts.

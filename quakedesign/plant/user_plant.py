@@ -1,4 +1,4 @@
-"""Plants of users, and of several blocks: a linear part, sectors, loads and disturbances, in exact numbers.
+"""Uncertain plants of users and of several blocks: linear part, sectors, loads and disturbances.
 
 x′ = Ax + B(u − v) + Σ entry·φ(row·(x, u − v), t) + Σ entry·d(t). A sector φ lies between two slopes, for all values of
 its argument or for those within a bound; a load v(t) changes slowly; a disturbance d is any measurable function of a

@@ -1,4 +1,4 @@
-"""Comparisons that show themselves: as JSON, as figures, in a notebook."""
+"""Comparisons as JSON, as figures, and in notebooks."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any

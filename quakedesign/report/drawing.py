@@ -1,4 +1,4 @@
-"""Common style of figures, figure files for journals, inline SVG, and cached figures."""
+"""Style of figures, figure files for journals, inline SVG, and cached figures."""
 
 import io
 import json

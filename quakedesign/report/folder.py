@@ -1,4 +1,4 @@
-"""The folder of results, complete or not there."""
+"""Result folders, written whole or not at all."""
 
 import os
 from collections.abc import Callable, Sequence

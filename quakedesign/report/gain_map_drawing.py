@@ -1,4 +1,4 @@
-"""A map of certified gains as a figure, a table and a folder; what was screened and what was proved look different."""
+"""Map of certified gains as a figure, a table and a folder; screened and proved cells look different."""
 
 from collections.abc import Sequence
 from importlib.metadata import version

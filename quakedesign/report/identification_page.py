@@ -1,4 +1,4 @@
-"""An identified law on a terminal and as a figure."""
+"""Identified friction law on a terminal and as a figure."""
 
 import math
 from pathlib import Path

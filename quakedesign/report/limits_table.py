@@ -1,4 +1,4 @@
-"""Limits of a fault as lines, as a figure and as a folder."""
+"""Performance limits of a fault as lines, as a figure and as a folder."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A sampling report on a terminal and in a folder."""
+"""Sampling study on a terminal and in a folder."""
 
 from collections.abc import Sequence
 from itertools import zip_longest

@@ -1,4 +1,4 @@
-"""A closed loop in Gallina: its field, V and claims, from which Rocq derives the obligations itself."""
+"""Closed loops in Gallina: field, V and claims, from which Rocq derives the obligations."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass

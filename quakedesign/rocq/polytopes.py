@@ -1,4 +1,4 @@
-"""An invariant polytope of the stick–slip plant in Gallina: loop, facets, responses, multipliers of every facet."""
+"""Invariant polytopes of the stick–slip plant in Gallina: loop, facets, responses, multipliers."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace

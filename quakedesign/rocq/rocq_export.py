@@ -1,4 +1,4 @@
-"""Self-contained files that Rocq's compiler verifies: the library of ``proofs/rocq``, a statement and its proof."""
+"""Self-contained files for Rocq: the library of ``proofs/rocq``, a statement and its proof."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence

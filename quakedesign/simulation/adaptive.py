@@ -1,4 +1,4 @@
-"""Runs of smooth loops to a tolerance, watched at every instant of the grid as if each were a step."""
+"""Adaptive runs of smooth loops, with metrics at every point of the grid."""
 
 from collections.abc import Callable
 from functools import cache, partial

@@ -1,4 +1,4 @@
-"""Runs of a fault of several blocks under a sampled law, on the stick–slip plant: friction holds each block at rest."""
+"""Runs of a fault of several blocks under a sampled law, on the stick–slip plant."""
 
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Blocks with rate-and-state friction that elasticity couples: cycles, runs under a law, and diffusing pressure.
+"""Coupled blocks with rate-and-state friction: seismic cycles, runs under a law, pressure diffusion.
 
 With ζ the slip less that of the far end, N = σ' − p and S the stress on a block per slip of every block, for each block
 

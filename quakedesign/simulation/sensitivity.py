@@ -1,4 +1,4 @@
-"""How a sampled loop answers to its sampling period, to noise and to its input gain: tables and figures."""
+"""Sensitivity of a sampled loop to its sampling period, noise and input gain: tables and figures."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

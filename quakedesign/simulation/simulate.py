@@ -1,4 +1,4 @@
-"""One closed loop from rest over the whole task."""
+"""Simulation of one closed loop from rest over the whole task."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A controlled fault with rate-and-state friction: sampled, held, through rock, with a stiff solver between samples."""
+"""Runs of a controlled fault with rate-and-state friction: zero-order hold, diffusion path, stiff solver."""
 
 import math
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Long runs in steps: checkpoints, kept instants, and cached results.
+"""Long runs in steps: checkpoints, retained samples, and cached results.
 
 An interrupted run continues with bitwise the same numbers.
 """

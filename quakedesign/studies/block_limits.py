@@ -1,4 +1,4 @@
-"""Limits of every controller of a fault of several blocks: unstable modes, and which of them no well reaches.
+"""Performance limits of a fault of several blocks: unstable modes that no well reaches.
 
 **Limit.** Let every block weaken at its steepest slope, with its least damping, and let ℓ be a left eigenvector of an
 unstable pole p of this linear plant: z = ℓ·(x, x′) obeys z′ = pz + ℓ·(φ + βbS(P − P*)). With constant φ of size H whose

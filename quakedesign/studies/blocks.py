@@ -1,4 +1,4 @@
-"""May one block stand for a fault? What is proved of a fault that is cut into several blocks."""
+"""Whether one block is an adequate model of a fault: guarantees of the fault cut into several blocks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

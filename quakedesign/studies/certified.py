@@ -1,4 +1,4 @@
-"""Answers about given gains of a homogeneous law, as facts for JSON and as sentences."""
+"""Verdicts on given gains of a homogeneous law, as facts for JSON and as sentences."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Faults of several blocks: what is proved of them, and how they run."""
+"""Faults of several blocks: guarantees and runs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -1,4 +1,4 @@
-"""Where the paper cannot be taken literally: every point as a check that computes, found in ``proofs/errata``."""
+"""Errata of the paper: each one a check that computes, found in ``proofs/errata``."""
 
 import sys
 from collections.abc import Callable, Iterable

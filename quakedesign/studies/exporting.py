@@ -1,4 +1,4 @@
-"""A controller as C, with what its differentiator needs."""
+"""Export of a controller as C, with the settings of its differentiator."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Gains scaled from one fault to another, as in the command ``scale``."""
+"""Gains scaled from one fault to another, as by the command ``scale``."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Bounds and chord slopes of a friction law that proofs may use: what it declares, checked against its expression."""
+"""Bounds and chord slopes of a friction law for proofs: its declared values, checked against its expression."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

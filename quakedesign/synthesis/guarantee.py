@@ -1,4 +1,4 @@
-"""Guarantee of a sampled loop, for given gains or a design."""
+"""`quakedesign.guarantee`: proved bounds of a sampled loop, for given laws or designs."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor

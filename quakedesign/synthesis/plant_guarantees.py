@@ -1,4 +1,4 @@
-"""Guarantee of an uncertain plant, with a law as control engineers have it in exact numbers."""
+"""Guarantees of uncertain plants under laws in exact numbers."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Homogeneous laws: base gains that are proved, and a scale λ for the fault."""
+"""Design of sliding modes: base gains with a proof, and a scale λ for the fault."""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Linear state feedback with integral action: Riccati equations, quadratic V, guarantees."""
+"""Design of linear state feedback with integral action: Riccati equations, quadratic V, guarantees."""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Objects that several kinds of guarantee files have: fault, reference, disturbance, implicit steps (proofs/FORMAT.md).
+"""Objects shared by several kinds of guarantee files: fault, reference, disturbance, implicit step.
 
 Each object says what its keys are and how it becomes a value of the package, and back.
 """

@@ -1,4 +1,4 @@
-"""Certificate files of guarantees (proofs/FORMAT.md): their objects with typed fields, reading, writing.
+"""Certificate files of guarantees (proofs/FORMAT.md): objects with typed fields, reading, writing.
 
 An object says what its keys are; `quakedesign.sos.exact.strict` reads and writes it by their types. Numbers are in SI
 units.

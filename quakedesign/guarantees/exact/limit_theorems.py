@@ -1,4 +1,4 @@
-"""Performance limits of every controller: two theorems evaluated in ball arithmetic.
+"""Performance limits of every controller: theorems, evaluated in ball arithmetic.
 
 Theorem 1 bounds the smallest peak error at a given sampling period. Theorem 2 gives the longest reaction
 and diffusion times, and the smallest withdrawal, with which a controller may stabilise the fault. The first

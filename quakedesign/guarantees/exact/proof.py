@@ -1,4 +1,4 @@
-"""What every proof of a loop offers, whatever its plant: `Proof`, and `NoProof` with a reason where there is none."""
+"""Interface of all proofs about a loop: `Proof`, and `NoProof` with a reason where there is none."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Several blocks with rate-and-state friction that slide slowly under their wells, as an uncertain plant.
+"""Several blocks with rate-and-state friction in slow sliding, as an uncertain plant.
 
 Each block obeys the equations of `sliding_small_gain`, whose symbols are used here, and springs pull it towards its
 neighbours: with q the pressures of the wells beside the plan Kr/μ*, behind a lag, S their shares, and

@@ -1,4 +1,4 @@
-"""Files of guarantees on the stick–slip plant (proofs/FORMAT.md)."""
+"""Files of proofs on the stick–slip plant (proofs/FORMAT.md)."""
 
 from fractions import Fraction
 from typing import Any

@@ -1,4 +1,4 @@
-"""A guarantee on the stick–slip plant as a statement that checks itself."""
+"""Proof about a sampled loop on the stick–slip plant: claims, their check, and the statement."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace

@@ -1,4 +1,4 @@
-"""Stick–slip plant: an invariant polytope of the sampled loop with friction that holds the fault at rest.
+"""Invariant polytope of the sampled loop on the stick–slip plant, verified in ball arithmetic.
 
 **Plant.** Let y = x2 ≥ 0 be the slip rate, p*(x1) the pressure that balances the fault at rest at slip x1, b·β(x1) =
 μN̂, and U = p*(x1) − p at a sample with the held pressure p. For the slip ξ since the sample

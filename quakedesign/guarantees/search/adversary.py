@@ -1,4 +1,4 @@
-"""Falsification of guaranteed loops: worst case found, a lower bound on the errors.
+"""Falsification of guaranteed loops: worst case found (lower bound).
 
 Chapters: sampled loop on a moving reference, with disturbance, friction slope, damping and input gain at
 their extremes; slow sliding, with adverse shear stress at the corners of the box of a, b and D_c.

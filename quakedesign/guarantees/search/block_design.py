@@ -1,4 +1,4 @@
-"""Laws for several blocks of a fault and their wells, chosen by an estimate of what is proved.
+"""Laws for several blocks of a fault and their wells, designed by estimates of the provable bounds.
 
 Linear-quadratic feedback of what is measured, with an estimate of the disturbance from the innovation of the slip
 rates: of all blocks where each has a well, else of averages, one for each well. In a decentralised law each well has

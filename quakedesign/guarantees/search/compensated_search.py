@@ -1,4 +1,4 @@
-"""Design of sliding modes in the scheme ``compensated``, with guaranteed bounds.
+"""Design of sliding modes in the schemes ``compensated`` and ``stick-slip``, with guaranteed bounds.
 
 The implicit step of a law is read from the scheme as a sum of signed powers; then scale, weight and
 authority are chosen by their certified bounds.

@@ -1,4 +1,4 @@
-"""Default designs of a fault: e-LQR and sliding mode for its own T_s or the longest proved.
+"""Default designs for a fault: e-LQR and sliding mode at its own T_s, or at the longest T_s with a proof.
 
 The second chapter states which schemes of a sliding mode have a guarantee (``compensated`` and ``stick-slip``) and why.
 """

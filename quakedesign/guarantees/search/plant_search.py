@@ -1,4 +1,4 @@
-"""Search for a guarantee of an uncertain plant under a sampled law: bounds of sectors, numbers of the small gain."""
+"""Search for a proof about an uncertain plant under a sampled law: bounds of the sectors."""
 
 from dataclasses import replace
 from fractions import Fraction

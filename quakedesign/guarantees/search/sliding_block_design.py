@@ -1,4 +1,4 @@
-"""Laws for blocks in slow sliding: the slips of the blocks, or an average for each well, are measured.
+"""Laws for blocks in slow sliding that measure the slip of each block, or an average for each well.
 
 Linear-quadratic feedback of a Kalman filter of slips, states of friction, pressures and a constant pressure error of
 each well, with weights from a search with the estimate of what is proved.

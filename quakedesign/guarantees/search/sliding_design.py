@@ -1,4 +1,4 @@
-"""Search for slow-sliding laws with a guarantee over a box of friction constants.
+"""Search for slow-sliding laws with a proof over a box of friction constants.
 
 The second chapter finds how distant a well, or how fast the sliding, may be, by continuation from an easy
 case.

@@ -1,4 +1,4 @@
-"""Designs with a guarantee on the stick–slip plant: gains by the states that disturbances reach, then a polytope."""
+"""Designs with a proof on the stick–slip plant: gains, then an invariant polytope."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace

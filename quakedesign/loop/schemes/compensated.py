@@ -1,4 +1,4 @@
-"""The implicit step with an estimate of the disturbance in place of the integral states."""
+"""The implicit step with a disturbance estimate in place of the integral states."""
 
 import math
 from dataclasses import dataclass

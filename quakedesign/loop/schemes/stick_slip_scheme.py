@@ -1,4 +1,4 @@
-"""The implicit step with the disturbance estimate of `StickSlipLaw`, which does not wind up while the fault rests."""
+"""The implicit step with the disturbance estimate of `StickSlipLaw`, which does not wind up at rest."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar

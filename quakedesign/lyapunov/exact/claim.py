@@ -1,4 +1,4 @@
-"""What a certificate is about, and what it consists of."""
+"""Statement of a Lyapunov certificate, and its evidence."""
 
 import dataclasses
 from collections.abc import Mapping

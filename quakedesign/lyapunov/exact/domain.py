@@ -1,4 +1,4 @@
-"""Where a certificate speaks about a fault although the control itself moves the matched perturbation (ERRATA 16).
+"""Domain of a certificate where the control itself moves the matched disturbance (ERRATA 16).
 
 Two ways to split h, both rigorous:
 

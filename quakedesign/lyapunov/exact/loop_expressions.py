@@ -1,4 +1,4 @@
-"""The field of a loop, and the units of its states, in SymPy."""
+"""Vector field of a loop, and units of its states, in SymPy."""
 
 from collections.abc import Mapping
 from fractions import Fraction

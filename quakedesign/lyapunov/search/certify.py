@@ -1,4 +1,4 @@
-"""Verdict on given gains of a homogeneous law, and the proved limits of these gains.
+"""Verdict on given gains of a homogeneous law, and proved margins of these gains.
 
 The limits are the largest disturbance bound, the largest range of β, and the decay rate. Each is located
 by Newton's rule on the margin of the conic programme, kept inside a bracket.

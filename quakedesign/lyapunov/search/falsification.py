@@ -1,4 +1,4 @@
-"""Runs against a homogeneous loop without a proof: disturbances under which its state grows. Measured, not proved."""
+"""Simulations against a homogeneous loop without a proof: disturbances under which its state grows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Exact proofs that a whole family holds no Lyapunov function: points and weights at which every one of them fails."""
+"""Exact proofs that a family contains no Lyapunov function, by points and weights (exact duals)."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

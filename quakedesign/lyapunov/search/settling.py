@@ -1,4 +1,4 @@
-"""How fast a proved loop settles: the rate κ of V̇ ≤ −κV^{n/m}, and the bound on the settling time that follows."""
+"""Settling time of a proved loop: the rate κ of V̇ ≤ −κV^{n/m}, and its bound."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

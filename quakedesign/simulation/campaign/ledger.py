@@ -1,4 +1,4 @@
-"""Folder of a campaign: what it is about, and one file for each batch that is done, written whole."""
+"""Folder of a campaign: its settings, and one file for each finished batch."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""What the engine says: a verdict with its proof, which can be checked again without a solver."""
+"""Result about a polynomial: a verdict with its proof, which is re-checked without a solver."""
 
 from collections.abc import Mapping
 from dataclasses import field

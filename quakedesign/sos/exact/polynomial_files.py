@@ -1,4 +1,4 @@
-"""The file about one polynomial (proofs/FORMAT.md): read strictly, written whole."""
+"""Files about one polynomial (proofs/FORMAT.md): strict reading, writing."""
 
 import json
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""What is asked: whether multiplier · polynomial is in the cone of a simple semialgebraic set."""
+"""Statement of a problem: whether multiplier · polynomial lies in the cone of a basic semialgebraic set."""
 
 from collections.abc import Iterator
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Exact reduction of the monomial bases before anything is solved.
+"""Exact reduction of monomial bases before a problem is solved.
 
 One rule does the work of Newton polytope and diagonal inconsistency. Let e be a monomial to which no equality and
 only diagonal Gram entries contribute, each with a positive factor. If its coefficient in the target is zero, all

@@ -1,4 +1,4 @@
-"""JSON read strictly: canonical rationals, bounded sizes, no unknown or duplicate keys; one reason for a refusal."""
+"""Strict reading of JSON: canonical rationals, bounded sizes, no unknown or duplicate keys."""
 
 import json
 import math

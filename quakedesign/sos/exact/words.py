@@ -1,4 +1,4 @@
-"""Sentences about the answer to a polynomial problem, and about regions of attraction."""
+"""Sentences about results for polynomials and regions of attraction."""
 
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, Context, Decimal

@@ -1,4 +1,4 @@
-"""A budget of work for a check, counted in the arithmetic before it is done (proofs/FORMAT.md), never in time.
+"""Budget of work for a check, counted in arithmetic operations before they are done (proofs/FORMAT.md).
 
 Without `limited` around it nothing is counted: a search may take as long as it is let.
 """

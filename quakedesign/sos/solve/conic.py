@@ -1,4 +1,4 @@
-"""Programmes stated in cvxpy and solved by Clarabel: once, or compiled and solved again with other Parameters."""
+"""Conic programmes stated in cvxpy and solved by Clarabel: once, or compiled with parameters."""
 
 import warnings
 from collections.abc import Iterator, Sequence

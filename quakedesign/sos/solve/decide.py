@@ -1,4 +1,4 @@
-"""The search for a proof of one statement: solve, round, look for a point, refute, pass to a face."""
+"""Search for a proof of one statement: solve, round, refute by a point, reduce to a face."""
 
 from dataclasses import dataclass, field
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Faces of the cone: where a target has rational zeros, or a Gram matrix a rational kernel, the basis shrinks.
+"""Facial reduction: rational zeros of the target, or a rational kernel of the Gram matrix, shrink the basis.
 
 A wrong guess costs time, never truth: the proof is checked against the full statement in the end.
 """

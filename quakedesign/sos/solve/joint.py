@@ -1,4 +1,4 @@
-"""Decision variables that put many polynomials into their cones at once, with the largest common margin.
+"""Decision variables with which several polynomials lie in their cones, with the largest common margin.
 
 Primal: maximise t with C_o + Σ_j x_j P_oj − t·N_o in the cone of every obligation o, and x within limits. It is stated
 from the other side,

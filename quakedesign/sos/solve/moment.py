@@ -1,4 +1,4 @@
-"""Membership in a cone as a semidefinite programme over functionals L, handed to Clarabel without a modelling layer.
+"""Membership in a cone as a semidefinite programme over functionals, passed to Clarabel directly.
 
     minimise L(target) + 4y  subject to  L(g_S·b bᵀ) ⪰ 0 for every block,  Σ traces + y = 1,  y ≥ 0,  L(m·h) = 0.
 
