@@ -14,7 +14,16 @@ import signal
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    as_completed,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
@@ -22,11 +31,61 @@ from multiprocessing import get_context, parent_process
 from threading import Thread, current_thread, main_thread
 from time import monotonic
 from types import FrameType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.files import discard_all, number_placed, sweep_system
 from quakedesign.text import one_line
+
+_Result = TypeVar("_Result")
+_SWITCH = 2e-4  # seconds after which threads take turns while one runs in the background
+_PATIENT = 0.2  # seconds between two reports of progress
+
+
+class Background:
+    """One thread beside the caller's, for runs: compiled steps and the C compiler need no interpreter lock."""
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self._stopped = False
+        self._done = 0.0
+
+    def _report(self, done: float) -> None:
+        """Progress of the thread, which ends here when the caller does not wait any longer."""
+        if self._stopped:
+            raise SimulationError("the run was stopped.")
+        self._done = done
+
+    def stop(self) -> None:
+        """End the present run early."""
+        self._stopped = True
+
+    def submit(self, run: Callable[..., _Result], *given: Any, **named: Any) -> "Future[_Result]":
+        """Begin a run, after those before it; it takes ``progress``."""
+        return self._executor.submit(run, *given, **named, progress=self._report)
+
+    def result(self, run: "Future[_Result]", tell: Callable[[float], None]) -> _Result:
+        """Wait for a run, with its progress."""
+        while not run.done():
+            tell(self._done)
+            wait([run], timeout=_PATIENT)
+        return run.result()
+
+
+@contextmanager
+def in_background() -> Iterator[Background]:
+    """Runs beside the caller's work, in the order in which they are submitted; all are ended when the block ends."""
+    interval = sys.getswitchinterval()
+    executor = ThreadPoolExecutor(1)
+    background = Background(executor)
+    sys.setswitchinterval(_SWITCH)
+    try:
+        yield background
+    finally:
+        background.stop()
+        executor.shutdown(cancel_futures=True)
+        sys.setswitchinterval(interval)
+
 
 # ----------------------------------------------------------------------
 # Signals that end a command: one line, the exit code of the shell, no process and no temporary folder left.

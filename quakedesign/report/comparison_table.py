@@ -6,7 +6,6 @@ from typing import Any
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.laws import Controller
-from quakedesign.loop import simulation_scheme
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.report.figures import figures
 from quakedesign.report.page import table_html
@@ -102,17 +101,15 @@ def compare(
         raise ParameterError(
             f"a loop setup of a comparison is that of given laws. Received {setup!r} without one. Give it to design."
         )
-    schemes = {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}
     tell = progress or (lambda _what, _done: None)
     how: dict[str, Any] = {
-        "with_published": with_published,
+        "with_published": with_published and not any(getattr(one, "setup", setup).path for one in designs),
         "whole_task": whole_task,
-        "schemes": schemes,
+        "schemes": _schemes(scheme, published_scheme),
         "plant": plant,
     }
-    judged = [one if isinstance(one, Design) else assess(fault, one, setup) for one in designs]
-    assessed = [made for made, one in zip(judged, designs, strict=True) if made is not one]
-    return Comparison(**vars(compared(fault, judged, tell, given=assessed, **how)))
+    made: Any = ((one, False) if isinstance(one, Design) else (assess(fault, one, setup), True) for one in designs)
+    return Comparison(**vars(compared(fault, made, tell, **how)))
 
 
 def designed_comparison(
@@ -138,7 +135,13 @@ def designed_comparison(
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """
-    for name in filter(None, schemes.values()):
-        simulation_scheme(name)
-    shown: dict[str, Any] = {"whole_task": whole_task, "plant": plant, **schemes}
-    return compare(fault, designs_of(fault, names, tell, {**(options or {}), "plant": plant}), progress=tell, **shown)
+    given = {**(options or {}), "plant": plant}
+    made = ((one, False) for one in designs_of(fault, names, tell, given))
+    how: dict[str, Any] = {"whole_task": whole_task, "plant": plant, "schemes": _schemes(**schemes)}
+    how["with_published"] = not given.get("setup", IDEAL).path
+    return Comparison(**vars(compared(fault, made, tell, **how)))
+
+
+def _schemes(scheme: str | None = None, published_scheme: str | None = None) -> dict[str, str]:
+    """Schemes by origin."""
+    return {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}

@@ -3,7 +3,8 @@
 The second chapter gives the equilibrium pressure [Pa] of a task and tests whether a run supplied it.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -31,6 +32,7 @@ from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
 from quakedesign.lyapunov.exact.fault_bounds import equilibrium_pressure, sectors
 from quakedesign.lyapunov.exact.premises import Variant
+from quakedesign.parallel import Background, in_background
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.integrators import amplification
 from quakedesign.studies.certified import certified_bound, largest_sampling_time, on_trajectory
@@ -166,10 +168,9 @@ class Compared:
 
 def compared(
     fault: Fault,
-    designs: Sequence[Design],
+    designs: Iterable[tuple[Design, bool]],
     tell: Tell,
     *,
-    given: Sequence[Design] = (),
     with_published: bool = True,
     whole_task: bool = False,
     schemes: Mapping[str, str],
@@ -177,7 +178,8 @@ def compared(
 ) -> Compared:
     """Runs of all controllers of a fault, as `quakedesign.report.compare` shows them; schemes by origin.
 
-    Those of the designs that are `given` are verdicts on given laws.
+    Each design says whether it is a verdict on a given law. Runs go on in the background while further designs are
+    made, if these come from a generator.
     """
     require_fault(fault)
     require_plant(fault, plant)
@@ -185,19 +187,24 @@ def compared(
         simulation_scheme(name)
     tell("uncontrolled", 0.0)
     if fault.friction.state_names:
-        return _slowly_compared(fault, designs, tell, whole=whole_task)
-    uncontrolled = natural_earthquake(fault, plant=plant)
-    entries: list[Entry] = []
-    at_once = not any(designed.setup.path for designed in designs)
-    for controller in published(fault.name).values() if with_published and at_once else ():
-        tell(f"{controller.title} (published): verdict", 0.0)
-        entries.append(_entry("published", assess(fault, controller), schemes, tell, plant))
-    for designed in designs:
-        known = any(designed is one for one in given)
-        entry = _entry("designed", designed, schemes, tell, plant, given=known)
-        tell(f"{entry.label}: worst cases", 0.0)
-        entries.append(replace(entry, answer=_answer(fault, designed, given=known)))
-    return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
+        return _slowly_compared(fault, [designed for designed, _ in designs], tell, whole=whole_task)
+    begun: list[tuple[Entry, Future[Trajectory] | None]] = []
+    with in_background() as runs:
+        uncontrolled = runs.submit(natural_earthquake, fault, plant=plant)
+        for controller in published(fault.name).values() if with_published else ():
+            tell(f"{controller.title} (published): verdict", 0.0)
+            begun.append(_begun("published", assess(fault, controller), schemes, runs, plant))
+        for designed, given in designs:
+            begun.append(_begun("designed", designed, schemes, runs, plant, given=given))
+            tell(f"{begun[-1][0].label}: worst cases", 0.0)
+            answer = _answer(fault, designed, given=given)
+            begun[-1] = replace(begun[-1][0], answer=answer), begun[-1][1]
+        natural = runs.result(uncontrolled, partial(tell, "uncontrolled"))
+        entries = [
+            entry if run is None else _ended(entry, runs.result(run, partial(tell, entry.label)), tell)
+            for entry, run in begun
+        ]
+    return Compared(fault=fault, uncontrolled=natural, entries=tuple(entries))
 
 
 def require_plant(fault: Fault, plant: str | None) -> None:
@@ -250,38 +257,38 @@ def designs_of(
     names: Iterable[str],
     tell: Tell,
     options: Mapping[str, Any] | None = None,
-) -> list[Design]:
-    """Designs of the named laws, with options of `quakedesign.design`."""
-    wanted, designs = list(names), []
+) -> Iterator[Design]:
+    """Designs of the named laws, one after the other, with options of `quakedesign.design`."""
+    wanted = list(names)
     for i, name in enumerate(wanted):
         tell(f"synthesis and proof of {name}", i / len(wanted))
-        designs.append(synthesise(fault, name, progress=tell, **(options or {})))
-    return designs
+        yield synthesise(fault, name, progress=tell, **(options or {}))
 
 
-def _entry(
-    origin: str, design: Design, schemes: Mapping[str, str], tell: Tell, plant: str | None, *, given: bool = False
-) -> Entry:
+def _begun(
+    origin: str, design: Design, schemes: Mapping[str, str], runs: Background, plant: str | None, *, given: bool = False
+) -> tuple[Entry, Future[Trajectory] | None]:
+    """Entry without its run, which has begun in the background if there is a controller."""
     sampling = design.controller.sampling if design.controller else None
     scheme = sampling.scheme if sampling else schemes[origin]
     differ = len(set(schemes.values())) > 1
     kind = "given" if given else origin
     label = f"{design.title} ({kind}, {scheme})" if differ else f"{design.title} ({kind})"
+    entry = Entry(label=label, origin=origin, design=design, run=None, given=given)
     if design.controller is None:
-        return Entry(label=label, origin=origin, design=design, run=None)
-    told = design.measurement
-    run = simulate(
-        design.fault,
-        design.controller,
-        scheme=scheme,
-        measurement=told,
-        plant=plant,
-        progress=lambda done: tell(label, done),
-    )
-    entry = Entry(label=label, origin=origin, design=design, run=run, given=given)
-    if design.controller.lipschitz_limit is not None:
-        return _with_rate(entry, design.controller, float(design.controller.lipschitz_limit), run, tell)
-    return entry if sampling else _linear(entry, run, tell)
+        return entry, None
+    options: dict[str, Any] = {"scheme": scheme, "measurement": design.measurement, "plant": plant}
+    return entry, runs.submit(simulate, design.fault, design.controller, **options)
+
+
+def _ended(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
+    """Entry with its run, and what the run decides."""
+    law = entry.design.controller
+    assert law is not None
+    entry = replace(entry, run=run)
+    if law.lipschitz_limit is not None:
+        return _with_rate(entry, law, float(law.lipschitz_limit), run, tell)
+    return entry if law.sampling else _linear(entry, run, tell)
 
 
 def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:

@@ -74,9 +74,15 @@ def test_every_row_says_its_scheme_and_is_the_run_of_it(compared):
 
 def test_the_plant_of_a_comparison_is_that_of_its_runs(monkeypatch):
     given = []
-    monkeypatch.setattr(comparison, "compare", lambda *_, **told: given.append(told["plant"]))
-    comparison.designed_comparison(SHORT, [], lambda *_: None, plant="printed")
-    comparison.designed_comparison(SHORT, [], lambda *_: None)
+
+    def compared(*_, **told):
+        given.append(told["plant"])
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(comparison, "compared", compared)
+    for plant in ({"plant": "printed"}, {}):
+        with pytest.raises(ZeroDivisionError):
+            comparison.designed_comparison(SHORT, [], lambda *_: None, **plant)
     assert given == ["printed", None]
 
 

@@ -1,7 +1,6 @@
 """A design is for the delay, lag and rock that it is told of: searched, judged, run and compared behind them."""
 
 from fractions import Fraction as F
-from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
@@ -58,14 +57,11 @@ def test_nothing_is_searched_beyond_what_any_controller_can_do(asked):
 
 def test_it_is_compared_behind_its_path_without_what_acts_at_once(asked, monkeypatch):
     runs = []
-    monkeypatch.setattr(comparison, "natural_earthquake", lambda fault, plant: Mock(spec=qd.Trajectory))
+    monkeypatch.setattr(comparison, "natural_earthquake", lambda fault, **more: Mock(spec=qd.Trajectory))
     monkeypatch.setattr(comparison, "simulate", lambda fault, law, **more: runs.append(law))
-    monkeypatch.setattr(comparison, "attacked", lambda fault, found: SimpleNamespace(proof=found, compensation=None))
-    monkeypatch.setattr(comparison, "replace", lambda entry, **more: entry)
+    monkeypatch.setattr(comparison, "_answer", lambda *_, given: None)
     design = qd.design(REAL, "elqr", lag=LAG)
-    found = comparison.compared(
-        REAL, [design], lambda *_: None, schemes={"designed": "explicit", "published": "explicit"}
-    )
+    found = qd.compare(REAL, [design])
     assert ([entry.origin for entry in found.entries], runs) == (["designed"], [design.controller])
     assert found.path == {"lag": LAG}
     assert set(found.left_out) == {"cta", "dia"}
