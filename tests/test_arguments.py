@@ -10,7 +10,7 @@ from enum import Enum
 from fractions import Fraction
 from inspect import isclass, isfunction, signature
 from pathlib import Path
-from typing import Unpack
+from typing import TypedDict, Unpack
 
 import numpy as np
 import pytest
@@ -21,7 +21,6 @@ from quakedesign.arguments import checked, matches
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.fault import Disturbance, Reference, UncertaintyBox
 from quakedesign.guarantees import Claims, guarantee
-from quakedesign.guarantees.exact.loop import Around
 from quakedesign.laws import Law, summed_integrals
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.loop import Diffusion
@@ -231,7 +230,14 @@ def test_one_number_and_masked_ones_are_no_collection(values):
         ExtendedLQR.from_values(values)
 
 
-def of_a_loop(**around: Unpack[Around]) -> None:
+class Times(TypedDict, total=False):
+    """Times of a loop [s]."""
+
+    delay: Fraction
+    lag: Fraction
+
+
+def of_a_loop(**times: Unpack[Times]) -> None:
     """Take arguments by the names of a typed dictionary."""
 
 

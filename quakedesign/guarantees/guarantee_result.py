@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import exp
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from quakedesign.exact import LowerBound, UpperBound, exact_text, float_above, r
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS
 from quakedesign.guarantees.exact.limit_theorems import SlidingPush, SmallestPeak, longest_diffusion, smallest_peak
-from quakedesign.guarantees.exact.loop import Around, Held
+from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup, Held
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.statement import SlidingProof, TrackingProof, guarantee
 from quakedesign.guarantees.loop_result import Guarantee
@@ -468,7 +468,7 @@ def answer_sliding(
     stress: Fraction | None = None,
     spread: Fraction = Fraction(0),
     tell: Tell = lambda what, done: None,
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> SlidingGuarantee:
     """Design and prove a law for a rate-and-state fault at the mean rate of its task.
 
@@ -485,8 +485,8 @@ def answer_sliding(
         By how much of their values a, b and D_c may be off [-].
     tell : callable, optional
         Called with what is being done and the fraction done [-].
-    **around : Fraction, Pump
-        As in `design_held`; a lag or a diffusion is needed. A proof is one that the pump can hold all of its pressures.
+    setup : ExactSetup
+        With a lag or a diffusion path. All pressures of a proof are within the limits of its pump.
 
     Raises
     ------
@@ -506,14 +506,14 @@ def answer_sliding(
         raise ParameterError(
             f"stress must be positive. Received {shortly(stress)} Pa. Omit stress for the largest that can be proved."
         )
-    if not (around.get("lag") or around.get("diffusion")):
+    if not (setup.lag or setup.diffusion):
         raise ParameterError(
             "slow sliding needs a diffusion path or a lag between well and fault. Received neither. Give --diffusion, "
             "such as '833 s', or --lag."
         )
     held_over = rational(fault.sampling_time) if step is None else step
     task = slow_sliding_plant(fault, stress or _TRIFLE, spread)
-    pump = around.pop("pump", None)
+    pump, setup = setup.pump, replace(setup, pump=None)
     if pump is not None and pump.rate is not None:
         raise ParameterError(
             "slow sliding has no guarantee with the rate limit of a pump. Received the rate limit "
@@ -521,38 +521,38 @@ def answer_sliding(
         )
     prove = _proof(pump, tell, given=stress is not None)
     tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
-    answer, reach, remedy = _answer(task, held_over, LOG_RATES[0], around, prove), WellReach(share=Fraction(1)), ""
+    answer, reach, remedy = _answer(task, held_over, LOG_RATES[0], setup, prove), WellReach(share=Fraction(1)), ""
     if answer.held is None:
         tell("how far the well may be", 0.3)
-        reach = farthest(task, suitable(task, held_over), around, stressed=stress is not None)
-        remedy = _remedy(fault, task, held_over, reach, around, prove, spread)
+        reach = farthest(task, suitable(task, held_over), setup, stressed=stress is not None)
+        remedy = _remedy(fault, task, held_over, reach, setup, prove, spread)
     for log_rate in LOG_RATES[1:]:
         if (answer.proved and (stress or answer.task.stress > _TRIFLE)) or reach.share < 1:
             break
         tell(f"a law for |ln(v/V)| up to {log_rate}", _SEARCHED)
-        smaller = _answer(task, held_over, log_rate, around, prove, reach.numbers)
+        smaller = _answer(task, held_over, log_rate, setup, prove, reach.numbers)
         more = smaller.proved and (not answer.proved or smaller.task.stress > answer.task.stress)
         answer = smaller if more else answer
     if not answer.proof.proved and not remedy and stress:
-        pumped: dict[str, Any] = {} if pump is None else {"pump": pump}
-        remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, **around, **pumped))
+        pumped = replace(setup, pump=pump)
+        remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, setup=pumped))
         if remedy and answer.held is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
             answer = replace(answer, proof=NoProof(reason=none))
     if not answer.proof.proved and not remedy:
-        remedy = _with_less_noise(task, held_over, around, prove)
+        remedy = _with_less_noise(task, held_over, setup, prove)
     if not answer.proof.proved:
-        why = (stress and _beyond(fault, stress, around)) or answer.proof.reason
+        why = (stress and _beyond(fault, stress, setup)) or answer.proof.reason
         return replace(answer, proof=replace(answer.proof, reason="; ".join(filter(None, (why, remedy)))))
     return answer
 
 
-def _beyond(fault: Fault, stress: Fraction, around: Around) -> str:
+def _beyond(fault: Fault, stress: Fraction, setup: ExactSetup) -> str:
     """Why no controller holds the fault under a stress [Pa] through its rock; empty where that is not proved."""
     most = rational(fault.effective_normal_stress)
     push = SlidingPush(model=sliding_model(fault), amplitude=stress)
     far = longest_diffusion(push, most, Fraction(0))
-    if far is None or around.get("diffusion", 0) <= far:
+    if far is None or setup.diffusion <= far:
         return ""
     return (
         f"no controller whose pressure stays within {LowerBound(most).quantity('Pa')} of what the reference needs can "
@@ -569,21 +569,26 @@ def _under_less(answer: SlidingGuarantee) -> str:
     return f"a proof was found for a stress of at most {most}: give --stress '{most}'; somewhat more may do"
 
 
-def _with_less_noise(task: SlidingPlant, step: Fraction, around: Around, prove: Prove) -> str:
+def _with_less_noise(task: SlidingPlant, step: Fraction, setup: ExactSetup, prove: Prove) -> str:
     """A bound of the slip noise for which a proof was found, all else as it is; empty without one."""
-    for noise in quieter(around):
-        loop: Around = {**around, "slip_noise": noise}
-        if _answer(task, step, LOG_RATES[0], loop, prove).proved:
-            return f"a proof was found {with_noise(noise, around).rstrip()}"
+    for noise in quieter(setup):
+        if _answer(task, step, LOG_RATES[0], replace(setup, slip_noise=noise), prove).proved:
+            return f"a proof was found {with_noise(noise, setup).rstrip()}"
     return ""
 
 
 def _remedy(
-    fault: Fault, task: SlidingPlant, step: Fraction, reach: WellReach, around: Around, prove: Prove, spread: Fraction
+    fault: Fault,
+    task: SlidingPlant,
+    step: Fraction,
+    reach: WellReach,
+    setup: ExactSetup,
+    prove: Prove,
+    spread: Fraction,
 ) -> str:
     """Which T_s, V or path would do; empty where a law was followed through all of the path at the T_s asked for."""
     if reach.share < 1:
-        return what_would_do(fault, task, reach, around, prove, spread=spread)
+        return what_would_do(fault, task, reach, setup, prove, spread=spread)
     suits = suitable(task, step)
     near = f"T_s near D_c/({AGEINGS:g} V), here {float(suits):.2g} s, suits: set sampling_time in [task]"
     return "" if suits == step else near
@@ -615,12 +620,12 @@ def _answer(
     task: SlidingPlant,
     step: Fraction,
     log_rate: Fraction,
-    around: Around,
+    setup: ExactSetup,
     prove: Prove,
     near: np.ndarray | None = None,
 ) -> SlidingGuarantee:
     """With |ln(v/V)| at most `log_rate`, searched near the numbers of a law as well if they are told."""
-    design = designed_sliding(task, step, log_rate=log_rate, near=near, **around)
+    design = designed_sliding(task, step, log_rate=log_rate, near=near, setup=setup)
     if isinstance(design, NoProof):
         return SlidingGuarantee(proof=design, task=task, held=None)
     proved = prove(task, design, log_rate)

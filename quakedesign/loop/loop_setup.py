@@ -261,16 +261,6 @@ class LoopSetup:
         """Fields that differ from their default, by name, in SI units."""
         return {part.name: value for part in fields(self) if (value := getattr(self, part.name)) != part.default}
 
-    def around(self) -> dict[str, Any]:
-        """Fields of a sampled loop beside its law and T_s, those that are not 0.
-
-        The delay of a loop counts from the middle of the averaging time, that of the setup from its end.
-        """
-        beside = {name: value for name, value in self.given().items() if name not in _NOT_OF_A_LOOP}
-        if self.averaging_time:
-            beside |= {"averaging": self.averaging_time, "delay": self.delay + self.averaging_time / 2}
-        return beside if self.pump is None else beside | {"pump": self.pump}
-
     def with_given(self, **given: Quantity | None) -> Self:
         """The setup with those fields that are not None.
 

@@ -10,6 +10,7 @@ import numpy as np
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational
 from quakedesign.files import whole_folder
 from quakedesign.guarantees import SlidingProof
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.report.drawing import NATURAL, figure, finish, write_figures, write_results
 from quakedesign.studies import Limits
 from quakedesign.studies.performance_limits import SlidingLimits
@@ -38,7 +39,7 @@ def limits_lines(limits: Limits) -> list[str]:
 
 def _delay(limits: Limits) -> str:
     """Delay of the loop; limits of slow sliding have none."""
-    late = 0 if isinstance(limits, SlidingLimits) else limits.told.around.get("delay", 0)
+    late = 0 if isinstance(limits, SlidingLimits) else ExactSetup.of(limits.told.setup).delay
     return f", delay {quantity(float(late), 's')}" if late else ""
 
 

@@ -31,6 +31,7 @@ from quakedesign.guarantees.exact.limit_theorems import (
     smallest_stick_slip_rate,
     smallest_withdrawal,
 )
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.guarantee_result import SlidingGuarantee, answer_sliding
 from quakedesign.guarantees.search.lqg import near_path, sliding_model
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Quantity
@@ -141,9 +142,9 @@ class Told:
         return {"slip_noise": self.slip_noise, "rate_noise": None if self._alone else self.rate_noise}
 
     @property
-    def around(self) -> dict[str, Any]:
-        """Of a design."""
-        return {"measured": self.measured, **self.setup.around()}
+    def wanted(self) -> dict[str, Any]:
+        """Arguments of a search for a design."""
+        return {"measured": self.measured, "setup": ExactSetup.of(self.setup)}
 
     def words(self) -> str:
         """For people: rounded up, since who is told less can do less."""
@@ -366,13 +367,13 @@ def limits(
     task, step = uncertain_plant(fault), rational(fault.sampling_time)
     withdrawal, spread = _given(fault, pressure, diffusivity)
     held, own = _proved_steps(task, step, told) if prove else ((), None)
-    late = told.around.get("delay", Fraction(0))
+    late = ExactSetup.of(told.setup).delay
     peak, proved = smallest_peak(task, step, late, **told.bounds), dict[str, Bound | None]()
     if held:
         proved["largest_step"] = LowerBound(held[-1].held.step)
     if own is not None:
         proved["peak_slip_rate_error"] = own.claims.slip_rate_error
-        longest = longest_delay(task, step, **told.around)
+        longest = longest_delay(task, step, **told.wanted)
         proved["largest_delay"] = LowerBound(longest.held.delay) if longest else None
         proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
         if (rock := _proved_rock(task, step, told)) is not None:
@@ -462,8 +463,8 @@ def _sliding_limits(
     model, step = sliding_model(fault), rational(fault.sampling_time)
     asked = None if stress is None else rational(stress, "stress")
     told = setup if setup is not None and setup.path else None
-    near = near_path(model)
-    answer = None if setup is None else answer_sliding(fault, stress=asked, spread=off, diffusion=near)
+    through = ExactSetup(diffusion=near_path(model))
+    answer = None if setup is None else answer_sliding(fault, stress=asked, spread=off, setup=through)
     found = answer.proof if answer is not None and answer.proof.proved else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
@@ -474,7 +475,7 @@ def _sliding_limits(
     push = SlidingPush(model=model, amplitude=amplitude)
     farthest, rock = longest_diffusion(push, withdrawal, step), (told or IDEAL).diffusion
     if told is not None and (farthest is None or rock <= farthest):
-        behind = answer_sliding(fault, stress=asked, spread=off, **told.around()).proof
+        behind = answer_sliding(fault, stress=asked, spread=off, setup=ExactSetup.of(told)).proof
         found = behind if behind.proved else None
         push = replace(push, amplitude=found.task.stress) if found else push
     impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
@@ -507,12 +508,12 @@ def _proved_steps(
     task: FaultPlant, step: Fraction, told: Told
 ) -> tuple[tuple[TrackingProof, ...], TrackingProof | None]:
     """Guarantees at growing T_s up to nearly the longest, and that at the fault's own, if there is one."""
-    own: TrackingProof | NoProof | None = design_held(task, step, objective="peak", **told.around)
-    longest = longest_step(task, **told.around)
+    own: TrackingProof | NoProof | None = design_held(task, step, objective="peak", **told.wanted)
+    longest = longest_step(task, **told.wanted)
     if own is not None and own.proved:
         own = _best_at(own, told)
     else:
-        own = continued(task, step, longest, **told.around)
+        own = continued(task, step, longest, **told.wanted)
     found = [] if own is None else [own]
     if longest is not None and (own is None or longest.guarantee.held.step > step):
         found.append(design_at(task, longest))
@@ -521,12 +522,12 @@ def _proved_steps(
 
 def _best_at(least_peak: TrackingProof, told: Told) -> TrackingProof:
     """Of a design for the smallest slip-rate error and one that tracks, that with the smaller one that is proved."""
-    tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.around)
+    tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.wanted)
     found = [least_peak, *([tracking] if tracking.proved else [])]
     return min(found, key=lambda g: g.claims.slip_rate_error)
 
 
 def _proved_rock(task: FaultPlant, step: Fraction, told: Told) -> LowerBound | None:
     """L²/D [s] behind which a law that is told of a clock is proved."""
-    farthest = farthest_rock(task, step, **told.around)
+    farthest = farthest_rock(task, step, **told.wanted)
     return LowerBound(farthest.held.diffusion) if farthest else None

@@ -21,6 +21,7 @@ from quakedesign.guarantees import (
     TrackingProof,
 )
 from quakedesign.guarantees.exact.limit_theorems import hopeless, too_slow
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
 from quakedesign.guarantees.guarantee_result import answer_sliding
 from quakedesign.guarantees.search.linear_design import nearest_setup
@@ -261,7 +262,7 @@ def guarantee(
             step=setup.step,
             stress=least,
             spread=off,
-            **setup.around(),
+            setup=ExactSetup.of(setup),
             **tell,
         )
     if stress is not None or off:
@@ -287,11 +288,11 @@ def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Want
     """Guarantee on a moving reference; none without given gains where no controller within σ′ can hold the fault."""
     setup, most = wanted.setup, rational(fault.effective_normal_stress)
     step = rational(fault.sampling_time) if setup.step is None else setup.step
-    around: Any = {"measured": setup.measured, **setup.around()}
-    delay = around.get("delay", Fraction(0))
+    exact = ExactSetup.of(setup)
+    delay = exact.delay
     beyond = hopeless(task, most, delay, setup.diffusion)
     if beyond and not wanted.gains:
-        near = nearest_setup(task, step, **around) if law.name == "elqr" else None
+        near = nearest_setup(task, step, measured=setup.measured, setup=exact) if law.name == "elqr" else None
         return TrackingGuarantee(fault=fault, proof=NoProof(reason=beyond), nearest=near)
     result = method_of(law).sampled(fault, task, law, step, wanted)
     slow = "" if wanted.gains else too_slow(task, most, max(step, setup.longest_step), delay)

@@ -21,12 +21,12 @@ from quakedesign.guarantees import (
     Compensation,
     ContinuousProof,
     FaultProof,
-    Held,
     NoProof,
     TrackingGuarantee,
     TrackingProof,
     best_guarantee,
 )
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.guarantee_result import FACTOR, given_answer
 from quakedesign.guarantees.search.estimate import spectral_radius
 from quakedesign.laws import Controller, LinearLaw, SampledController, Signals, SlidingMode, control_laws
@@ -354,13 +354,14 @@ class Samples(DesignMethod[SampledController]):
                 "a law is given with the signals that it measures: measured must be slip-and-rate, or slip for a law "
                 f"of the slip alone. Received {setup.measured!r}. Omit measured."
             )
-        around: Any = controller.sampling.path | setup.around()
+        exact = ExactSetup.of(setup)
+        path = {name: time for name, time in controller.sampling.path.items() if not getattr(exact, name)}
         still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
         try:
             steady_states(still, law.output, (Fraction(0),) * len(law.states), Fraction(1))
         except ParameterError:
             return NoProof(reason=_STANDING)
-        held = Held(law=law, step=step, **around)
+        held = replace(exact, **path).held(law, step)
         found = best_guarantee(task, held)
         if found.proved or found.small_gain is not None or held.longest_step:
             return found

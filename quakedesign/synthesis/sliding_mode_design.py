@@ -19,6 +19,7 @@ from quakedesign.guarantees import (
     guarantee_of,
     sampled_sliding_mode,
 )
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import GUARANTEED, design_sticking
 from quakedesign.guarantees.search.defaults import deadbeat, sliding_mode
 from quakedesign.guarantees.search.linear_design import longest_step, nearest_setup
@@ -101,7 +102,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         self, fault: Fault, task: FaultPlant, controller: SlidingMode, setup: LoopSetup
     ) -> FaultProof | NoProof:
         """In the scheme ``compensated`` or ``stick-slip``, and in no other."""
-        return guarantee_of(task, controller, **setup.noise)
+        return guarantee_of(task, controller, ExactSetup(**setup.noise))
 
     def base_law(self, task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...]) -> SlidingMode:
         """Given base gains, or the first ones known."""
@@ -121,16 +122,16 @@ class SlidingModes(DesignMethod[SlidingMode]):
         """In a scheme, with given base gains or the first ones known."""
         wanted.require_all_measured()
         options: Any = {"gains": wanted.gains, "scheme": wanted.scheme or GUARANTEED, "objective": wanted.objective}
-        around: Any = wanted.setup.around()
-        made = sliding_mode(task, law, step, **options, **around)
+        setup = ExactSetup.of(wanted.setup)
+        made = sliding_mode(task, law, step, **options, setup=setup)
         if isinstance(made, NoProof):
             return TrackingGuarantee(fault=fault, proof=made)
         if not made.proof.proved:
             laws, none = deadbeat(task, law, wanted.gains), made.proof
-            longest = longest_step(task, kind=laws, **around)
-            again = laws.continued(task, step, longest, **around)
+            longest = longest_step(task, kind=laws, setup=setup)
+            again = laws.continued(task, step, longest, setup=setup)
             if again is None:
-                nearest = nearest_setup(task, step, kind=laws, pressed=none.pressed, **around)
+                nearest = nearest_setup(task, step, kind=laws, pressed=none.pressed, setup=setup)
                 shorter = None if longest is None else laws.at(task, longest).proof
                 known = shorter if isinstance(shorter, TrackingProof) else None
                 asked = step if known else None
@@ -172,7 +173,7 @@ def _compensated(
             }
             return problem.judged(sticking.controller, certificate, details=details, runs=sticking.proof)
         without = {"not_at_rest": sticking.reason}
-    made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, **problem.setup.noise)
+    made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, ExactSetup(**problem.setup.noise))
     if found.runs is None:
         none = NoProof(reason=f"run in the scheme compensated, {found.reason}")
         return _scaled(problem, base, certificate, runs=none)

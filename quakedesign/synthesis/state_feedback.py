@@ -12,7 +12,6 @@ from quakedesign.guarantees import (
     OBJECTIVES,
     ContinuousProof,
     FaultProof,
-    Held,
     NoProof,
     TrackingGuarantee,
     TrackingProof,
@@ -23,6 +22,7 @@ from quakedesign.guarantees import (
     sampled_design,
 )
 from quakedesign.guarantees.exact.limit_theorems import hopeless
+from quakedesign.guarantees.exact.loop import ExactSetup, Held
 from quakedesign.guarantees.guarantee_result import GAINS, answer_sliding
 from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
@@ -98,20 +98,20 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
             wanted.require_all_measured()
         if wanted.scheme not in (None, "explicit"):
             raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {wanted.scheme!r}. Omit scheme.")
-        around: Any = setup.around()
+        exact = ExactSetup.of(setup)
         if wanted.gains:
             summed = summed_integrals(_four(wanted.gains), step)
-            if differs and (reason := why_no_law(step, setup.measured, around)):
+            if differs and (reason := why_no_law(step, setup.measured, exact)):
                 return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason))
             summed = told_by_differences(summed, step) if differs else summed
-            given = best_guarantee(task, Held(law=summed, step=step, **around))
+            given = best_guarantee(task, exact.held(summed, step))
             if given.proved:
                 return attacked(fault, given)
             other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
             if other.proof.proved:
                 return TrackingGuarantee(fault=fault, proof=given, nearest=(GAINS, other.proof))
             return replace(other, proof=given)
-        entries: Any = {"measured": setup.measured, **around}
+        entries: Any = {"measured": setup.measured, "setup": exact}
         found = design_held(task, step, objective=wanted.objective, **entries)
         if found.proved:
             return attacked(fault, found)
@@ -158,11 +158,11 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
             details |= {name: str(value) for name, value in sticking.held.noise.items()}
             return problem.judged(sticking.controller, name=law.name, details=details, runs=sticking)
         without = {"not_at_rest": sticking.reason}
-    around: Any = setup.around()
+    exact = ExactSetup.of(setup)
     most = rational(fault.effective_normal_stress)
-    if beyond := hopeless(task, most, around.get("delay", Fraction(0)), setup.diffusion):
+    if beyond := hopeless(task, most, exact.delay, setup.diffusion):
         return problem.undecided(law.name, beyond, NoProof(reason=beyond))
-    found = sampled_design(task, step, problem.objective, measured=setup.measured, **around)
+    found = sampled_design(task, step, problem.objective, measured=setup.measured, setup=exact)
     if found.runs is None:
         return problem.undecided(law.name, found.reason)
     runs, held = found.runs, found.runs.held
@@ -188,7 +188,9 @@ def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
         )
     wanted, fault = problem.sliding, problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))
-    answer = answer_sliding(fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, diffusion=path)
+    answer = answer_sliding(
+        fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, setup=ExactSetup(diffusion=path)
+    )
     reason = answer.proof.reason if not answer.proof.proved else None
     if answer.held is None:
         return problem.undecided(law.name, str(reason), sliding=answer)

@@ -14,6 +14,7 @@ from quakedesign.fault.fault_toml import fault_toml
 from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof
 from quakedesign.guarantees import guarantee_result as sliding_answer
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.sliding_design import WellReach, proved_sliding
 from quakedesign.laws import LinearLaw
 from quakedesign.loop.loop_setup import Pump
@@ -66,7 +67,7 @@ def test_an_estimate_of_the_largest_stress_that_is_too_large_is_lowered_until_it
     monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
     monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
     monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
-    found = sliding_answer.answer_sliding(load_fault("crustal-patch"), diffusion=Fraction(800))
+    found = sliding_answer.answer_sliding(load_fault("crustal-patch"), setup=ExactSetup(diffusion=Fraction(800)))
     assert found.proved
     assert tried == [41_000, 36_000, 30_000]
 
@@ -82,12 +83,17 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
     monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(stands[log_rate]))
     monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
     fault, half, quarter = load_fault("crustal-patch"), Fraction(1, 2), Fraction(1, 4)
-    assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800)).task.stress == 7_000
+    assert sliding_answer.answer_sliding(fault, setup=ExactSetup(diffusion=Fraction(800))).task.stress == 7_000
     assert tried == [(half, 1), (quarter, 7_000)]
     stands[half] = stands[quarter] = stands[Fraction(1, 8)] = 0
-    assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800)).proof.task.stress == 1
+    assert sliding_answer.answer_sliding(fault, setup=ExactSetup(diffusion=Fraction(800))).proof.task.stress == 1
     tried.clear()
-    assert sliding_answer.answer_sliding(fault, diffusion=Fraction(800), stress=Fraction(1, 2)).task.stress == half
+    assert (
+        sliding_answer.answer_sliding(
+            fault, setup=ExactSetup(diffusion=Fraction(800)), stress=Fraction(1, 2)
+        ).task.stress
+        == half
+    )
     assert tried == [(half, half)]
 
 
@@ -99,7 +105,9 @@ def test_a_well_that_is_impossible_is_said_to_be_that_before_what_would_do(monke
     fault = load_fault("crustal-patch")
 
     def reason(diffusion, stress):
-        return sliding_answer.answer_sliding(fault, diffusion=Fraction(diffusion), stress=stress).proof.reason
+        return sliding_answer.answer_sliding(
+            fault, setup=ExactSetup(diffusion=Fraction(diffusion)), stress=stress
+        ).proof.reason
 
     assert reason(10**6, Fraction(25_000)) == "too much; another"
     assert reason(2 * 10**6, None) == "too much; another"
@@ -116,7 +124,7 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
     monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
     monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
     fault, around = load_fault("crustal-patch"), {"diffusion": Fraction(800)}
-    found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).proof
+    found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof
     assert found.reason == (
         "too much; a proof was found for a stress of at most 20 kPa: give --stress '20 kPa'; somewhat more may do"
     )
@@ -125,10 +133,10 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
         found_below = lambda task, step, **around: HELD if task.stress < 35_000 else none  # noqa: E731
         patched.setattr(sliding_answer, "designed_sliding", found_below)
         patched.setattr(sliding_answer, "farthest", lambda *_, **__: WellReach(share=Fraction(1)))
-        found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).proof
+        found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof
     assert found.reason.startswith("no law was found that holds the fault under 40 kPa; a proof was found for a stress")
     monkeypatch.setattr(sliding_answer, "proved_sliding", lambda task, design, *, log_rate: NONE)
-    assert sliding_answer.answer_sliding(fault, stress=Fraction(40_000), **around).proof == NONE
+    assert sliding_answer.answer_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof == NONE
 
 
 def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch):
@@ -136,13 +144,15 @@ def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeyp
         quiet = design.slip_noise <= Fraction(1, 10**7)
         return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if quiet else NONE
 
-    design = lambda task, step, **more: replace(HELD, slip_noise=more.get("slip_noise", Fraction(0)))  # noqa: E731
+    design = lambda task, step, **more: replace(HELD, slip_noise=more["setup"].slip_noise)  # noqa: E731
     monkeypatch.setattr(sliding_answer, "designed_sliding", design)
     monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
     monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
     around = {"diffusion": Fraction(800), "slip_noise": Fraction(1, 10**6)}
     for stress in (None, Fraction(10_000)):
-        found = sliding_answer.answer_sliding(load_fault("crustal-patch"), stress=stress, **around).proof
+        found = sliding_answer.answer_sliding(
+            load_fault("crustal-patch"), stress=stress, setup=ExactSetup(**around)
+        ).proof
         assert found.reason == "too much; a proof was found with slip noise of at most 100 nm"
 
 
@@ -209,13 +219,13 @@ def test_a_pump_that_cannot_hold_what_may_be_asked_for_has_no_guarantee(monkeypa
     fault, asked = load_fault("crustal-patch"), {"diffusion": Fraction(833)}
     for stress in (Fraction(25000), None):
         enough = sliding_answer.answer_sliding(
-            fault, stress=stress, pump=Pump(least=Fraction(least), largest=Fraction(largest)), **asked
+            fault, stress=stress, setup=ExactSetup(pump=Pump(least=Fraction(least), largest=Fraction(largest)), **asked)
         )
         assert enough.proved
         assert enough.to_dict()["asked_pressure"] == [least.exact, largest.exact]
         for low, high in ((Fraction(least) + 1, Fraction(largest)), (Fraction(-(10**6)), Fraction(largest) - 1)):
             weak = Pump(least=low, largest=high)
-            found = sliding_answer.answer_sliding(fault, stress=stress, pump=weak, **asked)
+            found = sliding_answer.answer_sliding(fault, stress=stress, setup=ExactSetup(pump=weak, **asked))
             assert not found.proved
             assert "may be commanded, which a pump of" in found.lines()[0]
 
@@ -229,7 +239,9 @@ def test_the_stresses_that_are_tried_are_told_with_what_came_of_them(monkeypatch
     monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
     told = []
     known = sliding_answer.answer_sliding(
-        load_fault("crustal-patch"), diffusion=Fraction(800), tell=lambda what, done: told.append(what)
+        load_fault("crustal-patch"),
+        setup=ExactSetup(diffusion=Fraction(800)),
+        tell=lambda what, done: told.append(what),
     )
     assert known.task.stress == 36_000
     tried = [what for what in told if "stress" in what]

@@ -11,6 +11,7 @@ from quakedesign.cli import main
 from quakedesign.fault import fault_toml, load_fault
 from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.guarantee_result import SlidingGuarantee
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.studies import performance_limits as impossible_and_proved
@@ -158,8 +159,8 @@ def test_both_sides_are_of_the_stress_that_the_design_behind_the_well_stands(mon
     near = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     known = {Fraction(800): near, Fraction(900): replace(near, task=replace(near.task, stress=near.task.stress / 2))}
 
-    def answered(fault, *, diffusion, lag=0, **asked):
-        found = known.get(diffusion, NoProof(reason="too far"))
+    def answered(fault, *, setup, **asked):
+        found = known.get(setup.diffusion, NoProof(reason="too far"))
         return SlidingGuarantee(proof=found, task=near.task, held=None)
 
     monkeypatch.setattr(impossible_and_proved, "answer_sliding", answered)
@@ -181,8 +182,8 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     known, asked = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text()), []
     spreads = []
 
-    def answered(fault, *, stress, spread, **around):
-        asked.append(around)
+    def answered(fault, *, stress, spread, setup):
+        asked.append(setup)
         spreads.append(spread)
         return SlidingGuarantee(proof=known, task=known.task, held=known.held)
 
@@ -193,9 +194,10 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     assert f"table behind rock of L^2/D = {float(known.held.diffusion):.4g} s, for a, b and D_c as they are" in told
     assert "D = 2 m^2/s" in told
     assert run(*patch, "--diffusion", "9 s") == run(*patch, "--diffusivity", "2") == 0
-    near = {"diffusion": asked[0]["diffusion"]}
-    assert near["diffusion"] == pytest.approx(800)  # D_c/(10 V)
-    assert asked == [near, {"lag": 5, "diffusion": 800}, near, {"diffusion": 9}, near]
+    near = ExactSetup(diffusion=asked[0].diffusion)
+    assert near.diffusion == pytest.approx(800)  # D_c/(10 V)
+    ours = [ExactSetup(lag=Fraction(5), diffusion=Fraction(800)), ExactSetup(diffusion=Fraction(9))]
+    assert asked == [near, ours[0], near, ours[1], near]
     assert "L^2/D = 9 s: not shown to be infeasible" in " ".join(capsys.readouterr().out.split())
     asked.clear()
     assert run(*patch, "--well", "100 km") == 0
@@ -231,9 +233,9 @@ def test_designs_are_proved_with_the_whole_setup(monkeypatch, capsys):
     setup = ("--delay", "20 ms", "--lag", "0.3 s", "--well", "2 m", "--diffusivity", "0.5", "--jitter", "1 ms")
     noise = ("--measured", "slip", "--slip-noise", "5 um", "--averaging-time", "20 ms", "--rate-limit", "2 MPa/s")
     assert run("real-fault", *setup, *noise, "--json") == 0
-    around = {name: Fraction(value) for name, value in (("delay", "0.03"), ("lag", "0.3"), ("diffusion", "8"))}
-    around |= {"jitter": Fraction(1, 1000), "averaging": Fraction(1, 50), "pump": Pump(rate=Fraction(2 * 10**6))}
-    around |= {"measured": "slip", "slip_noise": Fraction(5, 10**6)}
-    assert told == {"design_held": around | {"objective": "peak"}, "longest_step": around}
+    path = {name: Fraction(value) for name, value in (("delay", "0.03"), ("lag", "0.3"), ("diffusion", "8"))}
+    times = {"jitter": Fraction(1, 1000), "averaging": Fraction(1, 50), "pump": Pump(rate=Fraction(2 * 10**6))}
+    wanted = {"measured": "slip", "setup": ExactSetup(**path, **times, slip_noise=Fraction(5, 10**6))}
+    assert told == {"design_held": wanted | {"objective": "peak"}, "longest_step": wanted}
     assert run("lab-fault", "--jitter", "-1 s") == run("lab-fault", "--well", "0 m") == 2
     assert capsys.readouterr().err.count("\n") == 2

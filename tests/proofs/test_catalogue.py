@@ -129,7 +129,7 @@ def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
         again = tightened(design_compensated(stored.task, base, stored.held.step).proof)
         assert again.held.law.root.pull == stored.held.law.root.pull
     else:
-        again = design_held(stored.task, stored.held.step, **stored.held.around)
+        again = design_held(stored.task, stored.held.step, setup=stored.held.setup)
     assert float(again.claims.slip_rate_error) == pytest.approx(float(stored.claims.slip_rate_error), rel=0.02)
     assert float(again.claims.slip_error) == pytest.approx(float(stored.claims.slip_error), rel=0.02)
 

@@ -11,6 +11,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.guarantees import NoProof, StickSlipGuarantee, TrackingGuarantee, guarantee_of, load_guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search import compensated_search as COMPENSATED
 from quakedesign.guarantees.search.compensated_search import recovered, sorted_terms, sticking_loop
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
@@ -139,7 +140,9 @@ def test_a_sliding_mode_is_designed_on_the_stick_slip_plant_where_it_is_proved(m
     assert replace(found, law=replace(found.law, pull=())) == linear.held
     again = recovered(design.guarantee)
     assert sticking_loop(again.controller).law.target_gain == found.law.target_gain
-    assert guarantee_of(uncertain_plant(REAL), design.controller, rate_noise=F(1)).reason.endswith("rate_noise")
+    assert guarantee_of(uncertain_plant(REAL), design.controller, setup=ExactSetup(rate_noise=F(1))).reason.endswith(
+        "rate_noise"
+    )
     without = replace(design.controller.sampling, settings=design.controller.sampling.settings[:2])
     bare = replace(design.controller, gains=dict(design.controller.gains), sampling=without)
     assert "rest_slip, slip_weight given" in guarantee_of(uncertain_plant(REAL), bare).reason

@@ -5,10 +5,10 @@ diffusion modes. The derivation of their bounds is in `quakedesign.guarantees.ex
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypedDict, cast
+from typing import TYPE_CHECKING, Any
 
 from quakedesign import laws
 from quakedesign.arguments import checked_dataclass
@@ -17,7 +17,7 @@ from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.norms import START
 from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, NominalModel
 from quakedesign.loop import Instants, Layer, PeriodicLoop, held_loop, starts, with_known_area
-from quakedesign.loop.loop_setup import Pump
+from quakedesign.loop.loop_setup import LoopSetup, Pump
 from quakedesign.plant.ranges import FaultPlant
 
 if TYPE_CHECKING:
@@ -28,31 +28,13 @@ if TYPE_CHECKING:
 # A sampled law with its loop setup, the subject of a guarantee besides the fault.
 
 
-class Around(TypedDict, total=False):
-    """Loop setup of `Held` besides the law and T_s; omitted values are 0, a pump without limits None."""
-
-    delay: Fraction
-    lag: Fraction
-    diffusion: Fraction
-    slip_noise: Fraction
-    rate_noise: Fraction
-    initial_slip: Fraction
-    initial_slip_rate: Fraction
-    jitter: Fraction
-    delay_jitter: Fraction
-    averaging: Fraction
-    pump: Pump | None
-    longest_step: Fraction
-
-
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class Held:
-    """A sampled law with its loop setup: T_s, zero-order hold, delay, lag, diffusion path and noise.
+class ExactSetup:
+    """Loop setup of a proof beside the law and T_s, in exact numbers.
 
     Attributes
     ----------
-    law : LinearLaw
-    step, delay, lag : Fraction
+    delay, lag : Fraction
         [s].
     diffusion : Fraction
         L²/D of the layer between well and fault [s]; 0 for none.
@@ -69,17 +51,9 @@ class Held:
     ramp : Fraction
         Largest time of a change of the pressure by the pump [s].
     longest_step : Fraction
-        Aperiodic sampling: longest interval between samples [s], `step` the shortest; 0 for periodic sampling.
-
-    Raises
-    ------
-    ParameterError
-        For a negative bound, noise of a slip rate that the law does not measure, or aperiodic sampling with a loop
-        setup of more than noise.
+        Aperiodic sampling: longest interval between samples [s], T_s the shortest; 0 for periodic sampling.
     """
 
-    law: LinearLaw
-    step: Fraction
     delay: Fraction = Fraction(0)
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
@@ -93,6 +67,53 @@ class Held:
     pump: Pump | None = None
     ramp: Fraction = Fraction(0)
     longest_step: Fraction = Fraction(0)
+
+    @classmethod
+    def of(cls, setup: LoopSetup) -> "ExactSetup":
+        """That of a loop setup, whose delay counts from the end of the averaging time: here from its middle."""
+        own = {part.name for part in fields(ExactSetup)} - {"averaging", "ramp"}
+        shared: dict[str, Any] = {name: getattr(setup, name) for name in own}
+        shared["delay"] += setup.averaging_time / 2
+        return ExactSetup(**shared, averaging=setup.averaging_time)
+
+    @property
+    def setup(self) -> "ExactSetup":
+        """Loop setup alone; a search for another law chooses the ramp anew."""
+        return replace(ExactSetup(**{part.name: getattr(self, part.name) for part in fields(ExactSetup)}), ramp=_ZERO)
+
+    @property
+    def path(self) -> dict[str, Any]:
+        """Delay, lag and L²/D [s] between law and fault."""
+        return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
+
+    def held(self, law: LinearLaw, step: Fraction) -> "Held":
+        """A law in this setup, with zero-order hold over T_s [s]."""
+        return Held(law=law, step=step, **{part.name: getattr(self, part.name) for part in fields(ExactSetup)})
+
+
+PLAIN = ExactSetup()
+"""Setup without delay, path, noise or timing errors."""
+
+
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
+class Held(ExactSetup):
+    """A sampled law with zero-order hold over T_s in its loop setup, see `ExactSetup`.
+
+    Attributes
+    ----------
+    law : LinearLaw
+    step : Fraction
+        T_s [s].
+
+    Raises
+    ------
+    ParameterError
+        For a negative bound, noise of a slip rate that the law does not measure, or aperiodic sampling with a loop
+        setup of more than noise.
+    """
+
+    law: LinearLaw
+    step: Fraction
 
     def __post_init__(self) -> None:
         if min(self.start) < 0:
@@ -145,16 +166,6 @@ class Held:
                 "delay, a lag, a diffusion path, jitter, averaging, the rate limit of a pump or an implicit step. "
                 f"Received longest_step {shortly(self.longest_step)} s with one of these. Omit longest_step, or these."
             )
-
-    @property
-    def around(self) -> Around:
-        """All but law and T_s."""
-        return cast(Around, {name: getattr(self, name) for name in Around.__annotations__})
-
-    @property
-    def path(self) -> dict[str, Any]:
-        """Delay, lag and L²/D [s] between law and fault."""
-        return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
 
     @property
     def start(self) -> tuple[Fraction, Fraction]:

@@ -11,7 +11,7 @@ from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import product
 from math import inf
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -21,7 +21,7 @@ from quakedesign.cache import search_once
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, to_sympy
 from quakedesign.fault.model import require_ordinary
-from quakedesign.guarantees.exact.loop import Around, Held
+from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup, Held
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.small_gain import Bounds, holds
 from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
@@ -228,7 +228,7 @@ def compensated(
     weight: Fraction,
     authority: Fraction,
     step: Fraction,
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> TrackingProof | NoProof:
     """Guarantee of given settings: the narrowest lines around the root, of a few, that close the circle.
 
@@ -241,7 +241,7 @@ def compensated(
         pull = implicit_pull(controller, step, authority)
     except UnsupportedError as error:
         return NoProof(reason=str(error))
-    held = _held(ImplicitRoot(pull=pull), weight, authority, step, around)
+    held = _held(ImplicitRoot(pull=pull), weight, authority, step, setup)
     first = guarantee(task, held)
     if first.proved:
         return first
@@ -270,7 +270,7 @@ def design_compensated(
     *,
     objective: str = "tracking",
     weights: tuple[Fraction, ...] = WEIGHTS,
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> Compensation:
     """Weight, authority and scale of a sliding mode with given base gains, chosen over certified bounds.
 
@@ -285,7 +285,7 @@ def design_compensated(
     ParameterError
     """
     require_ordinary(step=step)
-    return _made(task, controller, step, _deadbeat(task, step, objective, weights, **around), around)
+    return _made(task, controller, step, _deadbeat(task, step, objective, weights, setup=setup), setup)
 
 
 def _made(
@@ -293,20 +293,19 @@ def _made(
     controller: SlidingMode,
     step: Fraction,
     chosen: tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None],
-    around: Around,
+    setup: ExactSetup,
 ) -> Compensation:
     """A controller with a weight, B0 and the smallest λ for errors of a size, and what is guaranteed of it."""
     weight, authority, errors = chosen
     settings = ("weight", weight), ("authority", authority)
-    path: dict[str, Any] = {name: around.get(name, Fraction(0)) for name in ("delay", "lag", "diffusion")}
-    sampling = Sampling(step=step, scheme=GUARANTEED, settings=settings, **path)
+    sampling = Sampling(step=step, scheme=GUARANTEED, settings=settings, **setup.path)
     law = replace(controller, gains=dict(controller.gains), sampling=sampling)
     try:
         if errors is not None:
             law = law.scaled(_scale(law, authority, step, errors))
     except UnsupportedError as error:
         return Compensation(controller=law, proof=NoProof(reason=str(error)))
-    return Compensation(controller=law, proof=compensated(task, law, weight, authority, step, **around))
+    return Compensation(controller=law, proof=compensated(task, law, weight, authority, step, setup=setup))
 
 
 @dataclass(frozen=True, slots=True)
@@ -316,70 +315,70 @@ class Deadbeat(Kind):
     controller: SlidingMode
 
     def closest(
-        self, task: FaultPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]
+        self, task: FaultPlant, step: Fraction, near: np.ndarray | None, setup: ExactSetup = PLAIN
     ) -> Closest | NoProof:
         """The weight and B0 with which a deadbeat step comes nearest to a guarantee, for any gains."""
         if (none := unpredictable(task, step)) is not None:
             return none
-        if around.get("delay", 0) > MOST_DELAY * step:
+        if setup.delay > MOST_DELAY * step:
             return NoProof(reason=f"the delay is longer than {MOST_DELAY} periods")
 
         def cost(x: np.ndarray) -> float:
             if not (0 < x[0] <= 1 and _BESIDE[0] <= x[1] <= _BESIDE[1]):
                 return 2 * _WORST
-            held = self.held(task, x, step, **around)
+            held = self.held(task, x, step, setup=setup)
             found = closeness(task, held)[0]
             return found if found < _WORST else _WORST + min(spectral_radius(held.loop(task)), 1.0)
 
-        question = "nearly deadbeat", task, step, tuple(sorted(around.items()))
+        question = "nearly deadbeat", task, step, setup
         least, x = inf, np.array(_STARTS[0])
         for start in _STARTS if near is None else (near,):
             found = search_near(question, cost, start, enough=_NEAR_ENOUGH, evaluations=_EVALUATIONS)
             least, x = min((least, x), found, key=lambda reached: reached[0])
             if least < _NEAR_ENOUGH:
                 break
-        return Closest(least, x, self.held(task, x, step, **around))
+        return Closest(least, x, self.held(task, x, step, setup=setup))
 
-    def held(self, task: FaultPlant, numbers: np.ndarray, step: Fraction, **around: Unpack[Around]) -> Held:
+    def held(self, task: FaultPlant, numbers: np.ndarray, step: Fraction, setup: ExactSetup = PLAIN) -> Held:
         """The loop with a deadbeat step, of any gains."""
-        return _held(_DEADBEAT, *_settled(task, numbers), step, around)
+        return _held(_DEADBEAT, *_settled(task, numbers), step, setup)
 
     def proved(self, task: FaultPlant, found: Closest) -> TrackingProof | NoProof:
         """Of the smallest λ for which the step is deadbeat."""
-        return self.made(task, found.held.step, found.numbers, **found.held.around).without_stick
+        return self.made(task, found.held.step, found.numbers, setup=found.held.setup).without_stick
 
-    def made(self, task: FaultPlant, step: Fraction, numbers: np.ndarray, **around: Unpack[Around]) -> Compensation:
+    def made(self, task: FaultPlant, step: Fraction, numbers: np.ndarray, setup: ExactSetup = PLAIN) -> Compensation:
         """The controller with these numbers, and what is guaranteed of it."""
-        (weight, authority), held = _settled(task, numbers), self.held(task, numbers, step, **around)
+        (weight, authority), held = _settled(task, numbers), self.held(task, numbers, step, setup=setup)
         bounds = closeness(task, held)[1]
-        noise = around.get("slip_noise", Fraction(0)), around.get("rate_noise", Fraction(0))
+        noise = setup.slip_noise, setup.rate_noise
         errors = None if bounds is None else (bounds.slip_error + noise[0], bounds.slip_rate_error + noise[1])
-        return _made(task, self.controller, step, (weight, authority, errors), around)
+        return _made(task, self.controller, step, (weight, authority, errors), setup)
 
-    def leanest(self, task: FaultPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
+    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> Held | None:
         """That with the smallest peak."""
-        weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, **around)
-        law = _made(task, self.controller, step, (weight, authority, errors), around).controller
+        weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, setup=setup)
+        law = _made(task, self.controller, step, (weight, authority, errors), setup).controller
         root = ImplicitRoot(pull=implicit_pull(law, step, authority))
-        return None if errors is None else _held(root, weight, authority, step, around)
+        return None if errors is None else _held(root, weight, authority, step, setup)
 
     def continued(
-        self, task: FaultPlant, step: Fraction, longest: Longest | None, **around: Unpack[Around]
+        self, task: FaultPlant, step: Fraction, longest: Longest | None, setup: ExactSetup = PLAIN
     ) -> Compensation | None:
         """Design for a T_s [s] up to the longest, of numbers near those; None where none is proved."""
         if longest is None or longest.guarantee.held.step < step:
             return None
-        near = self.closest(task, step, longest.numbers, **around)
-        made = None if isinstance(near, NoProof) else self.made(task, step, near.numbers, **around)
+        near = self.closest(task, step, longest.numbers, setup=setup)
+        made = None if isinstance(near, NoProof) else self.made(task, step, near.numbers, setup=setup)
         return made if made is not None and made.proof.proved else None
 
     def at(self, task: FaultPlant, longest: Longest, objective: str = "peak") -> Compensation:
         """Design for the longest T_s and all else of a guarantee: as others are made, else that of the search."""
         held = longest.guarantee.held
-        made = design_compensated(task, self.controller, held.step, objective=objective, **held.around)
+        made = design_compensated(task, self.controller, held.step, objective=objective, setup=held.setup)
         if made.proof.proved:
             return made
-        return self.made(task, held.step, longest.numbers, **held.around)
+        return self.made(task, held.step, longest.numbers, setup=held.setup)
 
 
 def _settled(task: FaultPlant, numbers: np.ndarray) -> tuple[Fraction, Fraction]:
@@ -541,24 +540,24 @@ def _settings(law: SlidingMode) -> dict[str, Fraction]:
 
 @lru_cache(maxsize=64)
 def _deadbeat(
-    task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], **around: Unpack[Around]
+    task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], setup: ExactSetup = PLAIN
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
     """Weight and authority for a deadbeat step, of any law, and the errors that it leaves, if it has a guarantee."""
     require_known(objective, OBJECTIVES, "objective")
-    question = "deadbeat", task, step, objective, weights, sorted(around.items())
-    search = partial(_deadbeat_search, task, step, objective, weights, around)
+    question = "deadbeat", task, step, objective, weights, setup
+    search = partial(_deadbeat_search, task, step, objective, weights, setup)
     weight, authority, *errors = map(Fraction, search_once(search, *question))
     return weight, authority, (errors[0], errors[1]) if errors else None
 
 
 def _deadbeat_search(
-    task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], around: Around
+    task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], setup: ExactSetup
 ) -> list[str]:
     """The same, as texts."""
     seen = dict[tuple[Fraction, Fraction], BoundsEstimate]()
     for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
-        found = estimated(task, _held(_DEADBEAT, *choice, step, around))
+        found = estimated(task, _held(_DEADBEAT, *choice, step, setup))
         if found is not None and found.bounds.proved:
             seen[choice] = found
     if not seen:
@@ -569,7 +568,7 @@ def _deadbeat_search(
         allowed = [choice for choice in seen if peaks[choice] <= _ROOM * peaks[least]]
         least = min(allowed, key=lambda choice: seen[choice].drift_gain)
     bounds = _bounds(seen[least])
-    slip_noise, rate_noise = around.get("slip_noise", 0), around.get("rate_noise", 0)
+    slip_noise, rate_noise = setup.slip_noise, setup.rate_noise
     return [str(v) for v in (*least, bounds.slip_error + slip_noise, bounds.slip_rate_error + rate_noise)]
 
 
@@ -600,8 +599,8 @@ def _smallest_scale(
     return None
 
 
-def _held(root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, around: Around) -> Held:
-    return Held(law=compensated_law(root, weight, step * authority), step=step, **around)
+def _held(root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, setup: ExactSetup) -> Held:
+    return setup.held(compensated_law(root, weight, step * authority), step)
 
 
 def _bounds(estimate: BoundsEstimate) -> Bounds:

@@ -5,12 +5,12 @@ The second chapter states which schemes of a sliding mode have a guarantee (``co
 
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any, Unpack
+from typing import Any
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import UpperBound
-from quakedesign.guarantees.exact.loop import Around
+from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.statement import TrackingProof
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
@@ -96,7 +96,7 @@ def sampled_design(
     objective: str = "tracking",
     *,
     measured: str = MEASURED[0],
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> SampledDesign:
     """e-LQR for a T_s [s], or for the longest shorter one that has a guarantee; the rest as in `design_held`.
 
@@ -105,7 +105,7 @@ def sampled_design(
     ParameterError
         For an unknown objective.
     """
-    told: Any = {"measured": measured, **around}
+    told: Any = {"measured": measured, "setup": setup}
     found = design_held(task, step, objective=objective, **told)
     longest = longest_step(task, **told)
     if not found.proved:
@@ -126,7 +126,7 @@ def sampled_design(
 
 
 def sampled_sliding_mode(
-    task: FaultPlant, law: SlidingMode, step: Fraction, objective: str = "tracking", **noise: Unpack[Around]
+    task: FaultPlant, law: SlidingMode, step: Fraction, objective: str = "tracking", setup: ExactSetup = PLAIN
 ) -> tuple[Compensation, SampledDesign]:
     """Sliding mode with the base gains of a law for a T_s [s], or for the longest shorter one that has a guarantee.
 
@@ -138,10 +138,10 @@ def sampled_sliding_mode(
         For an unknown objective.
     """
     laws = Deadbeat(law)
-    made = design_compensated(task, law, step, objective=objective, **noise)
-    longest = longest_step(task, kind=laws, **noise)
+    made = design_compensated(task, law, step, objective=objective, setup=setup)
+    longest = longest_step(task, kind=laws, setup=setup)
     if not made.proof.proved:
-        made = laws.continued(task, step, longest, **noise) or made
+        made = laws.continued(task, step, longest, setup=setup) or made
     reason = made.proof.reason if not made.proof.proved else ""
     if reason and longest is not None:
         made = laws.at(task, longest, objective)
@@ -149,7 +149,7 @@ def sampled_sliding_mode(
         return made, SampledDesign(step=step, runs=None, reason=reason)
     runs = tightened(made.without_stick)
     held = runs.held
-    delayed = longest_delay(task, held.step, kind=laws, **noise)
+    delayed = longest_delay(task, held.step, kind=laws, setup=setup)
     return replace(made, proof=runs), SampledDesign(
         step=step,
         runs=runs,
@@ -164,7 +164,7 @@ def sampled_sliding_mode(
 
 
 def guarantee_of(
-    task: FaultPlant, law: SlidingMode, **noise: Unpack[Around]
+    task: FaultPlant, law: SlidingMode, setup: ExactSetup = PLAIN
 ) -> TrackingProof | StickSlipProof | NoProof:
     """What is guaranteed of a sliding mode as it runs: in the scheme ``compensated``, or in ``stick-slip``."""
     own = law.sampling
@@ -172,11 +172,11 @@ def guarantee_of(
         if missing := {"authority", "weight", "slip_weight", "rest_slip"} - dict(own.settings).keys():
             reason = f"the scheme {STICK_SLIP} has a guarantee with {', '.join(sorted(missing))} given in its settings"
             return NoProof(reason=reason)
-        if unknown := {name for name, value in noise.items() if value} - {"slip_noise"}:
-            reason = f"the stick-slip plant is proved without {', '.join(sorted(unknown))}"
+        if setup.rate_noise:
+            reason = "the stick-slip plant is proved without rate_noise"
             return NoProof(reason=reason)
         try:
-            return proved(task, sticking_loop(law, noise.get("slip_noise", Fraction(0))))
+            return proved(task, sticking_loop(law, setup.slip_noise))
         except UnsupportedError as error:
             return NoProof(reason=str(error))
     if own is None or own.scheme != GUARANTEED:
@@ -186,8 +186,8 @@ def guarantee_of(
     if not {"weight", "authority"} <= settings.keys():
         reason = f"the scheme {GUARANTEED} has a guarantee with a weight and an authority. Give both in its settings"
         return NoProof(reason=reason)
-    around: Any = {**own.path, **noise}
-    return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, **around))
+    setup = replace(setup, **own.path)
+    return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, setup=setup))
 
 
 def sliding_mode(
@@ -198,7 +198,7 @@ def sliding_mode(
     gains: tuple[str, ...] = (),
     scheme: str = GUARANTEED,
     objective: str = "tracking",
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> Compensation | NoProof:
     """Design a sliding mode with given base gains, or the first ones known for it, in a scheme.
 
@@ -213,7 +213,7 @@ def sliding_mode(
     scheme : str
     objective : str
         ``tracking`` or ``peak``.
-    **around : Fraction
+    setup : ExactSetup
         As in `design_held`.
 
     Raises
@@ -225,7 +225,7 @@ def sliding_mode(
     known = deadbeat(task, law, gains)
     if scheme != GUARANTEED:
         return NoProof(reason=_why_none(task, law, scheme, step))
-    made = design_compensated(task, known.controller, step, objective=objective, **around)
+    made = design_compensated(task, known.controller, step, objective=objective, setup=setup)
     return replace(made, proof=tightened(made.without_stick))
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import hypot, inf, log, log10, sqrt
-from typing import Any, Unpack, overload
+from typing import Any, overload
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -21,7 +21,7 @@ from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
-from quakedesign.guarantees.exact.loop import Around, Held
+from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup, Held
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain
 from quakedesign.guarantees.exact.statement import ContinuousProof, TrackingProof, above, continuous_peaks, guarantee
@@ -39,7 +39,7 @@ from quakedesign.guarantees.search.lqg import (
     LawFamily,
     family_of,
     measured_by,
-    require_surroundings,
+    require_setup,
     why_no_law,
 )
 from quakedesign.guarantees.search.unclocked import unclocked_estimate, unclocked_guarantee
@@ -146,15 +146,15 @@ def closest(
     *,
     near: np.ndarray | None = None,
     measured: str = MEASURED[0],
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> Closest | NoProof:
     """The law that comes nearest to a guarantee, or one well within it; `NoProof` if there is no law at all.
 
     The search begins near the numbers of another law if given, else near numbers of good laws of the family.
     """
-    if around.get("delay", 0) > MOST_DELAY * step:
+    if setup.delay > MOST_DELAY * step:
         return NoProof(reason=f"the delay is longer than {MOST_DELAY} periods")
-    laws = _Laws.of(task, step, measured, around)
+    laws = _Laws.of(task, step, measured, setup)
     if isinstance(laws, NoProof):
         return laws
     least, x = inf, np.array(laws.family.starts[0])
@@ -167,13 +167,13 @@ def closest(
 
 
 def nearby(
-    task: FaultPlant, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: FaultPlant, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], setup: ExactSetup = PLAIN
 ) -> TrackingProof | NoProof:
     """Design for the smallest certified slip-rate error, sought near the numbers of a law for another T_s or delay.
 
     Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_held` uses it at its end only.
     """
-    laws = _Laws.of(task, step, measured, around)
+    laws = _Laws.of(task, step, measured, setup)
     if isinstance(laws, NoProof):
         return laws
     found = best_guarantee(task, laws.held(laws.least_peak_near(near)))
@@ -187,7 +187,7 @@ def design_held(
     objective: str = "tracking",
     room: float | None = None,
     measured: str = MEASURED[0],
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> TrackingProof | NoProof:
     """Feedback with a disturbance estimate, its two gains and its weight chosen over certified bounds.
 
@@ -209,7 +209,7 @@ def design_held(
         observer, whose smallest error is larger, 1.4; with aperiodic sampling 1.25.
     measured : str
         One of `MEASURED`; the differentiator is the implicit one of order 2, from rest.
-    **around : Fraction
+    setup : ExactSetup
         Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s], as in `Held`; 0 unless given.
 
     Raises
@@ -217,14 +217,14 @@ def design_held(
     ParameterError
         For another objective or other measurements, or times and noise that are negative or too long.
     """
-    delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
+    delay, lag = setup.delay, setup.lag
     require_known(objective, OBJECTIVES, "objective")
     if step <= 0 or not 0 <= delay <= MOST_DELAY * step or lag < 0:
         raise ParameterError(
             f"step must be positive, delay 0 to {MOST_DELAY} steps, and lag 0 or more. Received the step "
             f"{float(step):.4g} s, the delay {float(delay):.4g} s and the lag {float(lag):.4g} s. Shorten the delay."
         )
-    laws = _Laws.of(task, step, measured, around)
+    laws = _Laws.of(task, step, measured, setup)
     if isinstance(laws, NoProof):
         return laws
     behind_rock, starts = bool(laws.template.diffusion), laws.family.starts
@@ -246,7 +246,7 @@ def design_held(
     noise = {name: v for name, v in laws.template.noise.items() if v}
     if found.proved or not noise:
         return found
-    quiet = around | dict.fromkeys(noise, Fraction(0))
+    quiet = replace(setup, slip_noise=Fraction(0), rate_noise=Fraction(0))
     without = design_held(task, step, objective=objective, room=room, measured=measured, **quiet)  # type: ignore[arg-type]
     return found if not without.proved else _with_noise(without, noise)
 
@@ -274,19 +274,19 @@ class _Laws:
     question: tuple[Any, ...]
 
     @classmethod
-    def of(cls, task: FaultPlant, step: Fraction, measured: str, around: Around) -> "_Laws | NoProof":
+    def of(cls, task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup) -> "_Laws | NoProof":
         """Laws for a T_s [s] and a loop setup, or the reason why there are none."""
-        require_surroundings(around)
+        require_setup(setup)
         require_step(step)
         if (none := unpredictable(task, step)) is not None:
             return none
-        if reason := why_no_law(step, measured, around):
+        if reason := why_no_law(step, measured, setup):
             return NoProof(reason=reason)
         require_known(measured, MEASURED, "measured")
-        middle = (step + (around.get("longest_step") or step)) / 2  # for which a law predicts that is told no time
-        family = family_of(task, middle, measured, around)
-        template = Held(law=family.law(np.array(family.starts[0])), step=step, **around)
-        return cls(task, family, template, (task, step, measured, tuple(sorted(around.items()))))
+        middle = (step + (setup.longest_step or step)) / 2  # for which a law predicts that is told no time
+        family = family_of(task, middle, measured, setup)
+        template = setup.held(family.law(np.array(family.starts[0])), step)
+        return cls(task, family, template, (task, step, measured, setup))
 
     def held(self, x: np.ndarray) -> Held:
         """The loop of a law."""
@@ -499,15 +499,15 @@ class Longest:
     numbers: np.ndarray
 
 
-Asked = tuple[FaultPlant, Fraction, Around]
-"""Task, T_s [s] and what is around a law, of a design."""
+Asked = tuple[FaultPlant, Fraction, ExactSetup]
+"""Task, T_s [s] and loop setup of a design."""
 
 
 class Kind(ABC):
     """A kind of laws, as far as a search for the most that one of them stands knows it."""
 
     @abstractmethod
-    def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
+    def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, setup: ExactSetup = PLAIN) -> Any:
         """`Closest` to a guarantee, or `NoProof`; near the numbers of another law if they are given."""
 
     @abstractmethod
@@ -515,7 +515,7 @@ class Kind(ABC):
         """Proof about a law that is near enough."""
 
     @abstractmethod
-    def leanest(self, task: FaultPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
+    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> Held | None:
         """The loop of a law whose pressure changes little; None where no law is known."""
 
 
@@ -525,17 +525,17 @@ class Linear(Kind):
 
     measured: str = MEASURED[0]
 
-    def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, **around: Unpack[Around]) -> Any:
+    def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, setup: ExactSetup = PLAIN) -> Any:
         """By a search over the numbers of the family."""
-        return closest(task, step, near=near, measured=self.measured, **around)
+        return closest(task, step, near=near, measured=self.measured, setup=setup)
 
     def proved(self, task: FaultPlant, found: Closest) -> TrackingProof | NoProof:
         """With a slow input gain where that helps."""
         return best_guarantee(task, found.held)
 
-    def leanest(self, task: FaultPlant, step: Fraction, **around: Unpack[Around]) -> Held | None:
+    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> Held | None:
         """That with the smallest change of pressure near the smallest peak."""
-        laws = _Laws.of(task, step, self.measured, around)
+        laws = _Laws.of(task, step, self.measured, setup)
         if isinstance(laws, NoProof):
             return None
         peak = min((laws.least_peak(start) for start in laws.family.starts), key=lambda reached: reached[0])[1]
@@ -543,7 +543,7 @@ class Linear(Kind):
 
 
 def longest_step(
-    task: FaultPlant, *, measured: str = MEASURED[0], kind: Kind | None = None, **around: Unpack[Around]
+    task: FaultPlant, *, measured: str = MEASURED[0], kind: Kind | None = None, setup: ExactSetup = PLAIN
 ) -> Longest | None:
     """A guarantee at nearly the longest T_s that has one, whatever the T_s of the fault; None where none is found.
 
@@ -552,14 +552,13 @@ def longest_step(
     Parameters
     ----------
     task : FaultPlant
-    measured, **around
+    measured, setup
         As in `design_held`.
     kind : Kind, optional
         Of the laws; linear ones unless given.
     """
-    path: dict[str, Any] = {**around}
-    late = sum(float(path.get(name) or 0) for name in ("delay", "lag", "diffusion"))
-    return _farthest(kind or Linear(measured), lambda step: (task, step, around), _first_step(task, late), None)
+    late = sum(map(float, setup.path.values()))
+    return _farthest(kind or Linear(measured), lambda step: (task, step, setup), _first_step(task, late), None)
 
 
 def _first_step(task: FaultPlant, late: float = 0.0) -> Fraction:
@@ -576,19 +575,19 @@ def continued(
     longest: Longest | None,
     *,
     measured: str = MEASURED[0],
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
     """Design for a T_s [s] near one for a longer T_s, where a search at T_s alone found none; None without one."""
     if longest is None or longest.guarantee.held.step < step:
         return None
-    found = nearby(task, step, longest.numbers, measured=measured, **around)
+    found = nearby(task, step, longest.numbers, measured=measured, setup=setup)
     return found if found.proved else None
 
 
 def design_at(task: FaultPlant, longest: Longest) -> TrackingProof:
     """Design for a small slip-rate error at T_s and all else of a guarantee, which stays where there is none."""
     held = longest.guarantee.held
-    found = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), **held.around)
+    found = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), setup=held.setup)
     return min((longest.guarantee, *([found] if found.proved else [])), key=lambda g: g.claims.slip_rate_error)
 
 
@@ -598,24 +597,24 @@ def longest_delay(
     *,
     measured: str = MEASURED[0],
     kind: Kind | None = None,
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
     """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
 
     def ask(delay: Fraction) -> Asked:
-        return task, step, {**around, "delay": delay}
+        return task, step, replace(setup, delay=delay)
 
     found = _farthest(kind or Linear(measured), ask, Fraction(0), MOST_DELAY * step, unit=step / 2)
     return None if found is None else found.guarantee
 
 
 def farthest_rock(
-    task: FaultPlant, step: Fraction, *, measured: str = MEASURED[0], **around: Unpack[Around]
+    task: FaultPlant, step: Fraction, *, measured: str = MEASURED[0], setup: ExactSetup = PLAIN
 ) -> TrackingProof | None:
     """A guarantee through nearly the largest L²/D of rock that has one; None where none is found."""
 
     def ask(time: Fraction) -> Asked:
-        return task, step, {**around, "diffusion": time}
+        return task, step, replace(setup, diffusion=time)
 
     found = _farthest(Linear(measured), ask, max(_first_step(task), step), None)
     return None if found is None else found.guarantee
@@ -628,7 +627,7 @@ def nearest_setup(
     measured: str = MEASURED[0],
     kind: Kind | None = None,
     pressed: bool = False,
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> tuple[str, TrackingProof] | None:
     """Of a loop without a guarantee: a quantity that fails, and a guarantee with nearly the most of it that has one.
 
@@ -638,25 +637,25 @@ def nearest_setup(
     sufficient one, for the box a fraction of all half-widths.
     """
     laws = kind or Linear(measured)
-    if pressed and (less := _less_pressed(laws, task, step, around)) is not None:
+    if pressed and (less := _less_pressed(laws, task, step, setup)) is not None:
         return less
-    pump = around.get("pump")
+    pump = setup.pump
     for name in LIMITING:
-        asked: Any = around.get(name)
+        asked: Any = getattr(setup, name, None)
         if name in (RATE, BOX, LONGEST):
-            asked = {RATE: pump and pump.rate, BOX: Fraction(any(task.spreads)), LONGEST: _slack(step, around)}[name]
+            asked = {RATE: pump and pump.rate, BOX: Fraction(any(task.spreads)), LONGEST: _slack(step, setup)}[name]
         if not asked:
             continue
 
         def ask(value: Fraction, name: str = name) -> Asked:
             other: Any = {name: value}
             if name == BOX:
-                return replace(task, spreads=_narrowed(task, value)), step, around
+                return replace(task, spreads=_narrowed(task, value)), step, setup
             if name == RATE:
                 other = {"pump": _ramped(pump, value), "ramp": value}
             elif name == LONGEST:
                 other = {LONGEST: step + value}
-            return task, step, {**around, **other}
+            return task, step, replace(setup, **other)
 
         most = step / 2 if name == RATE else asked
         first, unit = Fraction(0), min(asked, step) / 2
@@ -674,9 +673,9 @@ def nearest_setup(
     return None
 
 
-def _slack(step: Fraction, around: Around) -> Fraction:
+def _slack(step: Fraction, setup: ExactSetup) -> Fraction:
     """Longest sampling interval less T_s [s]."""
-    return max(around.get("longest_step", step) - step, Fraction(0))
+    return max(setup.longest_step - step, Fraction(0))
 
 
 def _narrowed(task: FaultPlant, share: Fraction) -> tuple[Fraction, Fraction, Fraction]:
@@ -685,9 +684,9 @@ def _narrowed(task: FaultPlant, share: Fraction) -> tuple[Fraction, Fraction, Fr
     return first, second, third
 
 
-def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, around: Around) -> tuple[str, TrackingProof] | None:
+def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, setup: ExactSetup) -> tuple[str, TrackingProof] | None:
     """The smallest pump, or the largest disturbance, for which a law of little pressure is proved."""
-    pump, held = around.get("pump"), laws.leanest(task, step, **around)
+    pump, held = setup.pump, laws.leanest(task, step, setup=setup)
     if held is None:
         return None
     if pump is not None and pump.limits is not None:
@@ -752,8 +751,8 @@ def _farthest(
     """
 
     def search(time: Fraction, near: np.ndarray | None) -> Closest | NoProof:
-        task, step, around = ask(time)
-        found: Closest | NoProof = laws.closest(task, step, near, **around)
+        task, step, setup = ask(time)
+        found: Closest | NoProof = laws.closest(task, step, near, setup=setup)
         return found
 
     good: Closest | None = None

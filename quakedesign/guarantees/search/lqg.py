@@ -19,7 +19,7 @@ from scipy.linalg import LinAlgError, expm, solve_discrete_are
 from quakedesign.errors import ParameterError
 from quakedesign.exact import fraction_of, rational, shortly, to_sympy
 from quakedesign.fault import Fault
-from quakedesign.guarantees.exact.loop import Around
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.estimate import rounded, short
 from quakedesign.laws import ErrorModel, LinearLaw, NominalModel, compensator, disturbance_estimate, slip_observer
 from quakedesign.laws.sampled_law import Matrix, Row, unit_row
@@ -39,13 +39,13 @@ _MOST_STATES = 20  # of a loop
 _WITHOUT_PATH = 6  # e1, e2, π2, d, the valve, its last step or the well, of a law that does not know the lag
 
 
-def path_modes(step: Fraction, around: Around, *, observed: bool = False) -> int:
+def path_modes(step: Fraction, setup: ExactSetup, *, observed: bool = False) -> int:
     """How many modes of a layer a law may know so that the loop keeps within the states of a file; 0 without one.
 
     Below 0 there are too many states even so. A law of the slip alone has one state more.
     """
-    ages = -int(-around.get("delay", Fraction(0)) // step)
-    layer, behind = MODES if around.get("diffusion") else 0, bool(around.get("lag"))
+    ages = -int(-setup.delay // step)
+    layer, behind = MODES if setup.diffusion else 0, bool(setup.lag)
     free = _MOST_STATES - _WITHOUT_PATH - layer - behind - 2 * ages - observed
     return free if layer else min(free, 0)
 
@@ -61,10 +61,10 @@ class PathFeedback:
     push: float
 
     @classmethod
-    def of(cls, model: NominalModel, step: Fraction, around: Around, *, observed: bool = False) -> "PathFeedback":
+    def of(cls, model: NominalModel, step: Fraction, setup: ExactSetup, *, observed: bool = False) -> "PathFeedback":
         """With as many modes of a layer as a law may know, of the slip alone if `observed`."""
         gain, short_gain = float(model.gain), short(float(model.gain))
-        flow, first = _sampled(model, step, around, path_modes(step, around, observed=observed))
+        flow, first = _sampled(model, step, setup, path_modes(step, setup, observed=observed))
         path, count = rounded(flow[2:, 2:]), len(flow) - 2  # states b·q of the pressures q of the path
         errors = np.hstack([flow[:2, :2], flow[:2, 2:] / gain])
         known = ErrorModel(
@@ -74,7 +74,7 @@ class PathFeedback:
             pressures=tuple(f"path{i}" for i in range(count)),
             unit=short_gain,
         )
-        unit = float(around.get("diffusion") or step + around.get("delay", 0) + around["lag"])
+        unit = float(setup.diffusion or step + setup.delay + setup.lag)
         return cls(known, flow, first, unit, unit * gain)
 
     def gains(self, slip: float, pressure: float) -> Row:
@@ -106,12 +106,12 @@ def _filter(update: np.ndarray, process: np.ndarray) -> np.ndarray:
     return np.array(covariance[:, 0] / (covariance[0, 0] + 1))
 
 
-def _sampled(model: NominalModel, step: Fraction, around: Around, modes: int) -> tuple[np.ndarray, np.ndarray]:
+def _sampled(model: NominalModel, step: Fraction, setup: ExactSetup, modes: int) -> tuple[np.ndarray, np.ndarray]:
     """A and B over one period, of e1, e2, the pressures of the path and the commands that wait [Pa]."""
-    delay, lag = around.get("delay", Fraction(0)), around.get("lag", Fraction(0))
+    delay, lag = setup.delay, setup.lag
     whole, late = int(delay // step), float(delay % step)
     ages = whole + (late > 0)
-    lagging, layer = int(lag > 0), Layer(time=around.get("diffusion") or lag)
+    lagging, layer = int(lag > 0), Layer(time=setup.diffusion or lag)
     size = 2 + lagging + modes
     shares = np.array([float(layer.share(i)) for i in range(modes)])
     rates = np.array([float(layer.rate(i)) for i in range(modes)])
@@ -172,12 +172,12 @@ def measured_by(law: LinearLaw) -> str:
     return MEASURED[2] if law.states[-ORDER:] == names_before() else MEASURED[law.of_slip_alone]
 
 
-def require_surroundings(around: Around) -> None:
+def require_setup(setup: ExactSetup) -> None:
     """Reject a diffusion time or noise below 0."""
     limits = (
-        ("diffusion", around.get("diffusion", Fraction(0)), "s"),
-        ("slip noise", around.get("slip_noise", Fraction(0)), "m"),
-        ("rate noise", around.get("rate_noise", Fraction(0)), "m/s"),
+        ("diffusion", setup.diffusion, "s"),
+        ("slip noise", setup.slip_noise, "m"),
+        ("rate noise", setup.rate_noise, "m/s"),
     )
     for what, value, unit in limits:
         if value < 0:
@@ -186,21 +186,21 @@ def require_surroundings(around: Around) -> None:
             )
 
 
-def why_no_law(step: Fraction, measured: str, around: Around) -> str:
+def why_no_law(step: Fraction, measured: str, setup: ExactSetup) -> str:
     """Why there are no laws for a loop; empty if there are."""
-    if around.get("longest_step") and measured != MEASURED[0]:
+    if setup.longest_step and measured != MEASURED[0]:
         return "aperiodic sampling needs slip and slip rate measured"
-    if measured == MEASURED[2] and any(around.get(name) for name in _NOT_BY_DIFFERENCES):
+    if measured == MEASURED[2] and any(getattr(setup, name) for name in _NOT_BY_DIFFERENCES):
         return "a differentiator needs zero initial errors, and no jitter, averaging, lag or diffusion path"
-    if not around.get("diffusion"):
+    if not setup.diffusion:
         return ""
-    if SHORTEST * around["diffusion"] < step:
-        return f"L^2/D = {float(around['diffusion']):.4g} s is below T_s/{SHORTEST}; omit the diffusion path"
-    known = path_modes(step, around, observed=measured == "slip") >= _FEWEST_MODES
+    if SHORTEST * setup.diffusion < step:
+        return f"L^2/D = {float(setup.diffusion):.4g} s is below T_s/{SHORTEST}; omit the diffusion path"
+    known = path_modes(step, setup, observed=measured == "slip") >= _FEWEST_MODES
     return "" if known else "a law with models of the delay and of the diffusion path has too many states"
 
 
-def family_of(task: FaultPlant, step: Fraction, measured: str, around: Around) -> LawFamily:
+def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup) -> LawFamily:
     """Feedback with an estimate of the disturbance, from slip and slip rate, from the slip alone or a differentiator.
 
     Behind a lag or a diffusion path the law also feeds back the pressures on their way, which it computes by its model.
@@ -212,19 +212,19 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, around: Around) -
         T_s [s].
     measured : str
         One of `MEASURED`.
-    around : Around
+    setup : ExactSetup
         Loop setup, for which `why_no_law` has no reason. The search of an observer begins near its slip noise.
     """
     if measured == MEASURED[2]:
-        plain = family_of(task, step, MEASURED[0], around)
+        plain = family_of(task, step, MEASURED[0], setup)
         return replace(plain, law=lambda x: told_by_differences(plain.law(x), step), starts=(*_GENTLE, *plain.starts))
-    observed, layer = measured == "slip", bool(around.get("diffusion"))
-    path = layer or (bool(around.get("lag")) and path_modes(step, around, observed=observed) >= 0)
+    observed, layer = measured == "slip", bool(setup.diffusion)
+    path = layer or (bool(setup.lag) and path_modes(step, setup, observed=observed) >= 0)
     feedback: PathFeedback | DelayFeedback
     if path:
-        feedback = PathFeedback.of(task.model, step, around, observed=observed)
+        feedback = PathFeedback.of(task.model, step, setup, observed=observed)
     else:
-        feedback = DelayFeedback.of(task.model, step, around.get("delay", Fraction(0)))
+        feedback = DelayFeedback.of(task.model, step, setup.delay)
     kalman = _Kalman.of(task.model, step)
 
     def law(x: np.ndarray) -> LinearLaw:
@@ -239,10 +239,10 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, around: Around) -
 
     starts: tuple[tuple[float, ...], ...] = (THROUGH_ROCK if layer else BEHIND_LAG) if path else _STARTS
     if observed:
-        decades = kalman.decades(float(task.amplitude), around.get("slip_noise", Fraction(0)))
+        decades = kalman.decades(float(task.amplitude), setup.slip_noise)
         first = starts if path else _OBSERVERS
         starts = tuple((*k[:2], decades + a, decades + b) for k, (*_, a, b) in zip(first, _OBSERVERS, strict=False))
-    period = step + around.get("diffusion", 0)
+    period = step + setup.diffusion
     return LawFamily(law, starts, admits, room=1.4 if observed else 1.6, period=period)
 
 
@@ -305,7 +305,7 @@ class DelayFeedback:
             """Errors after a unit acceleration for some time."""
             return np.array(expm(flow * duration))[:2, 2]
 
-        moved, first = _sampled(model, step, {"delay": delay}, 0)
+        moved, first = _sampled(model, step, ExactSetup(delay=delay), 0)
         ages = range(1, len(moved) - 1)
         arriving = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in ages]
         gain = float(model.gain)

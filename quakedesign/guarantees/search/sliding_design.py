@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import floor, log10
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
@@ -17,7 +17,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, sliding_step
-from quakedesign.guarantees.exact.loop import Around, Held
+from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup, Held
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sliding_small_gain import (
     SlidingClaims,
@@ -141,17 +141,17 @@ def designed_sliding(
     *,
     log_rate: Fraction = LOG_RATES[0],
     near: np.ndarray | None = None,
-    **around: Unpack[Around],
+    setup: ExactSetup = PLAIN,
 ) -> Held | NoProof:
     """The law with the smallest estimated bounds at the least stable corner of the box, |ln(v/V)| up to `log_rate`.
 
     The search begins `near` the numbers of a law as well, if they are told.
     """
-    chosen, _ = searched_sliding(task, step, log_rate, around, near=near)
+    chosen, _ = searched_sliding(task, step, log_rate, setup, near=near)
     if chosen is not None:
         return chosen
     ageing = float(task.ranges["critical_slip"][0] / task.rate)
-    path = "".join(f", {title} = {float(v):.4g} s" for title, v in _path(around).items() if v)
+    path = "".join(f", {title} = {float(v):.4g} s" for title, v in _path(setup).items() if v)
     reason = (
         f"no law with zero-order hold over {float(step):g} s was found whose loop is stable and forgets within some "
         f"hundred periods, D_c/V = {ageing:.3g} s{path}"
@@ -159,16 +159,15 @@ def designed_sliding(
     return NoProof(reason=reason)
 
 
-def _path(around: Around) -> dict[str, Fraction]:
-    zero = Fraction(0)
-    return {"L^2/D": around.get("diffusion", zero), "lag": around.get("lag", zero), "delay": around.get("delay", zero)}
+def _path(setup: ExactSetup) -> dict[str, Fraction]:
+    return {"L^2/D": setup.diffusion, "lag": setup.lag, "delay": setup.delay}
 
 
 def searched_sliding(
     task: SlidingPlant,
     step: Fraction,
     log_rate: Fraction,
-    around: Around,
+    setup: ExactSetup,
     *,
     near: np.ndarray | None = None,
     enough: float = 0.0,
@@ -179,7 +178,7 @@ def searched_sliding(
     Parameters
     ----------
     task : SlidingPlant
-    step, log_rate, around
+    step, log_rate, setup
         As of `designed_sliding`.
     near : array, optional
         Numbers to begin with beside the usual ones.
@@ -192,8 +191,8 @@ def searched_sliding(
     claims = _guess(corner, log_rate)
 
     def held(x: np.ndarray) -> Held | None:
-        law = _law(corner, task, step, around, x)
-        return None if law is None else Held(law=law, step=step, **around)
+        law = _law(corner, task, step, setup, x)
+        return None if law is None else setup.held(law, step)
 
     costs: list[float] = []
 
@@ -236,7 +235,9 @@ def worst_corner(task: SlidingPlant) -> SlidingPlant:
     return replace(task, ranges={**task.ranges, **fixed})
 
 
-def _law(corner: SlidingPlant, task: SlidingPlant, step: Fraction, around: Around, x: np.ndarray) -> LinearLaw | None:
+def _law(
+    corner: SlidingPlant, task: SlidingPlant, step: Fraction, setup: ExactSetup, x: np.ndarray
+) -> LinearLaw | None:
     sizes = map(float, np.exp(np.clip(x[:6], -30, 30)))
     weights = Weights(**dict(zip(Weights.__dataclass_fields__, sizes, strict=True)))
     a, b, d = (_middle(task, axis) * short(float(np.exp(v)), _DIGITS) for axis, v in zip(_AXES, x[6:], strict=True))
@@ -254,7 +255,7 @@ def _law(corner: SlidingPlant, task: SlidingPlant, step: Fraction, around: Aroun
         coefficient=_middle(task, "coefficient"),
     )
     try:
-        return sliding_law(model, step, diffusion=around.get("diffusion", Fraction(0)), weights=weights)
+        return sliding_law(model, step, diffusion=setup.diffusion, weights=weights)
     except ParameterError:
         return None
 
@@ -412,7 +413,7 @@ def suitable(task: SlidingPlant, step: Fraction) -> Fraction:
 
 
 def farthest(
-    task: SlidingPlant, step: Fraction, around: Around, *, stressed: bool, most: Fraction = Fraction(1)
+    task: SlidingPlant, step: Fraction, setup: ExactSetup, *, stressed: bool, most: Fraction = Fraction(1)
 ) -> WellReach:
     """How much of a path, lag and rock, a law can be followed along, from where one is easily found.
 
@@ -421,7 +422,7 @@ def farthest(
     task : SlidingPlant
     step : Fraction
         T_s [s].
-    around : Fraction
+    setup : ExactSetup
         As of `designed_sliding`; with a lag or rock.
     stressed : bool
         Whether the stress of the task is given, so that larger bounds of |ln(v/V)| may be needed.
@@ -431,48 +432,48 @@ def farthest(
     ageing = task.ranges["critical_slip"][0] / task.rate
     rates = LOG_RATES[::-1] if stressed else LOG_RATES[-1:]
     reached = WellReach()
-    share = min(most, _EASY * ageing / (around.get("lag", Fraction(0)) + around.get("diffusion", Fraction(0))))
+    share = min(most, _EASY * ageing / (setup.lag + setup.diffusion))
     for _ in range(1 + _NEARER):
-        reached = _followed_well(task, step, around, share, reached, rates)
+        reached = _followed_well(task, step, setup, share, reached, rates)
         if reached.share:
             break
         share /= 2
     farther = list(_FARTHER)
     while 0 < reached.share < most and farther:
         share = min(most, farther[0] * reached.share)
-        reached = _followed_well(task, step, around, share, reached, rates)
+        reached = _followed_well(task, step, setup, share, reached, rates)
         if reached.share < share:
             farther.pop(0)
     if 0 < reached.share < most:  # with room for a proof, whose bounds are larger than their estimate
-        return _followed_well(task, step, around, _WELL_ROOM * reached.share, reached, rates)
+        return _followed_well(task, step, setup, _WELL_ROOM * reached.share, reached, rates)
     return reached
 
 
 def _followed_well(
-    task: SlidingPlant, step: Fraction, around: Around, share: Fraction, before: WellReach, rates: tuple[Fraction, ...]
+    task: SlidingPlant,
+    step: Fraction,
+    setup: ExactSetup,
+    share: Fraction,
+    before: WellReach,
+    rates: tuple[Fraction, ...],
 ) -> WellReach:
     """A law for a share of the path, near the one before, or that one where none is found."""
     for log_rate in rates:
         held, numbers = searched_sliding(
-            task, step, log_rate, shortened(around, share), near=before.numbers, enough=_ENOUGH, most=_LAWS
+            task, step, log_rate, shortened(setup, share), near=before.numbers, enough=_ENOUGH, most=_LAWS
         )
         if held is not None:
             return WellReach(share=share, held=held, numbers=numbers, log_rate=log_rate)
     return before
 
 
-def shortened(around: Around, share: Fraction) -> Around:
+def shortened(setup: ExactSetup, share: Fraction) -> ExactSetup:
     """Share of lag and rock."""
-    nearer = around.copy()
-    if "lag" in around:
-        nearer["lag"] = share * around["lag"]
-    if "diffusion" in around:
-        nearer["diffusion"] = share * around["diffusion"]
-    return nearer
+    return replace(setup, lag=share * setup.lag, diffusion=share * setup.diffusion)
 
 
 def what_would_do(
-    fault: Fault, task: SlidingPlant, reach: WellReach, around: Around, prove: Prove, *, spread: Fraction
+    fault: Fault, task: SlidingPlant, reach: WellReach, setup: ExactSetup, prove: Prove, *, spread: Fraction
 ) -> str:
     """For which part of a path, and for which V through all of it, a proof was found; in words, for a `reach` below 1.
 
@@ -482,7 +483,7 @@ def what_would_do(
     task : SlidingPlant
         Of the fault.
     reach : WellReach
-    around : Fraction
+    setup : ExactSetup
         As of `designed_sliding`.
     prove : callable
     spread : Fraction
@@ -490,8 +491,8 @@ def what_would_do(
     """
     if reach.held is None or reach.numbers is None:
         return "none was found with a well that is much nearer either: a smaller spread, stress or noise may do"
-    for noise in (around.get("slip_noise", Fraction(0)), *quieter(around)):
-        loop = around if noise == around.get("slip_noise", 0) else {**around, "slip_noise": noise}
+    for noise in (setup.slip_noise, *quieter(setup)):
+        loop = setup if noise == setup.slip_noise else replace(setup, slip_noise=noise)
         held = replace(reach.held, slip_noise=noise)
         proof = prove(task, held, reach.log_rate)
         said = [_slower(fault, task, reach, loop, prove, spread)]
@@ -499,19 +500,19 @@ def what_would_do(
             path = (f"{title} = {float(v):.3g} s" for name, title in PATH.items() if (v := getattr(held, name)))
             said.append(f"at this V for {' and '.join(path)} with T_s = {float(held.step):.3g} s{_under(proof)}")
         if found := ", and ".join(filter(None, said)):
-            return f"a proof was found {with_noise(noise, around)}{found}"
+            return f"a proof was found {with_noise(noise, setup)}{found}"
     return "a smaller spread, stress or noise may do"
 
 
-def quieter(around: Around) -> tuple[Fraction, ...]:
+def quieter(setup: ExactSetup) -> tuple[Fraction, ...]:
     """Smaller bounds of the slip noise [m], down to none, to try where no proof is found; empty without noise."""
-    noise = around.get("slip_noise")
+    noise = setup.slip_noise
     return tuple(two_digits(share * noise) if share else Fraction(0) for share in _QUIETER) if noise else ()
 
 
-def with_noise(noise: Fraction, around: Around) -> str:
+def with_noise(noise: Fraction, setup: ExactSetup) -> str:
     """Words for a proof with a smaller slip noise than required; empty for the same."""
-    if noise == around.get("slip_noise", 0):
+    if noise == setup.slip_noise:
         return ""
     return (
         f"with slip noise of at most {LowerBound(noise).quantity('m')} "
@@ -520,13 +521,15 @@ def with_noise(noise: Fraction, around: Around) -> str:
     )
 
 
-def _slower(fault: Fault, task: SlidingPlant, reach: WellReach, around: Around, prove: Prove, spread: Fraction) -> str:
+def _slower(
+    fault: Fault, task: SlidingPlant, reach: WellReach, setup: ExactSetup, prove: Prove, spread: Fraction
+) -> str:
     """A task with the same target slip that takes longer, through the whole path; empty where none is proved."""
     time = float(short(_SLOWER * fault.reference.operation_time / float(reach.share), _WELL_DIGITS))
     reference = replace(fault.reference, operation_time=time)
     slow = replace(fault, reference=reference, sampling_time=sliding_step(fault.friction, reference))
     asked, step = slow_sliding_plant(slow, task.stress, spread), rational(slow.sampling_time)
-    held, _ = searched_sliding(asked, step, reach.log_rate, around, near=reach.numbers, enough=_ENOUGH, most=_LAWS)
+    held, _ = searched_sliding(asked, step, reach.log_rate, setup, near=reach.numbers, enough=_ENOUGH, most=_LAWS)
     proof = None if held is None else prove(asked, held, reach.log_rate)
     if proof is None or not proof.proved:
         return ""

@@ -11,6 +11,7 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, Claims, Held, NoProof, TrackingProof, guarantee
 from quakedesign.guarantees.exact import statement
 from quakedesign.guarantees.exact import statement as continuous
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.exact.statement import above, sentence_of
 from quakedesign.laws import ImplicitRoot, LinearLaw, Power, compensated, summed_integrals
 from quakedesign.loop import ContinuousLaw, Instants
@@ -126,9 +127,8 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
         {"rate_noise": F(2, 3)},
     )
     quiet = Held(law=alone, step=F(1))
-    around = ("delay", "lag", "diffusion", "slip_noise", "rate_noise", "initial_slip", "initial_slip_rate")
-    around += ("jitter", "delay_jitter", "averaging", "longest_step")
-    assert (quiet.noise, quiet.around) == ({}, dict.fromkeys(around, 0) | {"pump": None})
+    assert (quiet.noise, quiet.setup) == ({}, ExactSetup())
+    assert replace(quiet, lag=F(1, 2), ramp=F(1, 4)).setup == ExactSetup(lag=F(1, 2))
     said = TrackingProof(task=TASK, held=quiet, claims=CLAIMS).sentence()
     assert "with zero-order hold over 1 s, with the slip alone measured, for every" in said
     assert Held(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}

@@ -13,6 +13,7 @@ from scipy.linalg import expm
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import design_compensated, design_held, tightened
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.guarantee_result import attacked as beside_searches
 from quakedesign.laws import control_law
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -57,11 +58,11 @@ def designed(row):
     task = uncertain_plant(fault, rate_limited=kind == "rate")
     if kind in GAINS:
         law = control_law(kind).from_values(GAINS[kind], scale=F(1), divisor=task.authority)
-        made = design_compensated(task, law, step, **around)
+        made = design_compensated(task, law, step, setup=ExactSetup(**around))
         claim = tightened(made.proof)
         held = attacker.sliding(made.controller, made.weight, made.authority, claim, float(task.authority))
     else:
-        claim = design_held(task, step, **around)
+        claim = design_held(task, step, setup=ExactSetup(**around))
         claim = beside_searches(fault, claim).proof if kind == "rate" else claim  # claims with room for stick
         held = attacker.numbers(claim, force=task.amplitude if kind == "rate" else None)
     return claim, held if claim.slow_gain else replace(held, slope=0.0)  # any course of the gain where none is slow

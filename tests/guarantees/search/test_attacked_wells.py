@@ -12,6 +12,7 @@ from thinned import few
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import design_held
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
 
@@ -25,7 +26,7 @@ WELLS = {1: (1.2e-4, 1.5), 2: (2.0e-4, 1.5), 5: (6e-4, 2)}  # L²/D [s]: certifi
 
 @cache
 def through(rock):
-    return design_held(uncertain_plant(REAL), STEP, objective="peak", diffusion=F(rock))
+    return design_held(uncertain_plant(REAL), STEP, objective="peak", setup=ExactSetup(diffusion=F(rock)))
 
 
 def worst(held, periods, pieces, *chosen):
@@ -90,7 +91,7 @@ LAGS = {("0.184", "0.2"): 2.3e-4, ("0.05", "0.2"): 6.6e-5, ("0.184", "0.001"): 1
 @few("times", LAGS, every=3)
 def test_no_course_violates_a_guarantee_behind_a_lag(times, count):
     step, lag = map(F, times)
-    claim = design_held(uncertain_plant(REAL), step, lag=lag)
+    claim = design_held(uncertain_plant(REAL), step, setup=ExactSetup(lag=lag))
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= LAGS[times]
     held, periods, pieces = attacker.numbers(claim), 60, 6
@@ -113,7 +114,9 @@ SLIP_ALONE = {
 @pytest.mark.parametrize("behind", ["lag", "rock"])
 def test_no_course_with_noise_violates_a_guarantee_of_the_slip_alone(behind):
     around, step, most, count = SLIP_ALONE[behind]
-    claim = design_held(uncertain_plant(REAL), step, measured="slip", slip_noise=F(1, 10**6), **around)
+    claim = design_held(
+        uncertain_plant(REAL), step, measured="slip", setup=ExactSetup(slip_noise=F(1, 10**6), **around)
+    )
     assert claim.held.law.of_slip_alone
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= most
@@ -133,7 +136,7 @@ def test_no_course_with_noise_violates_a_guarantee_of_the_slip_alone(behind):
 @pytest.mark.slow
 def test_behind_a_short_lag_a_design_holds_as_well_as_behind_none():
     task, step = uncertain_plant(REAL), F("0.184")
-    short, none = design_held(task, step, lag=F("0.001")), design_held(task, step)
+    short, none = design_held(task, step, setup=ExactSetup(lag=F("0.001"))), design_held(task, step)
     for name in ("slip_error", "slip_rate_error"):
         assert getattr(short.claims, name) == pytest.approx(getattr(none.claims, name), rel=0.1)
 

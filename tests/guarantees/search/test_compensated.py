@@ -22,6 +22,7 @@ from quakedesign.guarantees import (
     tightened,
     worst_found,
 )
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import implicit_pull
 from quakedesign.laws import Power, Sampling, control_law, published
 from quakedesign.laws.feed_forward import feed_forward
@@ -98,7 +99,7 @@ def test_no_course_violates_a_guarantee(row, courses):
 def test_no_course_with_noise_violates_a_guarantee(row, courses):
     """Slip and slip rate told within 1 um and 10 um/s, along random courses and along the nominal response."""
     noise = {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
-    made = design_compensated(TASK, law(row, CTA if row == "cta" else DIA, 1), STEP, **noise)
+    made = design_compensated(TASK, law(row, CTA if row == "cta" else DIA, 1), STEP, setup=ExactSetup(**noise))
     held, claim = attacked(made.controller, made.weight, made.authority, made.proof)
     assert claim.check() is Verdict.PROVED
     assert designed(row).proof.claims.slip_rate_error < claim.claims.slip_rate_error <= F(4, 10**4)

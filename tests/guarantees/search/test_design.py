@@ -15,6 +15,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, design_held, guarantee, worst_found
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.guarantees.search.linear_design import _with_noise, closest
 from quakedesign.laws import published
@@ -43,7 +44,9 @@ DELAYS = {"real one period late": F("0.184")}
 @cache
 def designed(row):
     name, step, objective, *_ = ROWS[row]
-    return design_held(uncertain_plant(load_fault(name)), step, objective=objective, delay=DELAYS.get(row, F(0)))
+    return design_held(
+        uncertain_plant(load_fault(name)), step, objective=objective, setup=ExactSetup(delay=DELAYS.get(row, F(0)))
+    )
 
 
 @cache

@@ -9,6 +9,7 @@ import quakedesign as qd
 from quakedesign.cli.design_commands import DesignOptions
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.guarantees import Held, guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.defaults import SampledDesign
 from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.plant import uncertain_plant
@@ -40,10 +41,8 @@ def asked(monkeypatch):
 
 def test_a_design_knows_what_stands_between_law_and_fault(asked):
     design = qd.design(REAL, "elqr", lag="0.02", delay=F(1, 100), diffusion=0.5, slip_noise="1e-7")
-    assert asked == [
-        {"measured": "slip-and-rate", "delay": F(1, 100), "lag": LAG, "diffusion": F(1, 2)}
-        | {"slip_noise": F(1, 10**7)}
-    ]
+    setup = ExactSetup(delay=F(1, 100), lag=LAG, diffusion=F(1, 2), slip_noise=F(1, 10**7))
+    assert asked == [{"measured": "slip-and-rate", "setup": setup}]
     assert design.setup.path == {"delay": F(1, 100), "lag": LAG, "diffusion": F(1, 2)}
     assert design.controller.sampling.path == {"delay": 0, "lag": LAG, "diffusion": 0}
     assert (design.guarantee, str(design.verdict), design.details["lag"]) == (CLAIM, "proved", "1/50")

@@ -14,6 +14,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingGuarantee, design_held
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.lqg import measured_by
 from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov import Verdict
@@ -36,7 +37,9 @@ ROWS = {("peak", F(0)): (2.0e-4, 9e-5), ("tracking", F(0)): (2.6e-4, 7e-5), ("pe
 @cache
 def designed(row):
     objective, noise = row
-    return design_held(uncertain_plant(REAL), STEP, objective=objective, measured="differentiator", slip_noise=noise)
+    return design_held(
+        uncertain_plant(REAL), STEP, objective=objective, measured="differentiator", setup=ExactSetup(slip_noise=noise)
+    )
 
 
 @pytest.mark.slow

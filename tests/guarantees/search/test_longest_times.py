@@ -1,6 +1,6 @@
 """How long a sampling time may be, how much of a setup a design stands, and designs continued from others."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from fractions import Fraction as F
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +12,7 @@ import quakedesign as qd
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingProof, design_held, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup
 from quakedesign.guarantees.search import linear_design as longest_times
 from quakedesign.guarantees.search.linear_design import (
     Closest,
@@ -39,19 +40,23 @@ def longest(task):
     return longest_step(task)
 
 
+def vars_of(setup):
+    return {part.name: getattr(setup, part.name) for part in fields(setup)}
+
+
 @pytest.fixture
 def searched(monkeypatch):
     """Searches whose small gain at a time t is (t/longest)^1.2, and of a setup (1 + value)·t; what was tried."""
     tried = []
 
     def install(longest, *, proved=1.0, misses=()):
-        def closest(task, step, *, near=None, measured="slip-and-rate", **around):
-            much = sum(value for value in around.values() if isinstance(value, F | int))
+        def closest(task, step, *, near=None, measured="slip-and-rate", setup=PLAIN):
+            much = sum(value for value in vars_of(setup).values() if isinstance(value, F | int))
             tried.append((step, much, None if near is None else float(near[0])))
             small = float(step * (1 + much) / longest) ** 1.2
             if len(tried) in misses and near is None:
                 return NoProof(reason="none")
-            held = SimpleNamespace(step=step, **around)
+            held = SimpleNamespace(step=step, **vars_of(setup))
             return Closest(small if small < 1 else 1 + small, np.array([float(step)]), held)
 
         def best(task, held):
@@ -102,23 +107,23 @@ def test_the_longest_delay_is_found_within_a_tenth(task, searched, most):
 
 def test_the_quantity_of_a_setup_that_fails_is_named_with_the_most_that_is_proved(task, searched):
     searched(F(3, 2))
-    name, found = nearest_setup(task, F(1), delay=F(4), slip_noise=F(0))
+    name, found = nearest_setup(task, F(1), setup=ExactSetup(delay=F(4), slip_noise=F(0)))
     assert name == "delay"
     assert F(9, 20) <= found.held.delay <= F(1, 2)
     assert nearest_setup(task, F(1)) is None
-    assert nearest_setup(task, F(2), delay=F(4)) is None  # T_s itself is too long
+    assert nearest_setup(task, F(2), setup=ExactSetup(delay=F(4))) is None  # T_s itself is too long
 
 
 def test_a_search_near_another_law_that_finds_none_begins_anew(task, monkeypatch, searched):
     tried = searched(F(8, 5))
     plain = longest_times.closest
 
-    def stuck(task, step, *, near=None, **around):
-        found = plain(task, step, near=near, **around)
+    def stuck(task, step, *, near=None, **more):
+        found = plain(task, step, near=near, **more)
         return found if near is None else NoProof(reason="stuck")
 
     monkeypatch.setattr(longest_times, "closest", stuck)
-    assert nearest_setup(task, F(1), delay=F(4))[1].held.delay >= F(1, 2)
+    assert nearest_setup(task, F(1), setup=ExactSetup(delay=F(4)))[1].held.delay >= F(1, 2)
     assert None in [near for _, much, near in tried if much]
 
 
@@ -155,8 +160,8 @@ def test_every_command_proves_what_the_longest_step_says(task, longest):
 
 @pytest.mark.slow
 def test_behind_a_lag_with_noise_what_was_proved_at_0_22_s_is_found():
-    setup = {"measured": "slip", "lag": F("0.3"), "slip_noise": F(5, 10**6)}
-    found = longest_step(uncertain_plant(load_fault(LAGGING)), **setup)
+    setup = ExactSetup(lag=F("0.3"), slip_noise=F(5, 10**6))
+    found = longest_step(uncertain_plant(load_fault(LAGGING)), measured="slip", setup=setup)
     assert found.guarantee.held.step >= F("0.22")
     assert found.guarantee.check() is Verdict.PROVED
 

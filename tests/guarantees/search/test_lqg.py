@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from quakedesign.fault import load_fault
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.lqg import (
     FAVOURED,
     DelayFeedback,
@@ -58,7 +59,7 @@ def test_the_model_of_a_delay_predicts_the_next_sample_and_the_arrival(delay):
 @pytest.mark.parametrize("delay", ["0", "0.05", "0.27"])
 def test_the_model_of_a_lag_predicts_the_next_sample(delay):
     """Its states are 2.4 times the pressures: of the well, and of the commands that wait."""
-    model = PathFeedback.of(MODEL, STEP, {"delay": F(delay), "lag": F(1, 10)}).model
+    model = PathFeedback.of(MODEL, STEP, ExactSetup(delay=F(delay), lag=F(1, 10))).model
     a, b = np.array(model.update, float), np.array(model.command, float)
     commands = np.array([0.3, -0.2, 0.5])[: len(b) - 2]
     x = np.array([0.1, -0.2, 2.4 * 0.4, *2.4 * commands[1:]])
@@ -77,7 +78,7 @@ def regulator(a, b, cost, weight):
 
 def test_the_gains_behind_a_lag_are_those_of_a_regulator():
     """Of e1, e2 and 2.4 times the well's pressure; time in T_s + lag = 0.3 s, pressure in 1/(0.3·2.4)."""
-    feedback = PathFeedback.of(MODEL, STEP, {"lag": F(1, 10)})
+    feedback = PathFeedback.of(MODEL, STEP, ExactSetup(lag=F(1, 10)))
     a, b = np.array(feedback.model.update, float), np.array(feedback.model.command, float)
     cost, weight = np.diag([np.exp(-2.4) / 0.3**2, 1, 0]), np.exp(-1.0) * (0.3 * 2.4) ** 2
     assert np.allclose(np.array(feedback.gains(-2.4, -1.0), float), regulator(a, b, cost, weight), rtol=2e-3)
@@ -110,14 +111,15 @@ TASK = uncertain_plant(load_fault("real-fault"))
     ],
 )
 def test_a_family_models_what_is_between_law_and_fault(around, names):
-    both, observed = (family_of(TASK, STEP, measured, around) for measured in ("slip-and-rate", "slip"))
+    setup = ExactSetup(**around)
+    both, observed = (family_of(TASK, STEP, measured, setup) for measured in ("slip-and-rate", "slip"))
     law = both.law(np.array(both.starts[0]))
     assert law.states == ("predicted_rate", "disturbance", *names)
     law = observed.law(np.array(observed.starts[0]))
     kept = names[:-1] if "diffusion" in around else names  # a state more, a mode less
     assert law.states == ("predicted_slip", "predicted_rate", "disturbance", *kept)
     assert law.of_slip_alone
-    assert (both.room, observed.room, both.period) == (1.6, 1.4, STEP + around.get("diffusion", 0))
+    assert (both.room, observed.room, both.period) == (1.6, 1.4, STEP + setup.diffusion)
     assert all(both.admits(np.array(x)) for x in both.starts)
     assert all(observed.admits(np.array(x)) for x in observed.starts)
 
@@ -125,8 +127,8 @@ def test_a_family_models_what_is_between_law_and_fault(around, names):
 @pytest.mark.parametrize("path", [False, True])
 def test_a_family_admits_weights_from_0_to_1_and_exponents_below_12(path):
     """The first two numbers are exponents with a path only."""
-    around = {"lag": F(1, 10)} if path else {}
-    both, observed = (family_of(TASK, STEP, measured, around).admits for measured in ("slip-and-rate", "slip"))
+    setup = ExactSetup(lag=F(1, 10) if path else F(0))
+    both, observed = (family_of(TASK, STEP, measured, setup).admits for measured in ("slip-and-rate", "slip"))
     admitted = [bool(both(np.array([0.5, 0.5, weight]))) for weight in (-0.1, 0.0, 0.1, 0.9, 1.0, np.nan)]
     assert admitted == [False, False, True, True, False, False]
     for place in range(2):

@@ -11,6 +11,7 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, best_guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import design_compensated
 from quakedesign.guarantees.search.defaults import deadbeat, sampled_sliding_mode
 from quakedesign.guarantees.search.estimate import closeness
@@ -85,7 +86,7 @@ def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_muc
     assert low < leaner[0] <= leaner[1] < high
     pump = Pump(least=(low + leaner[0]) / 2, largest=(high + leaner[1]) / 2)
     assert isinstance(best_guarantee(task, replace(usual.held, pump=pump)), NoProof)
-    assert design_held(task, step, pump=pump).check() is Verdict.PROVED
+    assert design_held(task, step, setup=ExactSetup(pump=pump)).check() is Verdict.PROVED
 
 
 @pytest.mark.slow

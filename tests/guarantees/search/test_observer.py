@@ -14,10 +14,12 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, worst_found
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.linear_design import Longest, closest, design_at
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.parallel import in_background
 from quakedesign.plant import uncertain_plant
 from quakedesign.studies import comparison
 
@@ -32,8 +34,8 @@ STEP, NOISE, PERIODS, PIECES = F("0.184"), F(1, 10**6), 40, 6
 @cache
 def designed(name):
     around = {
-        "slip alone": {"measured": "slip", "slip_noise": NOISE},
-        "both": {"slip_noise": NOISE, "rate_noise": F(1, 10**5)},
+        "slip alone": {"measured": "slip", "setup": ExactSetup(slip_noise=NOISE)},
+        "both": {"setup": ExactSetup(slip_noise=NOISE, rate_noise=F(1, 10**5))},
     }[name]
     return design_held(uncertain_plant(REAL), STEP, objective="peak", **around)
 
@@ -149,15 +151,16 @@ def asked(monkeypatch):
 
 def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for(asked, monkeypatch):
     design = qd.design(REAL, "elqr", measured="slip", slip_noise="1e-6")
-    claim, told = design.guarantee, {"measured": "slip", "slip_noise": NOISE}
+    claim, told = design.guarantee, {"measured": "slip", "setup": ExactSetup(slip_noise=NOISE)}
     assert asked["design_held"] == told | {"objective": "tracking"}
     assert (asked["longest_step"], asked["longest_delay"]) == (told, told)
     assert (design.verdict, claim) == (Verdict.PROVED, designed("slip alone"))
     assert (design.details["measured"], design.details["slip_noise"]) == ("slip", "1/1000000")
     ran = []
     monkeypatch.setattr(comparison, "simulate", lambda *_, measurement, **__: ran.append(measurement))
-    comparison._entry("designed", design, {"designed": "explicit"}, lambda *_: None, None)
-    comparison._entry("designed", replace(design, setup=LoopSetup()), {"designed": "explicit"}, lambda *_: None, None)
+    with in_background() as runs:
+        for one in (design, replace(design, setup=LoopSetup())):
+            comparison._begun("designed", one, {"designed": "explicit"}, runs, None)[1].result()
     assert ran == [Measurement(slip_noise=1e-6, bounded=True), None]
 
 
@@ -171,7 +174,7 @@ def test_the_noisy_run_of_a_design_stays_within_its_guarantee():
 
 
 def test_a_delay_is_designed_for_with_the_slip_alone():
-    near = closest(uncertain_plant(REAL), STEP, measured="slip", slip_noise=NOISE, delay=F("0.1"))
+    near = closest(uncertain_plant(REAL), STEP, measured="slip", setup=ExactSetup(slip_noise=NOISE, delay=F("0.1")))
     assert near.closeness < 1
     found = best_guarantee(uncertain_plant(REAL), near.held)
     assert found.held.law.of_slip_alone
@@ -186,7 +189,4 @@ def test_near_the_longest_time_a_design_is_sought_for_what_a_guarantee_measures(
         "quakedesign.guarantees.search.linear_design.nearby", lambda *a, **k: told.append((a[:2], k)) or none
     )
     assert design_at(claim.task, Longest(claim, np.zeros(4))) is claim
-    around = {"delay": 0, "lag": 0, "diffusion": 0, "slip_noise": NOISE, "rate_noise": 0}
-    around |= {"initial_slip": 0, "initial_slip_rate": 0, "pump": None, "jitter": 0, "delay_jitter": 0, "averaging": 0}
-    around |= {"longest_step": 0}
-    assert told == [((claim.task, STEP), {"measured": "slip", **around})]
+    assert told == [((claim.task, STEP), {"measured": "slip", "setup": ExactSetup(slip_noise=NOISE)})]

@@ -9,6 +9,7 @@ import pytest
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault, Reference, friction_law
 from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.guarantee_result import _beyond
 from quakedesign.guarantees.search import sliding_design
 from quakedesign.guarantees.search.sliding_design import (
@@ -60,38 +61,38 @@ def proved(task, held, log_rate):
 @pytest.mark.slow
 def test_a_law_for_a_far_well_is_found_from_nearer_ones_on():
     """L²/D is 3.8 D_c/V, through which the usual starts lead to no law."""
-    around = {"diffusion": Fraction(2531)}
-    assert searched_sliding(TASK, STEP, LOG_RATES[-1], around)[0] is None
-    reach = farthest(TASK, STEP, around, stressed=False)
+    setup = ExactSetup(diffusion=Fraction(2531))
+    assert searched_sliding(TASK, STEP, LOG_RATES[-1], setup)[0] is None
+    reach = farthest(TASK, STEP, setup, stressed=False)
     assert reach.share == 1
     assert (reach.held.diffusion, reach.held.step) == (2531, 33)
 
 
 def test_where_a_well_is_too_far_a_slower_task_and_a_nearer_well_are_named():
-    around = {"diffusion": Fraction(20000)}
-    reach = farthest(TASK, STEP, around, stressed=False, most=Fraction(1, 40))
+    setup = ExactSetup(diffusion=Fraction(20000))
+    reach = farthest(TASK, STEP, setup, stressed=False, most=Fraction(1, 40))
     assert reach.share == Fraction(1, 40)
-    said = what_would_do(FAULT, TASK, reach, around, proved, spread=Fraction(0))
+    said = what_would_do(FAULT, TASK, reach, setup, proved, spread=Fraction(0))
     assert "at this V for L^2/D = 500 s with T_s = 33 s under a stress of at most 1 Pa" in said
     # 40 times slower with 5 % spare: 552000 s · 42 = 2.3e7 s, D_c/(20 V) = 6e-5 · 2.3e7/(20 · 0.05) s
     assert "operation_time = '2.3e+07 s', sampling_time = '1300 s'" in said
     assert "for V = 2.17e-09 m/s" in said
     assert "extrapolated" not in said
     known = replace(FAULT, friction=replace(GOUGE, slowest_rate=1e-8, reference_rate=1e-8))
-    said = what_would_do(known, TASK, reach, around, proved, spread=Fraction(0))
+    said = what_would_do(known, TASK, reach, setup, proved, spread=Fraction(0))
     assert "(but V = 2.17e-09 m/s is below the rates for which friction is known" in said
 
     def unproved(task, held, log_rate):
         return NoProof(reason="")
 
-    assert what_would_do(FAULT, TASK, reach, around, unproved, spread=Fraction(0)).startswith("a smaller spread")
+    assert what_would_do(FAULT, TASK, reach, setup, unproved, spread=Fraction(0)).startswith("a smaller spread")
 
 
 def test_where_the_slip_noise_is_too_large_a_smaller_one_is_named(monkeypatch):
     """Found at a hundredth: a tenth is tried before, and none after that."""
     reach = WellReach(share=Fraction(1, 40), held=held(Fraction(1, 10**7)), numbers=np.zeros(9))
     monkeypatch.setattr(sliding_design, "searched_sliding", lambda *_, **__: (None, np.zeros(9)))
-    around = {"diffusion": Fraction(20000), "slip_noise": Fraction(1, 10**7)}
+    setup = ExactSetup(diffusion=Fraction(20000), slip_noise=Fraction(1, 10**7))
     for most, said in (
         (Fraction(1, 10**7), "a proof was found at this V for L^2/D = 500 s"),
         (Fraction(1, 10**9), "a proof was found with slip noise of at most 1 nm at this V for L^2/D = 500 s"),
@@ -104,12 +105,12 @@ def test_where_the_slip_noise_is_too_large_a_smaller_one_is_named(monkeypatch):
             tried.append(held.slip_noise)
             return proved(task, held, log_rate) if held.slip_noise <= most else NoProof(reason="")
 
-        assert what_would_do(FAULT, TASK, reach, around, up_to, spread=Fraction(0)).startswith(said)
+        assert what_would_do(FAULT, TASK, reach, setup, up_to, spread=Fraction(0)).startswith(said)
         assert tried[0] == Fraction(1, 10**7)
 
 
 def test_where_no_law_is_found_near_the_fault_nothing_is_promised():
-    reach = farthest(replace(TASK, stress=Fraction(10**9)), STEP, {"lag": Fraction(600)}, stressed=False)
+    reach = farthest(replace(TASK, stress=Fraction(10**9)), STEP, ExactSetup(lag=Fraction(600)), stressed=False)
     assert (reach.share, reach.held) == (0, None)
     assert what_would_do(FAULT, TASK, reach, {}, proved, spread=Fraction(0)).startswith("none was found with a well")
 
@@ -117,9 +118,9 @@ def test_where_no_law_is_found_near_the_fault_nothing_is_promised():
 def test_a_well_that_no_controller_reaches_the_fault_through_is_said_to_be_one():
     """From the same L²/D on as `limits` says with T_s = 33 s, but for what T_s makes of it."""
     found = limits(FAULT, stress=1e4, prove=False).largest_diffusion_time.impossible_beyond
-    assert _beyond(FAULT, Fraction(10**4), {"diffusion": found * Fraction(999, 1000)}) == ""
-    assert _beyond(FAULT, Fraction(10**4), {"lag": found * 2}) == ""
-    said = _beyond(FAULT, Fraction(10**4), {"diffusion": found * Fraction(21, 20)})
+    assert _beyond(FAULT, Fraction(10**4), ExactSetup(diffusion=found * Fraction(999, 1000))) == ""
+    assert _beyond(FAULT, Fraction(10**4), ExactSetup(lag=found * 2)) == ""
+    said = _beyond(FAULT, Fraction(10**4), ExactSetup(diffusion=found * Fraction(21, 20)))
     assert said.startswith("no controller whose pressure stays within 40 MPa of what the reference needs")
 
 

@@ -16,6 +16,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Held, SlidingClaims
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.exact.sliding_small_gain import cell_bounds
 from quakedesign.guarantees.guarantee_result import answer_sliding
 from quakedesign.guarantees.search import sliding_design as slow_sliding
@@ -164,7 +165,7 @@ def test_where_the_way_has_taken_normal_stress_the_same_stress_does_more():
 @pytest.mark.slow
 def test_on_a_preset_the_search_comes_to_what_an_adversary_with_inertia_found():
     """1.220 V, by an ascent along the adjoint of the plant with inertia; 1.202 V before the way counted."""
-    found = answer_sliding(load_fault("crustal-patch"), diffusion=F(833))
+    found = answer_sliding(load_fault("crustal-patch"), setup=ExactSetup(diffusion=F(833)))
     assert 1.2195 < math.exp(worst_sliding(found.proof).log_rate)
     assert worst_sliding(found.proof).log_rate < found.proof.claims.log_rate
 
@@ -275,5 +276,5 @@ def test_a_search_ends_whose_best_law_stays_too_far_from_what_is_asked(monkeypat
 
     monkeypatch.setattr(slow_sliding, "spectral_radius", lambda loop: 0.5)
     monkeypatch.setattr(slow_sliding, "_estimate_of", estimated)
-    slow_sliding.searched_sliding(task("0", 8000), F(50), F(1, 2), {"lag": F(10)}, most=70)
+    slow_sliding.searched_sliding(task("0", 8000), F(50), F(1, 2), ExactSetup(lag=F(10)), most=70)
     assert least <= len(costs) <= most

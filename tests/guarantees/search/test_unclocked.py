@@ -11,6 +11,7 @@ import pytest
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, tightened
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search import unclocked
 from quakedesign.guarantees.search.unclocked import unclocked_estimate, unclocked_guarantee
@@ -85,7 +86,7 @@ def test_the_estimate_of_a_search_is_near_what_is_proved():
 def test_a_design_has_a_law_for_the_middle_of_the_range(monkeypatch):
     monkeypatch.setattr(design, "_FEWER", 12)
     task, around = uncertain_plant(load_fault("lab-fault")), {"longest_step": F(1, 500)}
-    claim = design_held(task, F(1, 1000), objective="peak", **around)
+    claim = design_held(task, F(1, 1000), objective="peak", setup=ExactSetup(**around))
     assert isinstance(claim, TrackingProof)
     assert claim.claims.slip_rate_error < F("1.6") * stored().claims.slip_rate_error
     assert claim.held.longest_step == F(1, 500)
@@ -93,7 +94,7 @@ def test_a_design_has_a_law_for_the_middle_of_the_range(monkeypatch):
 
 def test_a_law_of_the_slip_alone_has_too_many_states():
     task, around = uncertain_plant(load_fault("lab-fault")), {"longest_step": F(1, 500)}
-    assert "slip and slip rate" in design_held(task, F(1, 1000), measured="slip", **around).reason
+    assert "slip and slip rate" in design_held(task, F(1, 1000), measured="slip", setup=ExactSetup(**around)).reason
     held = replace(stored().held, law=longer(stored().held.law))
     assert "too many states" in unclocked_guarantee(task, held).reason
     assert unclocked_estimate(task, held) is None
