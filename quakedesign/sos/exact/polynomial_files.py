@@ -101,7 +101,7 @@ class FunctionalEntries(Entries):
 
 
 class StatementEntries(Entries):
-    """What is asked of a polynomial."""
+    """Statement about a polynomial: constraints, products of inequalities, degree and multiplier."""
 
     variables: Names
     polynomial: PolynomialEntries
