@@ -27,7 +27,6 @@ from quakedesign.sos.exact.strict import (
     PolynomialEntries,
     headed,
     made,
-    need,
     parse,
     polynomial_text,
     read_as,
@@ -265,7 +264,6 @@ class AttractionEntries(Entries):
     def claim(self, multiplier: Polynomial) -> Attraction:
         """The claim, of polynomials of its variables."""
         size = len(self.variables)
-        need(len(self.field) == size, f"field must have {size} entries")
         for polynomial in (self.V, multiplier, *self.field):
             require_polynomial(polynomial, "a polynomial", size, TERMS)
         level = self.level[0] if self.level else None
@@ -377,8 +375,8 @@ def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
         reason = str(error).partition("\n")[0]
         raise PolynomialError(f"{path} must be TOML. Received: {reason}. Quote polynomials.") from None
     field, function = raw.get("field"), raw.get("V")
-    texts = isinstance(field, dict) and all(isinstance(rate, str) for rate in field.values())
-    if not raw.keys() <= {"field", "V"} or not texts or not isinstance(function, str | None):
+    sound = isinstance(field, dict) and all(isinstance(rate, str) for rate in field.values())
+    if not raw.keys() <= {"field", "V"} or not sound or not isinstance(function, str | None):
         raise PolynomialError(
             f'{path} must have a table [field], such as x = "-x + x^3", and at most V = "x^2" before it.'
         )
