@@ -399,10 +399,10 @@ def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
 
 def _law(law: LinearLaw) -> dict[str, Any]:
     root = law.root
-    lines = {} if root is None else {"slopes": written(root.slopes), "remainder": exact_text(root.remainder)}
+    of_root = {} if root is None else {"slopes": written(root.slopes), "remainder": exact_text(root.remainder)}
     matrices = {name: written(getattr(law, name)) for name in ("update", "measured")}
     rows = {name: written(getattr(law, name)) for name in ("output", "feedback", "applied")}
-    return {**lines, "states": list(law.states), **matrices, **rows}
+    return {**of_root, "states": list(law.states), **matrices, **rows}
 
 
 # ----------------------------------------------------------------------

@@ -388,9 +388,9 @@ class SlidingChainRun:
         """Whether all errors of a run under a law are within what is proved of their blocks and wells."""
         assert isinstance(self.found, PlantGuarantee)
         N, claims, errors = len(self.chain.blocks), self.found.claims, self.errors
-        lines = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
+        values = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
         proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
-        return bool((np.concatenate(lines) <= np.array(proved, dtype=float)).all())
+        return bool((np.concatenate(values) <= np.array(proved, dtype=float)).all())
 
     def screen(self, conditions: Sequence[str]) -> list[str]:
         """What the proof depends on, and the run."""

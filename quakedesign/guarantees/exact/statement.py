@@ -761,15 +761,15 @@ def _along(task: SlidingPlant) -> str:
 
 def _friction(task: SlidingPlant) -> list[str]:
     """Parts of the statement on regularised friction and on the slip law."""
-    lines = ["friction regularised"] if task.regularised else []
-    return lines + (["state by the slip law"] if task.state_law == "slip" else [])
+    parts = ["friction regularised"] if task.regularised else []
+    return parts + (["state by the slip law"] if task.state_law == "slip" else [])
 
 
 def _box(task: SlidingPlant) -> str:
-    entries = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
+    symbols = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
     wide = [
         f"{short} from {_inside(*task.ranges[axis])}"
-        for axis, short in entries.items()
+        for axis, short in symbols.items()
         if task.ranges[axis][0] < task.ranges[axis][1]
     ]
     if not wide:

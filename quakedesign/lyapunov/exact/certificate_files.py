@@ -21,8 +21,8 @@ from quakedesign.lyapunov.exact.claim import Equilibrium, Evidence, Loop, Witnes
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.exact.strict import (
     LARGEST_FILE,
-    NAME,
     Entries,
+    Name,
     PolynomialEntries,
     common_grid,
     headed,
@@ -51,7 +51,6 @@ LIMITS = {
 }
 """Largest number of each in a file."""
 
-Name = Annotated[str, Meta(pattern=rf"\A{NAME.pattern}\Z")]
 Numbers = dict[Name, Fraction]
 Exponents = tuple[Annotated[int, Meta(ge=0, le=999)], ...]
 FactorEntries = tuple[str, Fraction, Literal["s", "a"]]

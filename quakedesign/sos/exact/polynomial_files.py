@@ -11,8 +11,8 @@ from quakedesign.errors import CertificateError, PolynomialError
 from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, Square, SumOfSquares
 from quakedesign.sos.exact.strict import (
-    NAME,
     Entries,
+    Name,
     PolynomialEntries,
     common_grid,
     headed,
@@ -28,7 +28,6 @@ from quakedesign.sos.exact.strict import (
 )
 
 TERMS, _VARIABLES, _CONSTRAINTS, _PRODUCTS, _BASIS, _SQUARES = 20_000, 16, 32, 1024, 400, 4096
-Name = Annotated[str, Meta(pattern=rf"\A{NAME.pattern}\Z")]
 Names = Annotated[tuple[Name, ...], Meta(min_length=1, max_length=_VARIABLES)]
 Product = Annotated[tuple[int, ...], Meta(max_length=_CONSTRAINTS)]
 Polynomials = Annotated[tuple[PolynomialEntries, ...], Meta(max_length=_CONSTRAINTS)]
