@@ -217,7 +217,7 @@ def evidence_of(raw: Any) -> Evidence:
     UnsupportedError
         For a bound of outputs under inputs, which files of the kind ``guarantee`` have replaced.
     """
-    if isinstance(raw, dict) and "inputs" in raw:
+    if isinstance(raw, dict) and {"inputs", "outputs"} <= raw.keys():
         raise UnsupportedError(
             "a file must be a proof, a refutation or of the kind guarantee. Received a bound under inputs, which is no "
             "longer read. Make the new file with certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE."
