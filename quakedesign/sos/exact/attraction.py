@@ -145,7 +145,7 @@ class Attraction:
     def _proves(self, proof: LyapunovProof) -> bool:
         parts = ((self.positive, proof.positive), (self.decrease, proof.decrease))
         size = len(self.variables)
-        return all(vanishes_at_origin_only(found.squares, size) and holds(asked, found) for asked, found in parts)
+        return all(vanishes_at_origin_only(sums.squares, size) and holds(statement, sums) for statement, sums in parts)
 
     def refuted_by(self, point: Point) -> bool:
         """Whether V is below the level at a point other than the origin, and is not positive or does not fall there."""

@@ -251,7 +251,7 @@ def _difference(raw: Any, again: Any) -> str:
 def made(kind: type[_Kind], *sources: Any, **entries: Any) -> _Kind:
     """Object whose fields are given, or attributes of the same name of one of the sources, or have their defaults."""
     for name, *_ in _parts(cast(Any, kind)):
-        found = [getattr(source, name) for source in sources if hasattr(source, name)]
-        if name not in entries and found:
-            entries[name] = found[0]
+        values = [getattr(source, name) for source in sources if hasattr(source, name)]
+        if name not in entries and values:
+            entries[name] = values[0]
     return kind(**entries)
