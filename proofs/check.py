@@ -92,7 +92,7 @@ def check(text: str) -> Result:
         return Result(verdict, tuple(lines))
     if "kind" in document:
         return check_guarantee(document)
-    if "inputs" in document:
+    if "inputs" in document and "outputs" in document:
         raise Outdated
     if "refutation" in document:
         return Result("refuted", tuple(beside("lyapunov.equilibrium").refute(document)))

@@ -135,7 +135,7 @@ class TrackingGuarantee(Guarantee):
             if self.shorter is not None:
                 lines.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             if self.nearest is not None:
-                other = _with_nearest(*self.nearest)
+                other = f"this law {_with_nearest(*self.nearest)}" if self.given else _with_nearest(*self.nearest)
                 if self.factor is not None:
                     other = f"not this law, but the same law with its output times {shortly(self.factor)}"
                 lines.append(f"{other}: {self.nearest[1].sentence()}")
@@ -232,7 +232,7 @@ class TrackingGuarantee(Guarantee):
         change = UpperBound(self.fault.disturbance_bounds[1])
         return [
             "these bounds allow the disturbance to jump; that of the fault file changes by at most "
-            f"{change:.3g} m/s^3: --class rate (disturbance_class='rate') proves smaller bounds"
+            f"{change:.3g} m/s^3: --class rate (disturbance_class='rate') may prove smaller bounds"
         ]
 
     @property
@@ -305,7 +305,7 @@ FACTOR = "pressure_factor"
 _QUANTITIES = {
     "delay_jitter": ("jitter of the delay", "s"),
     "jitter": ("jitter", "s"),
-    "averaging": ("averaging time", "s"),
+    "averaging": ("time of averaging", "s"),
     "delay": ("delay", "s"),
     "lag": ("lag", "s"),
     "diffusion": ("diffusion time L^2/D", "s"),
@@ -318,12 +318,16 @@ def _with_nearest(name: str, found: TrackingProof) -> str:
     if name == GAINS:
         return "with designed gains"
     if name in _QUANTITIES:
-        title, unit = _QUANTITIES[name]
-        if not getattr(found.held, name):
+        (title, unit), value = _QUANTITIES[name], getattr(found.held, name)
+        if not value:
             return f"without any {title}"
-        return f"with a {title} of at most {LowerBound(getattr(found.held, name)).quantity(unit)}"
+        if name not in ("delay", "lag", "diffusion"):
+            return f"with a {title} of at most {LowerBound(value).quantity(unit)}"
+        text = shortly(value)  # one value: nothing is proved of smaller ones
+        return f"with a {title} of {text if Fraction(text) == value else exact_text(value)} {unit}"
     if name == BOX:
-        widths = (f"{LowerBound(100 * width):.3g} % of {of}" for width, of in _widths(found))
+        pairs = zip(found.task.spreads, ("k", "eta", "N"), strict=True)
+        widths = (f"{LowerBound(100 * width):.3g} % of {of}" for width, of in pairs if width)
         return f"with the box of +-{', '.join(widths)}" if any(found.task.spreads) else "with the box paper"
     if name == AMPLITUDE:
         return f"with a disturbance of at most {LowerBound(found.task.amplitude):.3g} m/s^2"
@@ -350,11 +354,6 @@ def _nearest(name: str, found: TrackingProof, factor: Fraction | None) -> dict[s
         one = getattr(found.held, name, None) if name in _QUANTITIES else pump and pump.rate
         value = None if one is None else str(one)
     return {"quantity": name, "value": value, **found.claims.to_dict()}
-
-
-def _widths(found: TrackingProof) -> list[tuple[Fraction, str]]:
-    """Relative half-widths of the box of a guarantee, and of what."""
-    return [pair for pair in zip(found.task.spreads, ("k", "eta", "N"), strict=True) if pair[0]]
 
 
 def attacked(fault: Fault, found: TrackingProof | NoProof) -> TrackingGuarantee:
@@ -409,10 +408,10 @@ def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
 
 def _law(law: LinearLaw) -> dict[str, Any]:
     root = law.root
-    lines = {} if root is None else {"slopes": written(root.slopes), "remainder": exact_text(root.remainder)}
+    of_root = {} if root is None else {"slopes": written(root.slopes), "remainder": exact_text(root.remainder)}
     matrices = {name: written(getattr(law, name)) for name in ("update", "measured")}
     rows = {name: written(getattr(law, name)) for name in ("output", "feedback", "applied")}
-    return {**lines, "states": list(law.states), **matrices, **rows}
+    return {**of_root, "states": list(law.states), **matrices, **rows}
 
 
 # ----------------------------------------------------------------------

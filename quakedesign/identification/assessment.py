@@ -110,9 +110,9 @@ def sign_check(
     """
     if difference is None:
         return None
-    lines = [difference, *(other for other, _ in others.values())]
-    low = min(each.low for each in lines) + min(shift or 0.0, 0.0)
-    high = max(each.high for each in lines) + max(shift or 0.0, 0.0)
+    differences = [difference, *(other for other, _ in others.values())]
+    low = min(each.low for each in differences) + min(shift or 0.0, 0.0)
+    high = max(each.high for each in differences) + max(shift or 0.0, 0.0)
     passed = bool(low > 0 or high < 0) and not unsteady
     if passed:
         trends = "".join(f", also {what} (AIC {excess:+.3g})" for what, (_, excess) in others.items())

@@ -98,8 +98,8 @@ def holding(law: FrictionLaw, values: Mapping[str, float]) -> FrictionLaw:
     """A law with other values, those that no fault can have among them: an evolution effect that is not positive."""
     if values.get("evolution_effect", 1.0) > 0:
         return replace(law, **values)  # type: ignore[type-var]
-    entries = {name: getattr(law, name) for name in law.quantities()} | law._options()
-    return law._holding({**entries, **values})
+    own = {name: getattr(law, name) for name in law.quantities()} | law._options()
+    return law._holding({**own, **values})
 
 
 TREND, TREND_IN_TIME = "trend", "trend_in_time"

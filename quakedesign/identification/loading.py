@@ -166,9 +166,9 @@ class Loading:
         hidden = [] if self.pieces.rough else np.flatnonzero(late).tolist()
         hidden = sorted(sorted(hidden, key=lambda i: -abs(rates[i + 1] - rates[i]))[:_MOST_DELAYS])
         after = [(record.time >= begins[i + 1]) & (record.time < ends[i + 1]) for i in hidden]
-        lines = [(samples, 3 * off[i] + period) for samples, i in zip(after, hidden, strict=True) if samples.any()]
-        table = np.array([samples for samples, _ in lines]).T.reshape(len(record.time), len(lines)).astype(float)
-        return table, np.array([most for _, most in lines])
+        windows = [(samples, 3 * off[i] + period) for samples, i in zip(after, hidden, strict=True) if samples.any()]
+        table = np.array([samples for samples, _ in windows]).T.reshape(len(record.time), len(windows)).astype(float)
+        return table, np.array([most for _, most in windows])
 
     def drive(self, record: Record) -> tuple[Drive, ndarray]:
         """Drive between all samples and changes of rate, and which of these instants are samples."""
@@ -184,8 +184,8 @@ class Loading:
             rates = self.pieces.rates[np.searchsorted(self.pieces.begins, middles, side="right") - 1]
         normal = np.log(np.interp(instants, record.time, record.normal))
         growth, compliance = np.diff(normal) / lengths, np.exp(-(normal[1:] + normal[:-1]) / 2)
-        entries = {"lengths": lengths, "rates": rates, "growth": growth, "compliance": compliance}
-        return Drive(first_rate=self.first_rate, **entries), np.isin(instants, record.time)
+        columns = {"lengths": lengths, "rates": rates, "growth": growth, "compliance": compliance}
+        return Drive(first_rate=self.first_rate, **columns), np.isin(instants, record.time)
 
 
 def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None = None) -> tuple[Record, Loading | None]:

@@ -112,8 +112,8 @@ def _numbers(line: str) -> bool:
     if not line.strip() or line.strip()[0] in _COMMENTS:
         return False
     cells = [cell.strip() for cell in _cells(line, _sign(line))]
-    lines = [_CELL.fullmatch(cell) is not None for cell in cells if cell.lower() not in _MISSING]
-    return sum(lines) > 1 and lines[0]
+    numeric = [_CELL.fullmatch(cell) is not None for cell in cells if cell.lower() not in _MISSING]
+    return sum(numeric) > 1 and numeric[0]
 
 
 def _sign(line: str) -> str:
@@ -201,17 +201,17 @@ def _values(cells: pd.Series, column: Column, text: str, first: int) -> ndarray:
         values: ndarray = cells.to_numpy(dtype=float, copy=True)
         values[~np.isfinite(values)] = np.nan
         return values
-    sentence = cells.astype(str).str.strip()
-    sentence = sentence.where(~sentence.str.lower().isin(_MISSING), "nan")
-    if _is_date(sentence.iloc[0]):
-        dates = pd.to_datetime(sentence, format="ISO8601", errors="coerce")
+    texts = cells.astype(str).str.strip()
+    texts = texts.where(~texts.str.lower().isin(_MISSING), "nan")
+    if _is_date(texts.iloc[0]):
+        dates = pd.to_datetime(texts, format="ISO8601", errors="coerce")
         if dates.notna().all():
             return np.asarray((dates - dates.iloc[0]).dt.total_seconds().to_numpy(dtype=float))
-    numbers = pd.to_numeric(sentence.str.replace(r"(?<=[\d.])[dD](?=[+-]?\d)", "e", regex=True), errors="coerce")
-    wrong = (numbers.isna() & (sentence != "nan")).to_numpy().nonzero()[0]
+    numbers = pd.to_numeric(texts.str.replace(r"(?<=[\d.])[dD](?=[+-]?\d)", "e", regex=True), errors="coerce")
+    wrong = (numbers.isna() & (texts != "nan")).to_numpy().nonzero()[0]
     if len(wrong):
-        cell, lines = sentence.iloc[int(wrong[0])], enumerate(text.splitlines(), start=1)
-        rows = [i for i, line in lines if i > first and line.strip() and line.strip()[0] != "#"]
+        cell, numbered = texts.iloc[int(wrong[0])], enumerate(text.splitlines(), start=1)
+        rows = [i for i, line in numbered if i > first and line.strip() and line.strip()[0] != "#"]
         raise RecordError(
             f"line {rows[int(wrong[0])]} must hold a number in column {column.name}. Received {shown(cell)}."
             f"{_remedy(cell)}"
@@ -271,8 +271,8 @@ def _xlook_binary(data: bytes, size: int, channels: int, kind: str) -> list[Colu
             "that ends in _r) in xlook and write the record as text, or as binary again."
         )
     words = [data[36 + 84 * i : 36 + 84 * i + 26] for i in range(channels)]
-    lines = [[part.split(b"\0")[0].decode("latin-1").strip() for part in (word[:13], word[13:])] for word in words]
-    return [replace(heading(f"{name} [{unit}]"), values=row) for (name, unit), row in zip(lines, table, strict=True)]
+    headings = [[part.split(b"\0")[0].decode("latin-1").strip() for part in (word[:13], word[13:])] for word in words]
+    return [replace(heading(f"{name} [{unit}]"), values=row) for (name, unit), row in zip(headings, table, strict=True)]
 
 
 def _matlab(data: bytes, path: str | Path) -> list[Column]:

@@ -158,19 +158,19 @@ def identify_steps(
 def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
     """The common fit, the names that it shares, and by how much its squares exceed those of the steps' own fits."""
     fits = [step.fit for step in steps]
-    lines = [fit.experiment.coordinates for fit in fits]
+    of_steps = [fit.experiment.coordinates for fit in fits]
     quantities = steps[0].law.quantities()
-    everywhere = set.intersection(*({c.name for c in own} for own in lines))
-    shared = [c.name for c in lines[0] if c.name in everywhere & {*quantities, STIFFNESS} - {_LEVEL}]
-    coordinates: list[Coordinate] = [c for c in lines[0] if c.name in shared]
+    everywhere = set.intersection(*({c.name for c in own} for own in of_steps))
+    shared = [c.name for c in of_steps[0] if c.name in everywhere & {*quantities, STIFFNESS} - {_LEVEL}]
+    coordinates: list[Coordinate] = [c for c in of_steps[0] if c.name in shared]
     places, starts = [], []
-    for i, (fit, own) in enumerate(zip(fits, lines, strict=True)):
+    for i, (fit, own) in enumerate(zip(fits, of_steps, strict=True)):
         others = [c for c in own if c.name not in shared]
         at = [shared.index(c.name) if c.name in shared else len(coordinates) + others.index(c) for c in own]
         places.append(np.array(at))
         coordinates += [replace(c, name=c.name if i == 0 else f"{c.name} (step {i + 1})") for c in others]
         starts += [value for value, c in zip(fit.fitted.tolist(), own, strict=True) if c.name not in shared]
-    rows = [[[c.name for c in own].index(name) for name in shared] for own in lines]
+    rows = [[[c.name for c in own].index(name) for name in shared] for own in of_steps]
     values = np.array([fit.fitted[row] for fit, row in zip(fits, rows, strict=True)])
     sharp = np.array([np.maximum(fit.deviations[row] ** -2.0, 1e-12) for fit, row in zip(fits, rows, strict=True)])
     start = np.array([*(np.sum(sharp * values, axis=0) / np.sum(sharp, axis=0)), *starts])

@@ -155,8 +155,8 @@ class Law(ABC):
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
         # A read-only view cannot be pickled, and campaigns send controllers to other processes.
-        entries = {f.name: getattr(self, f.name) for f in fields(self)} | {"gains": dict(self.gains)}
-        return partial(type(self), **entries), ()
+        arguments = {f.name: getattr(self, f.name) for f in fields(self)} | {"gains": dict(self.gains)}
+        return partial(type(self), **arguments), ()
 
     @classmethod
     @abstractmethod

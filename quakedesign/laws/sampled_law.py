@@ -246,8 +246,8 @@ def compensator(
     of_prediction = fmpq_mat([[fmpq(i == j) for j in range(n)] for i in range(n)]) - corrections * _exact(measured)
     kept = [j for j in range(n) if any(of_prediction[i, j] != 0 for i in range(n))]
 
-    def rows(matrix: fmpq_mat, lines: Sequence[int], columns: Sequence[int] = range(seen)) -> Matrix:
-        return tuple(tuple(fraction_of(matrix[i, j]) for j in columns) for i in lines)
+    def rows(matrix: fmpq_mat, of_rows: Sequence[int], columns: Sequence[int] = range(seen)) -> Matrix:
+        return tuple(tuple(fraction_of(matrix[i, j]) for j in columns) for i in of_rows)
 
     return LinearLaw(
         states=tuple(states[j] for j in kept),

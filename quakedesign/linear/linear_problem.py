@@ -406,7 +406,7 @@ def decreases(
     rate : Fraction
         a [1/s].
     """
-    held = times(-2 * rate, theta)
+    term = times(-2 * rate, theta)
     return definite(theta) and all(
-        definite(total(times(-1, lyapunov(problem.loop(v, gains), theta)), held)) for v in problem.vertices()
+        definite(total(times(-1, lyapunov(problem.loop(v, gains), theta)), term)) for v in problem.vertices()
     )

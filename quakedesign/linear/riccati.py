@@ -111,9 +111,9 @@ def _propose(a: Matrix, g: Matrix, q: Matrix) -> Any:
 
     A, G, Q = map(floats, (a, g, q))
     values, vectors = np.linalg.eigh(G)
-    kept = np.abs(values) > 1e-15 * np.abs(values).max()
+    significant = np.abs(values) > 1e-15 * np.abs(values).max()
     try:
-        solution = control.care(A, vectors[:, kept], Q, np.diag(1 / values[kept]), method=METHOD)[0]
+        solution = control.care(A, vectors[:, significant], Q, np.diag(1 / values[significant]), method=METHOD)[0]
     except (np.linalg.LinAlgError, ValueError, control.ControlArgument) as error:
         raise ParameterError(
             f"the Riccati equation has no stabilising solution that can be found ({error}). A stabilisable pair and a "

@@ -95,9 +95,9 @@ def decrease_form(
     motion = _motion(problem, K, vertex)
     rate = (motion[0], motion[2], *matrix_product((tuple(K),), motion))
     fall = (*matrix_product(P, motion), *((_ZERO,) * 7 for _ in range(3)))
-    kept = ((_ZERO,) * 7,) * 4 + tuple((_ZERO,) * 4 + tuple(row) for row in W)
+    corner = ((_ZERO,) * 7,) * 4 + tuple((_ZERO,) * 4 + tuple(row) for row in W)
     gained = matrix_product(transpose(rate), W, rate)
-    return total(times(-1, fall), times(-1, transpose(fall)), times(-FOUR_OVER_PI_SQUARED * step**2, gained), kept)
+    return total(times(-1, fall), times(-1, transpose(fall)), times(-FOUR_OVER_PI_SQUARED * step**2, gained), corner)
 
 
 def _motion(problem: LinearProblem, K: Sequence[Fraction], vertex: Vertex) -> Matrix:
@@ -157,9 +157,9 @@ def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> l
         rate = (motion[0], motion[2], *matrix_product((tuple(K),), motion))
         A, R = scaled(motion, units, (*units, *outer)), scaled(rate, outer, (*units, *outer))
         fall = np.vstack([np.eye(4), np.zeros((3, 4))]) @ P @ A
-        kept = np.hstack([np.zeros((3, 4)), np.eye(3)])
+        selection = np.hstack([np.zeros((3, 4)), np.eye(3)])
         gained = float(FOUR_OVER_PI_SQUARED * step**2) * R.T @ W @ R
-        constraints.append(kept.T @ W @ kept - fall - fall.T - gained - margin * np.eye(7) >> 0)
+        constraints.append(selection.T @ W @ selection - fall - fall.T - gained - margin * np.eye(7) >> 0)
     if not solved(cp.Problem(cp.Maximize(margin), constraints), margin):
         return []
     return [
@@ -399,11 +399,11 @@ class HeldPoles:
         """Corner at which a period [s] is surely not asymptotically stable; None where none was found."""
         if not self.gains[3]:  # then z = 1 is a pole, whatever the plant
             return self.problem.vertices()[0]
-        return next((corner for corner, found in self.at(step).items() if any(abs(z) > 1 for z in found)), None)
+        return next((corner for corner, poles in self.at(step).items() if any(abs(z) > 1 for z in poles)), None)
 
     def radius(self, step: Fraction) -> float:
         """Spectral radius of a period [s], largest over the corners, measured."""
-        return max(float(abs(z).mid()) for found in self.at(step).values() for z in found)
+        return max(float(abs(z).mid()) for poles in self.at(step).values() for z in poles)
 
     def limit(self) -> tuple[Fraction, Fraction | None] | None:
         """Longest period [s] that the corners allow, nearly, and a longer one that they refute.
@@ -478,7 +478,7 @@ def varying_verdict(
     gains: Sequence[Fraction],
     step: float | str | Fraction,
     *,
-    known: LargestVaryingStep | None = None,
+    longest: LargestVaryingStep | None = None,
 ) -> VaryingVerdict:
     """Prove the law that runs, or refute it with constant parameters, at a sampling period.
 
@@ -488,14 +488,14 @@ def varying_verdict(
         In SI.
     step : number or text
         T [s].
-    known : LargestVaryingStep, optional
+    longest : LargestVaryingStep, optional
         What is proved of these gains already.
     """
     period = rational(step, "step")
     witness = HeldPoles(problem, gains).unstable(period)
     if witness is not None:
         return VaryingVerdict(verdict=Verdict.REFUTED, step=period, witness=witness)
-    proof: HoldProof | None = known.proof_at(period) if known else delay_proof(problem, gains, period)
+    proof: HoldProof | None = longest.proof_at(period) if longest else delay_proof(problem, gains, period)
     for degree in () if proof else _DEGREES:
         proof = proof or clock_proof(problem, gains, (period, period), degree=degree)
     return VaryingVerdict(verdict=Verdict.PROVED if proof else Verdict.UNDECIDED, step=period, proof=proof)
@@ -626,7 +626,7 @@ def held_loop(problem: LinearProblem, gains: Sequence[Fraction], step: float | s
     require_positive("Give it in seconds.", step=period)
     longest = largest_varying_step(problem, gains)
     return HeldLoop(
-        runs=varying_verdict(problem, gains, period, known=longest),
+        runs=varying_verdict(problem, gains, period, longest=longest),
         longest=longest,
         radius=HeldPoles(problem, gains).radius(period),
     )

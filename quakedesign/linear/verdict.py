@@ -76,13 +76,13 @@ def _answer(group: Mapping[str, Matrix]) -> Answer:
         gram = tuple(matrix[i][j] for i in range(size) for j in range(i, size))
         squares.append(Square(basis=basis, gram=gram))
         before += size
-    asked = Statement(
+    statement = Statement(
         variables=tuple(names),
         polynomial={e: c for e, c in polynomial.items() if c},
         degree=2,
         multiplier=constant(len(names)),
     )
-    return Answer(statement=asked, proof=SumOfSquares(squares=tuple(squares)))
+    return Answer(statement=statement, proof=SumOfSquares(squares=tuple(squares)))
 
 
 # ----------------------------------------------------------------------
@@ -115,8 +115,8 @@ class LinearVerdict:
         if isinstance(self.peaks, ContinuousProof):
             by_name["peaks"] = self.peaks
         problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
-        held = held_files(problem, gains, self.held.runs)
-        return by_name | {f"held{f'-{n}' if n else ''}": answer for n, answer in enumerate(held)}
+        sampled = held_files(problem, gains, self.held.runs)
+        return by_name | {f"held{f'-{n}' if n else ''}": answer for n, answer in enumerate(sampled)}
 
     def save(self, out: Path, *, force: bool = False) -> dict[str, str]:
         """Write every proof: the one of stability to `out`, the others beside it with their names added.
@@ -135,10 +135,10 @@ class LinearVerdict:
         paths = {
             name: out if name == "stability" else out.with_name(f"{out.stem}-{name}{out.suffix}") for name in proofs
         }
-        known = [str(path) for path in paths.values() if path.exists()]
-        if known and not force:
+        existing = [str(path) for path in paths.values() if path.exists()]
+        if existing and not force:
             raise OutputError(
-                f"certificate files must be new. Received {', '.join(known)}, which exist. "
+                f"certificate files must be new. Received {', '.join(existing)}, which exist. "
                 "Give --force to replace them."
             )
         for name, proof in proofs.items():
@@ -173,24 +173,24 @@ def judge(
     fault.require_memoryless("a verdict on gains")
     period = rational(fault.sampling_time if step is None else step, "step")
     bounded = certified_peaks(fault, controller, disturbance_class=peaks) if peaks is not None else None
-    held = held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), period)
+    sampled = held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), period)
     return LinearVerdict(
         fault=fault,
         controller=controller,
-        facts=linear_facts(fault, controller, held),
+        facts=linear_facts(fault, controller, sampled),
         analysis=analysis(fault, controller),
-        held=held,
+        held=sampled,
         peaks=bounded,
         asked=peaks,
     )
 
 
-def linear_facts(fault: Fault, controller: ExtendedLQR, held: HeldLoop) -> dict[str, Any]:
+def linear_facts(fault: Fault, controller: ExtendedLQR, sampled: HeldLoop) -> dict[str, Any]:
     """Bounds of the uncertainty, smallest gains and sampled stability.
 
     Parameters
     ----------
-    held : HeldLoop
+    sampled : HeldLoop
         What is decided of the same gains when p is held.
 
     Returns
@@ -202,5 +202,5 @@ def linear_facts(fault: Fault, controller: ExtendedLQR, held: HeldLoop) -> dict[
     return {
         "bounds": uncertainty_bounds(fault).to_dict(),
         "smallest_gain": {"k1": least.slip, "k2": least.rate},
-        "held": held.to_dict(),
+        "held": sampled.to_dict(),
     }

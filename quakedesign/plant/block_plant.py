@@ -64,8 +64,8 @@ def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupl
         tasks = [uncertain_plant(one) for one in fault.faults]
         name = f"{fault.name}, {N} blocks, {counted(m, 'well')}"
         along = "" if fault.diffusivity is None else f", pressures diffuse along the fault, {fault.diffusivity:g} m²/s"
-        told = fault.fault.box.name + along
-        return _parts(tasks, fault.springs, fault.shares, name, told, fault.flow, fault.pressures)
+        box = fault.fault.box.name + along
+        return _parts(tasks, fault.springs, fault.shares, name, box, fault.flow, fault.pressures)
     require_known(wells, ("each", "one"), "wells")
     if blocks is None or not 2 <= blocks <= MOST // 2:
         raise ParameterError(f"blocks must be 2 to {MOST // 2}. Received {blocks}.")
@@ -76,8 +76,8 @@ def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupl
         raise ParameterError(f"coupling of blocks must be positive. Received {shortly(K)} 1/s^2.")
     springs = [(a, b, K) for i in range(blocks - 1) for a, b in ((i, i + 1), (i + 1, i))]
     shares = [unit(blocks, i) for i in range(blocks)] if wells == "each" else [(Fraction(1),)] * blocks
-    held = f"{blocks} wells" if wells == "each" else "one well"
-    return _parts([task] * blocks, springs, shares, f"{blocks} blocks of {task.name}, {held}", fault.box.name)
+    wells_in_words = f"{blocks} wells" if wells == "each" else "one well"
+    return _parts([task] * blocks, springs, shares, f"{blocks} blocks of {task.name}, {wells_in_words}", fault.box.name)
 
 
 def _parts(
@@ -116,20 +116,20 @@ def _parts(
         needed.append(max(map(abs, dampings[i])) * first + task.reference_rates[1])
         disturbances[f"force on block {place}"] = (rate[i], needed[-1] + task.amplitude)
     if inverse is None:
-        held = [unit(m, k) for k in range(m)]
+        of_pressures = [unit(m, k) for k in range(m)]
         moving = [rate * first for rate in balance.pressures]
         for i, moved in enumerate(balance.moves):
             disturbances[f"balance of block {i + 1}"] = (unit(size, i), moved * first)
     else:  # pressures of the wells that hold block i against a pressure of 1
-        held = [tuple(row[i] for row in inverse) for i in range(N)]
+        of_pressures = [tuple(row[i] for row in inverse) for i in range(N)]
         moving = [max(map(abs, s)) * first / task.authority for s, task in zip(slopes, tasks, strict=True)]
     forces = [tuple(task.authority * v for v in row) for task, row in zip(tasks, pressures, strict=True)]
     pulls = [[*row[: 2 * N], *force[:more]] for row, force in zip(pulls, forces, strict=True)]
     seen = weights or ([unit(N, i) for i in range(N)] if more else None)
     steady = [row for row, read in zip(shares, pressures, strict=True) if any(read[:more])]
-    shifts = [[*[zero] * (2 * N), *(_dot(row, one) for row in steady)] if more else None for one in held]
+    shifts = [[*[zero] * (2 * N), *(_dot(row, one) for row in steady)] if more else None for one in of_pressures]
     order = ("slope", "damping", "input")
-    known = ", springs between the blocks as they are" if any(tasks[0].spreads) else ""
+    springs_in_words = ", springs between the blocks as they are" if any(tasks[0].spreads) else ""
     return {
         "A": [*rate, *pulls, *((*[zero] * (2 * N), *row[:more]) for row in flow)],
         "B": [(zero,) * m] * N + [row[more:] for row in (*forces, *flow)],
@@ -139,7 +139,7 @@ def _parts(
         "disturbances": disturbances,
         "loads": {
             f"pressure {i + 1}": (one, shift, v)
-            for i, (one, shift, v) in enumerate(zip(held, shifts, moving, strict=True))
+            for i, (one, shift, v) in enumerate(zip(of_pressures, shifts, moving, strict=True))
         },
         "outputs": {
             **{f"slip error {i + 1}": unit(size, i) for i in range(N)},
@@ -153,7 +153,7 @@ def _parts(
         "name": name,
         "remarks": {
             "plant": f"of {name}, without stick (friction continues to negative slip rates), for all friction and "
-            f"constants of box {box}{known}",
+            f"constants of box {box}{springs_in_words}",
             "disturbances": f"on a block: {LowerBound(tasks[0].amplitude).quantity('m/s²', 4)} of disturbance and at "
             f"most {UpperBound(max(needed)).quantity('m/s²')} that the reference needs",
         },
@@ -211,23 +211,23 @@ def _balance(
     """The balance of blocks under fewer wells."""
     both_ways = {(j, i, K) for i, j, K in springs} == set(springs)  # else they do not drop out of the mean
     alike = len(weights) == 1 and both_ways and all(task == tasks[0] for task in tasks)
-    found: _Balance | None = None
+    best: _Balance | None = None
     for _ in range(_TURNS if alike else 1):
         if alike:
-            law, steep = tasks[0].friction, _STEEP if found is None else 1 + max(found.moves)
+            law, steep = tasks[0].friction, _STEEP if best is None else 1 + max(best.moves)
             stronger = max(law.strengthening * steep, law.weakening * (steep - 2))
             faster = replace(law, weakening=law.weakening * steep, strengthening=stronger)
             stresses = [replace(tasks[0], friction=faster).stress] * len(tasks)
         else:
             stresses = _stresses(tasks, springs, shares, weights)
         better = _moving(tasks, springs, shares, weights, stresses)
-        if found is not None and max(better.moves) >= max(found.moves):
+        if best is not None and max(better.moves) >= max(best.moves):
             break
-        found = better
-        if max(found.moves) >= _LOST:
+        best = better
+        if max(best.moves) >= _LOST:
             break
-    assert found is not None
-    return found
+    assert best is not None
+    return best
 
 
 def _balancing(
@@ -319,9 +319,9 @@ def _closed(gains: Sequence[Sequence[Fraction]], first: Sequence[Fraction]) -> l
         return None
     own = np.array(first, dtype=float)
     own = own * _WIDER + 1e-9 * max(own.max(), 1e-100)
-    found = [rational(float(v)) for v in np.linalg.solve(np.eye(len(own)) - _WIDER * matrix, own)]
-    holds = all(v > 0 and f + _dot(row, found) < v for v, f, row in zip(found, first, gains, strict=True))
-    return found if holds else None
+    bounds = [rational(float(v)) for v in np.linalg.solve(np.eye(len(own)) - _WIDER * matrix, own)]
+    holds = all(v > 0 and f + _dot(row, bounds) < v for v, f, row in zip(bounds, first, gains, strict=True))
+    return bounds if holds else None
 
 
 def _middle(ends: Range) -> tuple[Fraction, Fraction]:

@@ -103,27 +103,27 @@ class SlidingPlant:
         """For people; nothing, as the reference slides throughout."""
         return ""
 
-    def differences(self, asked: "SlidingPlant") -> list[str]:
+    def differences(self, other: "SlidingPlant") -> list[str]:
         """Differences to another task that a proof for this one does not cover, with both values, SI.
 
         Constants of the fault, V, the plan and the law of friction must be the same; constants of friction, distance,
         swing and stress lie within those of the proof. The name is none of it.
         """
-        found = [
-            f"{name} [{unit}] {_as_told(getattr(self, name))} there, {_as_told(getattr(asked, name))} here"
+        texts = [
+            f"{name} [{unit}] {_in_words(getattr(self, name))} there, {_in_words(getattr(other, name))} here"
             for name, unit in _SAME.items()
-            if getattr(self, name) != getattr(asked, name)
+            if getattr(self, name) != getattr(other, name)
         ]
-        found += [
-            f"{name} [{unit}] up to {_as_told(getattr(self, name))} there, {_as_told(getattr(asked, name))} here"
+        texts += [
+            f"{name} [{unit}] up to {_in_words(getattr(self, name))} there, {_in_words(getattr(other, name))} here"
             for name, unit in _WITHIN.items()
-            if getattr(self, name) < getattr(asked, name)
+            if getattr(self, name) < getattr(other, name)
         ]
-        return found + [
-            f"{said} from {' to '.join(map(_as_told, self.ranges[axis]))} there, "
-            f"{' to '.join(dict.fromkeys(map(_as_told, asked.ranges[axis])))} here"
-            for axis, said in _CONSTANTS.items()
-            if asked.ranges[axis][0] < self.ranges[axis][0] or asked.ranges[axis][1] > self.ranges[axis][1]
+        return texts + [
+            f"{name_in_words} from {' to '.join(map(_in_words, self.ranges[axis]))} there, "
+            f"{' to '.join(dict.fromkeys(map(_in_words, other.ranges[axis])))} here"
+            for axis, name_in_words in _CONSTANTS.items()
+            if other.ranges[axis][0] < self.ranges[axis][0] or other.ranges[axis][1] > self.ranges[axis][1]
         ]
 
     @property
@@ -163,7 +163,7 @@ class SlidingPlant:
         return low - self.pressure_per_slip * self.distance - push, high + push
 
 
-def _as_told(value: Fraction | str | bool) -> str:
+def _in_words(value: Fraction | str | bool) -> str:
     """With six digits, or as it is."""
     return six_digits(value) if isinstance(value, Fraction) else str(value)
 

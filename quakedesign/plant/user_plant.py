@@ -150,10 +150,10 @@ class UncertainPlant:
         keep("outputs", _frozen({name: vector(row, f"output {name}", n) for name, row in outputs.items()}))
         keep("disturbances", _frozen({name: _disturbance(name, one, n) for name, one in self.disturbances.items()}))
         keep("loads", _frozen({name: _load(name, one, (n, m), C) for name, one in self.loads.items()}))
-        for given, known, what in ((self.gains, self.controls, "gains"), (self.noise, self.measurements, "noise")):
-            if unknown := set(given) - set(known):
+        for given, names, what in ((self.gains, self.controls, "gains"), (self.noise, self.measurements, "noise")):
+            if unknown := set(given) - set(names):
                 raise ParameterError(
-                    f"{what} of a plant must be of {', '.join(known)}. Received {', '.join(sorted(unknown))}."
+                    f"{what} of a plant must be of {', '.join(names)}. Received {', '.join(sorted(unknown))}."
                 )
         ends = {name: vector(pair, f"gains of {name}", 2) for name, pair in self.gains.items()}
         if any(low > high for low, high in ends.values()):
@@ -234,12 +234,12 @@ class UncertainPlant:
     def exact_sectors(self, bound: Callable[[str], Fraction]) -> dict[str, ExactSector]:
         """Sectors and gains, those with callable slopes up to a bound of the argument by their name."""
         n, m = self.sizes
-        found = {name: sector.at(bound(name), (n, m), name) for name, sector in self.sectors.items()}
+        sectors = {name: sector.at(bound(name), (n, m), name) for name, sector in self.sectors.items()}
         for name, (low, high) in self.gains.items():
             k = list(self.controls).index(name)
             entry = tuple(row[k] for row in self.B)
-            found[name] = ExactSector(entry=entry, row=unit(n + m, n + k), slopes=(low - 1, high - 1))
-        return found
+            sectors[name] = ExactSector(entry=entry, row=unit(n + m, n + k), slopes=(low - 1, high - 1))
+        return sectors
 
     def behind(self, lag: Any) -> "UncertainPlant":
         """The plant behind actuators with a time constant [s] each, q′ = (u − q)/lag, which are further states."""
@@ -282,10 +282,10 @@ def vector(values: Any, name: str, length: int | None = None) -> Row:
     entries = values.tolist() if hasattr(values, "tolist") else values
     if isinstance(entries, str) or not isinstance(entries, Sequence):
         raise ParameterError(f"{name} must be a sequence of numbers. Received {entries!r:.60}.")
-    found = tuple(rational(v, name) for v in entries)
-    if length is not None and len(found) != length:
-        raise ParameterError(f"{name} must have {length} numbers. Received {len(found)}.")
-    return found
+    numbers = tuple(rational(v, name) for v in entries)
+    if length is not None and len(numbers) != length:
+        raise ParameterError(f"{name} must have {length} numbers. Received {len(numbers)}.")
+    return numbers
 
 
 def matrix(values: Any, name: str) -> Matrix:
@@ -305,10 +305,10 @@ def _names(given: Sequence[str], letter: str, count: int, what: str) -> tuple[st
 
 def _disturbance(name: str, given: Any, n: int) -> tuple[Row, Fraction]:
     entry, size = given
-    found = vector(entry, f"entry of disturbance {name}", n), rational(size, f"size of disturbance {name}")
-    if found[1] < 0:
-        raise ParameterError(f"size of disturbance {name} must be 0 or more. Received {shortly(found[1])}.")
-    return found
+    disturbance = vector(entry, f"entry of disturbance {name}", n), rational(size, f"size of disturbance {name}")
+    if disturbance[1] < 0:
+        raise ParameterError(f"size of disturbance {name} must be 0 or more. Received {shortly(disturbance[1])}.")
+    return disturbance
 
 
 def _load(name: str, given: Any, sizes: tuple[int, int], C: Matrix) -> SlowLoad:
@@ -316,15 +316,15 @@ def _load(name: str, given: Any, sizes: tuple[int, int], C: Matrix) -> SlowLoad:
         return given
     control, shift, rate = given
     n, m = sizes
-    found = SlowLoad(
+    load = SlowLoad(
         control=vector(control, f"control of load {name}", m),
         shift=(Fraction(0),) * n if shift is None else vector(shift, f"shift of load {name}", n),
         rate=rational(rate, f"rate of load {name}"),
     )
-    seen = any(sum(c * s for c, s in zip(row, found.shift, strict=True)) for row in C)
-    if found.rate < 0 or seen:
+    seen = any(sum(c * s for c, s in zip(row, load.shift, strict=True)) for row in C)
+    if load.rate < 0 or seen:
         raise ParameterError(
             f"load {name} must have a rate of 0 or more and a shift that is not measured, C·shift = 0. Received the "
-            f"rate {shortly(found.rate)}{' and a shift that is measured' * seen}."
+            f"rate {shortly(load.rate)}{' and a shift that is measured' * seen}."
         )
-    return found
+    return load

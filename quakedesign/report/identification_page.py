@@ -55,8 +55,8 @@ def identification_lines(found: Identification | Steps, *, verbose: bool = False
     more += [f"not passed: {each}" for each in failed if each not in (*assessment.open, *assessment.cautions)]
     shown = [each for each in found.estimates.values() if verbose or not each.name.startswith(DELAY)]
     shown += [found.difference] if found.difference else []
-    lines = [each for each in found.record.remarks if verbose or " is read as " not in each]
-    more += [*_warnings(found), *([f"read: {'; '.join(lines)}"] if lines else []), *(_more(found) if verbose else [])]
+    notes = [each for each in found.record.remarks if verbose or " is read as " not in each]
+    more += [*_warnings(found), *([f"read: {'; '.join(notes)}"] if notes else []), *(_more(found) if verbose else [])]
     return [*_wrapped([answer, *but, ""]), _HEAD, *map(_row, shown), "", *_wrapped(more)]
 
 

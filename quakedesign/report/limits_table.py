@@ -110,7 +110,7 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
 def _constants(found: SlidingProof) -> str:
     """Whether the design is for a spread of a, b and D_c."""
     low, high = found.task.ranges["direct_effect"]
-    spread = UpperBound((high - low) / (high + low))
+    spread = LowerBound((high - low) / (high + low))  # a covered range: rounded inward
     return f"for a, b and D_c within {spread:.3g} of their values" if spread else "for a, b and D_c as they are given"
 
 

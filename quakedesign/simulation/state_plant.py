@@ -310,8 +310,8 @@ class PressurePath:
                 "the pressure of slow sliding goes through a lag, rock, or both. Received "
                 f"{', '.join(stage.name for stage in flowing)}. Leave out the others."
             )
-        entries = {stage.name: stage for stage in flowing}
-        lag, rock = entries.get("lag"), entries.get("diffusion")
+        by_name = {stage.name: stage for stage in flowing}
+        lag, rock = by_name.get("lag"), by_name.get("diffusion")
         return cls(
             stages=stages,
             lag=rational(lag.time_constant) if isinstance(lag, Lag) else Fraction(0),

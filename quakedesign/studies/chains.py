@@ -391,9 +391,9 @@ class SlidingChainRun:
         assert self.proof is not None
         assert self.proof.proved
         N, claims, errors = len(self.chain.blocks), self.proof.claims, self.errors
-        lines = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
+        values = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
         proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
-        return bool((np.concatenate(lines) <= np.array(proved, dtype=float)).all())
+        return bool((np.concatenate(values) <= np.array(proved, dtype=float)).all())
 
     def screen(self, conditions: Sequence[str]) -> list[str]:
         """What the proof depends on, and the run."""

@@ -32,7 +32,7 @@ from quakedesign.guarantees.exact.limit_theorems import (
     smallest_withdrawal,
 )
 from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.guarantee_result import SlidingGuarantee, answer_sliding
+from quakedesign.guarantees.guarantee_result import answer_sliding
 from quakedesign.guarantees.search.lqg import near_path, sliding_model
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Quantity
 from quakedesign.plant import FaultPlant, uncertain_plant
@@ -44,7 +44,7 @@ from quakedesign.simulation.natural import natural_peak
 _POINTS = 24  # of the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
-TOLD = "all controllers, linear or not, that know the fault and measure, up to the sample, no more than {}"
+TOLD = "all controllers, linear or not, that know the fault and measure, up to the sample, {} and nothing else"
 WAITING = "all controllers, linear or not, that know everything from the first sample after the disturbance begins"
 QUANTITIES = {
     "peak_slip_rate_error": ("slip-rate error", "m/s"),
@@ -147,9 +147,11 @@ class Told:
         return {"measured": self.measured, "setup": ExactSetup.of(self.setup)}
 
     def words(self) -> str:
-        """For people: rounded up, since who is told less can do less."""
-        slip = f"the slip within {UpperBound(self.slip_noise).quantity('m')}"
-        return slip if self._alone else f"{slip}, the slip rate within {UpperBound(self.rate_noise).quantity('m/s')}"
+        """Measured quantities with the bounds of their errors, rounded up: a limit holds for larger errors as well."""
+        slip = f"the slip with errors of no more than {UpperBound(self.slip_noise).quantity('m')}"
+        if self._alone:
+            return slip
+        return f"{slip}, the slip rate with errors of no more than {UpperBound(self.rate_noise).quantity('m/s')}"
 
     def knowing(self) -> str:
         """Controllers for which a smallest slip-rate error holds."""
@@ -426,7 +428,7 @@ def _limits(
 def _require_plain(fault: Fault, told: Told) -> None:
     if told.setup.noise or told.measured != MEASURED[0]:
         raise ParameterError(
-            f"no limit of slow sliding is known for noise. Received {fault.friction.name}, told {told.words()}. "
+            f"no limit of slow sliding is known for noise. Received {fault.friction.name}, measured {told.words()}. "
             "Leave noise out: what cannot be done without it cannot be done with it."
         )
     if more := told.setup.given().keys() - {"lag", "diffusion"}:
@@ -468,9 +470,10 @@ def _sliding_limits(
     found = answer.proof if answer is not None and answer.proof.proved else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
+        why = f": {answer.reason}" if answer is not None and not answer.proved else ""
         raise ParameterError(
             "limits of slow sliding need a shear stress disturbance above 0. Received none, and no design was "
-            f"found that withstands any{_why(answer)}. Give --stress, such as '25 kPa'."
+            f"found that withstands any{why}. Give --stress, such as '25 kPa'."
         )
     push = SlidingPush(model=model, amplitude=amplitude)
     farthest, rock = longest_diffusion(push, withdrawal, step), (told or IDEAL).diffusion
@@ -498,10 +501,6 @@ def _sliding_limits(
         guarantee=found,
         rock=rock,
     )
-
-
-def _why(answer: SlidingGuarantee | None) -> str:
-    return f": {answer.proof.reason}" if answer is not None and not answer.proof.proved else ""
 
 
 def _proved_steps(

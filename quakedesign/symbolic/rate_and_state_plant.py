@@ -179,8 +179,8 @@ def critical_stiffness(law: FrictionLaw, *, inertia: bool = True) -> sp.Expr:
     polynomials = [sp.Poly(condition.subs(_absent(law)), k_hat) for condition in conditions]
     if any(poly.degree() > 1 for poly in polynomials):
         raise UnsupportedError("the critical stiffness has a closed form for at most one state variable")
-    lines = [poly.all_coeffs() for poly in polynomials if poly.degree() == 1]
-    roots = [_inserted(sp.factor(-offset / slope), law) for slope, offset in lines]
+    linear = [poly.all_coeffs() for poly in polynomials if poly.degree() == 1]
+    roots = [_inserted(sp.factor(-offset / slope), law) for slope, offset in linear]
     nontrivial = [_with_stresses(r) for i, r in enumerate(roots) if r != 0 and r not in roots[:i]]
     return sp.Max(*nontrivial) if nontrivial else sp.Integer(0)
 

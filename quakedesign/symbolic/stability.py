@@ -339,17 +339,17 @@ class Model:
         """Which of the conditions for instability hold, with their numbers [1/s², 1/s]."""
         if not self.unstable:
             return ()
-        entries = {
+        templates = {
             plant.k_hat: "the spring unloads slower than friction weakens with slip: stiffness {} < {} 1/s²",
             plant.eta_hat: "damping is weaker than the rate weakening of friction: {} < {} 1/s",
         }
         if self._names:
-            entries[plant.k_hat] = "the spring is softer than steady sliding needs: stiffness {} < {} 1/s²"
+            templates[plant.k_hat] = "the spring is softer than steady sliding needs: stiffness {} < {} 1/s²"
         other = "a condition of Routh and Hurwitz fails: {} < {}"
         conditions = self.instability.args if isinstance(self.instability, sp.Or) else (self.instability,)
         found = [(c, [sp.N(side.subs(self.values), _DIGITS) for side in c.args]) for c in conditions]
         return tuple(
-            entries.get(c.args[0], other).format(*(f"{float(side):.4g}" for side in (low, high)))
+            templates.get(c.args[0], other).format(*(f"{float(side):.4g}" for side in (low, high)))
             for c, (low, high) in found
             if low < high
         )

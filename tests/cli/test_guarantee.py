@@ -170,7 +170,7 @@ def test_where_no_controller_can_hold_the_fault_the_nearest_rock_that_is_proved_
     code, out, _ = call("real-fault", "--diffusion", "180 s")
     assert code == 1
     assert out.startswith("none: no controller that withdraws at most 50 MPa can hold the fault through rock of L^2/D")
-    assert "with a diffusion time L^2/D of at most 7 s: on the plant without stick, from rest, " in out
+    assert "with a diffusion time L^2/D of 7 s: on the plant without stick, from rest, " in out
     assert "command limits" not in out
 
 

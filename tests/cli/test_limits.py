@@ -110,6 +110,20 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
     assert float(found["largest_diffusion_time"]["proved_up_to"]) == 833
 
 
+@pytest.mark.parametrize(
+    ("half_width", "said"), [(Fraction(2, 30), "0.0666"), (Fraction(1, 20), "0.05"), (Fraction(99999, 10**6), "0.0999")]
+)
+def test_a_covered_spread_is_rounded_inward(half_width, said, capsys, monkeypatch):
+    """A proof within 0.0666… covers 0.0666, not 0.0667."""
+    known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
+    ranges = {name: ((1 - half_width) * low, (1 + half_width) * low) for name, (low, _) in known.task.ranges.items()}
+    wide = replace(known, task=replace(known.task, ranges=ranges))
+    answer = SlidingGuarantee(proof=wide, task=wide.task, held=wide.held)
+    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **_: answer)
+    assert run("crustal-patch") == 0
+    assert f"for a, b and D_c within {said} of their values, on" in " ".join(capsys.readouterr().out.split())
+
+
 def test_noise_forbids_more(capsys):
     found = []
     for noise in ((), ("--measured", "slip", "--slip-noise", "1 um")):

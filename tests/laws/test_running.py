@@ -55,12 +55,16 @@ def test_a_run_asks_for_the_pressure_of_the_matrices():
 
 @pytest.mark.slow
 def test_the_whole_task_stays_far_inside_the_guarantee():
+    """The guarantee is of the plant without stick, for all t >= 0, every disturbance and all friction of the box.
+
+    The one disturbance of the file swings far more slowly than the loop answers: its errors are below a fifth of both.
+    """
     fault = load_fault("real-fault")
     claim = guarantee(uncertain_plant(fault), HELD)
     assert isinstance(claim, TrackingProof)
-    found = simulate(fault, HELD.controller).metrics
-    assert found.max_slip_error <= 6e-6 < claim.claims.slip_error
-    assert found.max_slip_rate_error <= 4.5e-6 < claim.claims.slip_rate_error
+    found = simulate(fault, HELD.controller, plant="printed", settled_from=0.0).metrics
+    assert found.max_slip_error <= claim.claims.slip_error / 5
+    assert found.max_slip_rate_error <= claim.claims.slip_rate_error / 5
     assert found.peak_slip_rate <= claim.claims.peak_slip_rate
     assert claim.claims.least_pressure <= found.min_pressure
     assert found.max_pressure <= claim.claims.largest_pressure

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from quakedesign.errors import CertificateError
+from quakedesign.lyapunov.exact.certificate_files import evidence_of
+
 PATH = Path(__file__).parents[2] / "proofs" / "check.py"
 
 
@@ -513,9 +516,20 @@ def test_a_file_of_a_kind_is_a_guarantee():
 
 def test_a_bound_under_inputs_is_no_longer_read(tmp_path, capsys):
     path = tmp_path / "old.json"
-    path.write_text('{"format": 1, "inputs": {}}')
+    path.write_text('{"format": 1, "inputs": {}, "outputs": {}}')
     assert checker.main([str(path)]) == 2
     assert "a bound under inputs: no longer read" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("key", ["inputs", "outputs"])
+def test_a_file_with_one_key_of_such_a_bound_is_invalid(key, tmp_path, capsys):
+    """Files about uncertain plants have inputs too; one without its kind is no bound of before."""
+    path = tmp_path / "other.json"
+    path.write_text(json.dumps({"format": 1, key: {}}))
+    assert checker.main([str(path)]) == 1
+    assert "invalid: the file must be complete" in capsys.readouterr().out
+    with pytest.raises(CertificateError):
+        evidence_of({"format": 1, key: {}})
 
 
 def test_keys_are_looked_at_before_anything_is_read():

@@ -5,7 +5,7 @@ import json
 from fractions import Fraction as F
 
 import pytest
-from standalone_guarantee import checker
+from standalone_guarantee import CHECK, PATH, checker
 
 from quakedesign.errors import CertificateError
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, read_guarantee
@@ -199,6 +199,33 @@ def test_both_take_what_is_just_allowed_and_refuse_what_is_just_beyond(raw, path
             except CertificateError:
                 package = False
             assert (standalone, package) == (expected, expected), value
+
+
+SLIDING = json.loads((PATH.parent / "certificates" / "sliding_crustal-patch.json").read_text(encoding="utf-8"))
+NEGATIVE = [
+    (HELD, ("loop", "of_reference"), [["0", "0"], ["0", "0"]], "of_reference must not be zero where it is given"),
+    (HELD, ("start",), {"slip": "0", "rate": "0"}, "a bound of the start must be above 0"),
+    (HELD, ("start",), {"slip": "-1/9", "rate": "1/9"}, "bounds of the initial slip and slip rate"),
+    (HELD, ("start",), {"slip": "1/9", "rate": "-1/9"}, "bounds of the initial slip and slip rate"),
+    (HELD, ("loop", "diffusion"), "-1", "diffusion"),
+    (HELD, ("loop", "longest"), "-1", "the longest step must exceed the step"),
+    (HELD, ("loop", "jitter"), {"measured": "-1/9", "delay": "1/2"}, "averaging and ramp must be 0 or more"),
+    (HELD, ("loop", "jitter"), {"measured": "1/2", "delay": "-1/9"}, "averaging and ramp must be 0 or more"),
+    (HELD, ("loop", "jitter"), {"measured": "1/9", "delay": "0", "mean": "-1"}, "averaging and ramp must be 0 or more"),
+    (SLIDING, ("reference", "swing"), "-1/20", "swing of crustal-patch must be from 0 to below 1"),
+    (SLIDING, ("cells",), [["rate", "1/2"], [], []], "a cut must be along one of direct_effect"),
+    (SLIDING, ("cells",), [["direct_effect"], [], []], "a cut must be one of direct_effect, .* and a number"),
+]  # fmt: skip
+
+
+@pytest.mark.usefixtures("coarse")
+@pytest.mark.parametrize(("raw", "path", "value", "said"), NEGATIVE)
+def test_the_package_names_the_rule_that_a_file_breaks(raw, path, value, said):
+    given = changed(raw, (path, value))
+    with pytest.raises(CertificateError, match=said):
+        parse_guarantee(json.dumps(given))
+    with pytest.raises(CHECK.Refused):
+        CHECK.check(json.dumps(given))
 
 
 @pytest.mark.usefixtures("coarse")

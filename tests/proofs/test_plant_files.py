@@ -156,6 +156,10 @@ def test_a_load_that_the_law_does_not_hold_is_refused_by_both():
         CHECK.check(json.dumps(document))
 
 
+WIDE = {"A": [["0"] * 49] * 49, "B": [["0"] * 2] * 49, "C": [["0"] * 49]}
+"""A law of 49 states that fits the plant."""
+
+
 @pytest.mark.parametrize(
     ("way", "value", "said"),
     [
@@ -166,6 +170,13 @@ def test_a_load_that_the_law_does_not_hold_is_refused_by_both():
         (("plant", "B"), [[], []], "a control"),
         (("plant", "A", 1), ["1"], "rows and columns of a plant must fit"),
         (("plant", "sectors", 0, "within"), "0", "a bound of a sector must be positive"),
+        (("plant", "sectors", 0, "slopes"), ["1", "0"], "slopes must be in order"),
+        (("plant", "sectors", 0, "row"), ["1", "0", "1"], "a sector with a bound must be of the states alone"),
+        *(
+            (("plant", name), STORED["plant"][name][:1] * 41, f"{name} must have at most 40 entries")
+            for name in ("C", "disturbances", "loads", "sectors", "outputs")
+        ),
+        (("law",), {**STORED["law"], **WIDE}, "a law must have at most 48 states"),
     ],
 )
 def test_the_package_names_the_rule_that_a_file_breaks(way, value, said):

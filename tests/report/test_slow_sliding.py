@@ -20,6 +20,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.guarantee_result import SlidingGuarantee
 from quakedesign.report.figures import cycle, errors, overviews, slow_sliding
 from quakedesign.report.folder import write_folder
@@ -211,7 +212,8 @@ def test_without_a_diffusion_the_well_is_near(monkeypatch):
     monkeypatch.setattr(state_feedback, "answer_sliding", answer)
     with pytest.raises(ParameterError, match="enough"):
         design(PATCH, "elqr", stress="25000")
-    assert asked | {"tell": None} == {"stress": Fraction(25000), "spread": 0, "tell": None, "diffusion": Fraction(800)}
+    setup = ExactSetup(diffusion=Fraction(800))
+    assert asked | {"tell": None} == {"stress": Fraction(25000), "spread": 0, "tell": None, "setup": setup}
 
 
 @pytest.mark.slow

@@ -70,7 +70,7 @@ def test_the_table_has_proved_bounds_rounded_up_beside_the_worst_found_and_the_r
     assert name == "a law with a long name"
     assert other.split() == ["slow", "slip", "–", "–", "20", "–", "–", "–", "-0.8", "…", "0"]
     assert worst == "worst: worst case found; pressure (p < 0: withdrawal): range proved, else run's"
-    assert tracked.startswith("tracked: slip within 2 % of the task's")
+    assert tracked == "tracked: slip error <= 2 % of target, slip rate <= reference + 1 % of the peak"
     assert max(map(len, lines)) <= 80
 
 

@@ -148,21 +148,27 @@ def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
     plain, found = study(REAL), study(REAL, measured="slip", slip_noise="1e-6")
     least, noisy = (one.peak_slip_rate_error for one in (plain, found))
     assert 1.36 < noisy.impossible_beyond / least.impossible_beyond < 1.37
-    assert noisy.holds_for.endswith("told up to the sample no more than the slip within 1 µm")
+    assert noisy.holds_for.endswith(
+        "and measure, up to the sample, the slip with errors of no more than 1 µm and nothing else"
+    )
     assert found.largest_step == plain.largest_step  # even for those who know everything
     told = {"measured": "slip", "slip_noise": F(1, 10**6)}
     assert told in designs[2]
     assert {"measured": "slip-and-rate"} in designs[2]
     assert {key: found.to_dict()[key] for key in told} == {key: str(value) for key, value in told.items()}
-    assert "slip-rate error: told no more than the slip within 1 µm up to" in " ".join(limits_lines(found))
+    said = "even for one that measures the slip with errors of no more than 1 µm up to each sample"
+    assert said in " ".join(" ".join(limits_lines(found)).split())
     assert found.smallest_peaks()[0][1] > 2 * found.smallest_peaks(told=False)[0][1]
-    assert "and for those told the slip within 1 µm" in limits_figure(found).axes[0].get_legend_handles_labels()[1]
+    label = "and with measurements of the slip with errors of no more than 1 µm"
+    assert label in limits_figure(found).axes[0].get_legend_handles_labels()[1]
     assert found.smallest_peaks(told=False) == plain.smallest_peaks()
 
 
 def test_noise_of_both_is_told_and_that_of_one_hides_nothing(designs):
     both = study(REAL, slip_noise="1e-6", rate_noise="1e-5", prove=False)
-    assert both.told.words() == "the slip within 1 µm, the slip rate within 10 µm/s"
+    errors = "the slip with errors of no more than 1 µm, the slip rate with errors of no more than 10 µm/s"
+    assert both.told.words() == errors
+    assert f"even for one that measures {errors} up to each sample" in " ".join(" ".join(limits_lines(both)).split())
     plain = study(REAL, prove=False).peak_slip_rate_error
     assert both.peak_slip_rate_error.impossible_beyond > plain.impossible_beyond
     for told in ({"slip_noise": "1e-6"}, {"rate_noise": "1e-6"}, {"measured": "slip"}):

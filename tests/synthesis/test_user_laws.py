@@ -469,4 +469,4 @@ def test_a_law_without_a_guarantee_names_a_smaller_delay_that_has_one(monkeypatc
     assert (name, near.held.delay) == ("delay", Fraction(9, 80))
     assert str(near.check()) == "proved"
     assert near.held.law == law.law
-    assert late.lines()[1].startswith("with a delay of at most 112 ms: on the plant without stick")
+    assert late.lines()[1].startswith("this law with a delay of 0.1125 s: on the plant without stick")

@@ -11,13 +11,13 @@ from msgspec.structs import astuple
 
 from quakedesign.laws.implicit_root import MOST_TERMS, ImplicitRoot, Power
 from quakedesign.plant.ranges import FaultPlant, Friction
-from quakedesign.sos.exact.strict import NAME, Entries, made
+from quakedesign.sos.exact.strict import Entries, Name, made
 
 Pair = tuple[Fraction, Fraction]
 Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
 MOST_STATES = 20
-Names = Annotated[tuple[Annotated[str, Meta(pattern=rf"\A{NAME.pattern}\Z")], ...], Meta(max_length=MOST_STATES)]
+Names = Annotated[tuple[Name, ...], Meta(max_length=MOST_STATES)]
 FaultName = Annotated[str, Meta(pattern=r"\A\w[\w .-]{0,59}\Z")]
 
 

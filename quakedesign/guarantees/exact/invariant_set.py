@@ -77,7 +77,7 @@ class InvariantPolytope:
 
     def __post_init__(self) -> None:
         size, count = len(self.facets[0]) if self.facets else 0, len(self.facets)
-        bases = [basis for lines in (self.at_samples, self.between) for line in lines for basis in line]
+        bases = [basis for table in (self.at_samples, self.between) for of_facet in table for basis in of_facet]
         sizes = sorted({len(row) for row in self.facets})
         large = [v for row in self.facets for v in row if max(abs(v.numerator), v.denominator) >= LARGEST]
         outside = [basis for basis in bases if len(basis) != size or not all(0 <= i < count for i in basis)]
@@ -104,10 +104,10 @@ class InvariantPolytope:
             *(
                 (
                     f"rows of {name} must have the same number of bases, 2 to {MOST_PIECES + 1},",
-                    _even(lines),
-                    f"rows of {_listed(sorted({len(line) for line in lines}))} bases",
+                    _even(table),
+                    f"rows of {_listed(sorted({len(of_facet) for of_facet in table}))} bases",
                 )
-                for name, lines in (("at_samples", self.at_samples), ("between", self.between))
+                for name, table in (("at_samples", self.at_samples), ("between", self.between))
             ),
             (
                 f"a basis must be {size} numbers of facets, from 0 to below {count}",
@@ -129,9 +129,9 @@ def _listed(numbers: list[int]) -> str:
     return ", ".join(map(str, numbers)) or "no"
 
 
-def _even(lines: tuple[tuple[Basis, ...], ...]) -> bool:
+def _even(table: tuple[tuple[Basis, ...], ...]) -> bool:
     """Whether all rows have the same pieces."""
-    return len({len(line) for line in lines}) == 1 and 2 <= len(lines[0]) <= MOST_PIECES + 1
+    return len({len(row) for row in table}) == 1 and 2 <= len(table[0]) <= MOST_PIECES + 1
 
 
 def reached_bounds(task: FaultPlant, held: Held, reach: InvariantPolytope) -> Bounds | NoProof:
@@ -293,8 +293,8 @@ def _exact(rows: Sequence[Row]) -> fmpq_mat:
 
 
 def _rows(whole: fmpq_mat, places: Basis) -> fmpq_mat:
-    lines = whole.tolist()
-    return fmpq_mat([lines[i] for i in places])
+    rows = whole.tolist()
+    return fmpq_mat([rows[i] for i in places])
 
 
 def _cut(start: Fraction, end: Fraction, pieces: int) -> list[Fraction]:

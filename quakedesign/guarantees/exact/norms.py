@@ -543,12 +543,12 @@ def _pieces(flow: SegmentFlow, rows: Any, columns: Any, weights: list[Any]) -> I
     ends = [absolute(phase * columns) for phase in phases]
     for i, phase in enumerate(phases[:-1]):
         bends = absolute(phase * flow.square) * flow.within[i] * absolute(columns) * flow.chord(i)
-        lines = zip(ends[i].tolist(), ends[i + 1].tolist(), bends.tolist(), strict=True)
+        by_row = zip(ends[i].tolist(), ends[i + 1].tolist(), bends.tolist(), strict=True)
         yield [
             reduce(
                 arb.max, (a.max(b) + more for a, b, more in zip(*(_free_sums(v, weights) for v in line), strict=True))
             )
-            for line in lines
+            for line in by_row
         ]
 
 

@@ -172,8 +172,8 @@ def row_bounds(part: LinearPart, found: ResponseBounds, inputs: Row) -> Row:
     own = [size for _, size in part.disturbances] + [load.rate for load in part.loads]
     halves = [(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors]
     sizes = [*own, *(w if h else Fraction(0) for w, h in zip(inputs, halves, strict=True))]
-    lines = [size for size in part.noise if size]
-    parts = (*zip(found.inputs, sizes, strict=True), *zip(found.sampled, lines, strict=True))
+    noise = [size for size in part.noise if size]
+    parts = (*zip(found.inputs, sizes, strict=True), *zip(found.sampled, noise, strict=True))
     bounds = list(found.start)
     for gains, size in parts:
         if size:

@@ -139,7 +139,7 @@ class LinearPart:
         columns = [(*entry, *[zero] * (size - n)) for entry, _ in self.disturbances]
         columns += [self._moved(load, law, waiting + 1) for load in self.loads]
         columns += [(*s.entry, *[zero] * (size - n)) for s in self.sectors]
-        lines = [
+        noise_columns = [
             (*[zero] * n, *(row[a] for row in (*law.measured, *law.feedback)), *[zero] * (size - n - q - m))
             for a in range(seen)
             if self.noise[a]
@@ -148,7 +148,7 @@ class LinearPart:
             flow=tuple(map(tuple, flow)),
             segments=tuple((tuple(map(tuple, one)), time) for one, time in segments),
             inputs=tuple(columns),
-            sampled=tuple(lines),
+            sampled=tuple(noise_columns),
             start=tuple(tuple(v * s for v in unit(size, i)) for i, s in enumerate(self.start) if s),
             rows=tuple(rows),
         )

@@ -405,7 +405,7 @@ def _of_claims(
         return NoProof(reason=f"the root of the implicit step leaves its range at {errors}")
     if reason := claims.opens(task) or _beyond_the_pump(held, claims):
         slow = held.pump is not None and bool(held.pump.too_slow(claims.largest_step, held.ramp))
-        return NoProof(reason=reason, small_gain=None, needs=claims.largest_step if slow else None, pressed=not slow)
+        return NoProof(reason=reason, needs=claims.largest_step if slow else None, pressed=not slow)
     return TrackingProof(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
 
 
@@ -731,15 +731,15 @@ def _along(task: SlidingPlant) -> str:
 
 def _friction(task: SlidingPlant) -> list[str]:
     """Parts of the statement on regularised friction and on the slip law."""
-    lines = ["friction regularised"] if task.regularised else []
-    return lines + (["state by the slip law"] if task.state_law == "slip" else [])
+    parts = ["friction regularised"] if task.regularised else []
+    return parts + (["state by the slip law"] if task.state_law == "slip" else [])
 
 
 def _box(task: SlidingPlant) -> str:
-    entries = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
+    symbols = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "D_c"}
     wide = [
         f"{short} from {_inside(*task.ranges[axis])}"
-        for axis, short in entries.items()
+        for axis, short in symbols.items()
         if task.ranges[axis][0] < task.ranges[axis][1]
     ]
     if not wide:

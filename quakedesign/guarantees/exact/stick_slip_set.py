@@ -771,7 +771,7 @@ def polytopes(
     flat = [[*own, *end] for end in ends]
     if found is None:
         return flat
-    lines = stop_bounds(task, held, found)
+    stops = stop_bounds(task, held, found)
     most = task.beta[1] * task.authority
     for combination in (COMBINATIONS[place] for place in LEAST):
         push, push0, _ = push_row(held, task.reference_rates[0] + held.told, combination)
@@ -779,7 +779,7 @@ def polytopes(
         room = most * (push0 + held.push_noise) - task.amplitude
         tall: list[Constraint] = [((*row, _ZERO), b) for row, b in flat[combination[0]]]
         tall += [((_ZERO, _ZERO, _ZERO, -one), _ZERO), (larger, room)]
-        tall += [((_ZERO, -g, _ZERO, one), h) for g, h in lines]
+        tall += [((_ZERO, -g, _ZERO, one), h) for g, h in stops]
         flat.append(tall)
     return flat
 

@@ -460,9 +460,9 @@ class _Growing:
         facets = [tuple(Fraction(float(v)) for v in row) for row in self.facets]
         sizes = np.append(self.size, self.size[1] * float(self.held.longest))
         corners = []
-        for place, lines in enumerate(polytopes(self.task, self.held, facets, found)):
-            tall = len(lines[0][0])
-            at = _corners(lines, sizes[:tall], self.centres.get(place))
+        for place, constraints in enumerate(polytopes(self.task, self.held, facets, found)):
+            tall = len(constraints[0][0])
+            at = _corners(constraints, sizes[:tall], self.centres.get(place))
             if at is None and tall == 3:
                 return None
             if at is not None:
@@ -660,13 +660,13 @@ class _Growing:
         facets = tuple(tuple(_dyadic(float(v)) for v in row) for row in self.facets)
         periods, bases = self.periods(), list[list[tuple[int, ...]]]()
         sizes = np.append(self.size, self.size[1] * float(self.held.longest))
-        lines = polytopes(self.task, self.held, facets, periods[0].found)
-        for constraints in lines:
+        groups = polytopes(self.task, self.held, facets, periods[0].found)
+        for constraints in groups:
             at = _corners(constraints, sizes[: len(constraints[0][0])])
             if at is None:
                 return None
             bases.append([tuple(int(v) for v in basis) for basis in at[1]])
-        self._complete(periods, np.array(facets, dtype=float), lines, bases)
+        self._complete(periods, np.array(facets, dtype=float), groups, bases)
         return StickSlipPolytope(
             facets=facets,
             multipliers=tuple(tuple(short(float(v), _DIGITS) for v in row) for row in self._scaled()),
@@ -678,21 +678,21 @@ class _Growing:
         self,
         periods: list[Period],
         facets: np.ndarray,
-        lines: list[list[Constraint]],
+        groups: list[list[Constraint]],
         bases: list[list[tuple[int, ...]]],
     ) -> None:
         """Add vertices that rounding hid, by linear programs, where a function would have a negative multiplier."""
         sizes = [short(float(v), 6) for v in (*self.size, self.size[1] * float(self.held.longest))]
         verifiers = [
             Verifier(constraints, known, sizes[: len(known[0])], place=place, facets=len(facets))
-            for place, (constraints, known) in enumerate(zip(lines, bases, strict=True))
+            for place, (constraints, known) in enumerate(zip(groups, bases, strict=True))
         ]
         for rows in _rows(periods, facets, self._scaled()):
             verifier = verifiers[rows.place]
             scaled = rows.factors * np.array(sizes[: rows.factors.shape[1]], dtype=float)
             shares = verifier.proposed(scaled)[1]
             for place in np.flatnonzero(shares.min(axis=1) < -_NEGATIVE * np.abs(shares).max(axis=1)):
-                basis = _basis(verifier.floats, np.array([float(end) for _, end in lines[rows.place]]), scaled[place])
+                basis = _basis(verifier.floats, np.array([float(end) for _, end in groups[rows.place]]), scaled[place])
                 if basis is not None and basis not in bases[rows.place]:
                     bases[rows.place].append(basis)
 

@@ -197,10 +197,10 @@ class Inclusion:
         test, known = _sign_only(falling), self._used(falling, known)
         before = ca.SX.sym("before", 2 + len(known))
         low, length, *values = ca.vertsplit(before)
-        entries = dict(zip(known, values, strict=True))
+        by_symbol = dict(zip(known, values, strict=True))
         for _ in range(AT_ONCE):
             length = length / 4
-            passed = sum(self._value(test, entries, low + share * length) >= 0 for share in (1, 2, 3))
+            passed = sum(self._value(test, by_symbol, low + share * length) >= 0 for share in (1, 2, 3))
             low = low + passed * length
         rounds = ca.Function("rounds", [before], [ca.vertcat(low, length, *values)])
         start = ca.vertcat(ca.fmin(width, 0), ca.fabs(width), *known.values())

@@ -211,7 +211,7 @@ class Certificate(Evidence):
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class _Problem:
     """A certificate and a law, the same as another by all that they hold."""
 
     digest: bytes
@@ -231,12 +231,12 @@ def decided_once(certificate: Certificate, law: "str | type[Law] | LoopField | N
     """
     if not isinstance(law, str | type | None):
         return certificate.check(law)
-    return _verdict(_Asked(sha256(pickle.dumps(certificate)).digest(), law, certificate))
+    return _verdict(_Problem(sha256(pickle.dumps(certificate)).digest(), law, certificate))
 
 
 @lru_cache(maxsize=64)
-def _verdict(asked: _Asked) -> Verdict:
-    return asked.certificate.check(asked.law)
+def _verdict(problem: _Problem) -> Verdict:
+    return problem.certificate.check(problem.law)
 
 
 def load_certificate(path: str | Path) -> Certificate:

@@ -21,8 +21,8 @@ from quakedesign.lyapunov.exact.claim import Equilibrium, Evidence, Loop, Witnes
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.exact.strict import (
     LARGEST_FILE,
-    NAME,
     Entries,
+    Name,
     PolynomialEntries,
     common_grid,
     headed,
@@ -51,7 +51,6 @@ LIMITS = {
 }
 """Largest number of each in a file."""
 
-Name = Annotated[str, Meta(pattern=rf"\A{NAME.pattern}\Z")]
 Numbers = dict[Name, Fraction]
 Exponents = tuple[Annotated[int, Meta(ge=0, le=999)], ...]
 FactorEntries = tuple[str, Fraction, Literal["s", "a"]]
@@ -97,10 +96,10 @@ class LoopEntries(Entries):
 
 def terms_of(entries: tuple[TermEntries, ...], loop: Loop, powers: Sequence[str]) -> tuple[Term, ...]:
     """Sum of terms with powers of the given names; parameters are all others of the loop."""
-    known = {*loop.gains, *loop.constants, *loop.ranges}
+    parameters = {*loop.gains, *loop.constants, *loop.ranges}
     for coefficient, names, factors in entries:
         need(coefficient != 0, "a term must not be zero")
-        need(known.issuperset(names), "a term has an unknown parameter")
+        need(parameters.issuperset(names), "a term has an unknown parameter")
         need(len({f[0] for f in factors}) == len(factors), "a state occurs twice in a term")
         for state, power, kind in factors:
             need(state in powers, "a factor has an unknown state")
@@ -218,7 +217,7 @@ def evidence_of(raw: Any) -> Evidence:
     UnsupportedError
         For a bound of outputs under inputs, which files of the kind ``guarantee`` have replaced.
     """
-    if isinstance(raw, dict) and "inputs" in raw:
+    if isinstance(raw, dict) and {"inputs", "outputs"} <= raw.keys():
         raise UnsupportedError(
             "a file must be a proof, a refutation or of the kind guarantee. Received a bound under inputs, which is no "
             "longer read. Make the new file with certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE."
@@ -240,14 +239,14 @@ def evidence_of(raw: Any) -> Evidence:
 
 def certificate_text(certificate: Evidence) -> str:
     """Text of the file, the same for the same certificate."""
-    loop, found = certificate.loop, certificate.refutation
+    loop, refutation = certificate.loop, certificate.refutation
     parts: dict[str, Any] = {
         "roots": {name: (of, *ends) for name, (of, ends) in loop.roots.items()},
         "lifts": {lift: term_entries(terms) for lift, terms in loop.lifts.items()},
         "field": {state: term_entries(terms) for state, terms in loop.field.items()},
     }
-    if found is not None:
-        file: LoopEntries = made(RefutationFile, loop, refutation=made(RefutationEntries, found), **parts)
+    if refutation is not None:
+        file: LoopEntries = made(RefutationFile, loop, refutation=made(RefutationEntries, refutation), **parts)
     else:
         witnesses = tuple(_witness_entries(name, one) for name, one in certificate.witnesses.items())
         parts |= {"V": term_entries(certificate.lyapunov), "claims": certificate.claims, "witnesses": witnesses}
@@ -297,8 +296,8 @@ def kind_of(raw: Any) -> str:
     """What a parsed file says that it is, else what its keys say: about a polynomial, or a closed loop."""
     if not isinstance(raw, dict):
         return LOOP
-    said = next((kind for kind in _KINDS if raw.get("kind") == kind), None)
-    return said or (POLYNOMIAL if "polynomial" in raw else LOOP)
+    named = next((kind for kind in _KINDS if raw.get("kind") == kind), None)
+    return named or (POLYNOMIAL if "polynomial" in raw else LOOP)
 
 
 # ----------------------------------------------------------------------
@@ -345,8 +344,8 @@ def _phrases(part: dict[str, Any], path: tuple[str, ...]) -> list[str]:
     """Entries that are no objects behind the path to them, then those of every object."""
     inner = {key: entry for key, entry in sorted(part.items()) if isinstance(entry, dict)}
     own = ", ".join(f"{key} {_entry(entry)}" for key, entry in sorted(part.items()) if key not in inner)
-    found = [" ".join((*path, own))] if own else []
-    return found + [phrase for key, entry in inner.items() for phrase in _phrases(entry, (*path, key))]
+    phrases = [" ".join((*path, own))] if own else []
+    return phrases + [phrase for key, entry in inner.items() for phrase in _phrases(entry, (*path, key))]
 
 
 def _entry(value: Any) -> str:

@@ -100,15 +100,15 @@ class DomainProblem:
         The certificate speaks where they add up to less than 1. None where nothing bounds them. The sensitivities of h
         are those for the errors of the level, or for other errors.
         """
-        known = self.robustness
-        if known is None or self.along_reference() > self.allowed:
+        robustness = self.robustness
+        if robustness is None or self.along_reference() > self.allowed:
             return None
         bounds = errors or self.sets.errors(level)
         still = Errors(slip=bounds.slip, rate=bounds.rate)
         g1, g2 = largest_sensitivities(self.fault, self.controller.divisor, still, **self._added)
         return {
-            "slip": known.slip * g1 * _root(level, known.slip_power),
-            "rate": known.rate * g2 * _root(level, known.rate_power),
+            "slip": robustness.slip * g1 * _root(level, robustness.slip_power),
+            "rate": robustness.rate * g2 * _root(level, robustness.rate_power),
         }
 
     @property

@@ -77,7 +77,7 @@ def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -
     rates = {x1: plant.e2 + plant.r1, x2: plant.acceleration_error + plant.r2, push: plant.r3}
     added = feedforward.acceleration(x1, x2, push)
     flat = sp.expand(flat + sum((added.diff(signal) * rate for signal, rate in rates.items()), start=sp.Integer(0)))
-    return _with_known(bending + sp.collect(flat, moved), fault, divisor)
+    return _with_values(bending + sp.collect(flat, moved), fault, divisor)
 
 
 @lru_cache(maxsize=16)
@@ -90,19 +90,19 @@ def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedFo
     added = feedforward.acceleration(plant.e1, plant.e2, sp.Integer(0))
     slip, still, rate, calm = plant.sensitivities()
     expressions = (slip + (still + added.diff(plant.e1)), rate + (calm + added.diff(plant.e2)))
-    first, second = (_with_known(expression, fault, divisor) for expression in expressions)
+    first, second = (_with_values(expression, fault, divisor) for expression in expressions)
     return first, second
 
 
-def _with_known(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Expr:
+def _with_values(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Expr:
     """Insert μ*, the divisor, the reference, and the growth of the disturbance where its value stands."""
     static = static_friction(fault)
     grown = plant.phi_1 * (plant.e1 + plant.r0) + plant.phi_2 * (plant.e2 + plant.r1)
-    known = {
+    values = {
         plant.mu_star: sp.Rational(static.numerator, static.denominator),
         plant.divisor: sp.Rational(divisor.numerator, divisor.denominator),
     }
-    return expression.xreplace({plant.phi: plant.phi + grown}).xreplace(known | _reference_values(fault))
+    return expression.xreplace({plant.phi: plant.phi + grown}).xreplace(values | _reference_values(fault))
 
 
 @lru_cache(maxsize=16)
@@ -215,18 +215,18 @@ class Sectors:
 
 def sectors(fault: Fault) -> Sectors:
     """Sector bounds of a fault over its uncertainty box: the ranges of its uncertain plant, exact."""
-    known = uncertain_plant(fault)
+    ranges = uncertain_plant(fault)
     nominal = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
     return Sectors(
-        authority=known.authority,
-        beta=known.beta,
-        slip=known.slip_chord,
-        rate=known.rate_chord,
+        authority=ranges.authority,
+        beta=ranges.beta,
+        slip=ranges.slip_chord,
+        rate=ranges.rate_chord,
         row_bounds=(
-            max(abs(s + nominal[plant.k_hat]) for s in known.slip_chord) / known.authority,
-            max(abs(w - nominal[plant.eta_hat]) for w in known.rate_chord) / known.authority,
+            max(abs(s + nominal[plant.k_hat]) for s in ranges.slip_chord) / ranges.authority,
+            max(abs(w - nominal[plant.eta_hat]) for w in ranges.rate_chord) / ranges.authority,
         ),
-        largest_effective_stress=max(map(abs, known.stress)),
+        largest_effective_stress=max(map(abs, ranges.stress)),
     )
 
 
@@ -306,11 +306,11 @@ def _net_stress() -> sp.Expr:
 
 def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]:
     """p* in symbols, written so that few of them repeat, and their ranges."""
-    known = {
+    values = {
         _growth: to_sympy(rational(fault.disturbance.slip_growth)),
         plant.mu_star: to_sympy(static_friction(fault)),
     }
-    expression = plant.sigma - sp.collect(sp.expand(_net_stress().subs(known) * _mu), _r) / _mu  # μ once
+    expression = plant.sigma - sp.collect(sp.expand(_net_stress().subs(values) * _mu), _r) / _mu  # μ once
     ranges = plant_ranges(fault)
     if not nominal:
         return expression, {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)}

@@ -95,7 +95,7 @@ class Obligations:
                 if name in exponents:
                     exponents[name].append(exponent)
         require(all(exponents.values()), "a lift occurs nowhere.")
-        return tuple(lift for lift, found in exponents.items() if any(found))
+        return tuple(lift for lift, occurring in exponents.items() if any(occurring))
 
     @cached_property
     def lift_degrees(self) -> dict[str, int]:
@@ -103,11 +103,11 @@ class Obligations:
         degrees: dict[str, int] = {}
         for lift in self.loop.lifts:
             weights = {**self.loop.states, **degrees}
-            found = {
+            values = {
                 sum(e) for signs in _signs(tuple(weights)) for e in self._argument(lift, weights, signs)[1] or [()]
             }
-            require(len(found) == 1 and min(found) >= 1, f"the argument of {lift} is no form of one positive degree.")
-            degrees[lift] = found.pop()
+            require(len(values) == 1 and min(values) >= 1, f"the argument of {lift} is no form of one positive degree.")
+            degrees[lift] = values.pop()
         return degrees
 
     def _require_null_zeros(self, arguments: Mapping[str, Polynomial]) -> None:
@@ -141,12 +141,12 @@ class Obligations:
             if lift in self.with_variable:
                 position = len(self.loop.states) + self.with_variable.index(lift)
                 power = tuple(self.lift_degrees[lift] * (i == position) for i in range(self.variables))
-                equality = [(Fraction(signs[lift]), {power: Fraction(1)}), (Fraction(-1), self._kept(high))]
+                equality = [(Fraction(signs[lift]), {power: Fraction(1)}), (Fraction(-1), self._of_variables(high))]
                 equalities.append(combination(equality))
                 if len({c > 0 for c in equalities[-1].values()}) == 1:
                     return None
             else:
-                largest = self._kept(high if signs[lift] > 0 else low)
+                largest = self._of_variables(high if signs[lift] > 0 else low)
                 inequalities.append({e: signs[lift] * c for e, c in largest.items()})
                 if all(c < 0 for c in inequalities[-1].values()):
                     return None
@@ -173,8 +173,8 @@ class Obligations:
                 for total, c in zip((least, largest), sorted(p.get(e, Fraction(0)) for p in ends), strict=True):
                     total[e] = total.get(e, Fraction(0)) + c
         occurring = [e for e in least if least[e] or largest[e]]
-        known = all(least[e] * largest[e] > 0 for e in occurring)
-        require(known, f"the sign of a coefficient in the argument of {lift} depends on a root.")
+        certain = all(least[e] * largest[e] > 0 for e in occurring)
+        require(certain, f"the sign of a coefficient in the argument of {lift} depends on a root.")
         return {e: least[e] for e in occurring}, {e: largest[e] for e in occurring}
 
     @cached_property
@@ -189,8 +189,8 @@ class Obligations:
 
         Refused if one has a range: that of a root may, if only the sign of the lift occurs.
         """
-        known, (low, high) = self.loop.parameters, self._ends
-        live = tuple(t for t in self.loop.lifts[lift] if all(known.get(p, Fraction(1)) for p in t.parameters))
+        parameters, (low, high) = self.loop.parameters, self._ends
+        live = tuple(t for t in self.loop.lifts[lift] if all(parameters.get(p, Fraction(1)) for p in t.parameters))
         names = [p for t in live for p in t.parameters]
         vague = [p for p in names if p not in low or (lift in self.with_variable and low[p] < high[p])]
         require(
@@ -200,11 +200,11 @@ class Obligations:
         )
         return live
 
-    def _kept(self, polynomial: Polynomial) -> dict[Exponents, Fraction]:
+    def _of_variables(self, polynomial: Polynomial) -> dict[Exponents, Fraction]:
         """Polynomial without the columns of lifts that have no variable."""
         names = (*self.loop.states, *self.loop.lifts)
-        kept = [i for i, name in enumerate(names) if name not in self.loop.lifts or name in self.with_variable]
-        return combination([(c, {tuple(e[i] for i in kept): Fraction(1)}) for e, c in polynomial.items()])
+        places = [i for i, name in enumerate(names) if name not in self.loop.lifts or name in self.with_variable]
+        return combination([(c, {tuple(e[i] for i in places): Fraction(1)}) for e, c in polynomial.items()])
 
     def vertices(self) -> Iterator[tuple[str, dict[str, Fraction]]]:
         """Every vertex of the box of ranges with its name."""
@@ -238,15 +238,15 @@ class Obligations:
         if self.loop.domain == "reals":
             return real_polynomial(self.derivative, tuple(self.loop.states), values)
         weights = {**self.loop.states, **self.lift_degrees}
-        return self._kept(cell_polynomial(self.derivative, weights, signs, values))
+        return self._of_variables(cell_polynomial(self.derivative, weights, signs, values))
 
 
 def _require_different(inequalities: Sequence[Polynomial], lifts: Sequence[str]) -> None:
     """Refuse signs that are proportional to each other or to a variable of the cell: no engine takes one twice."""
     largest = [max(map(abs, p.values())) for p in inequalities]
-    known = {tuple(sorted((e, c / m) for e, c in p.items())) for p, m in zip(inequalities, largest, strict=True)}
+    scaled = {tuple(sorted((e, c / m) for e, c in p.items())) for p, m in zip(inequalities, largest, strict=True)}
     require(
-        len(known) == len(inequalities) and not any(len(p) == 1 and sum(p[0][0]) == 1 for p in known),
+        len(scaled) == len(inequalities) and not any(len(p) == 1 and sum(p[0][0]) == 1 for p in scaled),
         f"the signs {', '.join(lifts)} say the same twice, or that of one state. Write them as one, or as ⌈x⌋⁰.",
     )
 
@@ -262,11 +262,11 @@ def _word(signs: Mapping[str, int]) -> str:
 
 def different(obligations: Iterable[Obligation]) -> Iterator[Obligation]:
     """Obligations of which no witness serves two: the first of each kind."""
-    known = set[tuple[Any, ...]]()
+    seen = set[tuple[Any, ...]]()
     for one in obligations:
         key = one.key
-        if key not in known:
-            known.add(key)
+        if key not in seen:
+            seen.add(key)
             yield one
 
 

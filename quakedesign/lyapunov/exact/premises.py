@@ -175,8 +175,8 @@ def feedforward_variants(fault: Fault, controller: SlidingMode, certificate: Cer
     CertificateError
         When the certificate is about other gains.
     """
-    known = [feed_forward(name, fault, controller.divisor) for name in FEED_FORWARDS]
-    return _variants(fault, controller, certificate, dict.fromkeys([controller.feedforward, *known]))
+    laws = [feed_forward(name, fault, controller.divisor) for name in FEED_FORWARDS]
+    return _variants(fault, controller, certificate, dict.fromkeys([controller.feedforward, *laws]))
 
 
 def _variants(
@@ -194,8 +194,8 @@ def _variants(
         "the certificate is about other gains than the controller's.",
     )
     bounded = all(f"bound_{state}" in certificate.claims for state in certificate.loop.states)
-    known = robustness(certificate, controller.loop_field()) if bounded else None
-    return tuple(_variant(DomainProblem(fault, law, certificate, known), bounded=bounded) for law in laws)
+    margins = robustness(certificate, controller.loop_field()) if bounded else None
+    return tuple(_variant(DomainProblem(fault, law, certificate, margins), bounded=bounded) for law in laws)
 
 
 def _variant(question: DomainProblem, *, bounded: bool) -> Variant:
@@ -390,7 +390,7 @@ def covers(certificate: Certificate, fault: Fault) -> list[str]:
         What is covered, in lines.
     """
     require_degree_of_slip(certificate.loop)
-    loop, said = certificate.loop, [f'covers {certificate.loop.law} on "{fault.name}", box {fault.box.name}']
+    loop, lines = certificate.loop, [f'covers {certificate.loop.law} on "{fault.name}", box {fault.box.name}']
     if loop.domain == "reals":
         needed = sectors(fault)
         if loop.constants != {"b": needed.authority}:
@@ -404,8 +404,8 @@ def covers(certificate: Certificate, fault: Fault) -> list[str]:
             raise CertificateError("the certified range of d = h' must hold 0 inside to cover a fault")
         rate = largest_matched_rate(fault, divisor, zero)
         least = UpperBound(rate / certified_lipschitz(certificate))
-        said.append(f"|h'| <= {UpperBound(rate):.4g} m/s^3 along the reference needs a scale of at least {least:.4g}")
+        lines.append(f"|h'| <= {UpperBound(rate):.4g} m/s^3 along the reference needs a scale of at least {least:.4g}")
     for name, (low, high) in ranges.items():
         if not loop.uncertain[name][0] <= low <= high <= loop.uncertain[name][1]:
             raise CertificateError(f"the certified range of {name} does not cover {fault.name}")
-    return said
+    return lines

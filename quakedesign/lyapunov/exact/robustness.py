@@ -73,8 +73,8 @@ class _Cells:
         """Uncertain values at every vertex and −V' there on a cell."""
         require(not self.loop.lifts, "V' is no polynomial in the states where powers are nested.")
         for _, values in self.obligations.vertices():
-            known = {**self.loop.parameters, **values}
-            rate = cell_polynomial(self.obligations.derivative, self.loop.states, signs, known)
+            parameters = {**self.loop.parameters, **values}
+            rate = cell_polynomial(self.obligations.derivative, self.loop.states, signs, parameters)
             yield values, self.form({e: -c for e, c in rate.items()}, self.fallen)
 
     def power(self, index: int) -> Fraction:

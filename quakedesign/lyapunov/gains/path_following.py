@@ -175,10 +175,10 @@ def _rest(row: FormRow, pace: Pace | None) -> Form:
         return {}
     m, n = pace.degrees
     form = _wide(pace.forms[row.cell], len(row.fall[0][1]))
-    found = form
+    result = form
     for _ in range(m - 1):
-        found = _times(found, form)
-    return {e: -pace.rate * (m - n) / m * c for e, c in found.items()}
+        result = _times(result, form)
+    return {e: -pace.rate * (m - n) / m * c for e, c in result.items()}
 
 
 def _wide(form: Form, size: int) -> Form:
@@ -252,8 +252,8 @@ def box(loop: Loop, units: Mapping[str, sp.Expr]) -> tuple[float, ...]:
     units : mapping of str to Expr
         Error that one unit of a state stands for, see `LoopField.units`.
     """
-    bound, known = loop.uncertain["d"][1], unit_ranges(loop, units)
-    return tuple(float(bound / known[state][0]) ** (1 / weight) for state, weight in loop.states.items())
+    bound, ranges = loop.uncertain["d"][1], unit_ranges(loop, units)
+    return tuple(float(bound / ranges[state][0]) ** (1 / weight) for state, weight in loop.states.items())
 
 
 def on_box(lyapunov: Sequence[Term], states: Mapping[str, int], sizes: Sequence[float]) -> float:
@@ -325,31 +325,31 @@ def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
     """Smallest −V̇/V^{n/m} over sampled points: an estimate of κ from above."""
     obligations = Obligations(loop, lyapunov)
     m = obligation_degree([p for _, p in obligations.function()], "V")
-    found = [np.inf]
+    least = [np.inf]
     for cell, one in obligations.decrease(""):
         potential = obligations.potential(cell.signs)
         points = _points(potential, m)
         values = np.maximum(_values(potential, points), 1e-300)
-        whole, kept = _lifted(points, one)
+        whole, inside = _lifted(points, one)
         rates = _values(one.polynomial, whole) / values ** (obligation_degree([one.polynomial], "V̇") / m)
-        found.append(float(rates[kept].min(initial=np.inf)))
-    return min(found)
+        least.append(float(rates[inside].min(initial=np.inf)))
+    return min(least)
 
 
 def _lifted(points: Any, one: Obligation) -> Any:
     """Points with the variables of nested powers, and which of them are in the cell."""
-    kept = np.full(len(points), True)
+    inside = np.full(len(points), True)
     for equality in one.equalities:
         position = points.shape[1]
         power = max(e[position] for e in equality)
         zero = np.zeros((len(points), max(len(e) for e in equality) - position))
         (sign,) = (float(c) for e, c in equality.items() if e[position])
         value = -sign * _values(equality, np.hstack([points, zero]))
-        kept &= value >= 0
+        inside &= value >= 0
         points = np.hstack([points, np.maximum(value, 0)[:, None] ** (1 / power)])
     for inequality in one.inequalities:
-        kept &= _values(inequality, points) >= 0
-    return points, kept
+        inside &= _values(inequality, points) >= 0
+    return points, inside
 
 
 def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
@@ -406,12 +406,12 @@ def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fractio
     """
     names = (*loop.gains, *loop.states, *loop.lifts)
     unknown = {name: sp.Dummy(name) for name in names}
-    known = {name: sp.Integer(sizes.get(name, 0)) for name in (*loop.uncertain, *loop.constants)}
-    known |= {root: unknown[of] / 2 for root, (of, _) in loop.roots.items()}
+    fixed = {name: sp.Integer(sizes.get(name, 0)) for name in (*loop.uncertain, *loop.constants)}
+    fixed |= {root: unknown[of] / 2 for root, (of, _) in loop.roots.items()}
 
     def size(term: Term) -> sp.Expr:
         powers = [unknown[name] * sp.Rational(e.numerator, e.denominator) for name, e, _ in term.factors]
-        return sum([*({**unknown, **known}[p] for p in term.parameters), *powers], start=sp.Integer(0))
+        return sum([*({**unknown, **fixed}[p] for p in term.parameters), *powers], start=sp.Integer(0))
 
     parts = {**loop.field, **loop.lifts}
     equations = [size(term) - unknown[name] for name, terms in parts.items() for term in terms]
@@ -570,8 +570,8 @@ TRUST = TrustRegion()
 
 def with_gains(loop: Loop, gains: Mapping[str, Fraction]) -> Loop:
     """Loop with other gains and the roots that belong to them."""
-    known = {**loop.constants, **gains}
-    roots = {name: (of, root_enclosure(known[of])) for name, (of, _) in loop.roots.items()}
+    parameters = {**loop.constants, **gains}
+    roots = {name: (of, root_enclosure(parameters[of])) for name, (of, _) in loop.roots.items()}
     return replace(loop, gains=dict(gains), roots=roots)
 
 
@@ -602,16 +602,16 @@ def climb(setting: PathSetting, state: State, *, free: bool = True, until: float
             break
         if share < TRUST.least:
             worthwhile = centred is None or objective.better(state.level, objective.improved(centred, TRUST.worthwhile))
-            found = _step(setting, state, 0.0) if free and worthwhile else None
-            if found is None or found.margin < TRUST.margin * state.margin:
+            better = _step(setting, state, 0.0) if free and worthwhile else None
+            if better is None or better.margin < TRUST.margin * state.margin:
                 break
-            state, share, centred = found, TRUST.again, found.level
+            state, share, centred = better, TRUST.again, better.level
             continue
-        found = _step(setting, state, share) if free else _level(setting, state, share)
-        if found is None:
+        better = _step(setting, state, share) if free else _level(setting, state, share)
+        if better is None:
             share /= TRUST.shrink
             continue
-        state, share = found, TRUST.longer(share)
+        state, share = better, TRUST.longer(share)
         if objective.better(state.level, states[-1].level):
             states.append(state)
     return states

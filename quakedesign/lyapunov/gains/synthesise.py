@@ -185,8 +185,8 @@ class LargestRange(Objective):
         return float(float(high / low) ** 0.5) * (1 - 1e-15)
 
 
-_KNOWN: dict[str, type[Objective]] = {o.name: o for o in (SmallestNorm, LargestDecay, LargestRange)}
-OBJECTIVES = tuple(_KNOWN)
+_OBJECTIVES: dict[str, type[Objective]] = {o.name: o for o in (SmallestNorm, LargestDecay, LargestRange)}
+OBJECTIVES = tuple(_OBJECTIVES)
 
 
 def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
@@ -198,8 +198,8 @@ def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
     ParameterError
         For a bound that is missing or not positive, or a loop that is not uncertain in what the objective is about.
     """
-    require_known(name, _KNOWN, "objective", UnknownNameError)
-    chosen = _KNOWN[name]
+    require_known(name, _OBJECTIVES, "objective", UnknownNameError)
+    chosen = _OBJECTIVES[name]
     if chosen.bounded and not (bound is not None and bound > 0):
         raise ParameterError(f"the objective {name} needs a positive bound on the norm. Received {bound}. Give one.")
     make = partial(chosen, bound=bound if chosen.bounded else None)
@@ -253,9 +253,9 @@ def question(
     if not ("d" in loop.uncertain and loop.uncertain["d"][1] > 0):
         raise ParameterError(f"synthesis needs a positive bound on |d|. Received lipschitz = {lipschitz}.")
     exponents = stretch_exponents(loop, {"d": 1})
-    known = tuple(with_gains(loop, gains) for gains in _literature(name, loop, exponents))
-    if bound is None and known:
-        bound = min(scaled_norm(one, exponents) for one in known)
+    published = tuple(with_gains(loop, gains) for gains in _literature(name, loop, exponents))
+    if bound is None and published:
+        bound = min(scaled_norm(one, exponents) for one in published)
     chosen = tuple(degrees) if degrees is not None else candidate_degrees(loop)[:2]
     lowest = candidate_degrees(loop)[0]
     if not chosen or not all(lowest <= m <= _HIGHEST for m in chosen):
@@ -266,7 +266,7 @@ def question(
         units={str(state): unit for state, unit in model.units.items()},
         degree=chosen[0],
     )
-    return SynthesisProblem(subject=subject, loop=loop, setting=setting, degrees=chosen, known=known)
+    return SynthesisProblem(subject=subject, loop=loop, setting=setting, degrees=chosen, known=published)
 
 
 def _literature(name: str, loop: Loop, exponents: Mapping[str, Fraction]) -> list[dict[str, Fraction]]:
@@ -559,16 +559,16 @@ def given(problem: SynthesisProblem, loop: Loop) -> ComparedGains:
     objective = replace(problem.setting.objective, bound=None)
     setting = replace(problem.setting, objective=objective, least=FAINT)
     shorter = objective.given(loop, problem.degrees, problem.subject)
-    found = [(shorter, objective.figure(shorter, setting))] if shorter else []
+    proofs = [(shorter, objective.figure(shorter, setting))] if shorter else []
     for degree in problem.degrees if objective.paced or not shorter else ():
         at = replace(setting, degree=degree)
         begin = objective.start(at, loop)
         states = _in_order(at, [climb(at, begin, free=False)]) if begin else []
-        states = [s for s in states if all(objective.better(s.level, value) for _, value in found)]
-        reached = _proved(at, states, problem.subject, _FEW if found else _TRIES)
-        found += [reached] if reached else []
-        if found and not objective.bounded:  # then V does not matter
+        states = [s for s in states if all(objective.better(s.level, value) for _, value in proofs)]
+        reached = _proved(at, states, problem.subject, _FEW if proofs else _TRIES)
+        proofs += [reached] if reached else []
+        if proofs and not objective.bounded:  # then V does not matter
             break
-    certificate, value = (max if objective.larger else min)(found, key=lambda item: item[1], default=(None, None))
+    certificate, value = (max if objective.larger else min)(proofs, key=lambda item: item[1], default=(None, None))
     norm = scaled_norm(loop, problem.setting.exponents)
     return ComparedGains(gains=dict(loop.gains), value=value, norm=norm, ratio=None, certificate=certificate)

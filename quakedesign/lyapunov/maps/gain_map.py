@@ -75,12 +75,12 @@ class Screener:
 
     def row(self, places: Sequence[Place]) -> tuple[list[tuple[Place, Fraction | None, int]], int]:
         """Limit and number of levels found at every point, beginning each at the level of its neighbour; and solves."""
-        found, start, before = [], len(self.sheet.levels), self._solves()
+        limits, start, before = [], len(self.sheet.levels), self._solves()
         self._followed.clear()
         for place in places:
             limit, start = self._reached(place, max(start, 1))
-            found.append((place, limit, start))
-        return found, self._solves() - before
+            limits.append((place, limit, start))
+        return limits, self._solves() - before
 
     def _reached(self, place: Place, start: int) -> tuple[Fraction | None, int]:
         limit = necessary_limit(self.sheet.at(place, 1), self.sheet.subject)
@@ -116,10 +116,10 @@ class Screener:
 
     def _path(self, sweep: Sweep, frame: Frame) -> Path:
         """Path without neighbours."""
-        known = sweep, frame.scale
-        if known not in self._paths:
-            self._paths[known] = Path(sweep, frame)
-        return self._paths[known].begin(frame)
+        key = sweep, frame.scale
+        if key not in self._paths:
+            self._paths[key] = Path(sweep, frame)
+        return self._paths[key].begin(frame)
 
     def proof(self, place: Place, level: int) -> tuple[Place, int, str | None, int]:
         """Text of a certificate of a point at a level, or None; and solves."""
@@ -132,14 +132,14 @@ class Screener:
         return place, level, certificate_text(certificate) if certificate else None, self._solves() - before
 
     def _sweep(self, loop: Loop) -> Sweep | None:
-        known = next((s for s in self._sweeps if s.covers(loop)), None)
-        if known is None:
+        sweep = next((s for s in self._sweeps if s.covers(loop)), None)
+        if sweep is None:
             try:
-                known = Sweep(loop, self.sheet.degree)
+                sweep = Sweep(loop, self.sheet.degree)
             except CertificateError:
                 return None
-            self._sweeps.append(known)
-        return known
+            self._sweeps.append(sweep)
+        return sweep
 
     def _solves(self) -> int:
         return self._answered + sum(s.solves for s in self._sweeps)
@@ -166,23 +166,23 @@ class Screeners:
         SimulationError
             When processes die again and again; one that was killed from outside is replaced.
         """
-        asked = [(self._sheet, question, one) for one in arguments]
-        return (answer for _, answer in self._crew.answers(_answer, asked))
+        tasks = [(self._sheet, question, one) for one in arguments]
+        return (answer for _, answer in self._crew.answers(_answer, tasks))
 
 
-class _Kept(threading.local):
+class _Cached(threading.local):
     """Screener of the last sheet that a thread was asked about: compiled sweeps have one place for their parameters."""
 
     screener: Screener | None = None
 
 
-_kept = _Kept()
+_cached = _Cached()
 
 
 def _answer(sheet: Sheet, question: str, arguments: tuple[Any, ...]) -> Any:
-    if _kept.screener is None or _kept.screener.sheet != sheet:
-        _kept.screener = Screener(sheet)
-    return getattr(_kept.screener, question)(*arguments)
+    if _cached.screener is None or _cached.screener.sheet != sheet:
+        _cached.screener = Screener(sheet)
+    return getattr(_cached.screener, question)(*arguments)
 
 
 # ----------------------------------------------------------------------
@@ -364,9 +364,9 @@ def _levels(subject: Subject, loop: Loop, levels: Sequence[Number] | None) -> tu
 
 def _lowest_degree(loop: Loop, bound: Fraction) -> int:
     """First degree that finds the base gains with a clear margin, or the first of all."""
-    asked, degrees = replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), candidate_degrees(loop)
+    bounded, degrees = replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), candidate_degrees(loop)
     for degree in degrees:
-        answer = Sweep(asked, degree).solve(asked)
+        answer = Sweep(bounded, degree).solve(bounded)
         if answer is not None and answer.margin > CLEAR:
             return degree
     return degrees[0]
@@ -380,9 +380,9 @@ def _screen(
     screened: dict[Place, int] = {}
     rows, solves = sheet.rows, 0
     tell(f"screening 0 of {sum(map(len, rows))} points", 0.0)
-    for found, more in screeners.answers("row", ((row,) for row in rows)):
+    for points, more in screeners.answers("row", ((row,) for row in rows)):
         solves += more
-        for place, limit, reached in found:
+        for place, limit, reached in points:
             limits[place], screened[place] = limit, reached
         tell(f"screening {len(screened)} of {sum(map(len, rows))} points", len(screened) / sum(map(len, rows)))
     return limits, screened, solves
@@ -405,26 +405,26 @@ def _prove(
     edges: set[Place] = set()
     solves = 0
 
-    def run(asked: list[tuple[Place, int]], what: str) -> None:
+    def run(open_places: list[tuple[Place, int]], what: str) -> None:
         nonlocal solves
-        for done, (place, level, text, more) in enumerate(screeners.answers("proof", asked), 1):
+        for done, (place, level, text, more) in enumerate(screeners.answers("proof", open_places), 1):
             solves += more
             if text is None:
                 reached[place] = level - 1
                 proved.setdefault(place, 0)
             else:
                 proved[place], texts[place] = level, text
-            tell(f"proving {what}: {done} of {len(asked)}", done / len(asked))
+            tell(f"proving {what}: {done} of {len(open_places)}", done / len(open_places))
 
     for level in range(len(sheet.levels), 0, -1):
         while True:
             inside = {p for p, k in reached.items() if k >= level}
             edge = {p for p in inside if _at_edge(p, inside, sheet)}
             edges |= edge
-            asked = [(p, level) for p in sorted(edge) if proved.get(p, 0) < level]
-            if not asked:
+            open_places = [(p, level) for p in sorted(edge) if proved.get(p, 0) < level]
+            if not open_places:
                 break
-            run(asked, f"the edge at L̄ = {float(sheet.levels[level - 1]):.4g}")
+            run(open_places, f"the edge at L̄ = {float(sheet.levels[level - 1]):.4g}")
     run(_drawn(reached, proved, interior, seed), "points inside")
     return proved, texts, frozenset(edges), solves
 

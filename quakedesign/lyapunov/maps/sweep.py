@@ -123,7 +123,7 @@ CLEAR = 1e-6
 """Margins above this decide what is chosen once for many points, such as a degree, on every processor alike: kernels of
 linear algebra move margins near zero by up to 2e-9."""
 _TOO_FAR = "the gains are too far apart for a search in floating point."
-_KEPT = 64  # scales whose numbers are kept
+_MOST_SCALES = 64  # scales whose numbers are kept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -252,11 +252,11 @@ class Sweep:
     def _in_units(self, scale: tuple[Fraction, ...]) -> "_Numbers":
         if scale not in self._numbers:
             free = self._numbers and not any(row.equalities or row.inequalities for row in self.rows)
-            known = next(iter(self._numbers.values())).cones if free else None
-            if len(self._numbers) >= _KEPT:
+            cones = next(iter(self._numbers.values())).cones if free else None
+            if len(self._numbers) >= _MOST_SCALES:
                 self._numbers.pop(next(iter(self._numbers)))
             try:
-                self._numbers[scale] = _Numbers(self, scale, known)
+                self._numbers[scale] = _Numbers(self, scale, cones)
             except OverflowError:
                 raise CertificateError(_TOO_FAR) from None
         return self._numbers[scale]
@@ -337,9 +337,9 @@ def _product(values: Mapping[str, float], names: tuple[str, ...]) -> float:
 
 def _nested(loop: Loop) -> list[tuple[Fraction, ...]]:
     """Gains and constants inside nested powers, which shape the cells; those of terms that vanish do not."""
-    known = loop.parameters | {name: loop.parameters[of] for name, (of, _) in loop.roots.items()}
+    parameters = loop.parameters | {name: loop.parameters[of] for name, (of, _) in loop.roots.items()}
     terms = [term for terms in loop.lifts.values() for term in terms]
-    values = [tuple(known[name] for name in term.parameters) for term in terms]
+    values = [tuple(parameters[name] for name in term.parameters) for term in terms]
     return [v if all(v) else (Fraction(0),) for v in values]
 
 
@@ -456,10 +456,10 @@ class Path:
         share = min(1.0, 0.9 / step.size)
         moved = _Place(step.tau, [f + share * d for f, d in zip(place.functionals, step.moves, strict=True)])
         if step.size < _NEAR:
-            known = [one for one in self._places[1:] if one.tau > step.tau]
-            if len(known) > 1 and known[-2].tau * _APART < step.tau:
-                known.pop()
-            self._places[1:] = [*known, moved]
+            later = [one for one in self._places[1:] if one.tau > step.tau]
+            if len(later) > 1 and later[-2].tau * _APART < step.tau:
+                later.pop()
+            self._places[1:] = [*later, moved]
         return moved
 
 
@@ -605,7 +605,7 @@ class _Rows:
 
     def beside(self, functional: Any) -> Any:
         """F⁻¹ S_i F⁻ᵀ of all unknowns i, with F Fᵀ = S = Σ_i L_i S_i: scaled triangles (rows × unknowns × ·)."""
-        found = []
+        blocks = []
         for block, (upper, lower, factors) in zip(self._blocks, self._corners, strict=True):
             rows, count, size, unknowns = block.shape[:4]
             whole = (block.transpose(0, 1, 2, 4, 3) @ functional[:, None, None, :, None])[..., 0]
@@ -613,20 +613,20 @@ class _Rows:
             half = (inverse @ block.reshape(rows, count, size, -1)).reshape(block.shape).transpose(0, 1, 4, 3, 2)
             both = (inverse @ half.reshape(rows, count, size, -1)).reshape(block.shape)
             triangles = both.transpose(0, 3, 1, 2, 4)[..., upper, lower] * factors
-            found.append(triangles.reshape(rows, unknowns, -1))
-        return np.concatenate(found, axis=2)
+            blocks.append(triangles.reshape(rows, unknowns, -1))
+        return np.concatenate(blocks, axis=2)
 
     def ends(self, triangles: Any) -> tuple[float, float]:
         """Smallest and largest eigenvalue of all matrices."""
-        found, start = [], 0
+        eigenvalues, start = [], 0
         for block, (upper, lower, factors) in zip(self._blocks, self._corners, strict=True):
             rows, count, size = block.shape[:3]
             stop = start + count * len(upper)
             full = np.empty((rows, count, size, size))
             full[..., lower, upper] = triangles[:, start:stop].reshape(rows, count, -1) / factors
-            found.append(np.linalg.eigvalsh(full))
+            eigenvalues.append(np.linalg.eigvalsh(full))
             start = stop
-        return min(float(np.min(e)) for e in found), max(float(np.max(e)) for e in found)
+        return min(float(np.min(e)) for e in eigenvalues), max(float(np.max(e)) for e in eigenvalues)
 
 
 def _longest(kind: _Rows, triangles: Any) -> float:

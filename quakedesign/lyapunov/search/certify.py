@@ -144,10 +144,10 @@ def _require_homogeneous(loop: Loop) -> None:
         degrees = _degrees(loop, terms, weights)
         _require_one({m: f"{t} in a nested power" for m, t in degrees.items()}, loop)
         weights[lift] = next(iter(degrees), Fraction(1))
-    found: dict[Fraction, str] = {}
+    every: dict[Fraction, str] = {}
     for state, terms in loop.field.items():
-        found |= {m - loop.states[state]: f"{t} in {state}'" for m, t in _degrees(loop, terms, weights).items()}
-    _require_one(found, loop)
+        every |= {m - loop.states[state]: f"{t} in {state}'" for m, t in _degrees(loop, terms, weights).items()}
+    _require_one(every, loop)
 
 
 def _degrees(loop: Loop, terms: tuple[Term, ...], weights: Mapping[str, Fraction]) -> dict[Fraction, str]:
@@ -198,14 +198,14 @@ def _ranges(
         raise ParameterError(
             f"lipschitz must not be negative and gain_range must be 0 < b_m <= b_M. Received {bound}, [{low}, {high}]."
         )
-    known = {"beta": (low, high), "d": (-bound, bound)}
-    unknown = [*(str(u) for u in model.uncertain if str(u) not in known), *map(str, model.constants)]
+    ranges = {"beta": (low, high), "d": (-bound, bound)}
+    unknown = [*(str(u) for u in model.uncertain if str(u) not in ranges), *map(str, model.constants)]
     if unknown or model.domain != "cells":
         raise ParameterError(
             "a Lipschitz bound applies to sliding-mode laws, uncertain in beta and d. "
             f"Received {name!r} with {', '.join(unknown) or 'a polynomial loop'}."
         )
-    return {str(u): known[str(u)] for u in model.uncertain}
+    return {str(u): ranges[str(u)] for u in model.uncertain}
 
 
 # ----------------------------------------------------------------------
@@ -488,9 +488,9 @@ def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
     limit = chosen(gains=dict(loop.gains)).lipschitz_limit if chosen is not None else None
     limits = [] if limit is None else [max(Fraction(0), limit)]
     for bound in (Fraction(0), max(_FAR, 4 * _reachable(loop))):
-        held = refute(replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), subject)
-        if held is not None and held.refutation is not None:
-            limits.append(abs(held.refutation.parameters["d"]))
+        refuted = refute(replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), subject)
+        if refuted is not None and refuted.refutation is not None:
+            limits.append(abs(refuted.refutation.parameters["d"]))
     return min(limits, default=None)
 
 
@@ -592,9 +592,9 @@ def _reachable(loop: Loop) -> Fraction:
     """Half of what all other terms of the rates that d acts on amount to."""
     rates = [terms for terms in loop.field.values() if any("d" in t.parameters for t in terms)]
     ends = {name: max(map(abs, range_)) for name, range_ in loop.ranges.items()}
-    known = {**loop.parameters, **ends}
+    values = {**loop.parameters, **ends}
     return (
-        sum((abs(coefficient(t, known)) for terms in rates for t in terms if "d" not in t.parameters), Fraction(0)) / 2
+        sum((abs(coefficient(t, values)) for terms in rates for t in terms if "d" not in t.parameters), Fraction(0)) / 2
     )
 
 

@@ -43,8 +43,8 @@ def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
             break
         fine = field.growths(plays[i : i + 1], 4 * steps, 1 / 400)[0]
         if fine > _AGAIN * coarse[i]:
-            told = (f"{name} follows {play}" for name, play in zip(loop.uncertain, plays[i], strict=True))
-            return Escape(growth=float(fine), strategy=", ".join(told))
+            strategies = (f"{name} follows {play}" for name, play in zip(loop.uncertain, plays[i], strict=True))
+            return Escape(growth=float(fine), strategy=", ".join(strategies))
     return None
 
 
@@ -81,21 +81,21 @@ class _FloatField:
 
     def rates(self, x: Any, parameters: Mapping[str, Any]) -> Any:
         """x' for states of shape (n, columns)."""
-        known = dict(zip(self.states, x, strict=True))
+        values = dict(zip(self.states, x, strict=True))
         for lift, terms in self.loop.lifts.items():
-            known[lift] = self._sum(terms, known, parameters)
-        columns = [self._sum(terms, known, parameters) + np.zeros(x.shape[1]) for terms in self.loop.field.values()]
+            values[lift] = self._sum(terms, values, parameters)
+        columns = [self._sum(terms, values, parameters) + np.zeros(x.shape[1]) for terms in self.loop.field.values()]
         return np.array(columns)
 
-    def _sum(self, terms: Sequence[Term], known: Mapping[str, Any], parameters: Mapping[str, Any]) -> Any:
+    def _sum(self, terms: Sequence[Term], values: Mapping[str, Any], parameters: Mapping[str, Any]) -> Any:
         total: Any = 0.0
         for term in terms:
             part: Any = float(term.coefficient)
             for name in term.parameters:
                 part = part * parameters[name]
             for state, exponent, kind in term.factors:
-                size = np.abs(known[state]) ** float(exponent) if exponent else 1.0
-                part = part * size * (np.sign(known[state]) if kind == "s" else 1.0)
+                size = np.abs(values[state]) ** float(exponent) if exponent else 1.0
+                part = part * size * (np.sign(values[state]) if kind == "s" else 1.0)
             total = total + part
         return total
 

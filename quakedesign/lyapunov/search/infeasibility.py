@@ -95,11 +95,11 @@ def _rows(loop: Loop, monomials: Sequence[Term]) -> Iterator[tuple[Obligation, .
     columns = [Obligations(loop, (term,)) for term in monomials]
     functions = zip(*([Obligation(n, p) for n, p in c.function()] for c in columns), strict=True)
     rates = zip(*([one for _, one in c.decrease("decrease")] for c in columns), strict=True)
-    known = set()
+    seen = set()
     for row in (*functions, *rates):
         key = tuple(one.key for one in row)
-        if key not in known:
-            known.add(key)
+        if key not in seen:
+            seen.add(key)
             yield row
 
 
@@ -182,7 +182,7 @@ class _PointSearch:
 
     def refine(self, decision: Any) -> bool:
         """Add the worst of many new points; False where none is worse than those at hand."""
-        known = len(self.lines)
+        count = len(self.lines)
         tight = np.argsort(np.array(self.lines) @ decision)[: 2 * len(decision)]
         for i in range(_MORE):
             if i % 2:
@@ -190,11 +190,11 @@ class _PointSearch:
             else:
                 row, point = self.places[int(self.random.choice(tight))]
                 self.add(row, self.near(point))
-        values = np.array(self.lines[known:]) @ decision
-        kept = [known + int(i) for i in np.argsort(values)[: _MORE // 4] if values[i] < _SURE]
-        self.places[known:] = [self.places[i] for i in kept]
-        self.lines[known:] = [self.lines[i] for i in kept]
-        return bool(kept)
+        values = np.array(self.lines[count:]) @ decision
+        violated = [count + int(i) for i in np.argsort(values)[: _MORE // 4] if values[i] < _SURE]
+        self.places[count:] = [self.places[i] for i in violated]
+        self.lines[count:] = [self.lines[i] for i in violated]
+        return bool(violated)
 
     def exact(self) -> Dual | None:
         """Weights of a basic solution, solved for exactly."""

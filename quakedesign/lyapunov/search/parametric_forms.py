@@ -102,7 +102,7 @@ def _potential(columns: Sequence[Obligations], signs: Mapping[str, int]) -> tupl
 def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[FormRow]:
     first, ends = columns[0], ends_of(loop)
     weights = {**loop.states, **first.lift_degrees}
-    kept = [i for i, name in enumerate(weights) if name in loop.states or name in first.with_variable]
+    places = [i for i, name in enumerate(weights) if name in loop.states or name in first.with_variable]
     terms = [(j, term) for j, column in enumerate(columns) for term in column.derivative]
     for cell in first.cells:
         plain = [(j, term.parameters, *_single(term, weights, cell.signs)) for j, term in terms]
@@ -113,7 +113,7 @@ def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[FormRow]:
             total: dict[tuple[Any, ...], Fraction] = {}
             for j, names, exponents, coefficient in plain:
                 chosen = [vertex.get(name, (name, 1)) for name in names]
-                key = (j, tuple(exponents[i] for i in kept), tuple(sorted(name for name, _ in chosen)))
+                key = (j, tuple(exponents[i] for i in places), tuple(sorted(name for name, _ in chosen)))
                 sign = math.prod(factor for _, factor in chosen)
                 total[key] = total.get(key, Fraction(0)) - coefficient * sign
             parts = tuple(sorted((*key, c) for key, c in total.items() if c))
@@ -125,8 +125,8 @@ def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[FormRow]:
 
 def _single(term: Term, weights: Mapping[str, int], signs: Mapping[str, int]) -> tuple[tuple[int, ...], Fraction]:
     """Exponents and coefficient of one term on a cell, its parameters left out."""
-    found = cell_polynomial((Term(term.coefficient, (), term.factors),), weights, signs, {})
-    return next(iter(found.items()))
+    polynomial = cell_polynomial((Term(term.coefficient, (), term.factors),), weights, signs, {})
+    return next(iter(polynomial.items()))
 
 
 # ----------------------------------------------------------------------
@@ -146,9 +146,9 @@ class Structure:
     def of(cls, loop: Loop, degree: int) -> "Structure":
         """Structure of a loop and a degree of V; numbers count only inside nested powers."""
         names = {p for terms in loop.lifts.values() for term in terms for p in term.parameters}
-        known = {**loop.parameters, **{name: low for name, (low, _) in loop.ranges.items()}}
+        values = {**loop.parameters, **{name: low for name, (low, _) in loop.ranges.items()}}
         fixed = (loop.law, tuple(loop.states.items()), tuple(loop.field.items()), tuple(loop.lifts.items()))
-        inside = tuple(sorted((name, known[name]) for name in names))
+        inside = tuple(sorted((name, values[name]) for name in names))
         return cls(fixed, inside, tuple((n, a == b, a == -b) for n, (a, b) in loop.ranges.items()), degree)
 
 

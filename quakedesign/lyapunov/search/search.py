@@ -343,11 +343,11 @@ def kept(search: Search) -> Search:
 
     @wraps(search)
     def known(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
-        path, found = place(loop, degree), list[Certificate | None]()
+        path, certificates = place(loop, degree), list[Certificate | None]()
 
         def searched() -> str:
-            found.append(search(loop, degree, subject))
-            return _NOTHING if found[0] is None else certificate_text(found[0])
+            certificates.append(search(loop, degree, subject))
+            return _NOTHING if certificates[0] is None else certificate_text(certificates[0])
 
         if path.exists():
             text = path.read_text(encoding="utf-8")
@@ -355,8 +355,8 @@ def kept(search: Search) -> Search:
             return search(loop, degree, subject)
         else:
             text = search_once(searched, "lyapunov", loop, degree)
-        if found or text == _NOTHING:
-            return found[0] if found else None
+        if certificates or text == _NOTHING:
+            return certificates[0] if certificates else None
         with suppress(CertificateError, WorkError):
             certificate = parse_certificate(text)
             if certificate.loop == loop and decided_once(certificate, subject) is Verdict.PROVED:
@@ -368,8 +368,8 @@ def kept(search: Search) -> Search:
 
 def place(loop: Loop, degree: int) -> Path:
     """File of a question: a loop with all its numbers, and the degree of V."""
-    asked = repr([degree, *((field.name, getattr(loop, field.name)) for field in fields(loop))])
-    return FOLDER / f"{loop.law}_{sha256(asked.encode()).hexdigest()[:16]}.json"
+    key = repr([degree, *((field.name, getattr(loop, field.name)) for field in fields(loop))])
+    return FOLDER / f"{loop.law}_{sha256(key.encode()).hexdigest()[:16]}.json"
 
 
 def keep(loop: Loop, degree: int, certificate: Certificate | None) -> None:

@@ -104,9 +104,9 @@ def fastest_settling(
     for m in tried:
         plain = find_certificate(loop, m, subject=subject)
         faster = with_largest_decay(plain, balance(loop), subject) if plain else None
-        told = settling(faster, start, model_of(subject)[1]) if faster else None
-        if faster and told:
-            settled.append((faster, told))
+        time = settling(faster, start, model_of(subject)[1]) if faster else None
+        if faster and time:
+            settled.append((faster, time))
         if degrees is None and len(settled) == 2:
             break
     return min(settled, key=lambda one: one[1].seconds, default=None)

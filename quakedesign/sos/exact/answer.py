@@ -66,13 +66,13 @@ class Answer:
         A negative number is proved to be non-negative on it, an inequality has negative coefficients and even exponents
         alone with a constant among them, or an equality has such coefficients of one sign.
         """
-        asked = self.statement
+        statement = self.statement
         below = [
-            *asked.inequalities,
-            *asked.equalities,
-            *({exponents: -c for exponents, c in h.items()} for h in asked.equalities),
+            *statement.inequalities,
+            *statement.equalities,
+            *({exponents: -c for exponents, c in h.items()} for h in statement.equalities),
         ]
-        constant = [p for p in (asked.polynomial,) if not any(map(any, p))]
+        constant = [p for p in (statement.polynomial,) if not any(map(any, p))]
         return self.verdict is Positivity.SOS and any(_is_below_zero(p) for p in (*constant, *below))
 
     def check(self) -> bool:

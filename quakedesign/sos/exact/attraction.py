@@ -27,7 +27,6 @@ from quakedesign.sos.exact.strict import (
     PolynomialEntries,
     headed,
     made,
-    need,
     parse,
     polynomial_text,
     read_as,
@@ -146,7 +145,7 @@ class Attraction:
     def _proves(self, proof: LyapunovProof) -> bool:
         parts = ((self.positive, proof.positive), (self.decrease, proof.decrease))
         size = len(self.variables)
-        return all(vanishes_at_origin_only(found.squares, size) and holds(asked, found) for asked, found in parts)
+        return all(vanishes_at_origin_only(sums.squares, size) and holds(statement, sums) for statement, sums in parts)
 
     def refuted_by(self, point: Point) -> bool:
         """Whether V is below the level at a point other than the origin, and is not positive or does not fall there."""
@@ -265,7 +264,6 @@ class AttractionEntries(Entries):
     def claim(self, multiplier: Polynomial) -> Attraction:
         """The claim, of polynomials of its variables."""
         size = len(self.variables)
-        need(len(self.field) == size, f"field must have {size} entries")
         for polynomial in (self.V, multiplier, *self.field):
             require_polynomial(polynomial, "a polynomial", size, TERMS)
         level = self.level[0] if self.level else None
@@ -377,8 +375,8 @@ def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
         reason = str(error).partition("\n")[0]
         raise PolynomialError(f"{path} must be TOML. Received: {reason}. Quote polynomials.") from None
     field, function = raw.get("field"), raw.get("V")
-    texts = isinstance(field, dict) and all(isinstance(rate, str) for rate in field.values())
-    if not raw.keys() <= {"field", "V"} or not texts or not isinstance(function, str | None):
+    sound = isinstance(field, dict) and all(isinstance(rate, str) for rate in field.values())
+    if not raw.keys() <= {"field", "V"} or not sound or not isinstance(function, str | None):
         raise PolynomialError(
             f'{path} must have a table [field], such as x = "-x + x^3", and at most V = "x^2" before it.'
         )

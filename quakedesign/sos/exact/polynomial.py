@@ -53,9 +53,9 @@ def multiplied(left: Any, right: Any) -> Any:
     """Product of two elements of the ring, its work counted before."""
     if counted():
         spend(len(left) * len(right), _height(left) + _height(right))
-    found = left * right
-    expanded(len(found))
-    return found
+    result = left * right
+    expanded(len(result))
+    return result
 
 
 def _height(polynomial: Any) -> int:
@@ -228,7 +228,7 @@ def nonnegative_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
 
 def _components(rows: Sequence[Sequence[Fraction]]) -> list[list[int]]:
     """Index sets between which all entries are zero."""
-    left, found = set(range(len(rows))), []
+    left, components = set(range(len(rows))), []
     while left:
         frontier, block = [min(left)], []
         left.discard(frontier[0])
@@ -238,8 +238,8 @@ def _components(rows: Sequence[Sequence[Fraction]]) -> list[list[int]]:
             near = [j for j in left if rows[i][j]]
             left.difference_update(near)
             frontier += near
-        found.append(sorted(block))
-    return found
+        components.append(sorted(block))
+    return components
 
 
 def _eliminates(block: list[list[Fraction]]) -> bool:

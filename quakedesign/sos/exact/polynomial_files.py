@@ -11,8 +11,8 @@ from quakedesign.errors import CertificateError, PolynomialError
 from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, Square, SumOfSquares
 from quakedesign.sos.exact.strict import (
-    NAME,
     Entries,
+    Name,
     PolynomialEntries,
     common_grid,
     headed,
@@ -28,7 +28,6 @@ from quakedesign.sos.exact.strict import (
 )
 
 TERMS, _VARIABLES, _CONSTRAINTS, _PRODUCTS, _BASIS, _SQUARES = 20_000, 16, 32, 1024, 400, 4096
-Name = Annotated[str, Meta(pattern=rf"\A{NAME.pattern}\Z")]
 Names = Annotated[tuple[Name, ...], Meta(min_length=1, max_length=_VARIABLES)]
 Product = Annotated[tuple[int, ...], Meta(max_length=_CONSTRAINTS)]
 Polynomials = Annotated[tuple[PolynomialEntries, ...], Meta(max_length=_CONSTRAINTS)]
@@ -41,10 +40,10 @@ class GramEntries(Entries):
     basis: Annotated[tuple[tuple[int, ...] | dict[str, str], ...], Meta(min_length=1, max_length=_BASIS)]
     gram: tuple[Fraction, ...]
 
-    def square(self, asked: Statement) -> Square:
+    def square(self, statement: Statement) -> Square:
         """The square, of sizes that fit a statement."""
-        need(self.product in asked.products, "a square has a product that is not listed")
-        n, size = len(asked.variables), len(self.basis)
+        need(self.product in statement.products, "a square has a product that is not listed")
+        n, size = len(statement.variables), len(self.basis)
         basis = tuple(entry if isinstance(entry, tuple) else read_polynomial(entry) for entry in self.basis)
         monomials = [element for element in basis if isinstance(element, tuple)]
         need(len(set(monomials)) == len(monomials), "a monomial occurs twice in a basis")
@@ -71,15 +70,15 @@ class SosEntries(Entries):
     cofactors: tuple[PolynomialEntries, ...]
     multiplier: Squares
 
-    def proof(self, asked: Statement) -> SumOfSquares:
+    def proof(self, statement: Statement) -> SumOfSquares:
         """The proof, of sizes that fit a statement."""
-        need(len(self.cofactors) == len(asked.equalities), "there must be a cofactor for each equality")
+        need(len(self.cofactors) == len(statement.equalities), "there must be a cofactor for each equality")
         for cofactor in self.cofactors:
-            require_polynomial(cofactor, "a cofactor", len(asked.variables), TERMS)
+            require_polynomial(cofactor, "a cofactor", len(statement.variables), TERMS)
         return SumOfSquares(
-            squares=tuple(entry.square(asked) for entry in self.squares),
+            squares=tuple(entry.square(statement) for entry in self.squares),
             cofactors=tuple(map(dict, self.cofactors)),
-            multiplier=tuple(entry.square(asked) for entry in self.multiplier),
+            multiplier=tuple(entry.square(statement) for entry in self.multiplier),
         )
 
 
@@ -101,7 +100,7 @@ class FunctionalEntries(Entries):
 
 
 class StatementEntries(Entries):
-    """What is asked of a polynomial."""
+    """Statement about a polynomial: constraints, products of inequalities, degree and multiplier."""
 
     variables: Names
     polynomial: PolynomialEntries
@@ -161,8 +160,8 @@ def read(raw: Any) -> tuple[Statement, Proof]:
         require_polynomial(refuted.proof.functional, "functional", len(refuted.variables), TERMS)
         return refuted.statement(), Functional(values=dict(refuted.proof.functional))
     file = read_as(SosFile, entries)
-    asked = file.statement()
-    return asked, file.proof.proof(asked)
+    statement = file.statement()
+    return statement, file.proof.proof(statement)
 
 
 def load(text: str) -> tuple[Statement, Proof]:
@@ -170,11 +169,11 @@ def load(text: str) -> tuple[Statement, Proof]:
     return read(parse(text))
 
 
-def text(asked: Statement, proof: Proof) -> str:
+def text(statement: Statement, proof: Proof) -> str:
     """Text of the file, the same for the same proof."""
-    plain: dict[str, Any] = {name: PolynomialEntries(getattr(asked, name)) for name in ("polynomial", "multiplier")}
-    plain |= {name: tuple(map(PolynomialEntries, getattr(asked, name))) for name in ("inequalities", "equalities")}
-    file = {"format": 1} | written(made(StatementEntries, asked, **plain)) | proof_entries(proof)
+    plain: dict[str, Any] = {name: PolynomialEntries(getattr(statement, name)) for name in ("polynomial", "multiplier")}
+    plain |= {name: tuple(map(PolynomialEntries, getattr(statement, name))) for name in ("inequalities", "equalities")}
+    file = {"format": 1} | written(made(StatementEntries, statement, **plain)) | proof_entries(proof)
     return json.dumps(file, ensure_ascii=True, separators=(",", ":")) + "\n"
 
 
@@ -195,7 +194,7 @@ def proof_entries(proof: Proof) -> dict[str, Any]:
     return {"sos": written(SosEntries(squares=squares, cofactors=cofactors, multiplier=multiplier))}
 
 
-def save(asked: Statement, proof: Proof | None, path: str | Path) -> None:
+def save(statement: Statement, proof: Proof | None, path: str | Path) -> None:
     """Write the file whole or not at all, and only if it can be read again.
 
     Raises
@@ -207,4 +206,4 @@ def save(asked: Statement, proof: Proof | None, path: str | Path) -> None:
     """
     if proof is None:
         raise CertificateError("only a proof can be saved. Received an undecided answer.")
-    write_readable(path, text(asked, proof), load)
+    write_readable(path, text(statement, proof), load)

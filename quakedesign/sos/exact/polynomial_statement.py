@@ -185,13 +185,13 @@ def statement(
     else:
         sets = list(_subsets(range(len(inequalities)), len(inequalities) if products else 1))
     degrees = [degree(g) for g in inequalities]
-    kept = tuple(sorted({s for s in sets if sum(degrees[i] for i in s) <= bound} | {()}, key=lambda s: (len(s), s)))
+    included = tuple(sorted({s for s in sets if sum(degrees[i] for i in s) <= bound} | {()}, key=lambda s: (len(s), s)))
     return Statement(
         variables=variables,
         polynomial=polynomial,
         inequalities=inequalities,
         equalities=equalities,
-        products=kept,
+        products=included,
         degree=bound,
         multiplier=factor,
     )

@@ -291,12 +291,12 @@ def names_in_text(*texts: str) -> tuple[str, ...]:
     PolynomialError
         When a text has a character that no polynomial has, or together they have too many variables.
     """
-    found = dict.fromkeys(name for text in texts for name in _order(text, _tokens(text), None))
-    if len(found) > VARIABLES:
+    names = dict.fromkeys(name for text in texts for name in _order(text, _tokens(text), None))
+    if len(names) > VARIABLES:
         raise PolynomialError(
-            f"at most {VARIABLES} different variables are read. Received {len(found)}. Use fewer, or rename them."
+            f"at most {VARIABLES} different variables are read. Received {len(names)}. Use fewer, or rename them."
         )
-    return tuple(found)
+    return tuple(names)
 
 
 def _tokens(text: str) -> list[Token]:
@@ -321,8 +321,8 @@ def _scan(text: str) -> Iterator[Token]:
 
 
 def _blank(text: str, place: int) -> int:
-    found = _BLANK.match(text, place)
-    return found.end() if found else place
+    match = _BLANK.match(text, place)
+    return match.end() if match else place
 
 
 def _order(text: str, tokens: Sequence[Token], variables: Sequence[str] | None) -> tuple[str, ...]:
@@ -455,14 +455,14 @@ def read(
     """
     if isinstance(on, str):
         on = (on,)
-    told = multiplier is None or (isinstance(multiplier, str) and multiplier == _AUTO)
-    inputs = [polynomial, *on, *([] if told else [multiplier])]
+    automatic = multiplier is None or (isinstance(multiplier, str) and multiplier == _AUTO)
+    inputs = [polynomial, *on, *([] if automatic else [multiplier])]
     names = tuple(map(str, variables)) if variables is not None else _names_of_inputs(inputs)
     if len(set(names)) < len(names):
         raise PolynomialError(f"variables must be different. Received {', '.join(names)}. Rename one.")
     exact = _polynomial(polynomial, names)
     constraints = [_constraint(c, names) for c in on]
-    factor = multiplier if told else _polynomial(multiplier, names)
+    factor = multiplier if automatic else _polynomial(multiplier, names)
     inequalities = tuple(p for kind, p in constraints if kind == "inequality")
     equalities = tuple(p for kind, p in constraints if kind == "equality")
     return names, exact, inequalities, equalities, factor

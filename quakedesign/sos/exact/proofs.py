@@ -161,8 +161,8 @@ def _in_monomials(basis: Sequence[Element], gram: IntegerGram) -> tuple[list[Exp
 
 def as_element(polynomial: Polynomial) -> Element:
     """Polynomial as a basis element: by its exponents where it is a monomial with coefficient 1."""
-    kept = {e: c for e, c in polynomial.items() if c}
-    return next(iter(kept)) if list(kept.values()) == [1] else kept
+    nonzero = {e: c for e, c in polynomial.items() if c}
+    return next(iter(nonzero)) if list(nonzero.values()) == [1] else nonzero
 
 
 def as_polynomial(basis_element: Element) -> Polynomial:

@@ -9,7 +9,7 @@ from fractions import Fraction
 from functools import cache, lru_cache
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar, cast
+from typing import Annotated, Any, NoReturn, TypeVar, cast
 
 import msgspec
 
@@ -21,7 +21,7 @@ from quakedesign.text import one_line
 _Kind = TypeVar("_Kind")
 
 LARGEST_FILE = 4 << 20
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
+Name = Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z][A-Za-z0-9_]{0,39}\Z")]
 _RATIONAL = re.compile(r"(-?[1-9][0-9]{0,399}|0)(?:/([1-9][0-9]{0,399}))?")
 _EXPONENTS = re.compile(r"(0|[1-9][0-9]{0,2})(,(0|[1-9][0-9]{0,2}))*")
 _GRID_BITS = 1 << 14
@@ -251,7 +251,7 @@ def _difference(raw: Any, again: Any) -> str:
 def made(kind: type[_Kind], *sources: Any, **entries: Any) -> _Kind:
     """Object whose fields are given, or attributes of the same name of one of the sources, or have their defaults."""
     for name, *_ in _parts(cast(Any, kind)):
-        found = [getattr(source, name) for source in sources if hasattr(source, name)]
-        if name not in entries and found:
-            entries[name] = found[0]
+        values = [getattr(source, name) for source in sources if hasattr(source, name)]
+        if name not in entries and values:
+            entries[name] = values[0]
     return kind(**entries)

@@ -37,13 +37,13 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
     verbose : bool
         With the sizes of the Gram matrices before and after the reduction.
     """
-    asked = answer.statement
-    lines = [f"{answer.verdict}: {_short(polynomial_words(asked.polynomial, asked.variables))}"]
-    conditions = [f"{polynomial_words(g, asked.variables)} >= 0" for g in asked.inequalities]
-    conditions += [f"{polynomial_words(h, asked.variables)} == 0" for h in asked.equalities]
+    statement = answer.statement
+    lines = [f"{answer.verdict}: {_short(polynomial_words(statement.polynomial, statement.variables))}"]
+    conditions = [f"{polynomial_words(g, statement.variables)} >= 0" for g in statement.inequalities]
+    conditions += [f"{polynomial_words(h, statement.variables)} == 0" for h in statement.equalities]
     if conditions:
         lines.append(f"on {', '.join(conditions)}")
-    multiplier = polynomial_words(asked.multiplier, asked.variables)
+    multiplier = polynomial_words(statement.multiplier, statement.variables)
     if multiplier != "1":
         lines.append(f"multiplied by {multiplier}")
     lines += [*_reason(answer), *filter(None, [answer.remark])]
@@ -56,20 +56,20 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
 
 def statement_words(answer: Answer) -> list[str]:
     """What `sentences` leaves out of a statement: its whole polynomial, its products and degree, and a functional."""
-    asked = answer.statement
-    whole = polynomial_words(asked.polynomial, asked.variables)
-    products = ("*".join(f"[{i}]" for i in chosen) or "1" for chosen in asked.products)
+    statement = answer.statement
+    whole = polynomial_words(statement.polynomial, statement.variables)
+    products = ("*".join(f"[{i}]" for i in chosen) or "1" for chosen in statement.products)
     lines = [f"polynomial: {whole}"] if _short(whole) != whole else []
-    lines.append(f"products: {', '.join(products)}; degree: {asked.degree}")
+    lines.append(f"products: {', '.join(products)}; degree: {statement.degree}")
     if isinstance(answer.proof, Functional):
         values = sorted(answer.proof.values.items(), reverse=True)
-        told = (f"L({polynomial_words({e: Fraction(1)}, asked.variables)}) = {value}" for e, value in values)
-        lines.append(f"functional, zero on all other monomials: {', '.join(told)}")
+        equations = (f"L({polynomial_words({e: Fraction(1)}, statement.variables)}) = {value}" for e, value in values)
+        lines.append(f"functional, zero on all other monomials: {', '.join(equations)}")
     return lines
 
 
 def _reason(answer: Answer) -> list[str]:
-    proof, asked = answer.proof, answer.statement
+    proof, statement = answer.proof, answer.statement
     if isinstance(proof, SumOfSquares):
         digits = max((len(exact_text(q)) for s in proof.squares for q in s.gram), default=1)
         count = sum(len(s.basis) for s in proof.squares)
@@ -78,11 +78,11 @@ def _reason(answer: Answer) -> list[str]:
         ]
     if isinstance(proof, Functional):
         return [
-            f"no such sum of squares with summands of degree up to {asked.degree}: a rational functional with "
+            f"no such sum of squares with summands of degree up to {statement.degree}: a rational functional with "
             f"{len(proof.values)} values is non-negative on all of them and negative here"
         ]
     if isinstance(proof, Point):
-        point = ", ".join(f"{n} = {exact_text(v)}" for n, v in zip(asked.variables, proof.coordinates, strict=True))
+        point = ", ".join(f"{n} = {exact_text(v)}" for n, v in zip(statement.variables, proof.coordinates, strict=True))
         return [f"negative at {point}", f"value {_shown(_value(answer, proof))}"]
     return ["neither a rational proof nor a rational refutation was found; this says nothing about the polynomial"]
 
@@ -124,47 +124,44 @@ def claim_words(claim: Attraction) -> list[str]:
     return [*lines, f"every solution {_start(claim)} tends to the origin, which is asymptotically stable"]
 
 
-def region_words(found: Region) -> list[str]:
+def region_words(region: Region) -> list[str]:
     """What is proved, what is refuted, and the reason where nothing is proved."""
-    lines = [found.verdict]
-    shown = found.proved or found.refuted
+    lines = [region.verdict]
+    shown = region.proved or region.refuted
     if shown is not None:
         lines += claim_words(shown)
-    if found.inclusion is not None:
-        assert found.shape_level is not None
-        lines.append(
-            f"that is so wherever {_shape(found)} <= {found.shape_level} ({LowerBound(found.shape_level)} rounded down)"
-        )
-    if found.proved is not None and found.refuted is not None:
-        lines += _point_words(found.refuted)
-    return [*lines, *filter(None, [found.remark])]
+    if region.inclusion is not None and (level := region.shape_level) is not None:
+        lines.append(f"that is so wherever {_shape(region)} <= {level} ({LowerBound(level)} rounded down)")
+    if region.proved is not None and region.refuted is not None:
+        lines += _point_words(region.refuted)
+    return [*lines, *filter(None, [region.remark])]
 
 
-def region_facts(found: Region) -> dict[str, Any]:
+def region_facts(region: Region) -> dict[str, Any]:
     """The same for JSON; exact numbers are texts."""
-    shown = found.proved or found.refuted
-    point = found.refuted.proof if found.refuted is not None else None
+    shown = region.proved or region.refuted
+    point = region.refuted.proof if region.refuted is not None else None
     coordinates = point.coordinates if isinstance(point, Point) else None
     return {
-        "verdict": found.verdict,
+        "verdict": region.verdict,
         "variables": list(shown.variables) if shown else None,
         "V": polynomial_words(shown.lyapunov, shown.variables) if shown else None,
-        "everywhere": found.proved is not None and found.proved.level is None,
-        "level": None if found.level is None else str(found.level),
-        "shape": None if found.inclusion is None else _shape(found),
-        "shape_level": None if found.shape_level is None else str(found.shape_level),
-        "refuted_above": None if found.refuted_above is None else str(found.refuted_above),
+        "everywhere": region.proved is not None and region.proved.level is None,
+        "level": None if region.level is None else str(region.level),
+        "shape": None if region.inclusion is None else _shape(region),
+        "shape_level": None if region.shape_level is None else str(region.shape_level),
+        "refuted_above": None if region.refuted_above is None else str(region.refuted_above),
         "point": None if coordinates is None else [str(x) for x in coordinates],
-        "equilibrium": None if found.refuted is None else found.refuted.equilibrium,
-        "remark": found.remark or None,
+        "equilibrium": None if region.refuted is None else region.refuted.equilibrium,
+        "remark": region.remark or None,
     }
 
 
-def _shape(found: Region) -> str:
+def _shape(region: Region) -> str:
     """The polynomial s of the inequality β − s ≥ 0."""
-    assert found.inclusion is not None
-    asked = found.inclusion.statement
-    return polynomial_words({e: -c for e, c in asked.inequalities[0].items() if any(e)}, asked.variables)
+    assert region.inclusion is not None
+    statement = region.inclusion.statement
+    return polynomial_words({e: -c for e, c in statement.inequalities[0].items() if any(e)}, statement.variables)
 
 
 def _start(claim: Attraction) -> str:

@@ -170,26 +170,26 @@ _ROOM = 1e-3  # of β, given up for a V inside of what is possible
 _GRID = 2**20  # of the coefficients of V
 
 
-def with_shape(found: Region, shape: Polynomial) -> Region:
+def with_shape(region: Region, shape: Polynomial) -> Region:
     """Region with the largest β found for which {shape ≤ β} is proved to lie in it."""
-    claim = found.proved
+    claim = region.proved
     if claim is None or claim.level is None:
-        return found
+        return region
     size = len(claim.variables)
     boundary = combination([(Fraction(1), claim.lyapunov), (-claim.level, constant(size))])
     rays = _Rays(len(next(iter(boundary))), shape, boundary)
     touching = min(map(rays.height, rays.lowest(rays.sampled())), default=0.0)
     if not 0 < touching < inf:
-        return found
+        return region
     for beta in (just_below(Fraction(touching) * share) for share in _SHARES):
-        asked = _inclusion(claim, _INSIDE * claim.level, shape, beta, degree(claim.lyapunov))
-        proof = strict_proof(asked)
+        inclusion = _inclusion(claim, _INSIDE * claim.level, shape, beta, degree(claim.lyapunov))
+        proof = strict_proof(inclusion)
         if proof is not None:
-            return replace(found, inclusion=Answer(statement=asked, proof=proof))
-    return found
+            return replace(region, inclusion=Answer(statement=inclusion, proof=proof))
+    return region
 
 
-def expanded(found: Region, shape: Polynomial, top: int, certify: Callable[[Attraction], Region]) -> Region:
+def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attraction], Region]) -> Region:
     """Region of a V of degree at most `top` with a larger part of the shape, from one that is proved.
 
     Parameters
@@ -197,7 +197,7 @@ def expanded(found: Region, shape: Polynomial, top: int, certify: Callable[[Attr
     certify : callable
         Region that is proved for a V.
     """
-    best = with_shape(found, shape)
+    best = with_shape(given, shape)
     for degree_now in range(2, top + 1, 2):
         for _ in range(_ROUNDS):
             candidates = (with_shape(certify(claim), shape) for claim in _improved(best, shape, degree_now))
@@ -212,17 +212,17 @@ def _grows(old: Region, new: Region) -> bool:
     return new.shape_level is not None and old.shape_level is not None and new.shape_level > _GROWTH * old.shape_level
 
 
-def _improved(found: Region, shape: Polynomial, top: int) -> Iterator[Attraction]:
+def _improved(region: Region, shape: Polynomial, top: int) -> Iterator[Attraction]:
     """Claims, not yet proved, with another V, from multipliers that leave less and more slack."""
-    claim, beta = found.proved, found.shape_level
+    claim, beta = region.proved, region.shape_level
     if claim is None or claim.level is None or beta is None:
         return
     own = combination([(1 / claim.level, claim.lyapunov)])
     top = max(top, degree(own))
     for slack in _SLACK:
-        held = replace(claim, lyapunov=own, level=slack, proof=None)
-        falling = _multiplier(held.decrease, top - 1 + max(map(degree, claim.field)))
-        inner = _multiplier(_inclusion(held, Fraction(1), shape, slack * beta, top), top)
+        candidate = replace(claim, lyapunov=own, level=slack, proof=None)
+        falling = _multiplier(candidate.decrease, top - 1 + max(map(degree, claim.field)))
+        inner = _multiplier(_inclusion(candidate, Fraction(1), shape, slack * beta, top), top)
         if falling is not None and inner is not None:
             lyapunov = _larger(claim, shape, top, falling, inner)
             if lyapunov is not None:
@@ -245,12 +245,12 @@ def _even(number: int) -> int:
     return number + number % 2
 
 
-def _multiplier(asked: Statement, least: int) -> Polynomial | None:
+def _multiplier(statement: Statement, least: int) -> Polynomial | None:
     """Squares that multiply the inequality in a proof of at least some degree; None without a proof."""
     for more in _MORE:
-        proof = strict_proof(replace(asked, degree=max(asked.degree, _even(least)) + more))
+        proof = strict_proof(replace(statement, degree=max(statement.degree, _even(least)) + more))
         if proof is not None:
-            size = len(asked.variables)
+            size = len(statement.variables)
             parts = (mapping(form(s.basis, integer_gram(s), size)) for s in proof.squares if s.product)
             return combination((Fraction(1), part) for part in parts)
     return None
@@ -276,8 +276,8 @@ def _larger(
     values = program.proposal(_ROOM)
     if values is None:
         return None
-    found = {e: nearest(v, _GRID) for e, v in zip(terms, values, strict=False)}
-    return {e: c for e, c in found.items() if c}
+    rounded = {e: nearest(v, _GRID) for e, v in zip(terms, values, strict=False)}
+    return {e: c for e, c in rounded.items() if c}
 
 
 def affine(fixed: Polynomial, parts: list[Polynomial]) -> dict[Exponents, Fraction]:
@@ -337,10 +337,10 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
         return replace(claim, proof=rest)
     reasons = []
     for top in degrees:
-        found = _searched(claim, top)
-        if isinstance(found, Attraction) and (proved := _proved(found)) is not None:
+        candidate = _searched(claim, top)
+        if isinstance(candidate, Attraction) and (proved := _proved(candidate)) is not None:
             return proved
-        why = found.reason if isinstance(found, NoSolution) else "the V that was found has no exact proof"
+        why = candidate.reason if isinstance(candidate, NoSolution) else "the V that was found has no exact proof"
         reasons.append(f"no V of degree {top}: {why}")
     return replace(claim, reason="; ".join(reasons) or "no degree of V was tried")
 
@@ -388,11 +388,11 @@ def region_of_attraction(
         if own is None:
             return Region(proved=None, refuted=None, remark="the linearised field has no V = x'Px. Give a V")
         claim = replace(claim, lyapunov=own)
-    found = _region(claim, relative)
+    region = _region(claim, relative)
     if inner is None:
-        return found
+        return region
     return (
-        with_shape(found, inner) if degree is None else expanded(found, inner, degree, lambda c: _region(c, relative))
+        with_shape(region, inner) if degree is None else expanded(region, inner, degree, lambda c: _region(c, relative))
     )
 
 
@@ -404,8 +404,8 @@ def _region(claim: Attraction, relative: float) -> Region:
         return Region(proved=proved, refuted=None, remark="" if proved else "no level was proved, and none refuted")
     if refuted.level is None:
         return Region(proved=None, refuted=refuted, remark="V is not positive")
-    found = Region(proved=_bisected(claim, refuted.height or Fraction(0), relative), refuted=refuted)
-    return found if found.proved else replace(found, remark="no level below was proved")
+    region = Region(proved=_bisected(claim, refuted.height or Fraction(0), relative), refuted=refuted)
+    return region if region.proved else replace(region, remark="no level below was proved")
 
 
 def _shape(field: Mapping[Any, Any], shape: Any, degree: int | None) -> Polynomial | None:
@@ -429,10 +429,10 @@ def _claim(field: Mapping[Any, Any], V: Any) -> Attraction:
 
 def _refuted(claim: Attraction) -> Attraction | None:
     """Level just above the lowest point found where V does not fall; no level where V is not positive."""
-    found = replace(claim, proof=lowest_crossing(claim))
-    if found.height is None:
+    refuted = replace(claim, proof=lowest_crossing(claim))
+    if refuted.height is None:
         return None
-    return _checked(replace(found, level=_just_above(found.height) if found.height > 0 else None))
+    return _checked(replace(refuted, level=_just_above(refuted.height) if refuted.height > 0 else None))
 
 
 def _just_above(height: Fraction) -> Fraction:
@@ -448,22 +448,22 @@ def _proved(claim: Attraction, *, thorough: bool = False) -> Attraction | None:
     """Claim with its proof; None if none is found."""
     positive = _squares(claim.positive, thorough)
     for more in _MORE if positive is not None else ():
-        asked = replace(claim.decrease, degree=claim.decrease.degree + more)
-        decrease = _squares(asked, thorough)
+        statement = replace(claim.decrease, degree=claim.decrease.degree + more)
+        decrease = _squares(statement, thorough)
         if positive is not None and decrease is not None:
-            found = _checked(replace(claim, proof=LyapunovProof(positive=positive, decrease=decrease)))
-            if found is not None:
-                return found
+            proved = _checked(replace(claim, proof=LyapunovProof(positive=positive, decrease=decrease)))
+            if proved is not None:
+                return proved
     return None
 
 
-def _squares(asked: Statement, thorough: bool) -> SumOfSquares | None:
+def _squares(statement: Statement, thorough: bool) -> SumOfSquares | None:
     """Proof of one statement: with a margin, or where that has none, on a face."""
-    found = strict_proof(asked)
-    if found is None and thorough:
-        proof = decide(asked).proof
-        found = proof if isinstance(proof, SumOfSquares) else None
-    return found
+    squares = strict_proof(statement)
+    if squares is None and thorough:
+        proof = decide(statement).proof
+        squares = proof if isinstance(proof, SumOfSquares) else None
+    return squares
 
 
 def _bisected(claim: Attraction, ceiling: Fraction, relative: float) -> Attraction | None:
@@ -482,8 +482,8 @@ def _bisected(claim: Attraction, ceiling: Fraction, relative: float) -> Attracti
     low = best.level
     while above - low > Fraction(relative) * above:
         middle = just_below((low + above) / 2)
-        found = _proved(replace(claim, level=middle))
-        best, low, above = (found, middle, above) if found is not None else (best, low, middle)
+        proved = _proved(replace(claim, level=middle))
+        best, low, above = (proved, middle, above) if proved is not None else (best, low, middle)
     return best
 
 
@@ -505,8 +505,8 @@ def _of_linearised(claim: Attraction) -> dict[Exponents, Fraction] | None:
     parts = (
         (fraction_of(P[n, 0]), tuple(map(sum, zip(units[i], units[j], strict=True)))) for n, (i, j) in enumerate(places)
     )
-    found = combination((value, {e: Fraction(1)}) for value, e in parts)
-    return found if strict_proof(replace(claim, lyapunov=found).positive) is not None else None
+    function = combination((value, {e: Fraction(1)}) for value, e in parts)
+    return function if strict_proof(replace(claim, lyapunov=function).positive) is not None else None
 
 
 def _searched(claim: Attraction, top: int) -> Attraction | NoSolution:
@@ -519,8 +519,8 @@ def _searched(claim: Attraction, top: int) -> Attraction | NoSolution:
     program.require(affine({}, [combination([(Fraction(-1), along(claim.field, p))]) for p in powers]))
     solution = program.solve()
     if isinstance(solution, NoSolution):
-        told = (polynomial_words({e: Fraction(1)}, claim.variables) for e in terms)
-        named = dict(zip(program.decisions, told, strict=True))
+        terms_in_words = (polynomial_words({e: Fraction(1)}, claim.variables) for e in terms)
+        named = dict(zip(program.decisions, terms_in_words, strict=True))
         return NoSolution(reason=re.sub(r"\bc+\d+\b", lambda m: f"the coefficient of {named[m[0]]}", solution.reason))
     values = zip(terms, solution.values.values(), strict=True)
     return replace(claim, lyapunov={e: c for e, c in values if c})

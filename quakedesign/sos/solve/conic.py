@@ -29,14 +29,14 @@ def stated_problems() -> Iterator[list[Any]]:
     list of cvxpy.Problem
         Complete when the block ends.
     """
-    found: dict[int, Any] = {}
+    by_number: dict[int, Any] = {}
     problems: list[Any] = []
-    token = _handed.set(found)
+    token = _handed.set(by_number)
     try:
         yield problems
     finally:
         _handed.reset(token)
-        problems.extend(found.values())
+        problems.extend(by_number.values())
 
 
 def handing_back() -> bool:
@@ -85,12 +85,12 @@ class Compiled:
         program = form["param_prob"]
         if not program.total_param_size:
             return self._form
-        told = np.zeros(program.total_param_size + 1)
-        told[-1] = 1
+        parameters = np.zeros(program.total_param_size + 1)
+        parameters[-1] = 1
         for key, parameter in program.id_to_param.items():
             start = program.param_id_to_col[key]
-            told[start : start + parameter.size] = np.ravel(parameter.value, order="F")
-        values, costs = program.reduced_A.reduced_mat @ told, program.q @ told
+            parameters[start : start + parameter.size] = np.ravel(parameter.value, order="F")
+        values, costs = program.reduced_A.reduced_mat @ parameters, program.q @ parameters
         rows, ends, (height, width) = program.reduced_A.problem_data_index
         last = ends[-2]
         side = np.zeros(height)

@@ -112,10 +112,10 @@ class StatementSearch:
 
     def _outside(self, program: MomentProgram | None) -> Proof | None:
         """Refutation by a monomial of the target that nothing can produce."""
-        known = set() if program is None else set(program.index)
+        covered = set() if program is None else set(program.index)
         target = self.statement.target
         for e in target:
-            if e not in known:
+            if e not in covered:
                 return self._finish(Functional(values={e: Fraction(-1 if target[e] > 0 else 1)}))
         return None
 
@@ -167,19 +167,19 @@ class StatementSearch:
         return None
 
 
-def strict_proof(asked: Statement) -> SumOfSquares | None:
+def strict_proof(statement: Statement) -> SumOfSquares | None:
     """Checked identity for a statement that holds with a margin, in monomials; None if none is found.
 
     Whether the multiplier is positive is the caller's question.
     """
-    search = StatementSearch(asked)
+    search = StatementSearch(statement)
     solution = search._solve(search.blocks)[0]
     if solution is None or not solution.margin > 0:
         return None
 
     def checked(proof: SumOfSquares) -> SumOfSquares | None:
         restored = search.moved.restored(proof)
-        return restored if identity_holds(asked, restored) else None
+        return restored if identity_holds(statement, restored) else None
 
     return rounded(search.statement, search.blocks, solution, checked)
 

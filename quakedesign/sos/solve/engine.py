@@ -103,7 +103,7 @@ class Method(ABC):
     order: ClassVar[int]
 
     @abstractmethod
-    def propose(self, asked: Statement) -> Proof | None:
+    def propose(self, statement: Statement) -> Proof | None:
         """Proof of exactly this statement, which is not that zero is a sum of squares; None if none is found."""
 
 
@@ -170,7 +170,7 @@ def prove(
     answer: Answer | None = None
     for chosen in _multipliers(names, exact, factor, inequalities, equalities):
         for more in growth:
-            asked = statement(
+            problem = statement(
                 names,
                 exact,
                 inequalities=inequalities,
@@ -180,21 +180,21 @@ def prove(
                 degree_bound=degree_bound,
                 more=more,
             )
-            if answer is not None and _largest_basis(asked) > _LARGEST_RETRY:
+            if answer is not None and _largest_basis(problem) > _LARGEST_RETRY:
                 continue
-            found = decide(asked)
-            if found.verdict in (Positivity.SOS, Positivity.NEGATIVE):
-                return replace(found, seconds=perf_counter() - start)
-            answer = found if answer is None or answer.verdict is Positivity.UNDECIDED else answer
+            decided = decide(problem)
+            if decided.verdict in (Positivity.SOS, Positivity.NEGATIVE):
+                return replace(decided, seconds=perf_counter() - start)
+            answer = decided if answer is None or answer.verdict is Positivity.UNDECIDED else answer
     assert answer is not None
     return replace(answer, seconds=perf_counter() - start)
 
 
-def _largest_basis(asked: Statement) -> int:
+def _largest_basis(statement: Statement) -> int:
     """Monomials up to half the degree; on ℝⁿ only of what is left beside squares, in its variables."""
-    if asked.inequalities or asked.equalities or not asked.target:
-        return _basis_size(asked.degree, len(asked.variables))
-    rest = square_factor(asked.target, len(asked.variables))[1]
+    if statement.inequalities or statement.equalities or not statement.target:
+        return _basis_size(statement.degree, len(statement.variables))
+    rest = square_factor(statement.target, len(statement.variables))[1]
     return _basis_size(degree(rest), sum(any(powers) for powers in zip(*rest, strict=True)))
 
 
@@ -202,7 +202,7 @@ def _basis_size(top: int, variables: int) -> int:
     return comb(top // 2 + variables, variables)
 
 
-def decide(asked: Statement) -> Answer:
+def decide(statement: Statement) -> Answer:
     """Search for a proof of exactly one statement.
 
     Raises
@@ -210,10 +210,10 @@ def decide(asked: Statement) -> Answer:
     PolynomialError
         When the multiplier is not shown to be positive.
     """
-    squares, start = _squares_of_multiplier(asked), perf_counter()
-    none = Answer(statement=asked, proof=None, blocks=block_sizes(asked), versions=versions())
-    nothing = SumOfSquares(squares=(), cofactors=tuple({} for _ in asked.equalities))
-    proposed = (method.propose(asked) for method in methods()) if asked.target else (nothing,)
+    squares, start = _squares_of_multiplier(statement), perf_counter()
+    none = Answer(statement=statement, proof=None, blocks=block_sizes(statement), versions=versions())
+    nothing = SumOfSquares(squares=(), cofactors=tuple({} for _ in statement.equalities))
+    proposed = (method.propose(statement) for method in methods()) if statement.target else (nothing,)
     multiplied = (replace(p, multiplier=squares) if isinstance(p, SumOfSquares) else p for p in proposed)
     answers = (replace(none, proof=proof) for proof in multiplied if proof is not None)
     return replace(next(filter(_decides, answers), none), seconds=perf_counter() - start)
@@ -270,20 +270,20 @@ def _multipliers(names: Any, polynomial: Any, factor: Any, inequalities: Any, eq
         yield product(size, [base] * k)
 
 
-def _squares_of_multiplier(asked: Statement) -> Any:
+def _squares_of_multiplier(claim: Statement) -> Any:
     """The multiplier as a sum of squares, unless its coefficients show that it is positive."""
-    if multiplier_is_positive(asked, ()):
+    if multiplier_is_positive(claim, ()):
         return ()
     own = statement(
-        asked.variables,
-        asked.multiplier,
-        inequalities=asked.inequalities,
-        degree_bound=max(asked.degree, degree(asked.multiplier) + degree(asked.multiplier) % 2),
+        claim.variables,
+        claim.multiplier,
+        inequalities=claim.inequalities,
+        degree_bound=max(claim.degree, degree(claim.multiplier) + degree(claim.multiplier) % 2),
     )
-    found = decide(replace(own, products=asked.products))
-    if isinstance(found.proof, SumOfSquares) and multiplier_is_positive(asked, found.proof.squares):
-        return found.proof.squares
-    where = "is positive on a dense part of the set" if asked.dense else "has a sum of squares with a positive constant"
+    positive = decide(replace(own, products=claim.products))
+    if isinstance(positive.proof, SumOfSquares) and multiplier_is_positive(claim, positive.proof.squares):
+        return positive.proof.squares
+    where = "is positive on a dense part of the set" if claim.dense else "has a sum of squares with a positive constant"
     raise PolynomialError(
         f"multiplier must be shown to be positive, that is, it {where}. This was not possible for the given one. "
         "Use for example 1 + x^2."
@@ -299,9 +299,9 @@ class Conic(Method):
     name: ClassVar[str] = "conic"
     order: ClassVar[int] = 2
 
-    def propose(self, asked: Statement) -> Proof | None:
+    def propose(self, statement: Statement) -> Proof | None:
         """See `Method.propose`."""
-        return StatementSearch(asked).run()
+        return StatementSearch(statement).run()
 
 
 # ----------------------------------------------------------------------
@@ -314,16 +314,16 @@ class SquareFactor(Method):
     name: ClassVar[str] = "square-factor"
     order: ClassVar[int] = 1
 
-    def propose(self, asked: Statement) -> SumOfSquares | None:
+    def propose(self, claim: Statement) -> SumOfSquares | None:
         """See `Method.propose`; None as well where r has no sum of squares.
 
         A square in the multiplier may be what makes r one, so that the polynomial's own is tried alone as well.
         """
-        count = len(asked.variables)
-        whole = replace(asked, polynomial=asked.target, multiplier=constant(count))
+        count = len(claim.variables)
+        whole = replace(claim, polynomial=claim.target, multiplier=constant(count))
         parts = {degree(root): (root, replace(part, polynomial=rest))
-                 for part in (asked, whole) for root, rest in [square_factor(part.polynomial, count)]}  # fmt: skip
-        proofs = (_multiplied(*parts[d], asked.degree - 2 * d) for d in sorted(parts, reverse=True) if d)
+                 for part in (claim, whole) for root, rest in [square_factor(part.polynomial, count)]}  # fmt: skip
+        proofs = (_multiplied(*parts[d], claim.degree - 2 * d) for d in sorted(parts, reverse=True) if d)
         return next((proof for proof in proofs if proof is not None), None)
 
 

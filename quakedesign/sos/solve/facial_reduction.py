@@ -89,13 +89,13 @@ class Block:
 
 def at_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[Fraction]]) -> list[Block]:
     """Blocks whose squares vanish at the given zeros of the target."""
-    kept = []
+    reduced = []
     for block in blocks:
         live = [z for z in zeros if evaluate(block.weight, z) > 0]
         smaller = block.restricted([block.at(z) for z in live])
         if smaller is not None:
-            kept.append(smaller)
-    return kept
+            reduced.append(smaller)
+    return reduced
 
 
 def at_real_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[float]], scale: Sequence[Fraction]) -> list[Block]:
@@ -103,13 +103,13 @@ def at_real_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[float]], sca
 
     A zero such as (√2, 1) need not be rational itself: within a class of equal parity its square roots cancel.
     """
-    kept = []
+    reduced = []
     for block in blocks:
         rows = [_proportional(block, z, scale) for z in zeros if _float_value(block.weight, z) > 1e-7]
         smaller = block.restricted([row for row in rows if row is not None])
         if smaller is not None:
-            kept.append(smaller)
-    return kept
+            reduced.append(smaller)
+    return reduced
 
 
 def _proportional(block: Block, zero: Sequence[float], scale: Sequence[Fraction]) -> Row | None:
@@ -147,22 +147,22 @@ def _modulo(block: Block, relations: Sequence[Polynomial]) -> Block | None:
             row[index[e]] = fmpq(c.numerator, c.denominator)
     reduced, rank = fmpq_mat(rows).rref()
     led = {order[next(i for i, v in enumerate(row) if v != 0)] for row in reduced.tolist()[:rank]}
-    kept = tuple(e for e in block.monomials if e not in led)
-    return replace(block, monomials=kept) if kept else None
+    remaining = tuple(e for e in block.monomials if e not in led)
+    return replace(block, monomials=remaining) if remaining else None
 
 
 def at_kernels(
     blocks: Sequence[Block], grams: Sequence[Any], threshold: float, tolerance: float, scale: Sequence[Fraction]
 ) -> list[Block] | None:
     """Blocks without the numerical kernels of their Gram matrices, rounded; None if there is no kernel."""
-    kept, found = [], False
+    reduced, smaller_face = [], False
     for block, gram in zip(blocks, grams, strict=True):
         kernel = _kernel(block, gram, threshold, tolerance, scale)
-        found = found or bool(kernel)
+        smaller_face = smaller_face or bool(kernel)
         smaller = block.restricted(kernel)
         if smaller is not None:
-            kept.append(smaller)
-    return kept if found else None
+            reduced.append(smaller)
+    return reduced if smaller_face else None
 
 
 def _kernel(block: Block, gram: Any, threshold: float, tolerance: float, scale: Sequence[Fraction]) -> list[Row]:

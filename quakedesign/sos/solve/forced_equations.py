@@ -78,10 +78,10 @@ class Forced:
         present, before = self, -1
         while len(present.reasons) > before and not present.contradiction:
             before = len(present.reasons)
-            for k, asked in enumerate(present.requirements):
-                reached = asked.reached
-                for e in sorted({e for part in asked.parts for e in part if e not in reached}, reverse=True):
-                    rule = f"requirement {k + 1}: no term of a certificate has {_monomial(asked.template.variables, e)}"
+            for k, need in enumerate(present.requirements):
+                reached = need.reached
+                for e in sorted({e for part in need.parts for e in part if e not in reached}, reverse=True):
+                    rule = f"requirement {k + 1}: no term of a certificate has {_monomial(need.template.variables, e)}"
                     present = present._with(present.requirements[k].coefficient(e), rule, names)
         return present
 
@@ -91,9 +91,9 @@ class Forced:
             r if b is None else replace(r, blocks=tuple(b)) for r, b in zip(self.requirements, faces, strict=True)
         )
         present = replace(self, requirements=tuple(within))
-        for k, asked in enumerate(present.requirements):
+        for k, need in enumerate(present.requirements):
             rule = f"requirement {k + 1}: a kernel of its Gram matrix, rounded"
-            for row in _annihilators(asked) if faces[k] is not None else ():
+            for row in _annihilators(need) if faces[k] is not None else ():
                 parts = present.requirements[k].parts
                 equation = tuple(sum((c * p.get(e, 0) for e, c in row.items()), start=Fraction(0)) for p in parts)
                 present = present._with(equation, rule, names)
@@ -101,14 +101,14 @@ class Forced:
 
     def refuted(self) -> str:
         """Requirement with a monomial that squares alone produce, and whose coefficient is negative; else nothing."""
-        for k, asked in enumerate(self.requirements):
-            system = System(asked.template, asked.present)
+        for k, need in enumerate(self.requirements):
+            system = System(need.template, need.present)
             mixed = {e for _, _, r in system.relations for e in r}
             for (_, i, j), column in zip(system.entries, system.columns, strict=False):
                 mixed |= {e for e, c in column.items() if i != j or c < 0}
-            for e, c in asked.parts[0].items():
-                if c < 0 and e not in mixed and not any(asked.coefficient(e)[1:]):
-                    monomial = _monomial(asked.template.variables, e)
+            for e, c in need.parts[0].items():
+                if c < 0 and e not in mixed and not any(need.coefficient(e)[1:]):
+                    monomial = _monomial(need.template.variables, e)
                     return f"requirement {k + 1}: squares alone produce {monomial}, but {c} stands before it"
         return ""
 
@@ -127,14 +127,14 @@ class Forced:
         return Forced(requirements=requirements, solved=solved, reasons=(*self.reasons, text))
 
 
-def _eliminated(asked: Requirement, pivot: int, row: Affine) -> Requirement:
-    gone = asked.parts[pivot + 1]
+def _eliminated(need: Requirement, pivot: int, row: Affine) -> Requirement:
+    gone = need.parts[pivot + 1]
     if not gone:
-        return asked
-    parts = [combination([(Fraction(1), p), (c, gone)]) if c else p for p, c in zip(asked.parts, row, strict=True)]
+        return need
+    parts = [combination([(Fraction(1), p), (c, gone)]) if c else p for p, c in zip(need.parts, row, strict=True)]
     parts[pivot + 1] = {}
     support = dict.fromkeys((e for p in parts for e in p), Fraction(1))
-    return replace(asked, parts=tuple(parts), template=replace(asked.template, polynomial=support))
+    return replace(need, parts=tuple(parts), template=replace(need.template, polynomial=support))
 
 
 def _insert(affine: Affine, pivot: int, row: Affine) -> Affine:
@@ -154,10 +154,10 @@ def _blocks(template: Statement) -> list[Block]:
     return modulo(initial_blocks(template), [r for _, _, r in relations(template)])
 
 
-def _annihilators(asked: Requirement) -> Iterable[dict[Exponents, Fraction]]:
+def _annihilators(need: Requirement) -> Iterable[dict[Exponents, Fraction]]:
     """Basis of the functionals on the monomials that vanish on every product of a face."""
-    columns = [dict(c) for c in {frozenset(c.items()) for c in System(asked.template, asked.present).columns}]
-    keys = sorted({e for c in (*columns, *asked.parts) for e in c})
+    columns = [dict(c) for c in {frozenset(c.items()) for c in System(need.template, need.present).columns}]
+    keys = sorted({e for c in (*columns, *need.parts) for e in c})
     if not columns:
         return [{e: Fraction(1)} for e in keys]
     entries = [[c.get(e, Fraction(0)) for e in keys] for c in columns]

@@ -26,8 +26,8 @@ from quakedesign.sos.solve.facial_reduction import modulo
 from quakedesign.sos.solve.moment import MomentProgram
 from quakedesign.sos.solve.rounding import relations
 
-_KEPT = 32
-_known: dict[tuple[Any, ...], "JointProgram"] = {}
+_MOST_CACHED = 32
+_cached: dict[tuple[Any, ...], "JointProgram"] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,10 +60,10 @@ class Proposal:
 def joint_program(demands: Sequence[Demand]) -> "JointProgram":
     """The programme of the structure that demands have, kept from the last time that it was asked for."""
     key = len(demands[0].parts), *(d.template.structure for d in demands)
-    program = _known.pop(key, None) or JointProgram(demands)
-    if len(_known) >= _KEPT:
-        _known.pop(next(iter(_known)), None)
-    return _known.setdefault(key, program)
+    program = _cached.pop(key, None) or JointProgram(demands)
+    if len(_cached) >= _MOST_CACHED:
+        _cached.pop(next(iter(_cached)), None)
+    return _cached.setdefault(key, program)
 
 
 class JointProgram:
@@ -136,9 +136,9 @@ class _Stated:
         cost = given["costs"] @ moments + given["radii"] @ (above + below)
         pull, signs = above - below, [above >= 0, below >= 0]
         if rows:
-            held = cp.Variable(rows, name="held")
-            cost, pull = cost + given["bounds"] @ held, pull + given["rows"].T @ held
-            signs += [held >= 0]
+            weights = cp.Variable(rows, name="held")
+            cost, pull = cost + given["bounds"] @ weights, pull + given["rows"].T @ weights
+            signs += [weights >= 0]
         if shares:
             shared = cp.Variable(name="shared")
             most = given["shares"] * shared

@@ -60,7 +60,7 @@ class Arrays:
 # Points inside a set of inequalities and on its boundary, and the way from its boundary towards the inside.
 
 _SEED = 20240608
-_SAMPLES, _KEPT = 4000, 12
+_SAMPLES, _RETAINED = 4000, 12
 _SPREADS = (0.1, 0.3, 1.0, 3.0)  # scaled variables are about one
 _HALVINGS = 40
 _NEAR = 1e-3  # distance from which on a constraint does not count as active
@@ -110,11 +110,11 @@ def lowest_samples(statement: Statement) -> list[list[float]]:
     low, high = np.zeros((len(outer), 1)), np.ones((len(outer), 1))
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        held = (violation(statement, start + middle * (outer - start)) <= 0)[:, None]
-        low, high = np.where(held, middle, low), np.where(held, high, middle)
+        inside = (violation(statement, start + middle * (outer - start)) <= 0)[:, None]
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     pool = np.concatenate([inner, start + low * (outer - start)])
     order = np.argsort(_polynomial(statement).at(pool), kind="stable")
-    return [[*map(float, point)] for point in pool[order[:_KEPT]]]
+    return [[*map(float, point)] for point in pool[order[:_RETAINED]]]
 
 
 def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[float], float]]:

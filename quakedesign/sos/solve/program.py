@@ -187,7 +187,7 @@ class Program:
         """Solution on the present faces, or how the search for one ended."""
         if self._forced.contradiction:
             return None, "so no decisions satisfy the requirements at this degree"
-        solution = next(filter(None, (self._rounded(*found) for found in self._interior(_ROOM))), None)
+        solution = next(filter(None, (self._rounded(*point) for point in self._interior(_ROOM))), None)
         ended = f"{'the rest' if self._forced.reasons else 'the programme'} is {self._status} in floating point"
         if self._margin is not None:
             ended += f", with a margin of {self._margin.value:.1g}, but no exact decisions were found"
@@ -201,11 +201,11 @@ class Program:
             return False
         faces: list[Sequence[Block] | None] = []
         sizes = [float(np.abs(v.value).max(initial=0)) for v in (self._vector, *(g for gs in self._grams for g in gs))]
-        for asked, grams in zip(self._forced.requirements, self._grams, strict=True):
+        for need, grams in zip(self._forced.requirements, self._grams, strict=True):
             whole = [gram.value + self._margin.value * np.eye(gram.shape[0]) for gram in grams]
             unit = max(1e-3 * max(sizes), 1e-300, *(float(np.abs(w).max()) for w in whole))
             scaled = [w / unit for w in whole]
-            faces.append(at_kernels(asked.present, scaled, threshold, tolerance, [Fraction(1)] * len(self.variables)))
+            faces.append(at_kernels(need.present, scaled, threshold, tolerance, [Fraction(1)] * len(self.variables)))
         self._forced = self._forced.on_faces(faces, self.decisions)
         return any(face is not None for face in faces)
 
@@ -220,8 +220,8 @@ class Program:
         if not room >= 0 or math.isinf(room):
             raise PolynomialError(f"room must be a number of at least 0. Received {room!r}. Write 0.01, say.")
         self.problem()
-        found = next(self._interior((room,)), None)
-        return None if found is None else np.asarray(self._vector.value).tolist()
+        solution = next(self._interior((room,)), None)
+        return None if solution is None else np.asarray(self._vector.value).tolist()
 
     def _interior(self, rooms: Sequence[float]) -> Iterator[tuple[float, float]]:
         """The optimum, and how much of it was given up where decisions with a margin are now at hand."""
@@ -269,9 +269,9 @@ class Program:
             if not positive_definite([[_at(entry, values) for entry in row] for row in rows]):
                 return None
         answers = []
-        for asked in self._required:
-            polynomial = combination(zip((Fraction(1), *values), asked.parts, strict=True))
-            answer = decide(replace(asked.template, polynomial=polynomial))
+        for need in self._required:
+            polynomial = combination(zip((Fraction(1), *values), need.parts, strict=True))
+            answer = decide(replace(need.template, polynomial=polynomial))
             if answer.verdict is not Positivity.SOS:
                 return None
             answers.append(answer)
@@ -279,8 +279,8 @@ class Program:
 
     def _constraints(self, margin: Any) -> list[Any]:
         constraints, self._grams = list(self.constraints), []
-        for asked in self._forced.requirements:
-            grams, equations = _membership(self._vector, asked, margin)
+        for need in self._forced.requirements:
+            grams, equations = _membership(self._vector, need, margin)
             self._grams.append(grams)
             constraints += [*(gram >> 0 for gram in grams), *equations]
         for j, affine in self._forced.solved.items():
@@ -357,19 +357,19 @@ def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fra
     )
 
 
-def _membership(vector: Any, asked: Requirement, margin: Any) -> tuple[list[Any], list[Any]]:
+def _membership(vector: Any, need: Requirement, margin: Any) -> tuple[list[Any], list[Any]]:
     """Gram matrices, less the margin, and the equations between their coefficients and those of the polynomial."""
     import cvxpy as cp
 
-    shape, reached = asked.shape, asked.reached
-    beyond = {e for part in asked.parts for e in part if e not in reached}  # none unless the requirements contradict
+    shape, reached = need.shape, need.reached
+    beyond = {e for part in need.parts for e in part if e not in reached}  # none unless the requirements contradict
     vanishing = []
-    for constant, *factors in map(asked.coefficient, beyond):
+    for constant, *factors in map(need.coefficient, beyond):
         vanishing.append(float(constant) + np.array(factors, dtype=float) @ vector == 0)
     if shape is None:
         return [], vanishing
-    known = [{e: c for e, c in part.items() if e in reached} for part in asked.parts]
-    left, triangles = np.array([shape.vector(part) for part in known]).T, shape.triangles()
+    reachable = [{e: c for e, c in part.items() if e in reached} for part in need.parts]
+    left, triangles = np.array([shape.vector(part) for part in reachable]).T, shape.triangles()
     total: Any = left[:, 0] + left[:, 1:] @ vector
     grams, start = [], 0
     for block in shape.blocks:
@@ -424,13 +424,13 @@ class Membership:
         unknown = [e for e in polynomial if e not in self.template.polynomial]
         if unknown:
             raise PolynomialError(f"monomials must be those of the template. Received {unknown[0]}.")
-        asked = polynomial
+        target = polynomial
         if len(self.template.multiplier) != 1 or any(map(any, self.template.multiplier)):
-            asked = replace(self.template, polynomial={e: Fraction(c) for e, c in polynomial.items()}).target
-        size = max((abs(float(c)) for c in asked.values()), default=0.0)
-        if size == 0 or not self._program.covers(asked):
+            target = replace(self.template, polynomial={e: Fraction(c) for e, c in polynomial.items()}).target
+        size = max((abs(float(c)) for c in target.values()), default=0.0)
+        if size == 0 or not self._program.covers(target):
             return 0.0 if size == 0 else float("-inf")
-        margin = self._program.margin({e: float(c) / size for e, c in asked.items()}, 1e-8)
+        margin = self._program.margin({e: float(c) / size for e, c in target.items()}, 1e-8)
         self.solver_seconds = self._program.solver_seconds
         return float("nan") if margin is None else margin * size
 

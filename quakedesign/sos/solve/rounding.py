@@ -76,9 +76,9 @@ def rounded(
         correction = system.correction(residual(statement, proof.squares, proof.cofactors))
         if correction is None:
             return None
-        found = decision(system.proof([a + correction[i] if i in correction else a for i, a in enumerate(values)]))
-        if found is not None:
-            return found
+        point = decision(system.proof([a + correction[i] if i in correction else a for i, a in enumerate(values)]))
+        if point is not None:
+            return point
     return None
 
 

@@ -85,10 +85,10 @@ def verify(
     squares = [_square(s, q, b, names) for s, q, b in zip(products, grams, bases, strict=True)]
     degrees = [0, *map(degree, inequalities)]
     reached = [d + 2 * max(map(_degree, s.basis)) for d, s in zip(degrees, squares, strict=True)]
-    asked = statement(
+    problem = statement(
         names, exact, inequalities=inequalities, products=False, degree_bound=max(degree(exact), *reached)
     )
-    return replace(_verified(asked, squares), seconds=perf_counter() - start)
+    return replace(_verified(problem, squares), seconds=perf_counter() - start)
 
 
 def _listed(given: Any) -> list[Any]:
@@ -134,21 +134,21 @@ def _matrix(gram: Any, size: int) -> Any:
     return matrix / 2 + matrix.T / 2
 
 
-def _verified(asked: Statement, squares: Sequence[Square]) -> Answer:
-    error = max(map(abs, residual(asked, squares, ()).values()), default=Fraction(0))
-    moved = scaled(asked)
+def _verified(problem: Statement, squares: Sequence[Square]) -> Answer:
+    error = max(map(abs, residual(problem, squares, ()).values()), default=Fraction(0))
+    moved = scaled(problem)
     blocks, grams = zip(*(_block(moved.statement, moved.square(s)) for s in squares), strict=True)
     least = min(float(np.linalg.eigvalsh(g)[0]) for g in grams)
     sizes = f"largest error in a coefficient {UpperBound(error):.2g}, least eigenvalue {least:.2g} scaled"
     matrix = f"the given matrix ({sizes})"
-    near = error <= _NEAR * max(map(abs, asked.polynomial.values()), default=Fraction(1))
+    near = error <= _NEAR * max(map(abs, problem.polynomial.values()), default=Fraction(1))
     for how, proof in _proposed(moved, blocks, grams) if near else ():
-        found = Answer(statement=asked, proof=proof, remark=f"proved by {matrix}, {how}", versions=versions())
-        if proof is not None and found.check():
-            return found
-    found = decide(asked)
-    why = "neither a proof nor a counterexample was found" if found.proof is None else "decided"
-    return replace(found, remark=f"no proof comes from {matrix}; {why} without it")
+        answer = Answer(statement=problem, proof=proof, remark=f"proved by {matrix}, {how}", versions=versions())
+        if proof is not None and answer.check():
+            return answer
+    answer = decide(problem)
+    why = "neither a proof nor a counterexample was found" if answer.proof is None else "decided"
+    return replace(answer, remark=f"no proof comes from {matrix}; {why} without it")
 
 
 def _block(moved: Statement, square: Square) -> tuple[Block, Any]:
@@ -304,15 +304,15 @@ def _matlab(content: bytes) -> dict[str, Any]:
     with catch_warnings():
         simplefilter("ignore", DeprecationWarning)  # of the kind of sparse matrices, which are made dense
         raw = loadmat(BytesIO(content), squeeze_me=False, chars_as_strings=True)
-    found = {key: raw[name] for name, key in _IN_MATLAB.items() if name in raw}
-    if set(found) != _KEYS:
-        return found
-    terms, basis = _plain(found["polynomial"]), _plain(found["basis"])
+    by_key = {key: raw[name] for name, key in _IN_MATLAB.items() if name in raw}
+    if set(by_key) != _KEYS:
+        return by_key
+    terms, basis = _plain(by_key["polynomial"]), _plain(by_key["basis"])
     return {
-        "variables": _texts(found["variables"]),
+        "variables": _texts(by_key["variables"]),
         "polynomial": terms[0] if len(terms) == 1 and isinstance(terms[0], str) else terms,
-        "basis": _texts(found["basis"]) if basis and isinstance(basis[0], str) else basis,
-        "gram": _dense(found["gram"]),
+        "basis": _texts(by_key["basis"]) if basis and isinstance(basis[0], str) else basis,
+        "gram": _dense(by_key["gram"]),
     }
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from fractions import Fraction as F
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from thinned import few
 
 import quakedesign as qd
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, best_guarantee
+from quakedesign.guarantees import Held, NoProof, TrackingGuarantee, TrackingProof, best_guarantee
+from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import design_compensated
 from quakedesign.guarantees.search.defaults import deadbeat, sampled_sliding_mode
@@ -21,6 +23,7 @@ from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
 
+PROOFS = Path(__file__).parents[3] / "proofs" / "certificates"
 REAL = load_fault("real-fault")
 STEP = F("0.184")
 
@@ -87,6 +90,28 @@ def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_muc
     pump = Pump(least=(low + leaner[0]) / 2, largest=(high + leaner[1]) / 2)
     assert isinstance(best_guarantee(task, replace(usual.held, pump=pump)), NoProof)
     assert design_held(task, step, setup=ExactSetup(pump=pump)).check() is Verdict.PROVED
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("delay", F(9, 80), "with a delay of 0.1125 s: "),
+        ("delay", F(1, 3), "with a delay of 1/3 s: "),
+        ("lag", F(1, 8), "with a lag of 0.125 s: "),
+        ("diffusion", F(0), "without any diffusion time L^2/D: "),
+        ("jitter", F(1, 3000), "with a jitter of at most 333 µs: "),
+        ("averaging", F(1, 80), "with a time of averaging of at most 12.5 ms: "),
+        ("delay_jitter", F(1, 80), "with a jitter of the delay of at most 12.5 ms: "),
+    ],
+)
+@pytest.mark.parametrize("given", [False, True])
+def test_a_nearest_value_is_a_bound_only_where_smaller_values_are_covered(name, value, said, given, task):
+    """A guarantee is of one delay, lag or path; a jitter and a time of averages are bounds of what may happen."""
+    law = qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], step="0.184").law
+    stored = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text(encoding="utf-8"))
+    near = replace(stored, held=Held(law=law, step=STEP, **{name: value}))
+    found = TrackingGuarantee(fault=REAL, proof=NoProof(reason="x"), nearest=(name, near), given=given)
+    assert found.lines()[1].startswith(f"{'this law ' if given else ''}{said}")
 
 
 @pytest.mark.slow

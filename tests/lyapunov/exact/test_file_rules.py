@@ -109,6 +109,39 @@ CASES = {
     ),
     "a power 25": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "25", "s"]])), "wrong exponent"),
     "33 parameters": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 1, ["k"] * 33)), "length <= 32"),
+    "a root of a state": (
+        lambda: hand.rooted_relay() | {"roots": {"s": ["x", "7/5", "3/2"]}},
+        "a root must be of a gain",
+    ),
+    "a state without a field": (
+        lambda: hand.oscillator() | {"field": {"x": hand.oscillator()["field"]["x"]}},
+        "field must have a list of terms for every state",
+    ),
+    "a field without a state": (
+        lambda: hand.edited(hand.relay(), ("field", "y", [])),
+        "field must have a list of terms for every state",
+    ),
+    "a term of zero": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 0, "0")), "a term must not be zero"),
+    "a parameter that is none": (
+        lambda: hand.edited(hand.relay(), ("field", "x", 0, 1, ["q"])),
+        "a term has an unknown parameter",
+    ),
+    "multiplier empty": (
+        lambda: hand.edited(hand.relay(), ("witnesses", 0, "multiplier", {})),
+        "a multiplier must not be empty or long",
+    ),
+    "multiplier of 201 terms": (
+        lambda: hand.edited(hand.relay(), ("witnesses", 0, "multiplier", {f"{i}": "1" for i in range(201)})),
+        "a multiplier must not be empty or long",
+    ),
+    "three squares of one variable": (
+        lambda: hand.edited(hand.relay(), ("witnesses", 0, "squares", [hand.square([0], [[1]], "1/6")] * 3)),
+        "squares are more than 2",
+    ),
+    "gram too long": (
+        lambda: hand.edited(hand.relay(), ("witnesses", 0, "squares", 0, "gram", ["1/2", "1"])),
+        "gram must have an entry for each pair of the basis",
+    ),
     "an exponent off the weight": (
         lambda: hand.edited(hand.relay(), ("field", "x", 0, 2, [["x", "1/2", "s"]])),
         "is no integer",
@@ -136,6 +169,13 @@ def test_what_is_at_the_edge_of_a_rule_is_read():
     assert edge.loop.field["x"][0].factors == (("x", 24, "s"),)
     inner = {"n": hand.X1, "m": [["1", [], [["n", "1", "s"]]]]}
     assert list(read(hand.relay() | {"lifts": inner}).loop.lifts) == ["n", "m"]
+    long = {f"{i}": "1" for i in range(200)}
+    found = read(hand.edited(hand.relay(), ("witnesses", 0, "multiplier", long))).witnesses["positive +"]
+    assert len(found.multiplier) == 200
+    halves = [hand.square([0], [[1]], "1/4")] * 2
+    assert (
+        len(read(hand.edited(hand.relay(), ("witnesses", 0, "squares", halves))).witnesses["positive +"].squares) == 2
+    )
     high = hand.edited(hand.relay(), ("witnesses", 0, "squares", 0, "basis", [[999]]))
     assert read(high).witnesses["positive +"].squares[0].basis == ((999,),)
 

@@ -176,6 +176,15 @@ def test_what_breaks_a_rule_is_not_read(case):
         load(json.dumps(ILL_FORMED[case]))
 
 
+@pytest.mark.parametrize("point", [[], ["1"], ["1", "0", "1"]])
+def test_a_point_has_a_coordinate_for_every_variable(point):
+    negative = {key: entry for key, entry in BY_HAND.items() if key != "sos"}
+    statement, proof = load(json.dumps(negative | {"negative": {"point": ["-1", "0"]}}))
+    assert (proof, statement.variables) == (Point(coordinates=(Fraction(-1), Fraction(0))), ("x", "y"))
+    with pytest.raises(CertificateError, match="point must have 2 coordinates"):
+        load(json.dumps(negative | {"negative": {"point": point}}))
+
+
 @pytest.mark.parametrize(
     "fine",
     [
