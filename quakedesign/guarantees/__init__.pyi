@@ -18,11 +18,8 @@ from .exact.statement import continuous_peaks as continuous_peaks
 from .exact.statement import guarantee as guarantee
 from .exact.stick_slip_guarantee import FaultProof as FaultProof
 from .exact.stick_slip_guarantee import StickSlipProof as StickSlipProof
-from .guarantee_result import TrackingGuarantee as TrackingGuarantee
-from .guarantee_result import answer_sliding as answer_sliding
-from .guarantee_result import attacked as attacked
-from .loop_result import Guarantee as Guarantee
-from .loop_result import PlantGuarantee as PlantGuarantee
+from .result import Guarantee as Guarantee
+from .result import PlantGuarantee as PlantGuarantee
 from .search.adversary import WorstCase as WorstCase
 from .search.adversary import worst_found as worst_found
 from .search.compensated_search import Compensation as Compensation
@@ -43,4 +40,7 @@ from .search.linear_design import farthest_rock as farthest_rock
 from .search.linear_design import longest_delay as longest_delay
 from .search.linear_design import longest_step as longest_step
 from .search.linear_design import tightened as tightened
-from .stick_slip_answer import StickSlipGuarantee as StickSlipGuarantee
+from .sliding_result import guarantee_sliding as guarantee_sliding
+from .stick_slip_result import StickSlipGuarantee as StickSlipGuarantee
+from .tracking_result import TrackingGuarantee as TrackingGuarantee
+from .tracking_result import attacked as attacked

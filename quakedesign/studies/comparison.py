@@ -22,8 +22,8 @@ from quakedesign.guarantees import (
     NoProof,
     attacked,
 )
-from quakedesign.guarantees.guarantee_result import given_answer
-from quakedesign.guarantees.stick_slip_answer import attacked_stick_slip
+from quakedesign.guarantees.stick_slip_result import stick_slip_with_worst_case
+from quakedesign.guarantees.tracking_result import given_with_worst_case
 from quakedesign.laws import Controller, published
 from quakedesign.linear.riccati import vertex_poles
 from quakedesign.linear.sampled_stability import HeldLoop
@@ -230,10 +230,10 @@ def _answer(fault: Fault, design: Design, *, given: bool) -> Guarantee | None:
     if design.sliding is not None:
         return design.sliding
     if found.proved and found.kind == STICK_SLIP:
-        return attacked_stick_slip(fault, found, design.compensation)
+        return stick_slip_with_worst_case(fault, found, design.compensation)
     if given:
         notes = getattr(design.controller, "notes", None)
-        return replace(given_answer(fault, found, notes), compensation=design.compensation)
+        return replace(given_with_worst_case(fault, found, notes), compensation=design.compensation)
     tried = str(design.details.get("not_at_rest", ""))
     answer = replace(attacked(fault, found), compensation=design.compensation, not_at_rest=tried)
     return answer if found.proved or design.runs else replace(answer, given=True)  # no T_s but the fault's was tried

@@ -32,8 +32,8 @@ from quakedesign.guarantees.exact.limit_theorems import (
     smallest_withdrawal,
 )
 from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.guarantee_result import answer_sliding
 from quakedesign.guarantees.search.lqg import near_path, sliding_model
+from quakedesign.guarantees.sliding_result import guarantee_sliding
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Quantity
 from quakedesign.plant import FaultPlant, uncertain_plant
 from quakedesign.simulation.natural import natural_peak
@@ -466,7 +466,7 @@ def _sliding_limits(
     asked = None if stress is None else rational(stress, "stress")
     told = setup if setup is not None and setup.path else None
     through = ExactSetup(diffusion=near_path(model))
-    answer = None if setup is None else answer_sliding(fault, stress=asked, spread=off, setup=through)
+    answer = None if setup is None else guarantee_sliding(fault, stress=asked, spread=off, setup=through)
     found = answer.proof if answer is not None and answer.proof.proved else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
@@ -478,7 +478,7 @@ def _sliding_limits(
     push = SlidingPush(model=model, amplitude=amplitude)
     farthest, rock = longest_diffusion(push, withdrawal, step), (told or IDEAL).diffusion
     if told is not None and (farthest is None or rock <= farthest):
-        behind = answer_sliding(fault, stress=asked, spread=off, setup=ExactSetup.of(told)).proof
+        behind = guarantee_sliding(fault, stress=asked, spread=off, setup=ExactSetup.of(told)).proof
         found = behind if behind.proved else None
         push = replace(push, amplitude=found.task.stress) if found else push
     impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))

@@ -23,8 +23,8 @@ from quakedesign.guarantees import (
     StickSlipProof,
     TrackingProof,
 )
-from quakedesign.guarantees.guarantee_result import SlidingGuarantee
 from quakedesign.guarantees.search.defaults import REACH
+from quakedesign.guarantees.sliding_result import SlidingGuarantee
 from quakedesign.laws import Controller, control_law, control_laws
 from quakedesign.laws.feed_forward import NONE, feed_forward
 from quakedesign.linear.sampled_stability import HeldLoop

@@ -23,10 +23,10 @@ from quakedesign.guarantees import (
 from quakedesign.guarantees.exact.limit_theorems import hopeless, too_slow
 from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
-from quakedesign.guarantees.guarantee_result import answer_sliding
 from quakedesign.guarantees.search.linear_design import nearest_setup
 from quakedesign.guarantees.search.sliding_block_design import sliding_block_guarantee
-from quakedesign.guarantees.stick_slip_answer import answer_stick_slip
+from quakedesign.guarantees.sliding_result import guarantee_sliding
+from quakedesign.guarantees.stick_slip_result import guarantee_stick_slip
 from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
@@ -244,7 +244,7 @@ def guarantee(
             )
         require_known(objective, OBJECTIVES, "objective")
         mode = method_of(family).base_law(uncertain_plant(fault), family, _exact_texts(gains))
-        return answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
+        return guarantee_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
     least = None if stress is None else exact_value(stress, "Pa", "stress")
     off = exact_value(spread, "", "spread")
     if fault.friction.state_names:
@@ -256,7 +256,7 @@ def guarantee(
                 "an initial slip or slip rate, jitter or averaging. Omit these options."
             )
         tell: Any = {} if progress is None else {"tell": progress}
-        return answer_sliding(
+        return guarantee_sliding(
             fault,
             controller=control_law(controller).name,
             step=setup.step,
@@ -276,7 +276,7 @@ def guarantee(
     usual = scheme is None and (method_of(family).takes_base_gains or not wanted.gains)
     if plant is None and usual and may_stick(family, setup, disturbance_class):
         mode = method_of(family).base_law(task, family, wanted.gains)
-        sticking = answer_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
+        sticking = guarantee_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
         if sticking.proof.proved:
             return sticking
         without = sticking.proof.reason

@@ -27,8 +27,8 @@ from quakedesign.guarantees import (
     best_guarantee,
 )
 from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.guarantee_result import FACTOR, given_answer
 from quakedesign.guarantees.search.estimate import spectral_radius
+from quakedesign.guarantees.tracking_result import FACTOR, given_with_worst_case
 from quakedesign.laws import Controller, LinearLaw, SampledController, Signals, SlidingMode, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.laws.sampled_law import steady_states
@@ -382,7 +382,7 @@ class Samples(DesignMethod[SampledController]):
     ) -> TrackingGuarantee:
         """Guarantee with the worst case found, for a law of the errors alone."""
         found = self.guarantee(fault, task, controller, setup)
-        answer = given_answer(fault, found, controller.notes)
+        answer = given_with_worst_case(fault, found, controller.notes)
         if found.proved or found.pressed or found.reason == _STANDING or setup.longest_step:
             return answer
         for factor in _FACTORS:

@@ -23,11 +23,12 @@ from quakedesign.guarantees import (
 )
 from quakedesign.guarantees.exact.limit_theorems import hopeless
 from quakedesign.guarantees.exact.loop import ExactSetup, Held
-from quakedesign.guarantees.guarantee_result import GAINS, answer_sliding
 from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
-from quakedesign.guarantees.stick_slip_answer import TAKEN
+from quakedesign.guarantees.sliding_result import guarantee_sliding
+from quakedesign.guarantees.stick_slip_result import TAKEN
+from quakedesign.guarantees.tracking_result import GAINS
 from quakedesign.laws import Controller, summed_integrals
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.laws.feed_forward import NONE
@@ -188,7 +189,7 @@ def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
         )
     wanted, fault = problem.sliding, problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))
-    answer = answer_sliding(
+    answer = guarantee_sliding(
         fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, setup=ExactSetup(diffusion=path)
     )
     reason = answer.proof.reason if not answer.proof.proved else None

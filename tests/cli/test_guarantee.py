@@ -285,7 +285,7 @@ def test_what_cannot_be_understood_is_one_line(call, arguments, words):
 @pytest.fixture
 def unattacked(monkeypatch):
     """Without the search for the worst, which has tests of its own."""
-    module = import_module("quakedesign.guarantees.guarantee_result")
+    module = import_module("quakedesign.guarantees.tracking_result")
     monkeypatch.setattr(module, "worst_found", lambda *_, **__: None)
 
 

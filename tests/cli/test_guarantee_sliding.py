@@ -11,8 +11,7 @@ from quakedesign.cli import main
 from quakedesign.exact import UpperBound
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.fault.fault_toml import fault_toml
-from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof
-from quakedesign.guarantees import guarantee_result as sliding_answer
+from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof, sliding_result
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.search.sliding_design import WellReach, proved_sliding
@@ -64,10 +63,10 @@ def test_an_estimate_of_the_largest_stress_that_is_too_large_is_lowered_until_it
         tried.append(task.stress)
         return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
 
-    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
-    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
-    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
-    found = sliding_answer.answer_sliding(load_fault("crustal-patch"), setup=ExactSetup(diffusion=Fraction(800)))
+    monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: HELD)
+    monkeypatch.setattr(sliding_result, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
+    monkeypatch.setattr(sliding_result, "proved_sliding", proved)
+    found = sliding_result.guarantee_sliding(load_fault("crustal-patch"), setup=ExactSetup(diffusion=Fraction(800)))
     assert found.proved
     assert tried == [41_000, 36_000, 30_000]
 
@@ -79,17 +78,17 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
         tried.append((log_rate, task.stress))
         return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS)
 
-    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
-    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(stands[log_rate]))
-    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
+    monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: HELD)
+    monkeypatch.setattr(sliding_result, "largest_stress", lambda task, design, *, log_rate: Fraction(stands[log_rate]))
+    monkeypatch.setattr(sliding_result, "proved_sliding", proved)
     fault, half, quarter = load_fault("crustal-patch"), Fraction(1, 2), Fraction(1, 4)
-    assert sliding_answer.answer_sliding(fault, setup=ExactSetup(diffusion=Fraction(800))).task.stress == 7_000
+    assert sliding_result.guarantee_sliding(fault, setup=ExactSetup(diffusion=Fraction(800))).task.stress == 7_000
     assert tried == [(half, 1), (quarter, 7_000)]
     stands[half] = stands[quarter] = stands[Fraction(1, 8)] = 0
-    assert sliding_answer.answer_sliding(fault, setup=ExactSetup(diffusion=Fraction(800))).proof.task.stress == 1
+    assert sliding_result.guarantee_sliding(fault, setup=ExactSetup(diffusion=Fraction(800))).proof.task.stress == 1
     tried.clear()
     assert (
-        sliding_answer.answer_sliding(
+        sliding_result.guarantee_sliding(
             fault, setup=ExactSetup(diffusion=Fraction(800)), stress=Fraction(1, 2)
         ).task.stress
         == half
@@ -99,13 +98,13 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
 
 def test_a_well_that_is_impossible_is_said_to_be_that_before_what_would_do(monkeypatch):
     """Beyond 1.3e6 s for 25 kPa on this fault, whatever law is looked for."""
-    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda *_, **__: NONE)
-    monkeypatch.setattr(sliding_answer, "farthest", lambda *_, **__: WellReach(share=Fraction(1, 2)))
-    monkeypatch.setattr(sliding_answer, "what_would_do", lambda *_, **__: "another")
+    monkeypatch.setattr(sliding_result, "designed_sliding", lambda *_, **__: NONE)
+    monkeypatch.setattr(sliding_result, "farthest", lambda *_, **__: WellReach(share=Fraction(1, 2)))
+    monkeypatch.setattr(sliding_result, "what_would_do", lambda *_, **__: "another")
     fault = load_fault("crustal-patch")
 
     def reason(diffusion, stress):
-        return sliding_answer.answer_sliding(
+        return sliding_result.guarantee_sliding(
             fault, setup=ExactSetup(diffusion=Fraction(diffusion)), stress=stress
         ).proof.reason
 
@@ -120,23 +119,23 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
     def proved(task, design, *, log_rate):
         return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
 
-    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
-    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
-    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
+    monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: HELD)
+    monkeypatch.setattr(sliding_result, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
+    monkeypatch.setattr(sliding_result, "proved_sliding", proved)
     fault, around = load_fault("crustal-patch"), {"diffusion": Fraction(800)}
-    found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof
+    found = sliding_result.guarantee_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof
     assert found.reason == (
         "too much; a proof was found for a stress of at most 20 kPa: give --stress '20 kPa'; somewhat more may do"
     )
     none = NoProof(reason="no law whose loop is stable")
     with monkeypatch.context() as patched:
         found_below = lambda task, step, **around: HELD if task.stress < 35_000 else none  # noqa: E731
-        patched.setattr(sliding_answer, "designed_sliding", found_below)
-        patched.setattr(sliding_answer, "farthest", lambda *_, **__: WellReach(share=Fraction(1)))
-        found = sliding_answer.answer_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof
+        patched.setattr(sliding_result, "designed_sliding", found_below)
+        patched.setattr(sliding_result, "farthest", lambda *_, **__: WellReach(share=Fraction(1)))
+        found = sliding_result.guarantee_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof
     assert found.reason.startswith("no law was found that holds the fault under 40 kPa; a proof was found for a stress")
-    monkeypatch.setattr(sliding_answer, "proved_sliding", lambda task, design, *, log_rate: NONE)
-    assert sliding_answer.answer_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof == NONE
+    monkeypatch.setattr(sliding_result, "proved_sliding", lambda task, design, *, log_rate: NONE)
+    assert sliding_result.guarantee_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof == NONE
 
 
 def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch):
@@ -145,12 +144,12 @@ def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeyp
         return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if quiet else NONE
 
     design = lambda task, step, **more: replace(HELD, slip_noise=more["setup"].slip_noise)  # noqa: E731
-    monkeypatch.setattr(sliding_answer, "designed_sliding", design)
-    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
-    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
+    monkeypatch.setattr(sliding_result, "designed_sliding", design)
+    monkeypatch.setattr(sliding_result, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
+    monkeypatch.setattr(sliding_result, "proved_sliding", proved)
     around = {"diffusion": Fraction(800), "slip_noise": Fraction(1, 10**6)}
     for stress in (None, Fraction(10_000)):
-        found = sliding_answer.answer_sliding(
+        found = sliding_result.guarantee_sliding(
             load_fault("crustal-patch"), stress=stress, setup=ExactSetup(**around)
         ).proof
         assert found.reason == "too much; a proof was found with slip noise of at most 100 nm"
@@ -212,20 +211,20 @@ def test_the_slip_law_is_proved_with_a_smaller_bound_of_the_slip_rate_than_is_tr
 def test_a_pump_that_cannot_hold_what_may_be_asked_for_has_no_guarantee(monkeypatch):
     """The known law asks for -153 kPa to 3.713 MPa under 25 kPa; less stress asks for less."""
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
-    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: known.held)
-    monkeypatch.setattr(sliding_answer, "proved_sliding", lambda task, held, log_rate: replace(known, task=task))
-    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, held, log_rate: Fraction(25000))
+    monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: known.held)
+    monkeypatch.setattr(sliding_result, "proved_sliding", lambda task, held, log_rate: replace(known, task=task))
+    monkeypatch.setattr(sliding_result, "largest_stress", lambda task, held, log_rate: Fraction(25000))
     least, largest = known.valve_pressures
     fault, asked = load_fault("crustal-patch"), {"diffusion": Fraction(833)}
     for stress in (Fraction(25000), None):
-        enough = sliding_answer.answer_sliding(
+        enough = sliding_result.guarantee_sliding(
             fault, stress=stress, setup=ExactSetup(pump=Pump(least=Fraction(least), largest=Fraction(largest)), **asked)
         )
         assert enough.proved
         assert enough.to_dict()["asked_pressure"] == [least.exact, largest.exact]
         for low, high in ((Fraction(least) + 1, Fraction(largest)), (Fraction(-(10**6)), Fraction(largest) - 1)):
             weak = Pump(least=low, largest=high)
-            found = sliding_answer.answer_sliding(fault, stress=stress, setup=ExactSetup(pump=weak, **asked))
+            found = sliding_result.guarantee_sliding(fault, stress=stress, setup=ExactSetup(pump=weak, **asked))
             assert not found.proved
             assert "may be commanded, which a pump of" in found.lines()[0]
 
@@ -234,11 +233,11 @@ def test_the_stresses_that_are_tried_are_told_with_what_came_of_them(monkeypatch
     def proved(task, design, *, log_rate):
         return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 38_000 else NONE
 
-    monkeypatch.setattr(sliding_answer, "designed_sliding", lambda task, step, **around: HELD)
-    monkeypatch.setattr(sliding_answer, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
-    monkeypatch.setattr(sliding_answer, "proved_sliding", proved)
+    monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: HELD)
+    monkeypatch.setattr(sliding_result, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
+    monkeypatch.setattr(sliding_result, "proved_sliding", proved)
     told = []
-    known = sliding_answer.answer_sliding(
+    known = sliding_result.guarantee_sliding(
         load_fault("crustal-patch"),
         setup=ExactSetup(diffusion=Fraction(800)),
         tell=lambda what, done: told.append(what),
@@ -248,6 +247,6 @@ def test_the_stresses_that_are_tried_are_told_with_what_came_of_them(monkeypatch
     assert [what.partition(" Pa")[0] for what in tried] == ["a stress of 4.1e+04"] * 2 + ["a stress of 3.6e+04"] * 2
     assert [what.rpartition(": ")[2] for what in tried] == ["proof", "not proved", "proof", "proved"]
     missing = replace(known, proof=NONE, held=None)
-    monkeypatch.setattr(state_feedback, "answer_sliding", lambda *_, tell, **__: tell("a law", 0.5) or missing)
+    monkeypatch.setattr(state_feedback, "guarantee_sliding", lambda *_, tell, **__: tell("a law", 0.5) or missing)
     synthesise(load_fault("crustal-patch"), "elqr", progress=lambda what, done: told.append(what))
     assert told[-1] == "a law"

@@ -12,7 +12,7 @@ from quakedesign.fault import fault_toml, load_fault
 from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.guarantee_result import SlidingGuarantee
+from quakedesign.guarantees.sliding_result import SlidingGuarantee
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.studies import performance_limits as impossible_and_proved
 
@@ -86,7 +86,7 @@ def test_a_disturbance_may_be_a_shear_stress(capsys):
 def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(capsys, monkeypatch, tmp_path):
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     answer = SlidingGuarantee(proof=known, task=known.task, held=known.held)
-    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
+    monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0
     said = capsys.readouterr().out
     assert said.splitlines()[1] == "(any shear stress of at most 25 kPa, T_s = 300 s)"
@@ -98,7 +98,7 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
         name: (Fraction(95, 100) * low, Fraction(105, 100) * high) for name, (low, high) in known.task.ranges.items()
     }
     wide = replace(known, task=replace(known.task, ranges=ranges))
-    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **_: replace(answer, proof=wide))
+    monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **_: replace(answer, proof=wide))
     assert run("crustal-patch") == 0
     assert "for a, b and D_c within 0.05 of their values, on" in " ".join(capsys.readouterr().out.split())
     assert "linearised about slow sliding" in said
@@ -119,7 +119,7 @@ def test_a_covered_spread_is_rounded_inward(half_width, said, capsys, monkeypatc
     ranges = {name: ((1 - half_width) * low, (1 + half_width) * low) for name, (low, _) in known.task.ranges.items()}
     wide = replace(known, task=replace(known.task, ranges=ranges))
     answer = SlidingGuarantee(proof=wide, task=wide.task, held=wide.held)
-    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **_: answer)
+    monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **_: answer)
     assert run("crustal-patch") == 0
     assert f"for a, b and D_c within {said} of their values, on" in " ".join(capsys.readouterr().out.split())
 
@@ -151,7 +151,7 @@ def test_where_no_design_stands_a_stress_the_reason_is_told(capsys, monkeypatch)
     """A sampling time that suits no law would else look like a missing option."""
     none = NoProof(reason="T_s near 0.51 s suits")
     answer = SlidingGuarantee(proof=none, task=None, held=None)
-    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
+    monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch") == 2
     assert "no design was found that withstands any: T_s near 0.51 s suits. Give --stress" in capsys.readouterr().err
 
@@ -163,7 +163,7 @@ def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, m
     file.write_text(fault_toml(patch))
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     answer = SlidingGuarantee(proof=known, task=known.task, held=known.held)
-    monkeypatch.setattr(impossible_and_proved, "answer_sliding", lambda fault, **asked: answer)
+    monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **asked: answer)
     assert run(str(file)) == 0
     assert "errors of this fault oscillate while they grow, or do not grow" in " ".join(capsys.readouterr().out.split())
 
@@ -177,7 +177,7 @@ def test_both_sides_are_of_the_stress_that_the_design_behind_the_well_stands(mon
         found = known.get(setup.diffusion, NoProof(reason="too far"))
         return SlidingGuarantee(proof=found, task=near.task, held=None)
 
-    monkeypatch.setattr(impossible_and_proved, "answer_sliding", answered)
+    monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", answered)
     sides = {}
     for diffusion in ("800 s", "900 s", "1000 s"):
         assert run("crustal-patch", "--diffusion", diffusion, "--json") == 0
@@ -201,7 +201,7 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
         spreads.append(spread)
         return SlidingGuarantee(proof=known, task=known.task, held=known.held)
 
-    monkeypatch.setattr(impossible_and_proved, "answer_sliding", answered)
+    monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", answered)
     patch = ("crustal-patch", "--stress", "25 kPa")
     assert run(*patch, "--well", "40 m", "--diffusivity", "2 m^2/s", "--lag", "5 s") == 0
     told = " ".join(capsys.readouterr().out.split())

@@ -21,7 +21,7 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.guarantee_result import SlidingGuarantee
+from quakedesign.guarantees.sliding_result import SlidingGuarantee
 from quakedesign.report.figures import cycle, errors, overviews, slow_sliding
 from quakedesign.report.folder import write_folder
 from quakedesign.report.page import accounts, parameter_rows
@@ -53,7 +53,7 @@ def comparison():
     still = simulate_state(SHORT, 1e-9, duration=1e7, inertia=False, method="dop853")
     natural = state_runs.StateRun(fault=SHORT, loading_rate=1e-9, start=sliding(SHORT, 1e-9), trajectory=still)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(state_feedback, "answer_sliding", lambda fault, **asked: answer)
+        patched.setattr(state_feedback, "guarantee_sliding", lambda fault, **asked: answer)
         patched.setattr(compared_in, "natural_run", lambda fault: natural)
         return compare(SHORT, [design(SHORT, "elqr")])
 
@@ -137,7 +137,7 @@ def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(compar
     )
     guarantee = comparison.entries[0].guarantee
     none = SlidingGuarantee(proof=NoProof(reason=why), task=guarantee.task, held=None)
-    monkeypatch.setattr(state_feedback, "answer_sliding", lambda fault, **asked: none)
+    monkeypatch.setattr(state_feedback, "guarantee_sliding", lambda fault, **asked: none)
     monkeypatch.setattr(compared_in, "natural_run", lambda fault: comparison.uncontrolled)
     without, told = compare(SHORT, [design(SHORT, "elqr")]), io.StringIO()
     assert accounts(without)[0].verdict == ["undecided"]
@@ -209,7 +209,7 @@ def test_without_a_diffusion_the_well_is_near(monkeypatch):
         asked.update(told)
         raise ParameterError("enough")
 
-    monkeypatch.setattr(state_feedback, "answer_sliding", answer)
+    monkeypatch.setattr(state_feedback, "guarantee_sliding", answer)
     with pytest.raises(ParameterError, match="enough"):
         design(PATCH, "elqr", stress="25000")
     setup = ExactSetup(diffusion=Fraction(800))

@@ -26,7 +26,7 @@ REAL = qd.load_fault("real-fault")
 GUARANTEE, FEEDBACK, SLIDING = (
     import_module(f"quakedesign.synthesis.{name}") for name in ("guarantee", "state_feedback", "sliding_mode_design")
 )
-ANSWER = import_module("quakedesign.guarantees.stick_slip_answer")
+ANSWER = import_module("quakedesign.guarantees.stick_slip_result")
 NONE = NoProof(reason="no polytope")
 
 
@@ -74,7 +74,7 @@ def test_a_design_without_that_proof_falls_back_and_says_why(monkeypatch, plain)
 )
 def test_loops_that_the_theorem_does_not_know_are_proved_without_stick(monkeypatch, plain, asked):
     monkeypatch.setattr(FEEDBACK, "design_stick_slip", None)
-    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", None)
+    monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", None)
     sampled = SimpleNamespace(runs=plain, reason="", premises=tuple)
     monkeypatch.setattr(FEEDBACK, "sampled_design", lambda *_, **__: sampled)
     monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
@@ -94,14 +94,14 @@ def test_a_design_hands_down_what_the_theorem_takes(monkeypatch, sticking):
 
 def test_a_guarantee_hands_down_what_the_theorem_takes(monkeypatch, sticking):
     seen, answer = {}, StickSlipGuarantee(fault=REAL, proof=sticking)
-    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda fault, setup, **given: seen.update(given) or answer)
+    monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", lambda fault, setup, **given: seen.update(given) or answer)
     assert qd.guarantee(REAL, objective="peak", progress=print) is answer
     assert seen == {"objective": "peak", "sliding": None, "progress": print}
 
 
 def test_a_sliding_mode_is_guaranteed_on_the_stick_slip_plant_with_its_base_gains(monkeypatch, sticking):
     seen, answer = [], StickSlipGuarantee(fault=REAL, proof=sticking)
-    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, sliding, **__: seen.append(sliding) or answer)
+    monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", lambda *_, sliding, **__: seen.append(sliding) or answer)
     monkeypatch.setattr(GUARANTEE, "_sampled", None)
     asked = [{}, {"gains": ("7", "6", "2.3", "1.1")}, {"scheme": "stick-slip"}, {"plant": "stick-slip"}]
     assert all(qd.guarantee(REAL, "cta", **given) is answer for given in asked)
@@ -113,7 +113,7 @@ def test_a_sliding_mode_is_guaranteed_on_the_stick_slip_plant_with_its_base_gain
     "asked", [{"plant": "printed"}, {"scheme": "compensated"}, {"rate_noise": "1 um/s"}, {"disturbance_class": "rate"}]
 )
 def test_a_sliding_mode_is_guaranteed_without_stick_where_that_is_asked_for(monkeypatch, asked):
-    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", None)
+    monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", None)
     monkeypatch.setattr(GUARANTEE, "_sampled", lambda *_: NONE)
     assert qd.guarantee(REAL, "cta", **asked) is NONE
 
@@ -184,19 +184,19 @@ def test_where_no_scale_makes_the_step_deadbeat_there_is_no_guarantee(monkeypatc
     ids=lambda given: next(iter(given)),
 )
 def test_other_laws_are_guaranteed_without_stick(monkeypatch, given):
-    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", None)
+    monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", None)
     monkeypatch.setattr(GUARANTEE, "_sampled", lambda *_: NONE)
     assert qd.guarantee(REAL, **given) is NONE
 
 
 def test_a_guarantee_takes_the_first_that_is_proved(monkeypatch, sticking, plain):
     answer = StickSlipGuarantee(fault=REAL, proof=sticking)
-    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, **__: answer)
+    monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", lambda *_, **__: answer)
     assert qd.guarantee(REAL) is answer
     assert answer.lines()[-1].startswith(
         "no controller with zero-order hold over T_s = 0.184 s keeps the slip rate below 1"
     )
-    monkeypatch.setattr(GUARANTEE, "answer_stick_slip", lambda *_, **__: replace(answer, proof=NONE))
+    monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", lambda *_, **__: replace(answer, proof=NONE))
     monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
     monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: TrackingGuarantee(fault=fault, proof=found))
     found = qd.guarantee(REAL)

@@ -20,7 +20,7 @@ import quakedesign as qd
 from quakedesign.checking import check_files
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.guarantees import guarantee_result
+from quakedesign.guarantees import tracking_result
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, save_guarantee
 from quakedesign.laws import NominalModel
 from quakedesign.loop import held_loop
@@ -87,8 +87,8 @@ def referred():
 @pytest.fixture
 def stuck(monkeypatch):
     """A quick search that finds the same on the stick-slip plant whatever the law."""
-    seen = guarantee_result.WorstCase(slip_error=1e-3, slip_rate_error=2e-5)
-    monkeypatch.setattr(guarantee_result, "worst_found", lambda claim, sticks=False: seen)
+    seen = tracking_result.WorstCase(slip_error=1e-3, slip_rate_error=2e-5)
+    monkeypatch.setattr(tracking_result, "worst_found", lambda claim, sticks=False: seen)
 
 
 def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
@@ -116,7 +116,7 @@ def test_no_search_of_the_stick_slip_plant_is_said_of_laws_that_it_does_not_take
     gap = "on the stick-slip plant nothing is proved for a given law, and its worst case is not searched"
     assert referred.stick_slip_gap.startswith(gap)
     assert referred.to_dict()["worst_found_with_stick"] is None
-    monkeypatch.setattr(guarantee_result, "growth_at_rest", lambda law, step: 0.5)  # e-fold in 0.5 s at rest
+    monkeypatch.setattr(tracking_result, "growth_at_rest", lambda law, step: 0.5)  # e-fold in 0.5 s at rest
     assert replace(found).stick_slip_gap.startswith(gap)
     assert replace(found).to_dict()["worst_found_with_stick"] is None
 

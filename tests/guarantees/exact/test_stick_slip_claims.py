@@ -23,7 +23,7 @@ from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip, gap, ranges, stick_slip_bounds, stop_bounds
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip, worst_stick_slip
-from quakedesign.guarantees.stick_slip_answer import StickSlipGuarantee
+from quakedesign.guarantees.stick_slip_result import StickSlipGuarantee
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.lyapunov import Verdict
@@ -461,7 +461,7 @@ def test_what_the_theorem_does_not_know_is_refused(given):
 def test_a_disturbance_of_bounded_rate_is_one_of_bounded_amplitude(disturbance_class, proof, monkeypatch):
     module = import_module("quakedesign.synthesis.guarantee")
     monkeypatch.setattr(
-        module, "answer_stick_slip", lambda fault, *_, **__: StickSlipGuarantee(fault=fault, proof=proof)
+        module, "guarantee_stick_slip", lambda fault, *_, **__: StickSlipGuarantee(fault=fault, proof=proof)
     )
     fault = qd.load_fault("real-fault")
     answer = qd.guarantee(fault, plant="stick-slip", disturbance_class=disturbance_class)

@@ -68,7 +68,7 @@ def test_a_law_has_one_bound_however_it_is_asked_for(monkeypatch):
     found = designed("real").guarantee
     assert found.slow_gain is not None
     assert found.claims.slip_rate_error < guarantee(found.task, found.held).claims.slip_rate_error * F(3, 4)
-    monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_found", lambda *_, **__: None)
+    monkeypatch.setattr("quakedesign.guarantees.tracking_result.worst_found", lambda *_, **__: None)
     assert qd.guarantee(REAL).proof == assess(REAL, designed("real").controller).guarantee == found
 
 

@@ -10,7 +10,6 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault, Reference, friction_law
 from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof
 from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.guarantee_result import _beyond
 from quakedesign.guarantees.search import sliding_design
 from quakedesign.guarantees.search.sliding_design import (
     LOG_RATES,
@@ -20,6 +19,7 @@ from quakedesign.guarantees.search.sliding_design import (
     suitable,
     what_would_do,
 )
+from quakedesign.guarantees.sliding_result import _beyond
 from quakedesign.laws import LinearLaw
 from quakedesign.plant import WHOLE, slow_sliding_plant
 from quakedesign.studies.performance_limits import limits

@@ -18,11 +18,11 @@ from quakedesign.guarantees import Held, SlidingClaims
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.exact.sliding_small_gain import cell_bounds
-from quakedesign.guarantees.guarantee_result import answer_sliding
 from quakedesign.guarantees.search import sliding_design as slow_sliding
 from quakedesign.guarantees.search.adversary import SlidingPieces, corners, courses, worst_sliding
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
 from quakedesign.guarantees.search.sliding_design import LOG_RATES, proved_sliding
+from quakedesign.guarantees.sliding_result import guarantee_sliding
 from quakedesign.loop import SlidingModel
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import SlidingPlant
@@ -165,7 +165,7 @@ def test_where_the_way_has_taken_normal_stress_the_same_stress_does_more():
 @pytest.mark.slow
 def test_on_a_preset_the_search_comes_to_what_an_adversary_with_inertia_found():
     """1.220 V, by an ascent along the adjoint of the plant with inertia; 1.202 V before the way counted."""
-    found = answer_sliding(load_fault("crustal-patch"), setup=ExactSetup(diffusion=F(833)))
+    found = guarantee_sliding(load_fault("crustal-patch"), setup=ExactSetup(diffusion=F(833)))
     assert 1.2195 < math.exp(worst_sliding(found.proof).log_rate)
     assert worst_sliding(found.proof).log_rate < found.proof.claims.log_rate
 

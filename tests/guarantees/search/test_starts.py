@@ -131,7 +131,7 @@ def called(capsys, *arguments):
 @pytest.mark.slow
 def test_the_command_says_from_where(capsys, monkeypatch):
     seen = WorstCase(slip_error=1e-5, slip_rate_error=1e-4)
-    monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_found", lambda *_, **__: seen)
+    monkeypatch.setattr("quakedesign.guarantees.tracking_result.worst_found", lambda *_, **__: seen)
     code, said = called(
         capsys, "real-fault", *GAINS, "--initial-slip", "0.01 mm", "--initial-slip-rate", "0.04 mm/s", "--json"
     )

@@ -11,9 +11,10 @@ from quakedesign.errors import CertificateError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import NoProof, PlantGuarantee, TrackingProof
 from quakedesign.guarantees.exact.plant_guarantee import PlantProof
-from quakedesign.guarantees.guarantee_result import SlidingGuarantee, TrackingGuarantee
 from quakedesign.guarantees.search.adversary import WorstCase
-from quakedesign.guarantees.stick_slip_answer import StickSlipGuarantee
+from quakedesign.guarantees.sliding_result import SlidingGuarantee
+from quakedesign.guarantees.stick_slip_result import StickSlipGuarantee
+from quakedesign.guarantees.tracking_result import TrackingGuarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
@@ -109,7 +110,7 @@ def test_a_result_about_an_own_plant_has_its_peaks_by_name():
 def test_worst_slow_sliding_is_given_by_name(monkeypatch):
     slow = stored("slow_sliding")
     seen = WorstCase(log_rate=0.1, slip_error=2e-6)
-    monkeypatch.setattr("quakedesign.guarantees.guarantee_result.worst_sliding", lambda _: seen)
+    monkeypatch.setattr("quakedesign.guarantees.sliding_result.worst_sliding", lambda _: seen)
     assert SlidingGuarantee(proof=slow, task=slow.task, held=slow.held).worst_case == {
         "log_rate": 0.1,
         "slip_error": 2e-6,

@@ -11,7 +11,7 @@ from quakedesign.fault import Fault
 from quakedesign.guarantees.exact.limit_theorems import smallest_stick_slip_rate
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
-from quakedesign.guarantees.loop_result import Guarantee
+from quakedesign.guarantees.result import Guarantee
 from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.guarantees.search.compensated_search import Compensation, design_sticking
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip, worst_stick_slip
@@ -97,7 +97,7 @@ TAKEN = frozenset({"step", "slip_noise", "longest_step"})
 """Quantities of a loop setup that the theorem knows."""
 
 
-def answer_stick_slip(
+def guarantee_stick_slip(
     fault: Fault,
     setup: LoopSetup,
     *,
@@ -137,15 +137,15 @@ def answer_stick_slip(
     wanted: Any = {"objective": objective, "slip_noise": setup.slip_noise, "healing": healing, "tell": tell}
     wanted["longest_step"] = setup.longest_step
     if sliding is None:
-        return attacked_stick_slip(fault, design_stick_slip(task, step, **wanted))
+        return stick_slip_with_worst_case(fault, design_stick_slip(task, step, **wanted))
     made = design_sticking(task, sliding, step, **wanted)
     if isinstance(made, NoProof):
-        return attacked_stick_slip(fault, made)
+        return stick_slip_with_worst_case(fault, made)
     assert isinstance(made.proof, StickSlipProof)
-    return attacked_stick_slip(fault, made.proof, made)
+    return stick_slip_with_worst_case(fault, made.proof, made)
 
 
-def attacked_stick_slip(
+def stick_slip_with_worst_case(
     fault: Fault, found: StickSlipProof | NoProof, compensation: Compensation | None = None
 ) -> StickSlipGuarantee:
     """A guarantee with the worst case found on its loop."""

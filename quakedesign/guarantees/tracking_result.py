@@ -1,57 +1,28 @@
-"""Results of `quakedesign.guarantee` without stick and in slow sliding: proof, worst case found, limits.
+"""Results of `quakedesign.guarantee` on the plant without stick: proof, worst case found, limits, nearest setup."""
 
-One class for loops on a moving reference, and one for rate-and-state faults in slow sliding.
-"""
-
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from math import exp
 from typing import Any
 
-import numpy as np
-
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.exact import LowerBound, UpperBound, exact_text, float_above, rational, shortly
+from quakedesign.exact import LowerBound, UpperBound, exact_text, float_above, shortly
 from quakedesign.fault import Fault
-from quakedesign.fault.fault_toml import AGEINGS
-from quakedesign.guarantees.exact.limit_theorems import SlidingPush, SmallestPeak, longest_diffusion, smallest_peak
-from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup, Held
+from quakedesign.guarantees.exact.limit_theorems import SmallestPeak, smallest_peak
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.statement import SlidingProof, TrackingProof, guarantee
-from quakedesign.guarantees.loop_result import Guarantee
-from quakedesign.guarantees.search.adversary import WorstCase, worst_found, worst_sliding
+from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
+from quakedesign.guarantees.result import Guarantee
+from quakedesign.guarantees.search.adversary import WorstCase, worst_found
 from quakedesign.guarantees.search.compensated_search import Compensation
 from quakedesign.guarantees.search.linear_design import AMPLITUDE, BOX, SATURATION
-from quakedesign.guarantees.search.lqg import measured_by, sliding_model
-from quakedesign.guarantees.search.sliding_design import (
-    LOG_RATES,
-    Prove,
-    WellReach,
-    designed_sliding,
-    farthest,
-    largest_stress,
-    proved_sliding,
-    quieter,
-    suitable,
-    two_digits,
-    what_would_do,
-    with_noise,
-)
+from quakedesign.guarantees.search.lqg import measured_by
 from quakedesign.laws import LinearLaw, RestLimit
 from quakedesign.laws.sampled_controller import growth_at_rest, warning_at_rest
-from quakedesign.loop.loop_setup import MEASURED, Pump
+from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant.of_fault import slow_sliding_plant
-from quakedesign.plant.sliding_plant import SlidingPlant
 from quakedesign.sos.exact.strict import written
 from quakedesign.text import quantity
-
-# ----------------------------------------------------------------------
-# What is guaranteed of a controller on a fault as it runs, beside the worst that a search finds.
 
 _TOLD = (
     "step",
@@ -370,7 +341,7 @@ def attacked(fault: Fault, found: TrackingProof | NoProof) -> TrackingGuarantee:
     return seen if found.slow_gain is None or not seen.leaves_with_stick else _with_room(seen, found)
 
 
-def given_answer(
+def given_with_worst_case(
     fault: Fault, found: TrackingProof | NoProof, notes: tuple[str, ...] | None = None
 ) -> TrackingGuarantee:
     """The guarantee of a given law with the worst case found, for a law of the errors alone."""
@@ -412,228 +383,3 @@ def _law(law: LinearLaw) -> dict[str, Any]:
     matrices = {name: written(getattr(law, name)) for name in ("update", "measured")}
     rows = {name: written(getattr(law, name)) for name in ("output", "feedback", "applied")}
     return {**of_root, "states": list(law.states), **matrices, **rows}
-
-
-# ----------------------------------------------------------------------
-# What is guaranteed of a law that holds a rate-and-state fault in slow sliding, as `guarantee` says it.
-
-Tell = Callable[[str, float], None]
-"""Of what is being done, and the fraction done [-]."""
-_TRIFLE = Fraction(1)  # stress [Pa] that is tried where a law is estimated to stand none: another law may stand more
-_SEARCHED = 0.8  # of the work, when a law of a search is proved
-_SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of an estimate that may be too large
-
-
-@dataclass(frozen=True, kw_only=True)
-class SlidingGuarantee(Guarantee):
-    """Guarantee of slow sliding, or the reason why there is none.
-
-    Attributes
-    ----------
-    proof : SlidingProof or NoProof
-    task : SlidingPlant
-    held : Held or None
-        The law as it runs; None where no law was found.
-    """
-
-    proof: SlidingProof | NoProof
-    task: SlidingPlant
-    held: Held | None
-    compensation: None = None
-
-    @cached_property
-    def worst(self) -> WorstCase | None:
-        """Worst case found (lower bound); some tenths of a second for every corner of the box."""
-        return worst_sliding(self.proof) if self.proof.proved else None
-
-    def lines(self) -> list[str]:
-        """For people."""
-        if self.worst is None:
-            return [self.proof.sentence()]
-        seen = f"slip error {quantity(self.worst.slip_error, 'm')}, slip rate {exp(self.worst.log_rate or 0):.4g} V"
-        return [f"proved: {self.proof.sentence()}", f"worst case found without inertia: {seen}"]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI; exact numbers as texts."""
-        seen = self.worst and {"log_rate": self.worst.log_rate, "slip_error": self.worst.slip_error}
-        return super().to_dict() | ({"worst_found": seen} if self.proved else {})
-
-
-def answer_sliding(
-    fault: Fault,
-    *,
-    controller: str = "elqr",
-    step: Fraction | None = None,
-    stress: Fraction | None = None,
-    spread: Fraction = Fraction(0),
-    tell: Tell = lambda what, done: None,
-    setup: ExactSetup = PLAIN,
-) -> SlidingGuarantee:
-    """Design and prove a law for a rate-and-state fault at the mean rate of its task.
-
-    Parameters
-    ----------
-    fault : Fault
-    controller : str
-        ``elqr``.
-    step : Fraction, optional
-        T_s [s]; the fault's unless given.
-    stress : Fraction, optional
-        Bound of the shear stress disturbance [Pa]; the largest that the design is seen to stand unless given.
-    spread : Fraction
-        By how much of their values a, b and D_c may be off [-].
-    tell : callable, optional
-        Called with what is being done and the fraction done [-].
-    setup : ExactSetup
-        With a lag or a diffusion path. All pressures of a proof are within the limits of its pump.
-
-    Raises
-    ------
-    ParameterError, UnsupportedError
-    """
-    box = fault.box
-    if controller != "elqr" or any((box.stiffness, box.damping, box.authority)):
-        raise UnsupportedError(
-            "slow sliding has a guarantee for the controller elqr, with the box of a, b and D_c given by --spread; "
-            "sliding modes do not apply, since the slip rate responds to the pressure without delay. Received the "
-            f"controller {controller} and the box {box.name}. Give --controller elqr, --box paper and --spread."
-        )
-    if not 0 <= spread < 1:
-        meant = f": {float(spread):g} % is {float(spread) / 100:g}" if 1 <= spread < 100 else ""
-        raise ParameterError(f"spread must be from 0 to below 1. Received {shortly(spread)}. Give a fraction{meant}.")
-    if stress is not None and stress <= 0:
-        raise ParameterError(
-            f"stress must be positive. Received {shortly(stress)} Pa. Omit stress for the largest that can be proved."
-        )
-    if not (setup.lag or setup.diffusion):
-        raise ParameterError(
-            "slow sliding needs a diffusion path or a lag between well and fault. Received neither. Give --diffusion, "
-            "such as '833 s', or --lag."
-        )
-    held_over = rational(fault.sampling_time) if step is None else step
-    task = slow_sliding_plant(fault, stress or _TRIFLE, spread)
-    pump, setup = setup.pump, replace(setup, pump=None)
-    if pump is not None and pump.rate is not None:
-        raise ParameterError(
-            "slow sliding has no guarantee with the rate limit of a pump. Received the rate limit "
-            f"{shortly(pump.rate)} Pa/s. Omit the rate limit."
-        )
-    prove = _proof(pump, tell, given=stress is not None)
-    tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
-    answer, reach, remedy = _answer(task, held_over, LOG_RATES[0], setup, prove), WellReach(share=Fraction(1)), ""
-    if answer.held is None:
-        tell("how far the well may be", 0.3)
-        reach = farthest(task, suitable(task, held_over), setup, stressed=stress is not None)
-        remedy = _remedy(fault, task, held_over, reach, setup, prove, spread)
-    for log_rate in LOG_RATES[1:]:
-        if (answer.proved and (stress or answer.task.stress > _TRIFLE)) or reach.share < 1:
-            break
-        tell(f"a law for |ln(v/V)| up to {log_rate}", _SEARCHED)
-        smaller = _answer(task, held_over, log_rate, setup, prove, reach.numbers)
-        more = smaller.proved and (not answer.proved or smaller.task.stress > answer.task.stress)
-        answer = smaller if more else answer
-    if not answer.proof.proved and not remedy and stress:
-        pumped = replace(setup, pump=pump)
-        remedy = _under_less(answer_sliding(fault, step=step, spread=spread, tell=tell, setup=pumped))
-        if remedy and answer.held is None:
-            none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
-            answer = replace(answer, proof=NoProof(reason=none))
-    if not answer.proof.proved and not remedy:
-        remedy = _with_less_noise(task, held_over, setup, prove)
-    if not answer.proof.proved:
-        why = (stress and _beyond(fault, stress, setup)) or answer.proof.reason
-        return replace(answer, proof=replace(answer.proof, reason="; ".join(filter(None, (why, remedy)))))
-    return answer
-
-
-def _beyond(fault: Fault, stress: Fraction, setup: ExactSetup) -> str:
-    """Why no controller holds the fault under a stress [Pa] through its rock; empty where that is not proved."""
-    most = rational(fault.effective_normal_stress)
-    push = SlidingPush(model=sliding_model(fault), amplitude=stress)
-    far = longest_diffusion(push, most, Fraction(0))
-    if far is None or setup.diffusion <= far:
-        return ""
-    return (
-        f"no controller whose pressure stays within {LowerBound(most).quantity('Pa')} of what the reference needs can "
-        f"hold the fault through rock of L^2/D above {far.quantity('s')} (nominal parameters, linearised, against this "
-        "stress from one time on)"
-    )
-
-
-def _under_less(answer: SlidingGuarantee) -> str:
-    """The stress for which a proof was found that is not for the one that was asked for; empty without one."""
-    if not answer.proved:
-        return ""
-    most = LowerBound(answer.task.stress).quantity("Pa")
-    return f"a proof was found for a stress of at most {most}: give --stress '{most}'; somewhat more may do"
-
-
-def _with_less_noise(task: SlidingPlant, step: Fraction, setup: ExactSetup, prove: Prove) -> str:
-    """A bound of the slip noise for which a proof was found, all else as it is; empty without one."""
-    for noise in quieter(setup):
-        if _answer(task, step, LOG_RATES[0], replace(setup, slip_noise=noise), prove).proved:
-            return f"a proof was found {with_noise(noise, setup).rstrip()}"
-    return ""
-
-
-def _remedy(
-    fault: Fault,
-    task: SlidingPlant,
-    step: Fraction,
-    reach: WellReach,
-    setup: ExactSetup,
-    prove: Prove,
-    spread: Fraction,
-) -> str:
-    """Which T_s, V or path would do; empty where a law was followed through all of the path at the T_s asked for."""
-    if reach.share < 1:
-        return what_would_do(fault, task, reach, setup, prove, spread=spread)
-    suits = suitable(task, step)
-    near = f"T_s near D_c/({AGEINGS:g} V), here {float(suits):.2g} s, suits: set sampling_time in [task]"
-    return "" if suits == step else near
-
-
-def _proof(pump: Pump | None, tell: Tell, *, given: bool) -> Prove:
-    """Proofs whose pressures the pump can hold, under the task's stress if that is given, or about the largest."""
-
-    def tried(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingProof | NoProof:
-        under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
-        tell(f"{under}: proof", _SEARCHED)
-        found = _held_by(pump, proved_sliding(task, held, log_rate=log_rate))
-        tell(f"{under}: {'proved' if found.proved else 'not proved'}", _SEARCHED)
-        return found
-
-    def about_the_largest(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingProof | NoProof:
-        most = largest_stress(task, held, log_rate=log_rate)
-        found: SlidingProof | NoProof
-        for share in _SHARES if most else _SHARES[:1]:
-            found = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), held, log_rate)
-            if found.proved:
-                break
-        return found
-
-    return tried if given else about_the_largest
-
-
-def _answer(
-    task: SlidingPlant,
-    step: Fraction,
-    log_rate: Fraction,
-    setup: ExactSetup,
-    prove: Prove,
-    near: np.ndarray | None = None,
-) -> SlidingGuarantee:
-    """With |ln(v/V)| at most `log_rate`, searched near the numbers of a law as well if they are told."""
-    design = designed_sliding(task, step, log_rate=log_rate, near=near, setup=setup)
-    if isinstance(design, NoProof):
-        return SlidingGuarantee(proof=design, task=task, held=None)
-    proved = prove(task, design, log_rate)
-    return SlidingGuarantee(proof=proved, task=proved.task if proved.proved else task, held=design)
-
-
-def _held_by(pump: Pump | None, found: SlidingProof | NoProof) -> SlidingProof | NoProof:
-    """A guarantee whose pressures at the valve the pump can hold."""
-    if pump is None or not found.proved:
-        return found
-    too_much = pump.exceeded(*found.valve_pressures)
-    return NoProof(reason=too_much) if too_much else found

@@ -12,7 +12,7 @@ from quakedesign.guarantees import TrackingGuarantee, WorstCase, attacked, guara
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 
-MODULE = import_module("quakedesign.guarantees.guarantee_result")
+MODULE = import_module("quakedesign.guarantees.tracking_result")
 FILE = Path(__file__).parents[2] / "proofs" / "certificates" / "guarantee_real-fault.json"
 SLOW = parse_guarantee(FILE.read_text())
 WIDE = guarantee(SLOW.task, SLOW.held)
