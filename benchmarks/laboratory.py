@@ -26,7 +26,7 @@ import sympy as sp
 from quakedesign.fault import Disturbance, Fault, load_fault
 from quakedesign.files import temporary_folder
 from quakedesign.guarantees import TrackingProof
-from quakedesign.guarantees.guarantee_result import TrackingGuarantee
+from quakedesign.guarantees.tracking_result import TrackingGuarantee
 from quakedesign.laws import Controller, published
 from quakedesign.loop import Actuator, Delay, Lag, Saturation, simulation_scheme
 from quakedesign.loop.actuators.base import Stage

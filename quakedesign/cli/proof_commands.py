@@ -299,7 +299,7 @@ def attraction(
     """
     from quakedesign.sos import Answer, Attraction, Region, region_of_attraction, save_attraction, stability
     from quakedesign.sos.exact.attraction import read_field
-    from quakedesign.sos.exact.words import region_facts, region_words
+    from quakedesign.sos.exact.words import region_entries, region_words
 
     began = perf_counter()
     for path, what in ((out, "proof file"), (above, "refutation file"), (inclusion, "proof file")):
@@ -325,5 +325,5 @@ def attraction(
             proof.save(path) if isinstance(proof, Answer) else save_attraction(proof, path)
     seconds = perf_counter() - began
     lines = [*region_words(region), f"{seconds:.2f} s; checked in exact arithmetic"]
-    output.show({**region_facts(region), **written, "seconds": seconds}, lines)
+    output.show({**region_entries(region), **written, "seconds": seconds}, lines)
     return 0 if region.proved is not None else 1

@@ -176,11 +176,11 @@ class BlockChain:
     @cached_property
     def springs(self) -> tuple[tuple[int, int, Fraction], ...]:
         """(i, j, K): block j pulls block i by K [1/s²] per metre of slip between them, G/(ρ·distance·length of i)."""
-        wave, found = rational(self.fault.shear_modulus) / rational(self.fault.density), []
+        wave, springs = rational(self.fault.shear_modulus) / rational(self.fault.density), []
         for i, j in pairwise(range(len(self.blocks))):
             distance = self.middles[j] - self.middles[i]
-            found += [(a, b, wave / (distance * self.lengths[a])) for a, b in ((i, j), (j, i))]
-        return tuple(found)
+            springs += [(a, b, wave / (distance * self.lengths[a])) for a, b in ((i, j), (j, i))]
+        return tuple(springs)
 
     @cached_property
     def faults(self) -> tuple[Fault, ...]:
@@ -241,7 +241,7 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
     wells = [_position(table) for table in tables["well"]]
     for key in tables:
         for place, table in enumerate(tables[key], 1):
-            problems.found += [type(one)(f"{key} {place}: {one}") for one in table.problems.found]
+            problems.errors += [type(one)(f"{key} {place}: {one}") for one in table.problems.errors]
     fault = problems.resolved(fault, str(source))
     parts = {"fault": fault.with_box(box) if box else fault, "blocks": tuple(blocks), "wells": tuple(wells)}
     return problems.resolved(along.built(BlockChain, parts | values), str(source))

@@ -112,7 +112,7 @@ class Table:
 
     def __init__(self, entries: Mapping[str, Any], problems: Problems, where: str = "") -> None:
         self.entries, self.problems, self.where = entries, problems, where
-        self._known: list[str] = []
+        self._keys: list[str] = []
         self._missing: list[str] = []
 
     def read(self, entries: Mapping[str, FileEntry], quantity: Reader = si_value) -> dict[str, Any]:
@@ -147,7 +147,7 @@ class Table:
         value = self.entries.get(key, default)
         if isinstance(value, dict):
             return self.table(key, optional=True)
-        self._known.append(key)
+        self._keys.append(key)
         with self.problems.collected():
             return _of(str, value, self._name(key), "a name or a table")
         return None
@@ -160,13 +160,13 @@ class Table:
 
     def close(self) -> None:
         """Report the missing entries, and the unknown ones with the nearest name of each."""
-        near = {key: nearest_name(key, self._missing or self._known) for key in self.entries if key not in self._known}
+        near = {key: nearest_name(key, self._missing or self._keys) for key in self.entries if key not in self._keys}
         meant = {key for key in self._missing if f" Did you mean {key}?" in near.values()}
         self.report_missing(meant)
         with self.problems.collected():
             if near:
                 named = " ".join(f"{self._name(key)} is not a known key.{question}" for key, question in near.items())
-                raise ScenarioError(f"{named} Known here are {', '.join(self._known)}.")
+                raise ScenarioError(f"{named} Known here are {', '.join(self._keys)}.")
 
     def report_missing(self, but: Collection[str] = ()) -> None:
         """Report the missing entries."""
@@ -177,7 +177,7 @@ class Table:
 
     def _key(self, entry: FileEntry) -> str:
         """Key of an entry in the file: its name, or a spelling of its symbol, as ``Dc`` or ``d_c`` for :math:`d_c`."""
-        letters, others = _letters(entry.symbol), self.entries.keys() - {*self._known} if entry.symbol else ()
+        letters, others = _letters(entry.symbol), self.entries.keys() - {*self._keys} if entry.symbol else ()
         spelt = [key for key in self.entries if key == entry.name or (key in others and _letters(key) == letters)]
         with self.problems.collected():
             if len(spelt) > 1:
@@ -187,7 +187,7 @@ class Table:
         return spelt[0] if len(spelt) == 1 else entry.name
 
     def _given(self, key: str, optional: bool = False) -> bool:
-        self._known.append(key)
+        self._keys.append(key)
         if key not in self.entries and not optional:
             self._missing.append(key)
         return key in self.entries

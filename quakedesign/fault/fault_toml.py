@@ -135,10 +135,10 @@ def beyond_rates(law: FrictionLaw, rate: float, *, source: str = "") -> str:
 
 def step_assumed(fault: Fault) -> bool:
     """Whether the T_s of a fault was filled in, so that another friction has another."""
-    return any(said.startswith(_STEP) for said in fault.assumed)
+    return any(text.startswith(_STEP) for text in fault.assumed)
 
 
-def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[str, ...] = ()) -> Fault:
+def completed(parts: Mapping[str, Any], task: Mapping[str, float], remarks: tuple[str, ...] = ()) -> Fault:
     """Fault of what a file has, the rest filled in and told in `Fault.assumed`.
 
     Parameters
@@ -147,7 +147,7 @@ def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[s
         Arguments of `Fault`, those of the task and perhaps the damping excepted.
     task : mapping
         target_slip [m], operation_time [s], ramp [-], sampling_time [s], as far as given.
-    said : tuple of str
+    remarks : tuple of str
         What was assumed before.
 
     Raises
@@ -157,7 +157,7 @@ def completed(parts: Mapping[str, Any], task: Mapping[str, float], said: tuple[s
     ParameterError
         For an unphysical value.
     """
-    assumed = list(said)
+    assumed = list(remarks)
     longest = task.get("operation_time", math.inf)
     trial = {
         "damping": 0.0,
@@ -435,14 +435,14 @@ def _values(part: object, entries: Mapping[str, FileEntry]) -> dict[str, Any]:
 
 def _stresses(fault: Fault) -> dict[str, str]:
     """What of the disturbance was given as a stress: the least float that is read as no less."""
-    found = {}
+    stresses = {}
     for name in fault.disturbance.stresses:
         size = abs(getattr(fault.disturbance, name))
         stress = nextafter(float_below(rational(size) / fault.exact_authority), 0)
         while acceleration(f"{stress!r} Pa", fault.exact_authority, name)[0] < size:
             stress = nextafter(stress, inf)
-        found[name] = f"{stress if getattr(fault.disturbance, name) >= 0 else -stress!r} Pa"
-    return found
+        stresses[name] = f"{stress if getattr(fault.disturbance, name) >= 0 else -stress!r} Pa"
+    return stresses
 
 
 def written(value: Any) -> str:

@@ -145,7 +145,7 @@ class Problems:
     """What is wrong with one input, collected so that all of it is said at once."""
 
     def __init__(self) -> None:
-        self.found: list[QuakedesignError] = []
+        self.errors: list[QuakedesignError] = []
 
     @contextmanager
     def collected(self) -> Iterator[None]:
@@ -153,19 +153,19 @@ class Problems:
         try:
             yield
         except QuakedesignError as error:
-            self.found += error.parts or (error,)
+            self.errors += error.parts or (error,)
 
     def refuse(self, where: str = "") -> None:
         """Raise what was collected, if anything: as it is, or as one error that counts and names them all."""
-        if not self.found:
+        if not self.errors:
             return
-        kinds = {type(error) for error in self.found}
+        kinds = {type(error) for error in self.errors}
         kind = kinds.pop() if len(kinds) == 1 else ScenarioError
-        messages = [str(error) for error in self.found]
+        messages = [str(error) for error in self.errors]
         if len(messages) > 1:
             messages = [f"{len(messages)} errors.", *(f"({i}) {text}" for i, text in enumerate(messages, start=1))]
         error = kind(f"{where}: {' '.join(messages)}" if where else " ".join(messages))
-        error.parts = tuple(self.found) if len(messages) > 1 else ()
+        error.parts = tuple(self.errors) if len(messages) > 1 else ()
         raise error from None
 
     def resolved(self, value: _Value | None, where: str = "") -> _Value:

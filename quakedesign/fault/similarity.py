@@ -420,14 +420,14 @@ def ordered(fault: Fault, clock: str = CLOCKS[0]) -> tuple[Quantity, ...]:
         For another clock.
     """
     require_known(clock, CLOCKS, "clock", UnknownNameError)
-    found, (slip, normal, time) = quantities(fault), map(BASES.index, ("slip", "normal_length", "time"))
+    every, (slip, normal, time) = quantities(fault), map(BASES.index, ("slip", "normal_length", "time"))
     # Friction parameters with a slip length, pure lengths first, then the target slip.
-    sizes = {name: dimension(q.unit) for name, q in found.items() if name.startswith("friction.")}
+    sizes = {name: dimension(q.unit) for name, q in every.items() if name.startswith("friction.")}
     lengths = sorted(
         (n for n, size in sizes.items() if size[slip] and not size[normal]), key=lambda n: sizes[n][time] != 0
     )
     first = (_UNIT_FRICTION, "density", "length", clock, *lengths, "reference.target_slip", "effective_normal_stress")
-    return tuple(sorted(found.values(), key=lambda q: (q.value == 0, first.index(q.name) if q.name in first else 99)))
+    return tuple(sorted(every.values(), key=lambda q: (q.value == 0, first.index(q.name) if q.name in first else 99)))
 
 
 def similarity(source: Fault, target: Fault, *, clock: str | None = None) -> Similarity:

@@ -58,9 +58,9 @@ def _words_of_units() -> frozenset[str]:
 
 def _is_no_unit(written: str) -> bool:
     """Whether a word is no unit of pint (name, name with a prefix, or plural), decided without loading pint."""
-    known, singular = _words_of_units(), written.removesuffix("s")
-    ends = {end[i:] for end in (written, singular) for i in range(len(end)) if not i or end[:i] in known}
-    return bool(known) and written.isascii() and written.isalpha() and known.isdisjoint(ends)
+    words, singular = _words_of_units(), written.removesuffix("s")
+    ends = {end[i:] for end in (written, singular) for i in range(len(end)) if not i or end[:i] in words}
+    return bool(words) and written.isascii() and written.isalpha() and words.isdisjoint(ends)
 
 
 @cache
@@ -88,8 +88,8 @@ def si_value(quantity: Any, unit: str, name: str) -> float:
         For an unknown unit, a wrong dimension, a missing unit or no number; and for hertz where an angular
         frequency is required, because pint converts 1 Hz to 1 rad/s.
     """
-    if (known := _plain(quantity, unit)) is not None:
-        return float(known)
+    if (plain := _plain(quantity, unit)) is not None:
+        return float(plain)
     wanted = f"a quantity in {unit}, such as {_example(unit)!r}" if unit else "a plain number"
     received = f"{name} must be {wanted}. Received {shown(quantity)}"
     if isinstance(quantity, bool) or not isinstance(quantity, str | int | float):
@@ -167,9 +167,9 @@ def _is_plural_of_a_symbol(word: str) -> bool:
     if not word.endswith("s"):
         return False
     for _, unit, _ in _registry().parse_unit_name(word)[:1]:
-        known = _registry()._units[unit]
-        own = word.endswith((known.name, known.symbol, *known.aliases))
-        return not own and known.symbol != known.name and word[:-1].endswith(known.symbol)
+        definition = _registry()._units[unit]
+        own = word.endswith((definition.name, definition.symbol, *definition.aliases))
+        return not own and definition.symbol != definition.name and word[:-1].endswith(definition.symbol)
     return False
 
 

@@ -79,10 +79,10 @@ def checks_of(
     first = float(begins[0]) if len(begins) else float("inf")
     inside = (raw.time >= time[0]) & (raw.time <= time[-1])
     residuals = (raw.friction - np.interp(raw.time, time, fit.measured - fit.residuals))[inside]
-    noise, known = _noise(raw, first)
+    noise, origin = _noise(raw, first)
     whole = float(np.sqrt(np.mean(np.sort(residuals**2)[: max(int(0.995 * len(residuals)), 1)]))) / noise
     checks = [] if loading is None else [_beginning(values, loading)]
-    checks.append(_within("residuals", whole, SEVERAL, f"residuals are {whole:.2g} times the noise {known}"))
+    checks.append(_within("residuals", whole, SEVERAL, f"residuals are {whole:.2g} times the noise {origin}"))
     factor = whole
     if len(begins):
         peak = _after_steps(fit, time, begins, record, used, values)
@@ -175,8 +175,8 @@ def _after_steps(
     way = float(np.ptp(path))
     within = min(max(_PEAK * values.get("critical_slip", 0.0), 0.01 * way), 0.2 * way)
     after = [(time >= begin) & (path - np.interp(begin, time, path) <= within) for begin in begins.tolist()]
-    found = [some for each in after if len(some := scores[each[fit.kept]]) >= 5]
-    return max((float(np.sqrt(np.mean(some**2))) for some in found), default=0.0)
+    several = [some for each in after if len(some := scores[each[fit.used]]) >= 5]
+    return max((float(np.sqrt(np.mean(some**2))) for some in several), default=0.0)
 
 
 def _halves(fit: Fit, time: ndarray, begins: ndarray, record: Record, used: ndarray) -> Check:

@@ -58,30 +58,30 @@ class CorrelatedNoise:
         whole[np.diag_indices(len(self.along))] += 1 / self.counts
         return whole if self.common is None else whole + self.common @ self.common.T
 
-    def deletion(self, residuals: ndarray, kept: ndarray) -> ndarray:
-        """Residuals less what the others tell of them, in their deviations then; those that are not kept tell nothing.
+    def deletion(self, residuals: ndarray, used: ndarray) -> ndarray:
+        """Residuals less what the others tell of them, in their deviations then; those that are not used tell nothing.
 
         The inverse of the covariance has both (Martin 1992, Commun. Stat. Theory Methods 21, 1183).
         """
-        whitener, beside = self.whitener(kept)[:, kept], self.covariance[:, kept]
+        whitener, beside = self.whitener(used)[:, used], self.covariance[:, used]
         inverse = whitener.T @ whitener
-        told = beside @ inverse
-        off = residuals - told @ residuals[kept]
-        variance = np.diag(self.covariance) - np.sum(told * beside, axis=1)
-        off[kept], variance[kept] = (inverse @ residuals[kept]) / np.diag(inverse), 1 / np.diag(inverse)
+        prediction = beside @ inverse
+        off = residuals - prediction @ residuals[used]
+        variance = np.diag(self.covariance) - np.sum(prediction * beside, axis=1)
+        off[used], variance[used] = (inverse @ residuals[used]) / np.diag(inverse), 1 / np.diag(inverse)
         return np.asarray(off / np.sqrt(variance))
 
-    def whitener(self, kept: ndarray) -> ndarray:
-        """Matrix that makes residuals independent with the variance of one measurement, without what is not kept."""
-        if (key := kept.tobytes()) not in self._whiteners:
-            factor = cholesky(self.covariance[np.ix_(kept, kept)], lower=True)
-            self._whiteners[key] = np.zeros((int(kept.sum()), len(kept)))
-            self._whiteners[key][:, kept] = dtrtri(factor, lower=1)[0]
+    def whitener(self, used: ndarray) -> ndarray:
+        """Matrix that makes residuals independent with the variance of one measurement, without what is not used."""
+        if (key := used.tobytes()) not in self._whiteners:
+            factor = cholesky(self.covariance[np.ix_(used, used)], lower=True)
+            self._whiteners[key] = np.zeros((int(used.sum()), len(used)))
+            self._whiteners[key][:, used] = dtrtri(factor, lower=1)[0]
         return self._whiteners[key]
 
     @cached_property
     def _whiteners(self) -> dict[bytes, ndarray]:
-        """Those that were made, by the samples that are kept."""
+        """Those that were made, by the samples that are used."""
         return {}
 
 
@@ -124,29 +124,29 @@ def noise_of(
     counts: ndarray,
     time: ndarray,
     path: ndarray | None,
-    kept: ndarray,
+    used: ndarray,
     most: int = _MOST_DENSE,
 ) -> CorrelatedNoise | None:
     """Likeliest noise of residuals, by slopes of what was fitted; None where independent samples are as likely.
 
-    None as well where fewer samples than three a slope, or more than `most`, are kept.
+    None as well where fewer samples than three a slope, or more than `most`, are used.
     """
-    if not 3 * slopes.shape[1] < kept.sum() <= most:
+    if not 3 * slopes.shape[1] < used.sum() <= most:
         return None
-    scale = np.linalg.norm(slopes[kept], axis=0)
-    basis, values, _ = np.linalg.svd(slopes[kept][:, scale > 0] / scale[scale > 0], full_matrices=False)
-    told = (residuals[kept], basis[:, values > 1e-8 * values[0]], counts[kept])
-    white = restricted_likelihood(*told, np.ones(len(told[0]) - 1), 0.0, 1.0)
-    best, found = white + _LEAST_GAIN, None
+    scale = np.linalg.norm(slopes[used], axis=0)
+    basis, values, _ = np.linalg.svd(slopes[used][:, scale > 0] / scale[scale > 0], full_matrices=False)
+    sample = (residuals[used], basis[:, values > 1e-8 * values[0]], counts[used])
+    white = restricted_likelihood(*sample, np.ones(len(sample[0]) - 1), 0.0, 1.0)
+    best, noise = white + _LEAST_GAIN, None
     for along, of_time in ((time, True), (path, False)):
         if along is None or not np.ptp(along) > 0:
             continue
-        way, steps = float(np.ptp(along)), np.abs(np.diff(along[kept]))
+        way, steps = float(np.ptp(along)), np.abs(np.diff(along[used]))
 
         def lost(at: ndarray, steps: ndarray = steps, way: float = way) -> float:
             inside = np.clip(at, (-30, -30), (_LARGEST, np.log(_LONGEST)))
             share, length = np.exp(inside) * [1, way]
-            return -restricted_likelihood(*told, steps, share, length) + 10 * float(np.sum(np.abs(at - inside)))
+            return -restricted_likelihood(*sample, steps, share, length) + 10 * float(np.sum(np.abs(at - inside)))
 
         trials = [np.array([share, np.log(length)]) for share in _SHARES for length in _LENGTHS]
         start = min(trials, key=lost)
@@ -155,5 +155,5 @@ def noise_of(
         ended = minimize(lost, start, method="Nelder-Mead", options=how)
         if -ended.fun > best:
             share, length = np.exp(np.minimum(ended.x, (_LARGEST, np.log(_LONGEST)))) * [1, way]
-            best, found = -ended.fun, CorrelatedNoise(float(share), float(length), along, counts, of_time)
-    return found
+            best, noise = -ended.fun, CorrelatedNoise(float(share), float(length), along, counts, of_time)
+    return noise

@@ -75,8 +75,8 @@ class Experiment(ABC):
 
     def near(self, values: Mapping[str, float]) -> ndarray:
         """What is fitted, at values of another experiment; where it has none, the middle of where searches start."""
-        told = ((c, values.get(c.name)) for c in self.coordinates)
-        return np.array([sum(map(c.inward, c.start)) / 2 if v is None else c.inward(v) for c, v in told])
+        given = ((c, values.get(c.name)) for c in self.coordinates)
+        return np.array([sum(map(c.inward, c.start)) / 2 if v is None else c.inward(v) for c, v in given])
 
     def outward(self, fitted: ndarray) -> dict[str, float]:
         """Values in their units by name."""

@@ -56,8 +56,8 @@ def cover(
     values = {"residual": residual, "drop": drop, "critical_slip": critical_slip}
     width = _decimal(max(abs(s / static - 1) for s in statics), up=True)
     authority = box.authority + width + box.authority * width
-    held = replace(law, **{name: float(value) for name, value in values.items()})  # type: ignore[type-var]
-    return held, replace(box, name="own", authority=authority)
+    middle = replace(law, **{name: float(value) for name, value in values.items()})  # type: ignore[type-var]
+    return middle, replace(box, name="own", authority=authority)
 
 
 def _decimal(value: Fraction, *, up: bool, digits: int = _DIGITS) -> Fraction:
@@ -128,15 +128,15 @@ def other_parts(identification: Identification, fault: Fault) -> str:
     if _gains_a_state(identification, fault):
         return shared
     loaded = ", reference rate, working range" if identification.law.state_names else ""
-    kept = "" if _step_follows(identification, fault) else ", T_s"
-    return f"{shared}{kept}, disturbance{loaded}"
+    step = "" if _step_follows(identification, fault) else ", T_s"
+    return f"{shared}{step}, disturbance{loaded}"
 
 
 def task_remarks(identification: Identification, fault: Fault) -> list[str]:
     """What to look at in the task that a fault file of a record has from a fault: what was assumed, and its rate."""
     law: Any = identification.law
     task, moved = fault.reference, _at_rate_of(fault, law)
-    assumed = [said for said in fault.assumed if said.startswith(_OF_TASK)]
+    assumed = [remark for remark in fault.assumed if remark.startswith(_OF_TASK)]
     lines = (
         [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
     )
@@ -150,11 +150,11 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
 
 def law_remarks(identification: Identification, fault: Fault) -> list[str]:
     """Whether a record has another law with state than the fault names, where it was not told which to take."""
-    named, found = fault.friction, identification.law
-    if identification.rival is None or not named.state_names or named.name == found.name:
+    named, law = fault.friction, identification.law
+    if identification.rival is None or not named.state_names or named.name == law.name:
         return []
     why = "the record prefers" if named.name == identification.rival.law else "the record was fitted without it, by"
-    return [f"{fault.name} names {named.name}, {why} {found.name}; --law {named.name} takes the other"]
+    return [f"{fault.name} names {named.name}, {why} {law.name}; --law {named.name} takes the other"]
 
 
 def next_command(identification: Identification, path: str | Path | None) -> str:
@@ -229,8 +229,8 @@ def save_fault(identification: Identification, fault: Fault, path: str | Path) -
             f"  {e.name} = {e.value:.6g} ({e.low:.6g} to {e.high:.6g}; {e.least:.6g} to {e.most:.6g}) {e.unit}".rstrip()
             for e in identification.estimates.values()
         ),
-        *(f"{said}." for said in [*task_remarks(identification, fault), *filter(None, [poor_fit(identification)])]),
-        *(f"Not passed: {said}." for said in identification.assessment.cautions),
+        *(f"{remark}." for remark in [*task_remarks(identification, fault), *filter(None, [poor_fit(identification)])]),
+        *(f"Not passed: {remark}." for remark in identification.assessment.cautions),
     ]
     write_whole(Path(path), "".join(f"# {line}\n" for line in remarks) + fault_toml(whole))
 
@@ -255,5 +255,5 @@ def _spread(identification: Identification) -> str:
 
 def _shares(identification: Identification) -> dict[str, Fraction]:
     """By how much of its best value each of a, b and D_c leaves it in the box."""
-    found = [identification.estimates[name] for name in _RATE_AND_STATE]
-    return {e.name: max(abs(rational(end) / rational(e.value) - 1) for end in (e.least, e.most)) for e in found}
+    estimates = [identification.estimates[name] for name in _RATE_AND_STATE]
+    return {e.name: max(abs(rational(end) / rational(e.value) - 1) for end in (e.least, e.most)) for e in estimates}

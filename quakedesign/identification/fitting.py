@@ -38,7 +38,7 @@ class Fit:
     fitted: ndarray  # coordinates as they are fitted
     measured: ndarray  # friction [-]
     counts: ndarray  # of how many measurements every sample is the mean
-    kept: ndarray  # samples that count
+    used: ndarray  # samples that count
     agreeing: int  # searches that end in the best fit
     starts: int  # searches
     correlated: CorrelatedNoise | None = None  # noise that samples share with their neighbours
@@ -56,15 +56,15 @@ class Fit:
         The noise of a mean of n falls with the root of n.
         """
         if self.correlated is not None:
-            return self.correlated.deletion(self.residuals, self.kept)
+            return self.correlated.deletion(self.residuals, self.used)
         return np.asarray(self.residuals * np.sqrt(self.counts))
 
     @cached_property
     def weights(self) -> ndarray:
         """Of all residuals, 0 for outliers; a matrix that makes them independent where noise is correlated."""
         if self.correlated is not None:
-            return self.correlated.whitener(self.kept)
-        return np.asarray(np.sqrt(self.counts) * self.kept)
+            return self.correlated.whitener(self.used)
+        return np.asarray(np.sqrt(self.counts) * self.used)
 
     @cached_property
     def whitened(self) -> ndarray:
@@ -79,7 +79,7 @@ class Fit:
     @property
     def freedom(self) -> int:
         """Samples that count, less the coordinates."""
-        return int(self.kept.sum()) - len(self.fitted)
+        return int(self.used.sum()) - len(self.fitted)
 
     @property
     def freedom_of_noise(self) -> float:
@@ -102,8 +102,8 @@ class Fit:
 
         Summed over lags up to five times itself (Sokal 1997, in Functional Integration, NATO ASI B361, 131).
         """
-        kept = self.whitened
-        covariance = correlate(kept, kept, method="fft")[len(kept) - 1 :][: len(kept) // 2]
+        residuals = self.whitened
+        covariance = correlate(residuals, residuals, method="fft")[len(residuals) - 1 :][: len(residuals) // 2]
         sums = 2 * np.cumsum(covariance / covariance[0]) - 1
         window = np.flatnonzero(np.arange(len(sums)) >= 5 * sums)
         return float(max(sums[window[0] if len(window) else -1], 1.0))
@@ -152,11 +152,11 @@ class Fit:
 def weighed(weights: ndarray, values: ndarray) -> ndarray:
     """Values of all samples, or columns of them, by weights of `Fit`; those without a weight are left out."""
     if weights.ndim == 2:
-        kept = np.any(weights != 0, axis=0)
+        used = np.any(weights != 0, axis=0)
         with np.errstate(invalid="ignore", over="ignore"):
-            return np.asarray(weights[:, kept] @ values[kept])
-    kept = weights > 0
-    return np.asarray((values[kept].T * weights[kept]).T)
+            return np.asarray(weights[:, used] @ values[used])
+    used = weights > 0
+    return np.asarray((values[used].T * weights[used]).T)
 
 
 def fit(
@@ -191,7 +191,7 @@ def fit(
         minima.append(minimised(experiment, measured, roots, start, steps=_COARSE))
         fitted, best = min(minima, key=lambda pair: pair[1])
         agreeing = sum(squares <= best * (1 + _AGREEMENT) for _, squares in minima)
-        entries: dict[str, Any] = {"measured": measured, "counts": counts, "kept": every}
+        entries: dict[str, Any] = {"measured": measured, "counts": counts, "used": every}
         fit = Fit(experiment=experiment, fitted=fitted, agreeing=agreeing, starts=number, **entries)
         if number >= least and agreeing > 1 and np.all(fit.deviations < high - low):
             break
@@ -274,13 +274,13 @@ def settled(fit: Fit) -> Fit:
     """
     made_for = np.full_like(fit.fitted, np.inf)
     for _ in range(_ROUNDS):
-        kept = ~outliers(fit.scaled)
+        used = ~outliers(fit.scaled)
         finer = fit.experiment
         if not np.all(np.abs(fit.fitted - made_for) <= fit.deviations):
             finer, made_for = finer.resolved(fit.fitted, fit.accuracy), fit.fitted
-        fitted, _ = minimised(finer, fit.measured, replace(fit, kept=kept).weights, fit.fitted)
-        unchanged = finer is fit.experiment and np.array_equal(kept, fit.kept)
-        fit = replace(fit, experiment=finer, fitted=fitted, kept=kept)
+        fitted, _ = minimised(finer, fit.measured, replace(fit, used=used).weights, fit.fitted)
+        unchanged = finer is fit.experiment and np.array_equal(used, fit.used)
+        fit = replace(fit, experiment=finer, fitted=fitted, used=used)
         if unchanged:
             break
     return fit
@@ -308,7 +308,7 @@ def advantage(one: Fit, other: Fit) -> tuple[float, float]:
 
     At the samples that both count, of fits with as many parameters: n·ln of that ratio, with n independent samples.
     """
-    both = one.kept & other.kept
+    both = one.used & other.used
     if one.correlated is not None or other.correlated is not None:
         ours, theirs = one.squares, other.squares
     else:
@@ -369,10 +369,10 @@ class Profile:
         fit, place, wanted = self.fit, self.place, math.sqrt(threshold)
         furthest = abs(fit.experiment.bounds[(side + 1) // 2][place] - fit.fitted[place])
         start = ProfilePoint(experiment=fit.experiment, resolved_at=fit.fitted, fitted=fit.fitted)
-        known = [each for each in self.points if each.step * side > 0]
-        below = max((p for p in known if p.distance < wanted), key=lambda p: abs(p.step), default=start)
+        points = [each for each in self.points if each.step * side > 0]
+        below = max((p for p in points if p.distance < wanted), key=lambda p: abs(p.step), default=start)
         far = replace(start, step=side * math.inf, distance=math.inf)
-        above = min((p for p in known if p.distance >= wanted), key=lambda p: abs(p.step), default=far)
+        above = min((p for p in points if p.distance >= wanted), key=lambda p: abs(p.step), default=far)
         deviation = fit.deviations[place]
         first = wanted * deviation if np.isfinite(deviation) else _FIRST
         for trial in range(_MOST_TRIALS):

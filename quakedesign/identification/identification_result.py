@@ -64,8 +64,8 @@ class ParameterEstimate:
 
     def to_dict(self) -> dict[str, Any]:
         """Value and ends, None for an end that the record does not set."""
-        known = {name: _finite(getattr(self, name)) for name in ("value", "low", "high")}
-        return {**known, "unit": self.unit, "identified": self.identified}
+        ends = {name: _finite(getattr(self, name)) for name in ("value", "low", "high")}
+        return {**ends, "unit": self.unit, "identified": self.identified}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,10 +173,10 @@ class Identification:
     @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
         """Samples left out, largest first."""
-        left = ~self.fit.kept
+        left = ~self.fit.used
         sizes, times = self.fit.residuals[left].tolist(), self.record.time[self.used][left].tolist()
-        found = [Outlier(time=time, size=size) for time, size in zip(times, sizes, strict=True)]
-        return tuple(sorted(found, key=lambda outlier: -abs(outlier.size)))
+        outliers = [Outlier(time=time, size=size) for time, size in zip(times, sizes, strict=True)]
+        return tuple(sorted(outliers, key=lambda outlier: -abs(outlier.size)))
 
     def allows(self, values: Mapping[str, float]) -> bool:
         """Whether the record allows a set of parameters, in the joint region at 95 %: all that were fitted, in SI."""
@@ -190,13 +190,13 @@ class Identification:
     def untold(self) -> list[str]:
         """Sentences about what the record cannot tell; none where it tells everything."""
         open_ = [e for e in self.estimates.values() if not (e.identified or e.name.startswith(_BESIDE))]
-        told, only = [], self.difference
+        texts, only = [], self.difference
         pair = only.name.split(" - ") if only is not None and only.identified else []
         if only is not None and pair and {e.name for e in open_} >= set(pair):
             ends = f"{only.name} = {_with_unit(only, only.value)} ({only.low:.4g} to {only.high:.4g})"
-            told.append(f"{pair[0]} and {pair[1]} are not identifiable from this record: only {ends} is")
+            texts.append(f"{pair[0]} and {pair[1]} are not identifiable from this record: only {ends} is")
             open_ = [estimate for estimate in open_ if estimate.name not in pair]
-        return told + [f"{e.name} is not identifiable from this record: {_one_sided(e)}" for e in open_]
+        return texts + [f"{e.name} is not identifiable from this record: {_one_sided(e)}" for e in open_]
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that JSON can hold; SI units."""
@@ -217,7 +217,7 @@ class Identification:
             "residual": {
                 "noise": fit.noise,
                 "unit": "",
-                "samples": int(fit.kept.sum()),
+                "samples": int(fit.used.sum()),
                 "correlation": fit.correlation,
                 "correlated": None if fit.correlated is None else fit.correlated.to_dict(fit.noise),
             },

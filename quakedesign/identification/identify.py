@@ -319,7 +319,7 @@ class _Choice:
     stiffness: float | None
     seed: int
     trend: str = "auto"
-    told: ndarray | None = None  # when pieces begin by the load point alone [s]
+    by_load: ndarray | None = None  # when pieces begin by the load point alone [s]
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
         """Profiles about the best fit of the best law, at the times of changes of rate that friction shows."""
@@ -342,8 +342,8 @@ class _Choice:
             choice = moved
             fits = [choice._fitted(each.kind, _nuisance(better), better.best, start=False) for each in fits]
         better, rival, others = choice._chosen(fits)
-        found = replace(profiled(better.best, choice.record, better.setup, self.seed), rival=rival)
-        return replace(found, assessment=choice._assessed(found, others))
+        result = replace(profiled(better.best, choice.record, better.setup, self.seed), rival=rival)
+        return replace(result, assessment=choice._assessed(result, others))
 
     def _moved(self, fitted: _Fitted) -> "_Choice | None":
         """The same with changes of rate at the times that friction shows; nothing where they are there already."""
@@ -354,14 +354,14 @@ class _Choice:
         if self.loading is None or not np.any(np.abs(delays) > _STAYS * errors):
             return None
         pieces, (after, most) = self.loading.pieces, self.loading.delays(self.record)
-        begins, told = pieces.begins.copy(), self.told if self.told is not None else pieces.begins
+        begins, original = pieces.begins.copy(), self.by_load if self.by_load is not None else pieces.begins
         for delay, samples, end in zip(delays.tolist(), after.T, most.tolist(), strict=True):
             first = self.record.time[np.flatnonzero(samples)[0]]
             place = int(np.searchsorted(begins, first, side="right")) - 1
-            begins[place] = np.clip(begins[place] + delay, told[place] - end, told[place] + end)
+            begins[place] = np.clip(begins[place] + delay, original[place] - end, original[place] + end)
         pieces = replace(pieces, begins=np.maximum.accumulate(np.clip(begins, self.raw.time[0], None)))
         record, loading = prepared(self.raw, (), pieces)
-        return replace(self, record=record, loading=loading, told=told)
+        return replace(self, record=record, loading=loading, by_load=original)
 
     def _chosen(self, fits: list[_Fitted]) -> tuple[_Fitted, Rival | None, dict[str, tuple[_Fitted, float]]]:
         """The best law, with trend and beginning where these are likelier; the next law, and fits that may be right.
@@ -390,39 +390,39 @@ class _Choice:
         own, rest = next(iter(_nuisance(fitted) & _TRENDS.keys()), ""), _nuisance(fitted) - _TRENDS.keys()
         names = {"", own} if self.trend in _ONE_TREND else _TRENDS
         same = fitted, fitted.best.squares
-        found = {name: same if name == own else self._among(fitted, {*rest, name} - {""}) for name in sorted(names)}
-        aic = {name: fitted.best.excess(squares) + 2 * bool(name) for name, (_, squares) in found.items()}
+        fits = {name: same if name == own else self._among(fitted, {*rest, name} - {""}) for name in sorted(names)}
+        aic = {name: fitted.best.excess(squares) + 2 * bool(name) for name, (_, squares) in fits.items()}
         late = self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE
         taken = TREND_IN_TIME if late else own
-        if taken and not needed(found[taken][0].best, found[""][1]):
+        if taken and not needed(fits[taken][0].best, fits[""][1]):
             taken = ""
-        better, _ = found.pop(taken)
-        others = {_TRENDS[name]: (other, aic[name] - aic[taken]) for name, (other, _) in found.items()}
+        better, _ = fits.pop(taken)
+        others = {_TRENDS[name]: (other, aic[name] - aic[taken]) for name, (other, _) in fits.items()}
         return better if better is fitted else _again(better), others
 
-    def _assessed(self, found: Identification, others: Mapping[str, tuple[_Fitted, float]]) -> Assessment:
+    def _assessed(self, result: Identification, others: Mapping[str, tuple[_Fitted, float]]) -> Assessment:
         """Tests of what was taken for granted, and what the record leaves open."""
-        values = found.fit.experiment.outward(found.fit.fitted)
-        checks, factor = checks_of(found.fit, self.raw, self.record, found.used, self.loading, values)
-        shift, doubted = self._late_trend(found), {}
-        for said, (other, excess) in others.items():
-            if found.difference is not None and in_doubt(excess, shift):
+        values = result.fit.experiment.outward(result.fit.fitted)
+        checks, factor = checks_of(result.fit, self.raw, self.record, result.used, self.loading, values)
+        shift, doubted = self._late_trend(result), {}
+        for trend, (other, excess) in others.items():
+            if result.difference is not None and in_doubt(excess, shift):
                 try:
-                    doubted[said] = _difference(other.best, jointly=False), excess
+                    doubted[trend] = _difference(other.best, jointly=False), excess
                 except BetterFit:  # whose valley leads elsewhere: its sign is open
-                    doubted[said] = replace(found.difference, low=-math.inf, high=math.inf), excess
-        off = unsteady_beginning(found.difference, values, self.loading) if self.loading is not None else ""
-        sign = sign_check(found.difference, doubted, shift, off)
+                    doubted[trend] = replace(result.difference, low=-math.inf, high=math.inf), excess
+        off = unsteady_beginning(result.difference, values, self.loading) if self.loading is not None else ""
+        sign = sign_check(result.difference, doubted, shift, off)
         checks = checks if sign is None else (*checks, sign)
-        told = (*found.untold(), *([sign.sentence] if sign is not None and not sign.passed else []))
-        return Assessment(checks=checks, factor=factor, open=told, experiments=tuple(found.experiments(sign)))
+        untold = (*result.untold(), *([sign.sentence] if sign is not None and not sign.passed else []))
+        return Assessment(checks=checks, factor=factor, open=untold, experiments=tuple(result.experiments(sign)))
 
-    def _late_trend(self, found: Identification) -> float | None:
+    def _late_trend(self, result: Identification) -> float | None:
         """By how much a - b changes if the trend begins with the first change of rate; None if it does not.
 
         A slow evolution of friction after a change of rate looks like a trend that the beginning does not have.
         """
-        fit, loading, load = found.fit, self.loading, self.record.load_point
+        fit, loading, load = result.fit, self.loading, self.record.load_point
         values = fit.experiment.outward(fit.fitted)
         if TREND not in values or loading is None or load is None or not len(loading.steps):
             return None
@@ -447,8 +447,8 @@ class _Choice:
         how, at = {}, None
         if near is not None:
             how = {"least": _LEAST_NEAR} if start else {"least": 1, "most": 0}
-            known = near.experiment.outward(near.fitted).items()
-            at = setup.experiment.near({name: v for name, v in known if start or not name.startswith(DELAY)})
+            values = near.experiment.outward(near.fitted).items()
+            at = setup.experiment.near({name: v for name, v in values if start or not name.startswith(DELAY)})
         best = fit(setup.experiment, measured, seed=self.seed, counts=counts, near=at, **how)
         return _Fitted(kind=kind, setup=setup, best=best)
 
@@ -457,9 +457,9 @@ class _Choice:
         slopes = np.nan_to_num(best.experiment.slopes(best.fitted), posinf=0, neginf=0)
         where, time = None if path is None else path[used], self.record.time[used]
         moved = self._moved_by_rates(fitted)
-        found = noise_of(best.residuals, np.hstack([slopes, moved]), best.counts, time, where, best.kept)
+        noise = noise_of(best.residuals, np.hstack([slopes, moved]), best.counts, time, where, best.used)
         none = CorrelatedNoise(0.0, 1.0, time, best.counts, True)
-        return replace(found or none, common=moved / best.noise) if moved.size else found
+        return replace(noise or none, common=moved / best.noise) if moved.size else noise
 
     def _moved_by_rates(self, fitted: _Fitted) -> ndarray:
         """By how much friction moves with one deviation of each rate of the load point, where that is felt.
@@ -566,13 +566,13 @@ def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, Pa
     only that, the valley of equal fits is straight in them.
     """
     names, effects = [c.name for c in best.experiment.coordinates], _effects(best)
-    found = {}
+    estimates = {}
     for i, name in enumerate(names):
         if wanted is None or name in wanted:
             direct = effects[:1] == [i]
             plain = len(effects) < 2 or (direct and len(effects) > 2)
-            found[name] = _estimate(best, i) if plain else _turned(best, i, effects[::-1] if direct else effects)
-    return found
+            estimates[name] = _estimate(best, i) if plain else _turned(best, i, effects[::-1] if direct else effects)
+    return estimates
 
 
 def _effects(best: Fit) -> list[int]:

@@ -22,7 +22,7 @@ _MOST_PIECES = 40
 _PATIENCE = 4  # pieces that may explain nothing before the search ends
 _TIMELY = 0.01  # of a sampling period, by which the time of a change may be off unseen
 _MOST_DELAYS = 4
-_HELD, _SLOW = 3.0, 0.05  # deviations of a rate about 0, and their share of the largest rate: less is a hold
+_HOLD, _SLOW = 3.0, 0.05  # deviations of a rate about 0, and their share of the largest rate: less is a hold
 _LARGE_CHANGE = 1.25  # of rate, that is a step and no wandering
 _LEAST_CHANGE = 0.03  # of the faster rate: friction feels it by 3 % of a or b
 _ODDS = 4.0  # times log n: what a new piece must improve a fit by, in variances
@@ -94,11 +94,11 @@ def straight_pieces(time: ndarray, position: ndarray, scatter: float, step: floa
     begins = np.where(np.abs(begins - nearest) < 1e-4 * span / len(time), nearest, begins)
     errors = _rate_errors(u, y - line, knots)
     most = float(np.max(np.abs(rates)))
-    held = (np.abs(rates) < _HELD * errors) & (_HELD * errors < _SLOW * most) & (np.arange(len(rates)) > 0)
-    rates = np.where(held | (np.abs(rates) < 1e-9 * most), 0.0, rates)
+    at_rest = (np.abs(rates) < _HOLD * errors) & (_HOLD * errors < _SLOW * most) & (np.arange(len(rates)) > 0)
+    rates = np.where(at_rest | (np.abs(rates) < 1e-9 * most), 0.0, rates)
     errors = np.where(rates == 0, 0.0, errors / np.maximum(np.abs(rates), 1e-300))
-    found = Pieces(begins=begins, rates=rates * size / span, noise=0.0, rough=bool(rough), errors=errors)
-    return replace(found, noise=float(np.std(position - found.position(time))))
+    pieces = Pieces(begins=begins, rates=rates * size / span, noise=0.0, rough=bool(rough), errors=errors)
+    return replace(pieces, noise=float(np.std(position - pieces.position(time))))
 
 
 def given_pieces(time: ndarray, position: ndarray, rates: ndarray) -> Pieces:
@@ -115,10 +115,10 @@ def given_pieces(time: ndarray, position: ndarray, rates: ndarray) -> Pieces:
     if noise > 0.03 * np.ptp(x):
         parts = zip(np.array_split(t, 8), np.array_split(x, 8), strict=True)
         moved = [np.polyfit(*part, 1)[0] for part in parts]
-        told, found = (", ".join(f"{rate:.3g}" for rate in each) for each in (rates, moved))
+        given, actual = (", ".join(f"{rate:.3g}" for rate in each) for each in (rates, moved))
         raise RecordError(
-            f"--rates must be those of the load point. Received {told} m/s; in eighths of the record it moves at "
-            f"{found} m/s. Correct the rates, or cut out the part with --from and --to."
+            f"--rates must be those of the load point. Received {given} m/s; in eighths of the record it moves at "
+            f"{actual} m/s. Correct the rates, or cut out the part with --from and --to."
         )
     return Pieces(begins=begins, rates=rates, noise=noise, given=True)
 
@@ -188,10 +188,10 @@ class Loading:
         return Drive(first_rate=self.first_rate, **columns), np.isin(instants, record.time)
 
 
-def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None = None) -> tuple[Record, Loading | None]:
+def prepared(record: Record, rates: Sequence[float] = (), fixed: Pieces | None = None) -> tuple[Record, Loading | None]:
     """A record as means of its samples, with load point and normal load as they drive it; and how these move.
 
-    `rates` of the load point [m/s], or the pieces, may be known. Raises `RecordError` where it does not move at these.
+    `rates` of the load point [m/s], or the pieces, may be given. Raises `RecordError` where it does not move at these.
     """
     time, load = record.time, record.load_point
     if load is None:
@@ -200,8 +200,8 @@ def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None =
                 "--rates go with a column of the load point, which says when they change. Received none. Add it."
             )
         return thinned(record), None
-    if known is not None:
-        pieces = known
+    if fixed is not None:
+        pieces = fixed
     elif len(rates):
         pieces = given_pieces(time, load, np.asarray(rates, dtype=float))
     elif record.load_rates is not None:
@@ -210,16 +210,16 @@ def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None =
         pieces = straight_pieces(time, load, scatter(time, load), reading_step(load))
     relative = FAR_OFF * scatter(time, record.friction) / abs(float(np.median(record.friction)))
     allowed, mean = relative * float(np.median(record.normal)), float(np.mean(record.normal))
-    loading = Loading(pieces=pieces, normal=None, level=mean, notes=(_said(pieces),))
+    loading = Loading(pieces=pieces, normal=None, level=mean, notes=(_in_words(pieces),))
     if np.percentile(np.abs(record.normal - mean), 99) > max(allowed, 1e-9 * mean):
         size = scatter(time, record.normal)
         normal = straight_pieces(time, record.normal, max(size, allowed / FAR_OFF), reading_step(record.normal))
         if normal.noise > max(allowed, 2 * size):
-            told = replace(loading, level=None), "the normal load is followed sample by sample"
+            normal_load = replace(loading, level=None), "the normal load is followed sample by sample"
         else:
             level = float(np.mean(record.normal - normal.position(time)))
-            told = replace(loading, normal=normal, level=level), "the normal load changes in straight pieces"
-        loading = replace(told[0], notes=(*loading.notes, told[1]))
+            normal_load = replace(loading, normal=normal, level=level), "the normal load changes in straight pieces"
+        loading = replace(normal_load[0], notes=(*loading.notes, normal_load[1]))
     means = thinned(record, pieces.begins, follow=pieces.rough)
     load = means.load_point if pieces.rough else pieces.position(means.time)
     pressed = means.normal if loading.level is None else np.full_like(means.normal, loading.level)
@@ -227,7 +227,7 @@ def prepared(record: Record, rates: Sequence[float] = (), known: Pieces | None =
     return replace(means, load_point=load, normal=pressed + moved), loading
 
 
-def _said(pieces: Pieces) -> str:
+def _in_words(pieces: Pieces) -> str:
     if pieces.rough:
         return "the load point moves as it was measured, with its noise: --rates gives its rates"
     lines = [f"{rate:.4g}" for rate in pieces.rates[:6]] + ["…"] * (len(pieces.rates) > 6)
@@ -250,8 +250,8 @@ def _design(u: ndarray, knots: ndarray) -> ndarray:
 def _hinges(u: ndarray, y: ndarray, knots: ndarray) -> tuple[ndarray, ndarray]:
     """Rates of all pieces, and the broken line."""
     design = _design(u, knots)
-    found, *_ = np.linalg.lstsq(design, y, rcond=None)
-    return np.cumsum(found[1:]), design @ found
+    coefficients, *_ = np.linalg.lstsq(design, y, rcond=None)
+    return np.cumsum(coefficients[1:]), design @ coefficients
 
 
 def _squares(u: ndarray, y: ndarray, knots: ndarray) -> float:
@@ -269,9 +269,9 @@ def _refined(u: ndarray, y: ndarray, knots: ndarray) -> ndarray:
             if gained < 1e-6 * least:
                 break
         design = np.hstack([_design(u, knots), -1.0 * (u[:, None] > knots)])
-        found, *_ = np.linalg.lstsq(design, y, rcond=None)
-        bends = found[2 : 2 + len(knots)]
-        moved = np.where(np.abs(bends) > 1e-12, found[2 + len(knots) :] / np.where(bends == 0, 1, bends), 0)
+        coefficients, *_ = np.linalg.lstsq(design, y, rcond=None)
+        bends = coefficients[2 : 2 + len(knots)]
+        moved = np.where(np.abs(bends) > 1e-12, coefficients[2 + len(knots) :] / np.where(bends == 0, 1, bends), 0)
         knots = np.sort(np.clip(knots + np.clip(moved, -0.05, 0.05), u[1], u[-2]))
         if len(np.unique(knots)) < len(knots):
             break

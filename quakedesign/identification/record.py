@@ -163,8 +163,8 @@ def read_windows(
 ) -> list[Record]:
     """A record of each window of a file, which is read once; as `read_record`."""
     given, remarks = _given(read_columns(path), columns)
-    given, told = _measured(given)
-    found = []
+    given, repairs = _measured(given)
+    records = []
     for window in windows:
         inside, left = _weighted(_window(given, *window))
         _require_sizes(inside)
@@ -180,11 +180,11 @@ def read_windows(
             normal_unit=unit,
             load_rates=rates,
             counts=inside.get("weight"),
-            remarks=(*remarks, *told, *left, *turned),
+            remarks=(*remarks, *repairs, *left, *turned),
             origin=float(inside["time"][0]),
         )
-        found.append(record)
-    return found
+        records.append(record)
+    return records
 
 
 def part(record: Record, inside: ndarray, name: str) -> Record:
@@ -211,13 +211,13 @@ def _weighted(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]
     return given | {"weight": given["weight"] / np.mean(given["weight"])}, [lost] * bool(np.any(weight == 0))
 
 
-def _given(found: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], list[str]]:
+def _given(columns: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], list[str]]:
     """Columns in SI by name, and what their names were taken for."""
     given: dict[str, np.ndarray] = {}
     headings: dict[str, str] = {}
-    named = _wanted(found, wanted)
+    named = _wanted(columns, wanted)
     unknown: list[Column] = []
-    for column in found:
+    for column in columns:
         name, column = named.get(column.heading, (_meant(column.name), column))
         name = name if name or column.unit else _meant(column.name.rpartition("_")[0])
         if not name:
@@ -229,11 +229,11 @@ def _given(found: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], li
             )
         else:
             given[name], headings[name] = column.values * _factor(name, column), column.heading
-    if not given and all(column.heading.isdigit() for column in found):
+    if not given and all(column.heading.isdigit() for column in columns):
         raise RecordError(
-            f"a record must begin with a line of headings. Received {len(found)} columns of numbers alone. Write names "
-            "and units above, or give them: --columns 'time=1 [s], load_point_displacement=2 [um], shear_stress=3 "
-            "[MPa], normal_stress=4 [MPa]'."
+            f"a record must begin with a line of headings. Received {len(columns)} columns of numbers alone. Write "
+            "names and units above, or give them: --columns 'time=1 [s], load_point_displacement=2 [um], "
+            "shear_stress=3 [MPa], normal_stress=4 [MPa]'."
         )
     for column in unknown:
         near = nearest_name(column.name.lower().replace(" ", "_"), COLUMNS)
@@ -261,26 +261,26 @@ def _meant(name: str) -> str:
     return _MEANT.get(_squeezed(name), "")
 
 
-def _wanted(found: Sequence[Column], wanted: str) -> dict[str, tuple[str, Column]]:
+def _wanted(columns: Sequence[Column], wanted: str) -> dict[str, tuple[str, Column]]:
     """Names that a user gives to headings, with the unit that was given."""
-    by_name = {place: column for i, column in enumerate(found, start=1) for place in (str(i), column.name)}
-    by_name |= {column.heading: column for column in found}
+    by_name = {place: column for i, column in enumerate(columns, start=1) for place in (str(i), column.name)}
+    by_name |= {column.heading: column for column in columns}
     named: dict[str, tuple[str, Column]] = {}
     for part in filter(None, (each.strip() for each in re.split(r",(?![^\[(]*[\])])", wanted))):
-        name, _, said = (each.strip() for each in part.partition("="))
-        if name not in COLUMNS or not said:
+        name, _, text = (each.strip() for each in part.partition("="))
+        if name not in COLUMNS or not text:
             raise RecordError(
                 f"--columns must name columns as time=Time(s), of {', '.join(COLUMNS)}. Received {shown(part)}."
-                f"{nearest_name(name, COLUMNS) if said else ' Write an equals sign.'}"
+                f"{nearest_name(name, COLUMNS) if text else ' Write an equals sign.'}"
             )
-        told = heading(said)
-        column = by_name.get(said) or by_name.get(told.heading) or by_name.get(told.name)
+        head = heading(text)
+        column = by_name.get(text) or by_name.get(head.heading) or by_name.get(head.name)
         if column is None:
-            near = nearest_name(told.name, by_name) or f" Write one of {', '.join(shown(c.heading) for c in found)}."
-            raise RecordError(f"--columns must name a heading of the file. Received {shown(said)}.{near}")
-        named[column.heading] = name, replace(column, unit=column.unit if told.unit is None else told.unit)
+            near = nearest_name(head.name, by_name) or f" Write one of {', '.join(shown(c.heading) for c in columns)}."
+            raise RecordError(f"--columns must name a heading of the file. Received {shown(text)}.{near}")
+        named[column.heading] = name, replace(column, unit=column.unit if head.unit is None else head.unit)
     chosen = {name for name, _ in named.values()}
-    return {c.heading: ("", c) for c in found if _meant(c.name) in chosen} | named
+    return {c.heading: ("", c) for c in columns if _meant(c.name) in chosen} | named
 
 
 def _factor(name: str, column: Column) -> float:
@@ -317,10 +317,10 @@ def _factor(name: str, column: Column) -> float:
 
 def _measured(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]:
     """Rows in which everything was measured, those at the same time as their mean, and what was done."""
-    table, told = pd.DataFrame(given), []
+    table, repairs = pd.DataFrame(given), []
     whole = table.dropna()
     if lost := len(table) - len(whole):
-        told.append(f"{lost} of {len(table)} rows without a number left out")
+        repairs.append(f"{lost} of {len(table)} rows without a number left out")
     if whole.empty:
         raise RecordError(
             f"a record must have rows with a number in every column. Received none in {len(table)} rows. Leave out the "
@@ -334,8 +334,8 @@ def _measured(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]
         )
     if (double := int(np.sum(np.diff(time) == 0))) and double < len(time) - 1:
         whole = whole.groupby("time", sort=False, as_index=False).mean()
-        told.append(f"{double} samples at the time of another: their mean is taken")
-    return {str(name): whole[name].to_numpy() for name in whole}, told
+        repairs.append(f"{double} samples at the time of another: their mean is taken")
+    return {str(name): whole[name].to_numpy() for name in whole}, repairs
 
 
 def _window(given: dict[str, ndarray], begin: str | None, end: str | None) -> dict[str, ndarray]:
@@ -388,18 +388,18 @@ def _require_sizes(given: dict[str, ndarray]) -> None:
 
 def _friction(given: dict[str, ndarray], stress: float | None) -> tuple[ndarray, ndarray, str]:
     """Friction coefficient, what is normal to it, and the unit of that."""
-    found = [name for name in ("friction", *_SHEAR) if name in given]
+    names = [name for name in ("friction", *_SHEAR) if name in given]
     for shear, across in _SHEAR.items():
         if {"friction", shear, across} <= given.keys():
             off = np.median(np.abs(given["friction"] * given[across] - given[shear]))
             if off <= _SAME * np.median(np.abs(given[shear])):  # the same twice
-                found = [name for name in found if name != "friction"]
-    if len(found) != 1:
+                names = [name for name in names if name != "friction"]
+    if len(names) != 1:
         raise RecordError(
             "a record must have exactly one column friction, shear_stress or shear_force. Received "
-            f"{', '.join(found) or 'none'}."
+            f"{', '.join(names) or 'none'}."
         )
-    measured = found[0]
+    measured = names[0]
     across = _SHEAR.get(measured) or next((n for n in _SHEAR.values() if n in given), "normal_stress")
     if across in given and stress is not None:
         raise RecordError(f"the normal stress must be given once. Received it beside the column {across}.")

@@ -54,17 +54,17 @@ def read_columns(path: str | Path) -> list[Column]:
     """Columns of a file, of equal length; `RecordError` when it is of no known kind, or a line unlike its headings."""
     data = read_bytes(path, "record", largest=_LARGEST_FILE, refusal=RecordError)
     if data.startswith(b"MATLAB 5.0"):
-        found = _matlab(data, path)
+        columns = _matlab(data, path)
     elif (offset := _xlook_offset(data)) is not None:
-        found = _xlook_binary(data, *offset)
+        columns = _xlook_binary(data, *offset)
     else:
-        found = _text(_decoded(data, path), path)
-    if len(found[0].values) > MOST_SAMPLES:
+        columns = _text(_decoded(data, path), path)
+    if len(columns[0].values) > MOST_SAMPLES:
         raise RecordError(
-            f"a record must have at most {MOST_SAMPLES} samples. Received {len(found[0].values)}. Cut out the part "
+            f"a record must have at most {MOST_SAMPLES} samples. Received {len(columns[0].values)}. Cut out the part "
             "that counts."
         )
-    return found
+    return columns
 
 
 def heading(text: str) -> Column:
@@ -150,8 +150,8 @@ def _headings(before: list[str], count: int, sign: str) -> list[Column]:
 def _heading_cells(line: str, sign: str) -> list[str]:
     """Cells of a line of headings, which may be divided by another sign than the numbers below."""
     own = sign if sign == r"\s+" or sign in line else _sign(line)
-    found = _BLANK_HEADING.findall(line) if own == r"\s+" else _cells(line, own)
-    return [cell.strip() for cell in found]
+    cells = _BLANK_HEADING.findall(line) if own == r"\s+" else _cells(line, own)
+    return [cell.strip() for cell in cells]
 
 
 def _refuse_count(named: list[Column], count: int, sign: str) -> None:
@@ -184,9 +184,9 @@ def _table(text: str, first: int, sign: str, columns: list[Column], line: str) -
             low_memory=False,
         )
     except (pd.errors.ParserError, ValueError) as error:
-        found = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(error))
+        match = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(error))
         what = (
-            f"line {int(found[2])} must hold {found[1]} values. Received {found[3]}." if found else "lines must agree."
+            f"line {int(match[2])} must hold {match[1]} values. Received {match[3]}." if match else "lines must agree."
         )
         raise RecordError(f"{what} Complete or remove it.") from None
     if len(columns) == len(cells) - 1:  # numbers of rows without a heading, as xlook's, stand first
@@ -278,25 +278,25 @@ def _xlook_binary(data: bytes, size: int, channels: int, kind: str) -> list[Colu
 def _matlab(data: bytes, path: str | Path) -> list[Column]:
     """Numeric arrays of a file of MATLAB's; a matrix gives columns named after their numbers."""
     try:
-        told = whosmat(io.BytesIO(data))
-        kinds = {name: shape for name, shape, kind in told if kind in _ARRAYS}
+        listed = whosmat(io.BytesIO(data))
+        kinds = {name: shape for name, shape, kind in listed if kind in _ARRAYS}
         if sum(math.prod(shape) for shape in kinds.values()) > _MOST_NUMBERS:
             raise ValueError(f"more than {_MOST_NUMBERS} numbers")
-        held = loadmat(io.BytesIO(data), squeeze_me=True, variable_names=list(kinds))
+        content = loadmat(io.BytesIO(data), squeeze_me=True, variable_names=list(kinds))
     except (MatReadError, NotImplementedError, ValueError, TypeError, OSError) as error:
         raise RecordError(f"a MATLAB file must be readable. Received {path}: {error}. Save it with -v7.") from None
-    arrays = {n: value for n, value in held.items() if isinstance(value, np.ndarray) and value.dtype.kind in "iuf"}
+    arrays = {n: value for n, value in content.items() if isinstance(value, np.ndarray) and value.dtype.kind in "iuf"}
     long = max((value.shape[0] for value in arrays.values() if value.ndim), default=0)
     if long < 2:
         raise RecordError(
             f"a MATLAB file must hold numeric arrays of equal length. Received {path} with "
-            f"{', '.join(name for name, *_ in told) or 'nothing'}. Save the columns as vectors."
+            f"{', '.join(name for name, *_ in listed) or 'nothing'}. Save the columns as vectors."
         )
-    found = []
+    vectors = []
     for name, value in arrays.items():
         if value.shape == (long,):
-            found.append(replace(heading(name), values=value.astype(float)))
+            vectors.append(replace(heading(name), values=value.astype(float)))
         elif value.ndim == 2 and value.shape[0] == long:
-            columns = enumerate(value.T.astype(float), start=len(found) + 1)
-            found += [replace(heading(str(i)), values=column) for i, column in columns]
-    return found
+            columns = enumerate(value.T.astype(float), start=len(vectors) + 1)
+            vectors += [replace(heading(str(i)), values=column) for i, column in columns]
+    return vectors

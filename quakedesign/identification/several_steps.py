@@ -69,22 +69,22 @@ def read_steps(
         raise RecordError(
             f"--from and --to are for one window. Received them beside --steps {shown(steps)}. Omit them."
         )
-    found: list[Record] = []
+    parts: list[Record] = []
     windows = [[end.strip() for end in each.split(" to ")] for each in steps.split(",")]
     named = [" to ".join(ends) for ends in windows]
     if wrong := [name for name, ends in zip(named, windows, strict=True) if len(ends) != 2]:
         raise RecordError(f"--steps must name windows as 0 s to 60 s, 60 s to 120 s. Received {shown(wrong[0])}.")
     records = read_windows(path, [(begin, end) for begin, end in windows], **how)
     for window, record in zip(named, records, strict=True):
-        for other in found:
+        for other in parts:
             shared = np.isin((record.origin + record.time).round(9), (other.origin + other.time).round(9))
             if shared.sum() > 1:
                 raise RecordError(
                     f"--steps windows must not overlap: part them. Received {shared.sum()} samples of {window} twice."
                 )
             record = part(record, ~shared, record.name)
-        found.append(replace(record, name=f"{record.name} {window}"))
-    return found
+        parts.append(replace(record, name=f"{record.name} {window}"))
+    return parts
 
 
 def cut(record: Record) -> list[Record]:
@@ -178,7 +178,7 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
     joint = _Joint(fits=tuple(fits), parts=parts, places=tuple(places), coordinates=tuple(coordinates))
     measured = joint.joined([fit.measured for fit in fits])
     ones, pieces = np.ones(len(measured)), sum(fit.freedom_of_noise for fit in fits)
-    best = Fit(experiment=joint, fitted=start, measured=measured, counts=ones, kept=ones > 0, agreeing=1, starts=1)
+    best = Fit(experiment=joint, fitted=start, measured=measured, counts=ones, used=ones > 0, agreeing=1, starts=1)
     best = replace(best, pieces=pieces)
     for _ in range(_ROUNDS):
         finer = best.experiment.resolved(best.fitted, best.accuracy)
@@ -190,8 +190,8 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
 def _assessed(common: Identification, steps: Sequence[Identification], probability: float) -> Assessment:
     """Whether one law explains all steps, and whether a - b has one sign in it and in a step at least."""
     text = "explains" if probability >= _UNLIKELY else "does not explain"
-    said = f"one set of parameters {text} all steps (chance {probability:.2g})"
-    one = Check(name="common", passed=probability >= _UNLIKELY, value=probability, limit=_UNLIKELY, sentence=said)
+    sentence = f"one set of parameters {text} all steps (chance {probability:.2g})"
+    one = Check(name="common", passed=probability >= _UNLIKELY, value=probability, limit=_UNLIKELY, sentence=sentence)
     signs = {np.sign(c.value) for step in steps for c in step.assessment.checks if c.name == "sign" and c.passed}
     sign = sign_check(common.difference, {})
     if sign is not None and sign.passed and signs != {np.sign(sign.value)}:
@@ -242,5 +242,5 @@ class _Joint(Experiment):
 
     def resolved(self, fitted: ndarray, accuracy: float) -> "_Joint":
         """With each step resolved for its own noise."""
-        told = zip(self.parts, self.places, self.fits, strict=True)
-        return replace(self, parts=tuple(each.resolved(fitted[at], fit.accuracy) for each, at, fit in told))
+        parts = zip(self.parts, self.places, self.fits, strict=True)
+        return replace(self, parts=tuple(each.resolved(fitted[at], fit.accuracy) for each, at, fit in parts))

@@ -148,9 +148,9 @@ class SlidingExperiment(Experiment):
         q = np.asarray(fitted)
         if q.tobytes() not in self._latest:
             start = self._build["start"](q).full()
-            found = self._accumulated(start, self._inputs, np.tile(q[:, None], self._inputs.shape[1])).full()
+            states = self._accumulated(start, self._inputs, np.tile(q[:, None], self._inputs.shape[1])).full()
             self._latest.clear()
-            self._latest[q.tobytes()] = np.hstack([start, found])
+            self._latest[q.tobytes()] = np.hstack([start, states])
         return self._latest[q.tobytes()]
 
     @cached_property
@@ -186,7 +186,7 @@ def _steps(
     trial: Any, fitted: ndarray, accuracy: float, drive: Drive, start: Any
 ) -> tuple[tuple[float, ...], ...] | None:
     """Lengths of the steps between all samples that one simulation chooses; None where too many, or too short ones."""
-    y, length, found, left = start, float("inf"), [], _MOST_STEPS * len(drive.lengths)
+    y, length, steps, left = start, float("inf"), [], _MOST_STEPS * len(drive.lengths)
     for whole, between in zip(drive.lengths.tolist(), drive.inputs.T.tolist(), strict=True):
         taken: list[float] = []
         rest = whole
@@ -201,8 +201,8 @@ def _steps(
                 taken.append(length)
                 y, rest = after, (0.0 if length == rest else rest - length)
             length *= _SAFETY * factor if factor < 1 else max(_SAFETY * factor, 1.0)
-        found.append(tuple(taken))
-    return tuple(found)
+        steps.append(tuple(taken))
+    return tuple(steps)
 
 
 @lru_cache(maxsize=8)
@@ -249,7 +249,7 @@ def _built(
         "friction_slopes": ([y, q], [ca.jacobian(read, ca.vertcat(y, q))]),
     }
     built = {
-        name: ca.Function(name, into, [ca.densify(each) for each in ca.cse(found)])
-        for name, (into, found) in outputs.items()
+        name: ca.Function(name, into, [ca.densify(each) for each in ca.cse(results)])
+        for name, (into, results) in outputs.items()
     }
     return built | {name: vectorised(built[name]) for name in ("step_slopes", "friction", "friction_slopes")}

@@ -87,12 +87,12 @@ class Drawn(_Weakening):
 
     def friction(self, fitted: ndarray) -> ndarray:
         """Shear over normal force [-] at every sample."""
-        held, softness = self._held(fitted)
-        return np.asarray(held - softness * self.slip(fitted)[0])
+        limit, softness = self._without_slip(fitted)
+        return np.asarray(limit - softness * self.slip(fitted)[0])
 
     def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives, those of slip from the balance at the sample where it was reached."""
-        (slip, since), (_, softness) = self.slip(fitted), self._held(fitted)
+        (slip, since), (_, softness) = self.slip(fitted), self._without_slip(fitted)
         at_fixed_slip = np.zeros((len(slip), len(fitted)))
         at_fixed_slip[:, -1] = self.normal[0] / self.normal
         if self.stiffness is None:
@@ -104,25 +104,25 @@ class Drawn(_Weakening):
         moved[slip == 0] = 0
         return np.asarray(at_fixed_slip - softness[:, None] * moved)
 
-    def _held(self, fitted: ndarray) -> tuple[ndarray, ndarray]:
+    def _without_slip(self, fitted: ndarray) -> tuple[ndarray, ndarray]:
         """Shear over normal force if nothing slips, and its fall per slip [1/m]."""
         softness = (np.exp(fitted[-2]) if self.stiffness is None else self.stiffness) / self.normal
         return np.asarray(fitted[-1] * self.normal[0] / self.normal + softness * self.load_point), softness
 
     def slip(self, fitted: ndarray) -> tuple[ndarray, ndarray]:
         """Slip [m] at every sample, and the sample at which it was reached."""
-        held, softness = self._held(fitted)
+        limit, softness = self._without_slip(fitted)
         strength, weakening = self.strength(np.zeros(1), fitted)
         if np.min(softness + weakening) <= 0:
-            return np.full(len(held), np.nan), np.arange(len(held))
-        slip, slips = np.zeros(len(held)), held > strength
+            return np.full(len(limit), np.nan), np.arange(len(limit))
+        slip, slips = np.zeros(len(limit)), limit > strength
 
-        def excess(slip: ndarray, held: ndarray, softness: ndarray) -> ndarray:
-            return held - softness * slip - self.strength(slip, fitted)[0]  # type: ignore[no-any-return]
+        def excess(slip: ndarray, limit: ndarray, softness: ndarray) -> ndarray:
+            return limit - softness * slip - self.strength(slip, fitted)[0]  # type: ignore[no-any-return]
 
         if np.any(slips):
-            told = held[slips], softness[slips]
-            slip[slips] = find_root(excess, (0.0, told[0] / told[1]), args=told).x
+            own = limit[slips], softness[slips]
+            slip[slips] = find_root(excess, (0.0, own[0] / own[1]), args=own).x
         largest = np.maximum.accumulate(slip)
-        new = np.where(slip == largest, np.arange(len(held)), 0)
+        new = np.where(slip == largest, np.arange(len(limit)), 0)
         return largest, np.maximum.accumulate(new)

@@ -78,7 +78,7 @@ class FrequencyFacts:
     disturbance_peak_rate: float
 
 
-def frequency_facts(loop: FeedbackLoop, corner: Vertex) -> FrequencyFacts:
+def frequency_properties(loop: FeedbackLoop, corner: Vertex) -> FrequencyFacts:
     """Margins of L(z) = βb(k2z³ + k1z² + k3z + k4)/(z²(z² + wz − s)) and norms of the closed loop at one vertex."""
     beta, slip, rate = corner
     k1, k2, k3, k4 = loop.gains

@@ -16,7 +16,7 @@ from quakedesign.errors import CertificateError, WorkError
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, nearest, rational
 from quakedesign.fault import Fault
 from quakedesign.laws import Controller
-from quakedesign.linear.frequency import FrequencyFacts, circle_limit, frequency_facts, slip_limit
+from quakedesign.linear.frequency import FrequencyFacts, circle_limit, frequency_properties, slip_limit
 from quakedesign.linear.linear_problem import FeedbackLoop, Polytope, Vertex, modal_scaling, polytope_of
 from quakedesign.lyapunov import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
 from quakedesign.lyapunov.exact.fault_bounds import Sectors, plant_ranges, sectors
@@ -421,7 +421,7 @@ def analysis(fault: Fault, controller: Controller) -> Analysis:
         unstable_at=loop.unstable_vertex(),
         slope=friction_slope_margin(fault, controller),
         span=gain_range(fault, controller),
-        frequency=tuple(frequency_facts(loop, corner) for corner in needed.vertices()),
+        frequency=tuple(frequency_properties(loop, corner) for corner in needed.vertices()),
     )
 
 

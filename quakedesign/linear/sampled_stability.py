@@ -607,7 +607,7 @@ def _number(bound: LowerBound | UpperBound | None) -> float | None:
     return None if bound is None else float(bound)
 
 
-def held_loop(problem: LinearProblem, gains: Sequence[Fraction], step: float | str | Fraction) -> HeldLoop:
+def sampled_loop(problem: LinearProblem, gains: Sequence[Fraction], step: float | str | Fraction) -> HeldLoop:
     """Decide a K at a sampling period [s], and up to which period it holds.
 
     Parameters

@@ -19,7 +19,7 @@ from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.linear.linear_problem import LinearProblem, Matrix
 from quakedesign.linear.riccati import smallest_gain
 from quakedesign.linear.robust_stability import Analysis, analysis
-from quakedesign.linear.sampled_stability import HeldLoop, VaryingVerdict, held_loop
+from quakedesign.linear.sampled_stability import HeldLoop, VaryingVerdict, sampled_loop
 from quakedesign.linear.uncertainty_bounds import uncertainty_bounds
 from quakedesign.lyapunov import Certificate
 from quakedesign.sos import Answer
@@ -33,7 +33,7 @@ from quakedesign.sos.exact.proofs import Square, SumOfSquares
 _LARGEST = 16
 
 
-def held_files(problem: LinearProblem, gains: Sequence[Fraction], verdict: VaryingVerdict) -> list[Answer]:
+def sampled_files(problem: LinearProblem, gains: Sequence[Fraction], verdict: VaryingVerdict) -> list[Answer]:
     """Every form, in SI, whose definiteness proves a held loop; nothing for another verdict."""
     return definite_files(verdict.proof.forms(problem, gains)) if verdict.proof is not None else []
 
@@ -96,7 +96,7 @@ class LinearVerdict:
     fault: Fault
     controller: ExtendedLQR
     analysis: Analysis
-    facts: Mapping[str, Any]  # mapping: See `linear_facts`
+    facts: Mapping[str, Any]  # mapping: See `linear_entries`
     held: HeldLoop  # What is decided when p is held over the sampling period asked for
     peaks: ContinuousProof | NoProof | None  # In continuous time; None when they were not asked for
     asked: str | None = None  # Class of the disturbance for which peaks were asked for
@@ -115,7 +115,7 @@ class LinearVerdict:
         if isinstance(self.peaks, ContinuousProof):
             by_name["peaks"] = self.peaks
         problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
-        sampled = held_files(problem, gains, self.held.runs)
+        sampled = sampled_files(problem, gains, self.held.runs)
         return by_name | {f"held{f'-{n}' if n else ''}": answer for n, answer in enumerate(sampled)}
 
     def save(self, out: Path, *, force: bool = False) -> dict[str, str]:
@@ -173,11 +173,11 @@ def judge(
     fault.require_memoryless("a verdict on gains")
     period = rational(fault.sampling_time if step is None else step, "step")
     bounded = certified_peaks(fault, controller, disturbance_class=peaks) if peaks is not None else None
-    sampled = held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), period)
+    sampled = sampled_loop(LinearProblem.of(fault), tuple(controller.gains.values()), period)
     return LinearVerdict(
         fault=fault,
         controller=controller,
-        facts=linear_facts(fault, controller, sampled),
+        facts=linear_entries(fault, controller, sampled),
         analysis=analysis(fault, controller),
         held=sampled,
         peaks=bounded,
@@ -185,7 +185,7 @@ def judge(
     )
 
 
-def linear_facts(fault: Fault, controller: ExtendedLQR, sampled: HeldLoop) -> dict[str, Any]:
+def linear_entries(fault: Fault, controller: ExtendedLQR, sampled: HeldLoop) -> dict[str, Any]:
     """Bounds of the uncertainty, smallest gains and sampled stability.
 
     Parameters

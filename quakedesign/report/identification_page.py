@@ -82,7 +82,7 @@ def _more(found: Identification) -> list[str]:
     """Tests that passed, noise and searches, what was assumed."""
     fit, rate = found.fit, getattr(found.law, "reference_rate", None)
     means, all_ = len(fit.counts), round(float(np.sum(fit.counts)))
-    samples = f"{int(fit.kept.sum())} samples" if all_ == means else f"{all_} samples averaged to {means}"
+    samples = f"{int(fit.used.sum())} samples" if all_ == means else f"{all_} samples averaged to {means}"
     return [
         *(f"passed: {check.sentence}" for check in found.assessment.checks if check.passed),
         f"noise per sample {fit.noise:.3g}; {samples}; {fit.agreeing} of {fit.starts} searches "
@@ -195,11 +195,11 @@ def identification_figure(identification: Identification) -> Any:
         else:
             axes["rate"].set_ylim(0, 1.2e6 * np.max(rates))
     below = axes["residual"]
-    below.plot(way[fit.kept], fit.residuals[fit.kept], ".", color=_MEASURED, markersize=2)
+    below.plot(way[fit.used], fit.residuals[fit.used], ".", color=_MEASURED, markersize=2)
     for level, style in ((-2 * fit.noise, _DASHED), (0.0, "solid"), (2 * fit.noise, _DASHED)):
         below.axhline(level, color=NATURAL, linewidth=0.6, linestyle=style)
     inside = 8 * fit.noise
-    below.plot(way[~fit.kept], np.clip(fit.residuals[~fit.kept], -inside, inside), "x", color=_OUTLIER, markersize=5)
+    below.plot(way[~fit.used], np.clip(fit.residuals[~fit.used], -inside, inside), "x", color=_OUTLIER, markersize=5)
     below.set_ylabel("residual [-]", fontsize=SMALL)
     below.set_xlabel(label, fontsize=SMALL)
     for name in names[1:]:
@@ -245,7 +245,7 @@ def _friction(axis: Any, identification: Identification, way: ndarray, part: sli
         along = fit.experiment.columns[:, 0]
         line = simulated[0] + fit.fitted[-1] * (along - along[0])
         axis.plot(way[part], line[part], color=NATURAL, linewidth=0.8, linestyle=_DASHED, label="trend")
-    left = np.flatnonzero(~fit.kept[part]) + (part.start or 0)
+    left = np.flatnonzero(~fit.used[part]) + (part.start or 0)
     if len(left):
         axis.plot(way[left], fit.measured[left], "x", color=_OUTLIER, markersize=5, label="left out")
     axis.set_ylabel("friction [-]", fontsize=SMALL)
@@ -254,7 +254,7 @@ def _friction(axis: Any, identification: Identification, way: ndarray, part: sli
 def _correlation(axis: Any, fit: Fit) -> None:
     """Autocorrelation of residuals, and of what is left of them when their neighbours are taken into account."""
     for left, colour, label in (
-        ((fit.residuals * np.sqrt(fit.counts))[fit.kept], _MEASURED, "residuals"),
+        ((fit.residuals * np.sqrt(fit.counts))[fit.used], _MEASURED, "residuals"),
         (fit.whitened, _FITTED, "made independent"),
     ):
         off = left - left.mean()

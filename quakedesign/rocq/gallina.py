@@ -50,13 +50,13 @@ def denominator(polynomial: Polynomial) -> int:
     return lcm(1, *(c.denominator for c in polynomial.values()))
 
 
-def clearing(asked: Statement) -> int:
+def clearing(statement: Statement) -> int:
     """Common denominator of the polynomial, the inequalities and the equalities."""
-    return lcm(*map(denominator, (asked.polynomial, *asked.inequalities, *asked.equalities)))
+    return lcm(*map(denominator, (statement.polynomial, *statement.inequalities, *statement.equalities)))
 
 
 def in_integers(
-    asked: Statement, squares: Sequence[Square], cofactors: Sequence[Polynomial], constraints: int | None = None
+    statement: Statement, squares: Sequence[Square], cofactors: Sequence[Polynomial], constraints: int | None = None
 ) -> IntegerWitness:
     """Witness of the statement multiplier · polynomial = Σ squares + Σ cofactors · equalities, in integers.
 
@@ -65,17 +65,17 @@ def in_integers(
     constraints : int, optional
         What the constraints are multiplied by; then the polynomial is taken as it is, with integers.
     """
-    common = clearing(asked) if constraints is None else constraints
+    common = clearing(statement) if constraints is None else constraints
     grams = [_over_wholes(square, common) for square in squares]
     shares = [scaled(q, Fraction(1, common)) for q in cofactors]
     scale = lcm(1, *(v.denominator for rows in grams for row in rows for v in row), *map(denominator, shares))
-    factor = denominator(asked.multiplier)
+    factor = denominator(statement.multiplier)
     ratio = Fraction(scale, factor * (common if constraints is None else 1))
     return IntegerWitness(
         clearing=common,
         left=ratio.numerator,
         right=ratio.denominator,
-        multiplier=scaled(asked.multiplier, factor),
+        multiplier=scaled(statement.multiplier, factor),
         squares=tuple(_square(square, rows, scale) for square, rows in zip(squares, grams, strict=True)),
         cofactors=tuple(scaled(q, scale) for q in shares),
     )
@@ -118,7 +118,7 @@ class Reason:
     rest: int = 0
 
 
-def multiplier_reason(asked: Statement, squares: Sequence[Square]) -> Reason:
+def multiplier_reason(statement: Statement, squares: Sequence[Square]) -> Reason:
     """Reason for the sign of a statement's multiplier.
 
     Parameters
@@ -133,16 +133,16 @@ def multiplier_reason(asked: Statement, squares: Sequence[Square]) -> Reason:
     """
     if not squares:
         return Reason()
-    one = (0,) * len(asked.variables)
+    one = (0,) * len(statement.variables)
     strict = next((i for i, s in enumerate(squares) if not s.product and one in s.basis), None)
     if strict is None:
-        return Reason(sums=_sums(asked, squares, Fraction(0)))
+        return Reason(sums=_sums(statement, squares, Fraction(0)))
     margin, less = _less_one(squares[strict], squares[strict].basis.index(one))
     numerator = margin.denominator
     return Reason(
-        sums=_sums(asked, [*squares[:strict], less, *squares[strict + 1 :]], margin),
+        sums=_sums(statement, [*squares[:strict], less, *squares[strict + 1 :]], margin),
         numerator=numerator,
-        rest=int(margin * numerator * denominator(asked.multiplier)),
+        rest=int(margin * numerator * denominator(statement.multiplier)),
     )
 
 
@@ -161,14 +161,14 @@ def _less_one(square: Square, index: int) -> tuple[Fraction, Square]:
     )
 
 
-def _sums(asked: Statement, squares: Sequence[Square], margin: Fraction) -> IntegerWitness:
+def _sums(statement: Statement, squares: Sequence[Square], margin: Fraction) -> IntegerWitness:
     """numerator · μ − rest = Σ squares, with μ times its common denominator."""
-    factor = Fraction(margin.denominator * denominator(asked.multiplier))
-    size = len(asked.variables)
-    target = combination([(factor, asked.multiplier), (-factor * margin, constant(size))])
+    factor = Fraction(margin.denominator * denominator(statement.multiplier))
+    size = len(statement.variables)
+    target = combination([(factor, statement.multiplier), (-factor * margin, constant(size))])
     scaled_squares = [replace(s, gram=tuple(factor * v for v in s.gram)) for s in squares]
-    stated = replace(asked, polynomial=target, multiplier=constant(size), equalities=())
-    return in_integers(stated, scaled_squares, (), clearing(asked))
+    stated = replace(statement, polynomial=target, multiplier=constant(size), equalities=())
+    return in_integers(stated, scaled_squares, (), clearing(statement))
 
 
 # ----------------------------------------------------------------------
@@ -224,12 +224,12 @@ def _square_term(given: IntegerSquare) -> str:
     return f"Square {product} {basis}\n      {rows}"
 
 
-def question(asked: Statement) -> str:
+def question(statement: Statement) -> str:
     """The polynomial, the inequalities and the equalities of a statement."""
     inequalities, equalities = (
-        listed(map(polynomial, given), ";\n   ") for given in (asked.inequalities, asked.equalities)
+        listed(map(polynomial, given), ";\n   ") for given in (statement.inequalities, statement.equalities)
     )
-    return f"Question\n  {polynomial(asked.polynomial)}\n  {inequalities}\n  {equalities}"
+    return f"Question\n  {polynomial(statement.polynomial)}\n  {inequalities}\n  {equalities}"
 
 
 def reason(given: Reason) -> str:

@@ -30,8 +30,8 @@ class Columns:
         return gallina.listed(filter(None, map(self._term, terms)), ";\n   ")
 
     def _term(self, term: Term) -> str:
-        known = tuple(p for p in term.parameters if p in self.values)
-        number = value(Term(term.coefficient, known, ()), self.values)
+        parameters = tuple(p for p in term.parameters if p in self.values)
+        number = value(Term(term.coefficient, parameters, ()), self.values)
         if not number:
             return ""
         varying = gallina.listed((str(self.varying.index(p)) for p in term.parameters if p not in self.values), ";")
@@ -73,15 +73,15 @@ def loop_theorems(evidence: Evidence) -> Iterator[str]:
 
 def _columns(evidence: Evidence, obligations: Obligations, m: int) -> Columns:
     loop = evidence.loop
-    kept = obligations.with_variable
+    variables = obligations.with_variable
     potential = {_POTENTIAL: m} if "decay" in evidence.claims else {}
     degrees = obligations.lift_degrees
     return Columns(
         weights={
             **loop.states,
-            **{lift: degrees[lift] for lift in kept},
+            **{lift: degrees[lift] for lift in variables},
             **potential,
-            **{lift: 1 for lift in loop.lifts if lift not in kept},
+            **{lift: 1 for lift in loop.lifts if lift not in variables},
         },
         varying=tuple(name for name, (low, high) in loop.ranges.items() if low < high),
         values={**loop.parameters, **{name: low for name, (low, high) in loop.ranges.items() if low == high}},

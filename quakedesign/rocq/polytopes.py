@@ -38,15 +38,15 @@ _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (
 
 def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
     """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant."""
-    task, held, reach = claim.task, claim.held, claim.reach
-    if held.longest_step:
+    task, loop, reach = claim.task, claim.held, claim.reach
+    if loop.longest_step:
         raise UnsupportedError("Rocq verifies the stick-slip loop for periodic sampling alone. Use the two checkers")
     with ctx.workprec(BITS):
-        push, moved = _outward(*pushes(task, held, reach)), task.reference_rates[0] * held.step
-        found = ranges(task, reach.box[0] + moved, push, reach.box[1] * held.step)
-        found = replace(found, **{name: _outward(*getattr(found, name)) for name in ("slope", "damping", "chord")})
-        (period,) = periods = Period.deciding(BALLS, task, held, found, reach.box[1], push)
-        deciding = verifiers(task, held, reach, found)
+        push, moved = _outward(*pushes(task, loop, reach)), task.reference_rates[0] * loop.step
+        bounds = ranges(task, reach.box[0] + moved, push, reach.box[1] * loop.step)
+        bounds = replace(bounds, **{name: _outward(*getattr(bounds, name)) for name in ("slope", "damping", "chord")})
+        (period,) = periods = Period.deciding(BALLS, task, loop, bounds, reach.box[1], push)
+        deciding = verifiers(task, loop, reach, bounds)
         sliding, resting = (_hints(deciding, rows) for rows in facet_rows(periods, reach))
         yield _loop(period)
         yield (
@@ -66,7 +66,7 @@ def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
     low, high = map(gallina.rational, push)
     yield f"Definition proposed : proposals :=\n  Proposals hints_of_slides hints_of_rests {low} {high}\n  {pushed}."
     stated = (getattr(claim.claims, one.name) for one in fields(claim.claims))
-    numbers = map(gallina.rational, (*stated, *found.rest_pressure))
+    numbers = map(gallina.rational, (*stated, *bounds.rest_pressure))
     yield f"Definition claimed : claims := Claims {' '.join(numbers)}."
     yield gallina.accepted("follows plant facets proposed claimed", "followed")
     flow = f"follows_from_flow plant known {_terms(period)} (1 # {1 << _OFF})"
@@ -87,21 +87,21 @@ def _outward(low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def _loop(period: Period) -> str:
-    task, held, found, law = period.task, period.held, period.found, period.held.law
+    task, loop, bounds, law = period.task, period.held, period.found, period.held.law
     fastest, bend = task.reference_rates
     bent = (_outward(Fraction(0), fraction_of(v.upper().fmpq()))[1] for v in period.bent)
     numbers = (
-        *(held.step, task.amplitude, task.authority, task.beta[1], *found.slope, *found.chord, *found.damping),
-        *(fastest + held.told, bend, *bent, law.rate_gain, law.target_gain, law.return_rate, law.level_gain),
-        *(law.slip_gain, law.rest_slip, held.slip_noise),
+        *(loop.step, task.amplitude, task.authority, task.beta[1], *bounds.slope, *bounds.chord, *bounds.damping),
+        *(fastest + loop.told, bend, *bent, law.rate_gain, law.target_gain, law.return_rate, law.level_gain),
+        *(law.slip_gain, law.rest_slip, loop.slip_noise),
     )
     return f"Definition plant : loop := Loop {' '.join(map(gallina.rational, numbers))}."
 
 
 def _facet(row: tuple[Fraction, ...], given: tuple[Fraction, ...]) -> str:
-    free, bare, cut, bare_cut, kept = given
+    free, bare, cut, bare_cut, rest = given
     flags = ["true" if flag else "false" for flag in (bare, bare_cut)]
-    entries = *map(gallina.rational, (*row, free)), flags[0], gallina.rational(cut), flags[1], gallina.rational(kept)
+    entries = *map(gallina.rational, (*row, free)), flags[0], gallina.rational(cut), flags[1], gallina.rational(rest)
     return f"Facet {' '.join(entries)}"
 
 
@@ -176,13 +176,13 @@ def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Ro
         signed = floats.copy()
         signed[:, 0], signed[:, 2] = signed[:, 0] * verifier.sign, abs(signed[:, 2])
         signs = EXACT.middle(rows.constants) + (signed.clip(min=0) * EXACT.middle(verifier.sizes)).sum(axis=1)
-        found = {}
+        hints = {}
         for w, top, sign, basis, share, left in zip(rows.which, tops, signs, bases, shares, own, strict=True):
             if float(1 - top) > _CLOSE:
-                found[int(w)] = _Hint.of(verifier, basis, share)
+                hints[int(w)] = _Hint.of(verifier, basis, share)
             else:
-                found[int(w)] = _Hint(False, ()) if 1 - sign > _CLOSE else _Hint.itself(verifier, left)
-        yield rows, found
+                hints[int(w)] = _Hint(False, ()) if 1 - sign > _CLOSE else _Hint.itself(verifier, left)
+        yield rows, hints
 
 
 def _pair(least: _Hint, largest: _Hint, *, positive: bool = False) -> str:
@@ -193,11 +193,11 @@ def _pair(least: _Hint, largest: _Hint, *, positive: bool = False) -> str:
 
 def _by_slide(given: Iterator[tuple[Rows, dict[int, _Hint]]], count: int) -> list[str]:
     """Per facet: whether the innovation is cut off, chord, beta; end of r'."""
-    found: dict[int, list[str]] = {i: [] for i in range(count)}
+    by_facet: dict[int, list[str]] = {i: [] for i in range(count)}
     for many in zip(*[given] * len(COMBINATIONS), strict=True):
         for facet in many[0][1]:
-            found[facet].append(gallina.listed(hints[facet].text() for _, hints in many))
-    return [gallina.listed(found[i], ";\n     ") for i in range(count)]
+            by_facet[facet].append(gallina.listed(hints[facet].text() for _, hints in many))
+    return [gallina.listed(by_facet[i], ";\n     ") for i in range(count)]
 
 
 def _by_rest(given: Iterator[tuple[Rows, dict[int, _Hint]]], falls: list[bool]) -> list[str]:
@@ -209,14 +209,14 @@ def _by_rest(given: Iterator[tuple[Rows, dict[int, _Hint]]], falls: list[bool]) 
             for facet, hint in next(given)[1].items():
                 share = 0 if falls[facet] else place
                 table[facet, chord, share, *_PAIRS[part]] = hint
-    found = []
+    texts = []
     for facet, fall in enumerate(falls):
         cases = []
         for chord, share in product(range(2), range(1 if fall else 2)):
             pairs = (_pair(*(table[facet, chord, share, i, j] for j in (0, 1)), positive=i == 1) for i in range(4))
             cases.append(gallina.listed(pairs))
-        found.append(gallina.listed(cases, ";\n     "))
-    return found
+        texts.append(gallina.listed(cases, ";\n     "))
+    return texts
 
 
 def _pushed(slices: list[Verifier], period: Period) -> str:

@@ -130,20 +130,20 @@ def _stick_slip(raw: Any) -> Iterator[str]:
 
 
 def _polynomial(raw: Any) -> Iterator[str]:
-    asked, proof = read_polynomial_file(raw)
-    yield f"(* variables 0, 1, ...: {', '.join(asked.variables)} *)"
-    yield f"Definition asked : question := {gallina.question(asked)}."
+    statement, proof = read_polynomial_file(raw)
+    yield f"(* variables 0, 1, ...: {', '.join(statement.variables)} *)"
+    yield f"Definition asked : question := {gallina.question(statement)}."
     if isinstance(proof, Point):
-        yield from _negative(asked, proof)
+        yield from _negative(statement, proof)
     elif isinstance(proof, SumOfSquares):
-        yield from _nonnegative(asked, proof)
+        yield from _nonnegative(statement, proof)
     else:
         raise UnsupportedError(f"{_KINDS} Received not-sos. Use check.py.")
 
 
-def _negative(asked: Statement, proof: Point) -> Iterator[str]:
+def _negative(statement: Statement, proof: Point) -> Iterator[str]:
     yield f"Definition point : list Q := {gallina.listed(map(gallina.rational, proof.coordinates))}."
-    values = (evaluate(p, proof.coordinates) for p in (asked.polynomial, *asked.inequalities))
+    values = (evaluate(p, proof.coordinates) for p in (statement.polynomial, *statement.inequalities))
     yield f"Definition values : list Q := {gallina.listed(map(gallina.rational, values))}."
     yield gallina.accepted("negative asked point values")
     yield (
@@ -153,9 +153,9 @@ def _negative(asked: Statement, proof: Point) -> Iterator[str]:
     )
 
 
-def _nonnegative(asked: Statement, proof: SumOfSquares) -> Iterator[str]:
-    why = multiplier_reason(asked, proof.multiplier)
-    yield f"Definition proof : witness := {gallina.witness(in_integers(asked, proof.squares, proof.cofactors))}."
+def _nonnegative(statement: Statement, proof: SumOfSquares) -> Iterator[str]:
+    why = multiplier_reason(statement, proof.multiplier)
+    yield f"Definition proof : witness := {gallina.witness(in_integers(statement, proof.squares, proof.cofactors))}."
     yield f"Definition why : reason := {gallina.reason(why)}."
     yield gallina.accepted("nonnegative asked proof why")
     yield (
@@ -171,9 +171,9 @@ def _attraction(raw: Any) -> Iterator[str]:
     yield f"(* variables 0, 1, ...: {', '.join(claim.variables)} *)"
     yield "(* V, and minus its derivative where V is at most the level *)"
     parts = ((claim.positive, claim.proof.positive), (claim.decrease, claim.proof.decrease))
-    for number, (asked, proof) in enumerate(parts):
-        why = f" ({gallina.reason(multiplier_reason(asked, proof.multiplier))})"
-        yield _part(asked, proof, "nonnegative", why).replace("@", str(number))
+    for number, (statement, proof) in enumerate(parts):
+        why = f" ({gallina.reason(multiplier_reason(statement, proof.multiplier))})"
+        yield _part(statement, proof, "nonnegative", why).replace("@", str(number))
     yield from _everywhere(range(len(parts)))
 
 
@@ -189,12 +189,12 @@ def _all(numbers: Sequence[int]) -> str:
     return f"{''.join(f'Forall_cons _ holds_{n} (' for n in numbers)}Forall_nil _{')' * len(numbers)}"
 
 
-def _part(asked: Statement, proof: SumOfSquares | Witness, check: str, tail: str = "") -> str:
+def _part(statement: Statement, proof: SumOfSquares | Witness, check: str, tail: str = "") -> str:
     """One question with its proof, with @ for its number."""
-    data = in_integers(asked, proof.squares, proof.cofactors)
+    data = in_integers(statement, proof.squares, proof.cofactors)
     return "\n".join(
         [
-            f"Definition asked_@ : question := {gallina.question(asked)}.",
+            f"Definition asked_@ : question := {gallina.question(statement)}.",
             f"Definition proof_@ : witness := {gallina.witness(data)}.",
             gallina.accepted(f"{check} asked_@ proof_@{tail}", "accepted_@"),
             f"Definition holds_@ := {check}_sound asked_@ proof_@{tail} accepted_@.\n",
@@ -223,6 +223,6 @@ def _obligations(evidence: Evidence) -> Iterator[tuple[str, str]]:
     domain = evidence.loop.domain
     for one in different(claimed(evidence.loop, evidence.lyapunov, evidence.claims)):
         given = evidence.witnesses[one.name]
-        asked = statement_of(one, domain, given.multiplier)
+        statement = statement_of(one, domain, given.multiplier)
         how = ("nonnegative", " Terms") if domain == "reals" else ("on_cell",)
-        yield one.name, _part(asked, given, *how)
+        yield one.name, _part(statement, given, *how)

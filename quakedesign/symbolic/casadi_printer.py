@@ -56,12 +56,12 @@ def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) ->
 
 
 def _translate(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], table: Operations) -> list[Any]:
-    known: dict[sp.Basic, Any] = dict(values)
+    translated: dict[sp.Basic, Any] = dict(values)
 
     def walk(node: sp.Basic) -> Any:
-        if node not in known:
-            known[node] = _number(node) if node.is_number else _operate(node, table, walk)
-        return known[node]
+        if node not in translated:
+            translated[node] = _number(node) if node.is_number else _operate(node, table, walk)
+        return translated[node]
 
     return [walk(sp.sympify(expression)) for expression in expressions]
 
@@ -204,7 +204,7 @@ def vectorised(function: Any) -> Callable[..., "np.ndarray"]:
 
     def evaluated(*inputs: "np.ndarray") -> "np.ndarray":
         work: list[Any] = [0.0] * function.sz_w()
-        found = np.empty((function.nnz_out(0), max(each.shape[1] for each in inputs)))
+        result = np.empty((function.nnz_out(0), max(each.shape[1] for each in inputs)))
         with np.errstate(all="ignore"):
             for code, out, into in steps:
                 if code == ca.OP_CONST:
@@ -212,10 +212,10 @@ def vectorised(function: Any) -> Callable[..., "np.ndarray"]:
                 elif code == ca.OP_INPUT:
                     work[out[0]] = inputs[into[0]][into[1]]
                 elif code == ca.OP_OUTPUT:
-                    found[out[1]] = work[into[0]]
+                    result[out[1]] = work[into[0]]
                 else:
                     work[out[0]] = _INSTRUCTIONS[code](*(work[place] for place in into))
-        return found
+        return result
 
     return evaluated
 

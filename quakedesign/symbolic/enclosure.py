@@ -73,8 +73,8 @@ def regular(expression: sp.Expr, box: Box) -> bool:
 
     Then its derivatives off the kinks tell how it runs; at other jumps derivatives have an impulse.
     """
-    known = _intervals(expression, box)
-    ends = [known[node.args[0]] for node in known if _singular_at_zero(node)]
+    intervals = _intervals(expression, box)
+    ends = [intervals[node.args[0]] for node in intervals if _singular_at_zero(node)]
     return all(low > 0 or high < 0 for low, high in ends)
 
 
@@ -86,15 +86,15 @@ def _singular_at_zero(node: Any) -> bool:
 
 def _intervals(expression: sp.Expr, box: Box) -> dict[sp.Basic, Interval]:
     """Intervals of an expression and of every part of it."""
-    known: dict[sp.Basic, Interval] = dict(box)
+    bounds: dict[sp.Basic, Interval] = dict(box)
 
     def walk(node: Any) -> Interval:
-        if node not in known:
-            known[node] = _rounded(_number(node) if node.is_Number or node.is_NumberSymbol else _operate(node, walk))
-        return known[node]
+        if node not in bounds:
+            bounds[node] = _rounded(_number(node) if node.is_Number or node.is_NumberSymbol else _operate(node, walk))
+        return bounds[node]
 
     walk(sp.sympify(expression))
-    return known
+    return bounds
 
 
 def _number(node: Any) -> Interval:
@@ -378,10 +378,10 @@ def _worked(results: list[Any], work: Work) -> list[Any]:
 
 
 def _depending(work: Work, index: int) -> Work:
-    known, depending = {index}, []
+    reached, depending = {index}, []
     for step in work:
-        if not known.isdisjoint(step[2]):
-            known.add(step[0])
+        if not reached.isdisjoint(step[2]):
+            reached.add(step[0])
             depending.append(step)
     return depending
 
@@ -524,8 +524,8 @@ def upper_bound(
         if limit is not None and (-bound < limit or limit <= attained < -bound < float("inf")):
             break
         heapq.heappop(heap)
-        for part, found in _halves(operations, worst, values):
-            heapq.heappush(heap, (-_upper(found[-1]), next(order), part, found))
+        for part, moved in _halves(operations, worst, values):
+            heapq.heappush(heap, (-_upper(moved[-1]), next(order), part, moved))
     result = -heap[0][0]
     if result == float("inf"):
         raise ParameterError(
@@ -549,11 +549,11 @@ def _halves(operations: _Operations, box: dict[Any, Any], values: list[Any]) -> 
         middle = (low + high) / 2
         parts, worst = [], None
         for part in ((low, middle), (middle, high)):
-            found = operations.moved(values, symbol, ball(*part))
-            upper = _upper(found[-1])
+            moved = operations.moved(values, symbol, ball(*part))
+            upper = _upper(moved[-1])
             if least is not None and upper >= least:  # the other half cannot make it better
                 break
-            parts.append((box | {symbol: part}, found))
+            parts.append((box | {symbol: part}, moved))
             worst = upper if worst is None else max(worst, upper)
         else:
             best, least = parts, worst
@@ -614,7 +614,7 @@ def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction)
     UnsupportedError
         For a function without an enclosure.
     """
-    form, order, found = _Form(sp.sympify(expression)), count(), limit
+    form, order, bound = _Form(sp.sympify(expression)), count(), limit
     heap: list[tuple[End, int, Box]] = []
 
     def push(part: Box) -> None:
@@ -624,7 +624,7 @@ def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction)
     for _ in range(PIECES):
         top = -heap[0][0]
         if top <= limit + slack:
-            return max(found, Fraction(top))
+            return max(bound, Fraction(top))
         part = heapq.heappop(heap)[2]
         risen = form.risen(part)
         for point in (_centre(risen), _centre(part)):  # a face may lie on a kink, where less is known than beside it

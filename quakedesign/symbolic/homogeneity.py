@@ -171,10 +171,10 @@ def homogeneous(
 def _decided(components: Mapping[Any, Any], weights: Mapping[Any, Any], degree: sp.Rational | None) -> Homogeneity:
     moved = {s: dilate(e, weights) for s, e in components.items()}
     degrees = {s: _degrees(e) for s, e in moved.items()}
-    found = {m - weights.get(s, 0) for s, several in degrees.items() if several is not None for m in several}
+    differences = {m - weights.get(s, 0) for s, several in degrees.items() if several is not None for m in several}
     homogeneous = all(several is not None for several in degrees.values())
-    if homogeneous and len(found | ({degree} if degree is not None else set())) <= 1:
-        m = next(iter(found), degree)
+    if homogeneous and len(differences | ({degree} if degree is not None else set())) <= 1:
+        m = next(iter(differences), degree)
         proof = tuple(
             Identity(left=e.subs(dilation(weights), simultaneous=True), right=epsilon ** (m + weights.get(s, 0)) * e)
             if e != 0

@@ -33,8 +33,8 @@ _Given = ParamSpec("_Given")
 _Result = TypeVar("_Result")
 
 
-def kept(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
-    """Read the results of a derivation where they are kept. Its one argument, if any, are names of states."""
+def stored(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
+    """Read the results of a derivation where they are stored. Its one argument, if any, are names of states."""
     home = derivation.__module__.rpartition(".")[2]
 
     @cache
@@ -48,19 +48,19 @@ def kept(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
 
 def derived_again() -> str:
     """Content of the file, derived now."""
-    known = shipped(FILE)
-    before, found = dict(known), {}
-    known.clear()
+    shipped_texts = shipped(FILE)
+    before, derived = dict(shipped_texts), {}
+    shipped_texts.clear()
     try:
         for key in before:
             name, *states = key.split()
             home, function = name.split(".")
             derivation = getattr(import_module(f"{__package__}.{home}"), function)
             derivation.cache_clear()
-            found[key] = sp.srepr(derivation(*([tuple(states)] if states else [])))
+            derived[key] = sp.srepr(derivation(*([tuple(states)] if states else [])))
     finally:
-        known.update(before)
-    return json.dumps(found, indent=1) + "\n"
+        shipped_texts.update(before)
+    return json.dumps(derived, indent=1) + "\n"
 
 
 def _read(text: str) -> Any:
@@ -111,7 +111,7 @@ def force_balance() -> sp.Eq:
     return sp.Eq(m * acceleration, -friction_force + k * (far - z) - eta * v + m * disturbance(z, v, t))
 
 
-@kept
+@stored
 def shifted_acceleration() -> sp.Expr:
     """x2' of eq. shift: the force balance measured from the equilibrium without pressure and disturbance."""
     z, v, acceleration, far, z_star = sp.symbols("z v a delta_far z^*", real=True)
@@ -151,7 +151,7 @@ def jacobian() -> sp.Matrix:
     return field.jacobian([x1, x2]).subs(named).subs({x1: 0, x2: 0})
 
 
-@kept
+@stored
 def instability() -> sp.Or:
     """Condition for an unstable origin: det J < 0 or trace J > 0, solved for k̂ and η̂ (ERRATA 2)."""
     J = jacobian()
@@ -175,13 +175,13 @@ def _error_acceleration() -> sp.Expr:
     return shifted - r.diff(t, 2)
 
 
-@kept
+@stored
 def control_coefficient() -> sp.Expr:
     """β [-]."""
     return sp.simplify(sp.expand(_error_acceleration()).coeff(nu))
 
 
-@kept
+@stored
 def matched_perturbation() -> sp.Expr:
     """h [m/s²]."""
     return _error_acceleration().subs(nu, 0) / control_coefficient()
@@ -219,7 +219,7 @@ r0, r1, r2, r3 = sp.symbols("r_0 r_1 r_2 r_3", real=True)
 acceleration_error = sp.Symbol(r"\dot{e}_2", real=True)
 
 
-@kept
+@stored
 def matched_rate() -> sp.Expr:
     """h' along a solution, in values of friction, its slopes, the reference and its derivatives, and e1, e2, e2'.
 
@@ -252,7 +252,7 @@ def matched_rate() -> sp.Expr:
     return divisor / N_hat * sp.collect(inner, [slip_slope, rate_slope, r3, phi_t]) / friction_value**2
 
 
-@kept
+@stored
 def matched_rate_in_parts() -> sp.Tuple:
     """h' as what the slopes of friction bring in, and the rest, expanded."""
     slopes = (slip_slope, rate_slope)
@@ -262,7 +262,7 @@ def matched_rate_in_parts() -> sp.Tuple:
     return sp.Tuple(bending, flat)
 
 
-@kept
+@stored
 def sensitivities() -> sp.Tuple:
     """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time, each as what the slope of friction brings in and the rest.
 
@@ -306,8 +306,8 @@ class _Latex(LatexPrinter):  # type: ignore[misc]
 
 class _Plain(StrPrinter):  # type: ignore[misc]
     def _print_Derivative(self, rate: sp.Derivative) -> str:
-        known = rate.expr == reference(t)
-        return "r" + "'" * rate.derivative_count if known else str(super()._print_Derivative(rate))
+        of_reference = rate.expr == reference(t)
+        return "r" + "'" * rate.derivative_count if of_reference else str(super()._print_Derivative(rate))
 
     def _print_Function(self, call: sp.Function) -> str:
         return "r" if call == reference(t) else str(super()._print_Function(call))

@@ -15,7 +15,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import rational, shortly
 from quakedesign.fault import Fault, FrictionLaw
 from quakedesign.symbolic import plant
-from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, kept, mu_star, p, sigma
+from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, mu_star, p, sigma, stored
 
 # ----------------------------------------------------------------------
 # The plant about steady sliding, for friction with state: third order with inertia, quasi-dynamic without.
@@ -45,7 +45,7 @@ def _state_rates(names: tuple[str, ...]) -> list[sp.Expr]:
     return [sp.Function(rf"g_{name}", real=True)(plant.x1, rate, *state_symbols(names)) for name in names]
 
 
-@kept
+@stored
 def sliding_acceleration(names: tuple[str, ...] = ()) -> sp.Expr:
     """v' [m/s²] of the force balance, measured from sliding at v_∞ without pressure and disturbance.
 
@@ -83,7 +83,7 @@ def slope_symbols(names: tuple[str, ...] = ()) -> dict[sp.Expr, sp.Symbol]:
     return slopes
 
 
-@kept
+@stored
 def jacobian(names: tuple[str, ...] = ()) -> sp.Matrix:
     """Jacobian of (x1, v, states) in the slopes of `slope_symbols`, at a pressure p that the far end balances."""
     quiet = sliding_acceleration(names).replace(plant.disturbance, lambda *_: sp.Integer(0))
@@ -115,7 +115,7 @@ def _tidy(expression: sp.Expr) -> sp.Expr:
     return sp.factor(expression) if expression.is_rational_function() else expression
 
 
-@kept
+@stored
 def characteristic(names: tuple[str, ...] = (), *, inertia: bool = True) -> tuple[sp.Expr, ...]:
     """Coefficients of det(λE − J), highest power first, in the slopes and `effective_stress`.
 

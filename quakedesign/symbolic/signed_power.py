@@ -163,8 +163,8 @@ def normal_form(expression: sp.Expr) -> sp.Expr:
 
 def signs(expression: sp.Expr) -> tuple[sp.Expr, ...]:
     """Arguments P of the signs ⌈P⌋⁰ in an expression, in a fixed order."""
-    found = {power.args[0] for power in expression.atoms(SignedPower) if power.args[1] == 0}
-    return tuple(sorted(found, key=sp.default_sort_key))
+    arguments = {power.args[0] for power in expression.atoms(SignedPower) if power.args[1] == 0}
+    return tuple(sorted(arguments, key=sp.default_sort_key))
 
 
 def _flat(e: sp.Expr) -> sp.Expr:

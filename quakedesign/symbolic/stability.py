@@ -256,11 +256,11 @@ def nucleation_length(fault: Fault, *, pressure: float = 0, loading_rate: float 
 
 
 def _number(expression: sp.Expr, fault: Fault, pressure: float, rate: float | None) -> sp.Expr:
-    held = _interval(pressure, fault)[0]
+    constant = _interval(pressure, fault)[0]
     values = {
         **plant.plant_values(fault),
         **fault.friction.values(),
-        p: sp.Rational(str(held)),
+        p: sp.Rational(str(constant)),
         rate_and_state_plant.loading_rate: sp.Rational(str(operating_rate(fault, rate))),
         rate_and_state_plant.shear_modulus: sp.Rational(str(rational(fault.shear_modulus))),
     }
@@ -347,10 +347,10 @@ class Model:
             templates[plant.k_hat] = "the spring is softer than steady sliding needs: stiffness {} < {} 1/s²"
         other = "a condition of Routh and Hurwitz fails: {} < {}"
         conditions = self.instability.args if isinstance(self.instability, sp.Or) else (self.instability,)
-        found = [(c, [sp.N(side.subs(self.values), _DIGITS) for side in c.args]) for c in conditions]
+        sides = [(c, [sp.N(side.subs(self.values), _DIGITS) for side in c.args]) for c in conditions]
         return tuple(
             templates.get(c.args[0], other).format(*(f"{float(side):.4g}" for side in (low, high)))
-            for c, (low, high) in found
+            for c, (low, high) in sides
             if low < high
         )
 

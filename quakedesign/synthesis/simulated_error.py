@@ -163,7 +163,7 @@ def synthesise_sampled(
         Its value is the metric, in its unit; never worse than that of gains from the literature that are proved.
     """
     asked = question(trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=degrees)
-    known = [_measured(trial, asked, loop) for loop in asked.known]
+    known = [_measured(trial, asked, loop) for loop in asked.published]
     small = synthesise(
         trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=asked.degrees, starts=1, compare=False
     )

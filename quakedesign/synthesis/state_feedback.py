@@ -35,9 +35,9 @@ from quakedesign.laws.feed_forward import NONE
 from quakedesign.linear.linear_problem import FeedbackLoop, LinearProblem, Matrix
 from quakedesign.linear.riccati import RiccatiDesign, riccati_design
 from quakedesign.linear.robust_stability import finished_exactly, robust_stability, sector_loop, why_undecided
-from quakedesign.linear.sampled_stability import HeldLoop, held_loop
+from quakedesign.linear.sampled_stability import HeldLoop, sampled_loop
 from quakedesign.loop.loop_setup import MEASURED, LoopSetup
-from quakedesign.loop.sensing.differentiator import told_by_differences
+from quakedesign.loop.sensing.differentiator import by_differences
 from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.search.search import claims_of, find_certificate, finish, quadratic_margin
@@ -88,7 +88,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
 
     def held_loop(self, fault: Fault, controller: ExtendedLQR) -> HeldLoop | None:
         """The law as it is, over the fault's T_s."""
-        return held_loop(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
+        return sampled_loop(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
 
     def sampled(
         self, fault: Fault, task: FaultPlant, law: type[ExtendedLQR], step: Fraction, wanted: Wanted
@@ -104,7 +104,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
             summed = summed_integrals(_four(wanted.gains), step)
             if differs and (reason := why_no_law(step, setup.measured, exact)):
                 return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason))
-            summed = told_by_differences(summed, step) if differs else summed
+            summed = by_differences(summed, step) if differs else summed
             given = best_guarantee(task, exact.held(summed, step))
             if given.proved:
                 return attacked(fault, given)

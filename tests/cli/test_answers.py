@@ -537,7 +537,7 @@ def test_a_region_is_code_zero_where_a_level_is_proved(
         "quakedesign.sos.region_of_attraction", lambda *given, **more: asked.append((*given, more)) or region
     )
     monkeypatch.setattr("quakedesign.sos.save_attraction", lambda proof, path: path.write_text(proof))
-    monkeypatch.setattr("quakedesign.sos.exact.words.region_facts", lambda _: {"level": 1})
+    monkeypatch.setattr("quakedesign.sos.exact.words.region_entries", lambda _: {"level": 1})
     monkeypatch.setattr("quakedesign.sos.exact.words.region_words", lambda _: ["a region"])
     words = ("attraction", "field.toml", *["--everywhere"] * everywhere)
     code, out, _ = call(*words)

@@ -54,9 +54,9 @@ def test_a_noise_comes_back_and_white_noise_has_no_other_part():
 
 
 def test_whitened_noise_is_independent_with_the_variance_of_one_measurement():
-    known, kept = CorrelatedNoise(30.0, 8.0, ALONG, COUNTS, True), np.ones(NUMBER, dtype=bool)
-    kept[50] = False
-    weights = known.whitener(kept)
+    known, used = CorrelatedNoise(30.0, 8.0, ALONG, COUNTS, True), np.ones(NUMBER, dtype=bool)
+    used[50] = False
+    weights = known.whitener(used)
     assert weights.shape == (NUMBER - 1, NUMBER)
     assert np.all(weights[:, 50] == 0)
     np.testing.assert_allclose(weights @ known.covariance @ weights.T, np.eye(NUMBER - 1), atol=1e-9)
@@ -75,15 +75,15 @@ def test_what_all_samples_share_is_part_of_the_covariance():
 
 
 def test_what_neighbours_tell_is_taken_away():
-    known, kept = CorrelatedNoise(0.5, 50.0, ALONG, COUNTS, True), np.ones(NUMBER, dtype=bool)
+    known, used = CorrelatedNoise(0.5, 50.0, ALONG, COUNTS, True), np.ones(NUMBER, dtype=bool)
     slow = np.sin(ALONG / 60)
     slow[200] += 1.0
-    kept[[200, 300]] = False
-    own = known.deletion(slow, kept)
+    used[[200, 300]] = False
+    own = known.deletion(slow, used)
     assert np.argmax(np.abs(own)) == 200
     assert own[200] > 5 * np.max(np.abs(np.delete(own, 200)))
-    rest = np.flatnonzero(kept & (np.arange(NUMBER) != 100))
-    for place, others in ((100, rest), (300, np.flatnonzero(kept))):
+    rest = np.flatnonzero(used & (np.arange(NUMBER) != 100))
+    for place, others in ((100, rest), (300, np.flatnonzero(used))):
         beside = known.covariance[place, others] @ np.linalg.inv(known.covariance[np.ix_(others, others)])
         left = known.covariance[place, place] - beside @ known.covariance[others, place]
         assert own[place] == pytest.approx((slow[place] - beside @ slow[others]) / left**0.5, rel=1e-6)
@@ -135,7 +135,7 @@ def fitted(columns, measured, noise=None):
         fitted=np.zeros(columns.shape[1]),
         measured=measured,
         counts=ones,
-        kept=ones > 0,
+        used=ones > 0,
         agreeing=1,
         starts=1,
         correlated=noise,
@@ -156,7 +156,7 @@ def trends(records, trend, fading, white):
             noise[i] = fading * noise[i - 1] + (1 - fading**2) ** 0.5 * noise[i]
         measured = noise + white * draw.standard_normal(200) + trend * time
         plain = fitted(columns, measured)
-        likely = noise_of(plain.residuals, columns, plain.counts, time, None, plain.kept)
+        likely = noise_of(plain.residuals, columns, plain.counts, time, None, plain.used)
         best = fitted(columns, measured, likely)
         without = np.linalg.lstsq(weighed(best.weights, columns[:, :-1]), weighed(best.weights, measured), rcond=None)
         left = weighed(best.weights, measured - columns[:, :-1] @ without[0])

@@ -67,14 +67,14 @@ def line(samples):
     return Linear(np.column_stack([np.ones(samples), np.arange(samples)]))
 
 
-def made(experiment, measured, *, fitted=None, counts=None, kept=None):
+def made(experiment, measured, *, fitted=None, counts=None, used=None):
     samples = len(measured)
     return Fit(
         experiment=experiment,
         fitted=np.zeros(experiment.matrix.shape[1]) if fitted is None else fitted,
         measured=measured,
         counts=np.ones(samples) if counts is None else counts,
-        kept=np.ones(samples, dtype=bool) if kept is None else kept,
+        used=np.ones(samples, dtype=bool) if used is None else used,
         agreeing=1,
         starts=1,
     )
@@ -237,7 +237,7 @@ def test_a_profile_that_comes_upon_a_better_fit_hands_it_on():
 
 def test_fits_with_correlated_noise_compare_by_their_whitened_squares():
     one, other = (
-        SimpleNamespace(kept=np.ones(10, dtype=bool), squares=squares, correlation=correlation, correlated=noise)
+        SimpleNamespace(used=np.ones(10, dtype=bool), squares=squares, correlation=correlation, correlated=noise)
         for squares, correlation, noise in ((2.0, 2.0, None), (3.0, 5.0, object()))
     )
     assert advantage(one, other) == pytest.approx((1.5, 10 / 2 * np.log(1.5)), rel=1e-12)
@@ -301,7 +301,7 @@ class Watched(Linear):
 def test_rounds_end_when_one_has_left_out_nothing_new(outlier, rounds):
     measured, asked = np.resize([1e-3, -1e-3], 30), []
     measured[12] += outlier
-    assert fit(Watched(line(30).matrix, asked), measured, seed=1).kept.all() == (rounds == 1)
+    assert fit(Watched(line(30).matrix, asked), measured, seed=1).used.all() == (rounds == 1)
     assert len(asked) == 2 + rounds
 
 
@@ -311,7 +311,7 @@ def test_a_fit_without_an_outlier_is_that_of_the_others():
     measured[12] += 0.1
     found = fit(line(30), measured, seed=1)
     others = np.delete(np.arange(30), 12)
-    assert (~found.kept).nonzero()[0].tolist() == [12]
+    assert (~found.used).nonzero()[0].tolist() == [12]
     assert found.fitted == pytest.approx(np.polyfit(others, measured[others], 1)[::-1], rel=1e-6)
     assert found.freedom == 29 - 2
     residuals = measured[others] - np.polyval(np.polyfit(others, measured[others], 1), others)
@@ -320,7 +320,7 @@ def test_a_fit_without_an_outlier_is_that_of_the_others():
 
 def test_a_mean_of_many_measurements_weighs_by_the_root_of_their_number():
     counts = np.array([4.0, 1.0, 9.0, 1.0])
-    found = made(Linear(np.ones((4, 1))), np.array([1.0, 2.0, -1.0, 50.0]), counts=counts, kept=np.arange(4) < 3)
+    found = made(Linear(np.ones((4, 1))), np.array([1.0, 2.0, -1.0, 50.0]), counts=counts, used=np.arange(4) < 3)
     assert found.scaled.tolist() == [2.0, 2.0, -3.0, 50.0]
     assert found.weights.tolist() == [2.0, 1.0, 3.0, 0.0]
     assert (found.squares, found.freedom, found.noise) == (17.0, 2, 8.5**0.5)
@@ -396,8 +396,8 @@ def test_deviations_are_those_of_the_inverse_and_infinite_along_what_is_not_told
 def test_the_advantage_is_of_the_samples_that_both_count():
     """Squares of 4 and of 8 over three samples, two for an independent one: 3/2 ln 2."""
     matrix = Linear(np.ones((5, 1)))
-    one = made(matrix, np.array([1.0, -1.0, 2**0.5, -9.0, 0.1]), kept=np.array([1, 1, 1, 0, 1], dtype=bool))
-    other = replace(one, measured=2**0.5 * one.measured, kept=np.array([1, 1, 1, 1, 0], dtype=bool))
+    one = made(matrix, np.array([1.0, -1.0, 2**0.5, -9.0, 0.1]), used=np.array([1, 1, 1, 0, 1], dtype=bool))
+    other = replace(one, measured=2**0.5 * one.measured, used=np.array([1, 1, 1, 1, 0], dtype=bool))
     vars(one)["correlation"], vars(other)["correlation"] = 2.0, 3.0
     assert advantage(one, other) == pytest.approx((2.0, 3 / 2 * np.log(2)), rel=1e-12)
     assert advantage(other, one) == pytest.approx((0.5, -3 / 2 * np.log(2)), rel=1e-12)
@@ -414,7 +414,7 @@ def test_a_move_along_a_valley_leaves_what_is_not_felt():
         fitted=np.zeros(3),
         measured=np.ones(4),
         counts=np.ones(4),
-        kept=np.ones(4, dtype=bool),
+        used=np.ones(4, dtype=bool),
         agreeing=1,
         starts=1,
     )

@@ -71,7 +71,7 @@ def test_ends_are_those_of_linear_least_squares_where_the_law_is_linear():
     assert found.identified
     assert list(found.estimates) == ["residual", "drop", "critical_slip"]
     fit = found.fit
-    slopes = fit.experiment.slopes(fit.fitted)[fit.kept]
+    slopes = fit.experiment.slopes(fit.fitted)[fit.used]
     covariance = np.linalg.inv(slopes.T @ slopes) * fit.noise**2
     for i, estimate in enumerate(found.estimates.values()):
         wide = np.sqrt(covariance[i, i] * np.array([fit.threshold(1), fit.threshold(3)]) * fit.correlation)

@@ -35,13 +35,13 @@ class Level(Experiment):
         return np.ones((self.samples, 2))
 
 
-def made(values=(0.5, -0.5, 0.25, -0.25, 0.0), *, kept=(True,) * 5):
+def made(values=(0.5, -0.5, 0.25, -0.25, 0.0), *, used=(True,) * 5):
     return Fit(
         experiment=Level(len(values)),
         fitted=np.array([math.log(2.0), -math.log(2.0)]),
         measured=np.array(values),
         counts=np.array([1.0, 2.0, 1.0, 2.0, 1.0]),
-        kept=np.array(kept),
+        used=np.array(used),
         agreeing=2,
         starts=4,
     )
@@ -124,7 +124,7 @@ def test_a_set_on_the_edge_of_the_region_is_allowed_and_one_beyond_is_not(monkey
 
 
 def test_outliers_are_told_at_their_times_largest_first():
-    found = identification(made((0.1, 9.0, 0.0, -20.0, 0.1), kept=(True, False, True, False, True)))
+    found = identification(made((0.1, 9.0, 0.0, -20.0, 0.1), used=(True, False, True, False, True)))
     assert found.outliers == (Outlier(time=14.0, size=-20.0), Outlier(time=12.0, size=9.0))
     assert found.to_dict()["outliers"] == [
         {"time": 14.0, "time_unit": "s", "size": -20.0, "size_unit": ""},
@@ -173,7 +173,7 @@ def test_what_to_try_leaves_out_what_was_tried():
 
 
 def test_the_file_of_a_result_has_its_numbers():
-    fit = made(kept=(True, True, True, True, False))
+    fit = made(used=(True, True, True, True, False))
     found = identification(fit, estimates={"drop": told(least=-math.inf)}, difference=told("drop - x")).to_dict()
     assert found["residual"] == {
         "noise": fit.noise,

@@ -164,7 +164,7 @@ def test_the_law_that_made_a_record_is_preferred_unless_one_is_asked_for(law, ot
     assert asked.rival is None
     assert found.rival.squares > 1.5
     assert found.rival.excess > 10
-    independent = found.fit.kept.sum() / min(found.fit.correlation, asked.fit.correlation)
+    independent = found.fit.used.sum() / min(found.fit.correlation, asked.fit.correlation)
     assert found.rival.excess == pytest.approx(independent * np.log(found.rival.squares), rel=0.1)
 
 

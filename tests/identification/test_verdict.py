@@ -27,19 +27,19 @@ next_command = getattr(checked_command, "__wrapped__", checked_command)  # takes
 
 
 def checks(
-    residuals, *, begins=None, raw=None, noise=1.0, values=None, slopes=None, kept=None, path=None, whitened=None
+    residuals, *, begins=None, raw=None, noise=1.0, values=None, slopes=None, used=None, path=None, whitened=None
 ):
     """Checks of residuals [-] at times 0, 1, 2 …, with a noise of 1 from sample to sample."""
     time = np.arange(float(len(residuals)))
-    kept = np.ones(len(residuals), dtype=bool) if kept is None else kept
+    used = np.ones(len(residuals), dtype=bool) if used is None else used
     fit = SimpleNamespace(
         measured=np.array(residuals),
         residuals=np.array(residuals),
-        kept=kept,
-        whitened=np.array(residuals)[kept] if whitened is None else whitened,
+        used=used,
+        whitened=np.array(residuals)[used] if whitened is None else whitened,
         noise=noise,
-        weights=kept.astype(float),
-        slopes=(np.ones((len(residuals), 1)) if slopes is None else slopes)[kept],
+        weights=used.astype(float),
+        slopes=(np.ones((len(residuals), 1)) if slopes is None else slopes)[used],
     )
     held = SimpleNamespace(time=time, friction=np.array(residuals if raw is None else raw))
     record = SimpleNamespace(time=time, load_point=time if path is None else path)
@@ -104,9 +104,9 @@ def test_a_peak_of_twice_the_noise_passes_and_four_samples_or_those_left_out_tel
     found, _ = checks(residuals, begins=[300.0])
     assert found["peak"].passed
     assert "is explained" in found["peak"].sentence
-    kept = np.ones(COUNT, dtype=bool)
-    kept[302] = False
-    assert checks(residuals, begins=[300.0], kept=kept)[0]["peak"].value == 0.0
+    used = np.ones(COUNT, dtype=bool)
+    used[302] = False
+    assert checks(residuals, begins=[300.0], used=used)[0]["peak"].value == 0.0
     worst, _ = checks(np.where(np.arange(COUNT) < 250, 1.5, residuals), begins=[100.0, 300.0])
     assert worst["peak"].value == 2.0
     _, quiet_after = checks(np.where(np.arange(COUNT) < 250, 3.0, 0.0), begins=[300.0])

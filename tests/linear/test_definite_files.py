@@ -8,7 +8,7 @@ import quakedesign as qd
 from quakedesign.laws import published
 from quakedesign.linear.linear_problem import LinearProblem
 from quakedesign.linear.sampled_stability import varying_verdict
-from quakedesign.linear.verdict import definite_files, held_files
+from quakedesign.linear.verdict import definite_files, sampled_files
 from quakedesign.sos.exact.polynomial_files import load, text
 
 GOOD, BAD = ((F(2), F(-1)), (F(-1), F(1))), ((F(1), F(1)), (F(1), F(1)))
@@ -34,7 +34,7 @@ def test_more_than_sixteen_variables_are_split(count, sizes):
 def test_the_published_gains_have_their_matrices_in_files_and_bad_gains_none():
     problem = LinearProblem.of(qd.load_fault("lab-fault"))
     gains = tuple(published("lab-fault")["elqr"].gains.values())
-    held = held_files(problem, gains, varying_verdict(problem, gains, "0.0005"))
+    held = sampled_files(problem, gains, varying_verdict(problem, gains, "0.0005"))
     assert len(held) == 3  # P, W and four vertices of seven variables
     assert all(answer.check() for answer in held)
-    assert held_files(problem, gains, varying_verdict(problem, gains, "0.001")) == []
+    assert sampled_files(problem, gains, varying_verdict(problem, gains, "0.001")) == []

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.linear.frequency import circle_limit, frequency_facts, slip_limit
+from quakedesign.linear.frequency import circle_limit, frequency_properties, slip_limit
 from quakedesign.linear.linear_problem import FeedbackLoop, floats
 from quakedesign.lyapunov.exact.fault_bounds import Sectors
 
@@ -89,7 +89,7 @@ def test_the_circle_criterion_is_never_above_the_linear_limit_and_here_close():
 
 @pytest.mark.parametrize("corner", list(product((F(1), F(57, 40)), (F(-1), F(29, 10)), (F(23, 10),))))
 def test_margins_move_a_pole_onto_the_axis(corner):
-    facts = frequency_facts(LOOP, corner)
+    facts = frequency_properties(LOOP, corner)
     beta, slip, rate = (float(v) for v in corner)
     assert facts.stable
     if facts.gain_reduction is not None:
@@ -114,7 +114,7 @@ def test_margins_move_a_pole_onto_the_axis(corner):
 def test_norms_agree_with_python_control():
     for corner in LOOP.sectors.vertices():
         A = floats(LOOP.matrix(corner))
-        facts = frequency_facts(LOOP, corner)
+        facts = frequency_properties(LOOP, corner)
         for row, value in ((0, facts.disturbance_peak_slip), (1, facts.disturbance_peak_rate)):
             system = control.ss(A, np.array([[0.0], [1], [0], [0]]), np.eye(4)[[row]], [[0.0]])
             peak = np.abs(control.frequency_response(system, np.logspace(-2, 2, 4001)).frdata).max()
@@ -130,7 +130,7 @@ def test_an_optimal_k_has_a_return_difference_of_at_least_one():
         slip=(F(-1),) * 2,
         rate=(F(23, 10),) * 2,
     )
-    facts = frequency_facts(loop, loop.sectors.vertices()[0])
+    facts = frequency_properties(loop, loop.sectors.vertices()[0])
     assert facts.return_difference > 1 - 1e-6
     assert facts.phase_margin >= 60
     assert facts.gain_reduction is None or facts.gain_reduction <= 0.5

@@ -32,7 +32,7 @@ def test_every_proof_of_the_published_gains_is_a_file_that_checks(tmp_path):
 
 
 def test_what_cannot_be_asked_is_refused_before_the_work(monkeypatch):
-    for place in ("verdict.linear_facts", "sampled_stability.largest_varying_step"):
+    for place in ("verdict.linear_entries", "sampled_stability.largest_varying_step"):
         monkeypatch.setattr(f"quakedesign.linear.{place}", lambda *_, **__: pytest.fail("worked"))
     with pytest.raises(UnknownNameError, match="amplitude, rate"):
         judge(LAB, published("lab-fault")["elqr"], peaks="any")

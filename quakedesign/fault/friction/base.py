@@ -114,8 +114,8 @@ class FrictionLaw(ABC):
         """Return the law with SymPy rationals for quantities; only for building expressions."""
         import sympy as sp
 
-        held = {name: sp.Rational(str(rational(getattr(self, name), name))) for name in self.quantities()}
-        return self._holding(self._options() | held)
+        exact = {name: sp.Rational(str(rational(getattr(self, name), name))) for name in self.quantities()}
+        return self._holding(self._options() | exact)
 
     def values(self) -> "dict[sp.Symbol, sp.Rational]":
         """Exact value of every quantity's symbol."""

@@ -105,11 +105,11 @@ class RateAndState(FrictionLaw):
         """Friction coefficient [-] with rate and state held at the ends of the working range beyond it."""
         import sympy as sp
 
-        def held(value: Any, low: Any, high: Any) -> "sp.Expr":
+        def clip(value: Any, low: Any, high: Any) -> "sp.Expr":
             return sp.Min(sp.Max(value, low), high)
 
-        theta = held(self._theta(state), self.critical_slip / self.fastest_rate, self.critical_slip / self.slowest_rate)
-        return self.friction(held(rate, self.slowest_rate, self.fastest_rate), theta)
+        theta = clip(self._theta(state), self.critical_slip / self.fastest_rate, self.critical_slip / self.slowest_rate)
+        return self.friction(clip(rate, self.slowest_rate, self.fastest_rate), theta)
 
     def state_rates(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "tuple[sp.Expr, ...]":
         """θ' [-]."""

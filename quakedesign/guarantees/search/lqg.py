@@ -26,7 +26,7 @@ from quakedesign.laws.sampled_law import Matrix, Row, unit_row
 from quakedesign.loop import SHORTEST, Layer, SlidingModel
 from quakedesign.loop.layer import MODES
 from quakedesign.loop.loop_setup import MEASURED
-from quakedesign.loop.sensing.differentiator import ORDER, names_before, told_by_differences
+from quakedesign.loop.sensing.differentiator import ORDER, by_differences, names_before
 from quakedesign.plant.ranges import FaultPlant
 from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_rate
 
@@ -217,7 +217,7 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup
     """
     if measured == MEASURED[2]:
         plain = family_of(task, step, MEASURED[0], setup)
-        return replace(plain, law=lambda x: told_by_differences(plain.law(x), step), starts=(*_GENTLE, *plain.starts))
+        return replace(plain, law=lambda x: by_differences(plain.law(x), step), starts=(*_GENTLE, *plain.starts))
     observed, layer = measured == "slip", bool(setup.diffusion)
     path = layer or (bool(setup.lag) and path_modes(step, setup, observed=observed) >= 0)
     feedback: PathFeedback | DelayFeedback

@@ -27,5 +27,5 @@ __all__ = [
 @cache
 def stages() -> dict[str, type[Stage]]:
     """Every stage of the package, by name, along the signal."""
-    known = discovered(__name__, Stage, shared=("base", "chain"))
-    return dict(sorted(known.items(), key=lambda item: (issubclass(item[1], FlowStage), item[1].place)))
+    every = discovered(__name__, Stage, shared=("base", "chain"))
+    return dict(sorted(every.items(), key=lambda item: (issubclass(item[1], FlowStage), item[1].place)))

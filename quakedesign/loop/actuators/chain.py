@@ -64,8 +64,8 @@ class Actuator:
 
     def completed(self, other: "Actuator") -> "Actuator":
         """Actuator extended by the stages of another one whose kind it lacks."""
-        known = {stage.name for stage in self.stages}
-        more = (stage for stage in other.stages if stage.name not in known)
+        names = {stage.name for stage in self.stages}
+        more = (stage for stage in other.stages if stage.name not in names)
         along = sorted((*self.stages, *more), key=lambda stage: (isinstance(stage, FlowStage), stage.place))
         return Actuator(stages=tuple(along))
 
@@ -114,24 +114,24 @@ class Actuator:
 
     def hold(self, numbers: list[Any], memory: list[Any], pressure: Any, step: float) -> tuple[Any, Any, list[Any]]:
         """Held pressure [Pa], excess of the commanded pressure [Pa], and the memory afterwards."""
-        kept: list[Any] = []
+        memories: list[Any] = []
         excess: Any = 0.0
         for stage, own, past in zip(self.sampled, *_split(self.sampled, numbers, memory), strict=True):
             before = pressure
             pressure, past = stage.apply(own, past, pressure, step)
             excess = excess + (before - pressure) if stage.limits else excess
-            kept += past
-        return pressure, excess, kept
+            memories += past
+        return pressure, excess, memories
 
-    def flow(self, numbers: list[Any], memory: list[Any], held: Any) -> tuple[list[Any], Any, dict[str, Any]]:
+    def flow(self, numbers: list[Any], memory: list[Any], applied: Any) -> tuple[list[Any], Any, dict[str, Any]]:
         """Rates of the flowing stages, pressure [Pa] in the fault, and signals of `FLOWS`, under a pressure held."""
         rates: list[Any] = []
         signals: dict[str, Any] = {}
         for stage, own, past in zip(self.flowing, *_split(self.flowing, numbers, memory), strict=True):
-            rates += stage.rates(own, past, held)
-            signals |= stage.flows(own, past, held)
-            held = stage.output(own, past, held)
-        return rates, held, signals
+            rates += stage.rates(own, past, applied)
+            signals |= stage.flows(own, past, applied)
+            applied = stage.output(own, past, applied)
+        return rates, applied, signals
 
 
 DIRECT = Actuator()

@@ -172,8 +172,8 @@ class RateLimit(SampledStage):
         """Rate-limited pressure; see `SampledStage.apply`."""
         import casadi as ca
 
-        (rate,), (held,) = numbers, memory
-        reached = held + ca.fmin(ca.fmax(pressure - held, -rate * step), rate * step)
+        (rate,), (before,) = numbers, memory
+        reached = before + ca.fmin(ca.fmax(pressure - before, -rate * step), rate * step)
         return reached, [reached]
 
 

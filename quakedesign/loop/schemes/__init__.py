@@ -34,8 +34,8 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
     if ":" not in name:
         require_known(name, sorted(schemes()), "scheme")
     kind = named(name, schemes(), Scheme, "scheme")
-    known: set[str] = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
-    for setting in sorted(settings.keys() - known):
+    names: set[str] = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
+    for setting in sorted(settings.keys() - names):
         able = [n for n, one in schemes().items() if is_dataclass(one) and setting in {f.name for f in fields(one)}]
         raise ParameterError(
             f"settings of {setting} are for the schemes {', '.join(sorted(able)) or 'of nobody'}. "
@@ -60,10 +60,10 @@ def own_way(
         return usual if scheme is None else scheme, step, {}
     chosen, period = own.scheme if scheme is None else scheme, float(own.step)
     wanted, named = {key: float(value) for key, value in own.settings}, isinstance(chosen, str)
-    told = wanted if isinstance(chosen, str) else {key: getattr(chosen, key, None) for key in wanted}
+    received_settings = wanted if isinstance(chosen, str) else {key: getattr(chosen, key, None) for key in wanted}
     name = chosen if isinstance(chosen, str) else chosen.name
-    if (name, told) != (own.scheme, wanted) or step not in (None, period):
-        received = "".join(f", {key} {value!r}" for key, value in told.items() if not named)
+    if (name, received_settings) != (own.scheme, wanted) or step not in (None, period):
+        received = "".join(f", {key} {value!r}" for key, value in received_settings.items() if not named)
         raise ParameterError(
             f"a sampled law runs with the scheme {own} and the step {period!r} s of its design. Received the scheme "
             f"{name}{received} and the step {period if step is None else step!r} s. Omit scheme and step."

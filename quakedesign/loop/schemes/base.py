@@ -169,7 +169,7 @@ class Decided(ABC):
 
     @classmethod
     @abstractmethod
-    def decide(cls, found: tuple[sp.Expr, ...], law: DiscreteLaw, known: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
         """What the controller does, given the expressions, the values of their symbols, and its own memory."""
 
 
@@ -198,11 +198,11 @@ def control_step(kind: type[Decided], law: DiscreteLaw) -> ControlStep:
     symbols = {"signals": SIGNALS, "integrals": law.integrals, "numbers": lifted.numbers}
     inputs = {name: ca.SX.sym(name, len(parts)) for name, parts in symbols.items()}
     own = ca.SX.sym("own", kind.own_size)
-    known = {s: inputs[name][i] for name, parts in symbols.items() for i, s in enumerate(parts)}
+    values = {s: inputs[name][i] for name, parts in symbols.items() for i, s in enumerate(parts)}
     split = len(lifted.expressions) - len(slopes)
-    decision = kind.decide(lifted.expressions[:split], law, known, ca.vertsplit(own) if kind.own_size else [])
-    changes = (after - known[s] for s, after in zip(law.integrals, decision.integrals, strict=True))
-    slope = discrete_law.values(lifted.expressions[split:], known)
+    decision = kind.decide(lifted.expressions[:split], law, values, ca.vertsplit(own) if kind.own_size else [])
+    changes = (after - values[s] for s, after in zip(law.integrals, decision.integrals, strict=True))
+    slope = discrete_law.values(lifted.expressions[split:], values)
     push = sum((k * change for k, change in zip(slope, changes, strict=True)), start=ca.SX(0))
     results = [decision.pressure, _column(decision.integrals), _column(decision.own), push]
     names = ["pressure", "integrals", "own", "push"]
@@ -271,8 +271,8 @@ class NoClock:
         now = wait < 1
         following, drawn = uniform(state)
         fresh = self.shortest + ca.floor((self.longest - self.shortest + 1) * drawn)
-        kept = [ca.if_else(now, new, old) for new, old in zip(following, state, strict=True)]
-        return now, [ca.if_else(now, fresh, wait) - 1, *kept]
+        states = [ca.if_else(now, new, old) for new, old in zip(following, state, strict=True)]
+        return now, [ca.if_else(now, fresh, wait) - 1, *states]
 
 
 # ----------------------------------------------------------------------
@@ -286,11 +286,11 @@ class ControlSample:
     """Everything known at one sample (SX): the pressures held before and from it, and the memory afterwards."""
 
     before: Any
-    held: Any
+    applied: Any
     integrals: list[Any]
     numbers: list[Any]
     own: list[Any]
-    kept: list[Any]
+    memories: list[Any]
     noise: list[Any]
     clock: list[Any]
     flow: list[Any]
@@ -386,13 +386,13 @@ class Sampled(Scheme, Decided):
         """See `Scheme.advance`."""
         sample = self._sample(loop, counter, state, step)
         moving = ca.vertcat(state[:2], *sample.flow)
-        for held, begin, share in self._sections(sample):
+        for applied, begin, share in self._sections(sample):
             # With one entry more than the section before: repetitions are told apart by their numbers of arguments.
-            given = ca.vertcat(counter, held, *sample.numbers, *([begin] if begin else []))
+            given = ca.vertcat(counter, applied, *sample.numbers, *([begin] if begin else []))
             times = math.ceil(share * self.substeps)
             motion = self._motion(step, begin, share, times)
             moving = loop.advance_often(method, motion, given, moving, share * step / times, times)
-        rest = ca.vertcat(*sample.own, sample.held, *sample.kept, *sample.noise, *sample.clock)
+        rest = ca.vertcat(*sample.own, sample.applied, *sample.memories, *sample.noise, *sample.clock)
         first = 2 + len(sample.integrals)
         count = state.shape[0] - first - rest.shape[0] - len(sample.flow)
         constants = state[first : first + count]
@@ -401,15 +401,15 @@ class Sampled(Scheme, Decided):
     def _sections(self, sample: ControlSample) -> tuple[tuple[Any, float, float], ...]:
         """Pressures that are held between two samples, from which share of the period, and for which."""
         late = self.actuator.part
-        return ((sample.before, 0, late), (sample.held, late, 1 - late)) if late else ((sample.held, 0, 1),)
+        return ((sample.before, 0, late), (sample.applied, late, 1 - late)) if late else ((sample.applied, 0, 1),)
 
     def _motion(self, step: float, begin: float, share: float, times: int) -> Any:
         """Rates of plant and actuator under a pressure held, as `Stepped.advance_often` takes them."""
 
         def motion(plant: Any, passed: Any, now: Any, given: Any) -> Any:
-            counter, held, *numbers = ca.vertsplit(given)
+            counter, applied, *numbers = ca.vertsplit(given)
             time = (counter + (begin + passed * share / times)) * step
-            rates, pressure, _ = self.actuator.flow(numbers, ca.vertsplit(now[2:]), held)
+            rates, pressure, _ = self.actuator.flow(numbers, ca.vertsplit(now[2:]), applied)
             return ca.vertcat(plant(time, now[:2], pressure), *rates)
 
         return motion
@@ -442,20 +442,20 @@ class Sampled(Scheme, Decided):
         part = {name: [next(entries) for _ in values] for name, values in self._parts(loop).items()}
         seen, noise = self.measurement.measure(part["deviation"], part["noise"], state[:2])
         ahead = self.clock.shortest if self.clock else 1
-        known = self._known(loop, counter, step, seen, ahead)
-        known |= {discrete_law.authority: part["authority"][0], discrete_law.held: part["held"][0]}
-        signals = ca.vertcat(*(known[symbol] for symbol in SIGNALS))
+        inputs = self._inputs(loop, counter, step, seen, ahead)
+        inputs |= {discrete_law.authority: part["authority"][0], discrete_law.held: part["held"][0]}
+        signals = ca.vertcat(*(inputs[symbol] for symbol in SIGNALS))
         before = state[2 : 2 + count]
         given = signals, before, ca.vertcat(*part["law"]), ca.vertcat(*part["own"])
         pressure, after, own, push = self.control_step(loop).function(*given)
-        held, excess, kept = self.actuator.hold(part["sampled"], part["kept"], pressure, ahead * step)
+        applied, excess, memories = self.actuator.hold(part["sampled"], part["kept"], pressure, ahead * step)
         winds = excess * push > 0
         integrals = [ca.if_else(winds, before[i], after[i]) for i in range(count)]
         memory = [own[i] for i in range(self.own_size)]
-        found = ControlSample(
-            part["held"][0], held, integrals, part["flowing"], memory, kept, noise, [], part["flow"], push
+        sample = ControlSample(
+            part["held"][0], applied, integrals, part["flowing"], memory, memories, noise, [], part["flow"], push
         )
-        return self._if_now(found, ca.vertsplit(before) if count else [], part) if self.clock else found
+        return self._if_now(sample, ca.vertsplit(before) if count else [], part) if self.clock else sample
 
     def _if_now(self, sample: ControlSample, integrals: list[Any], part: dict[str, list[Any]]) -> ControlSample:
         """The sample, or what there was before where none is taken now."""
@@ -466,16 +466,16 @@ class Sampled(Scheme, Decided):
 
         return replace(
             sample,
-            held=ca.if_else(now, sample.held, sample.before),
+            applied=ca.if_else(now, sample.applied, sample.before),
             integrals=chosen(sample.integrals, integrals),
             own=chosen(sample.own, part["own"]),
-            kept=chosen(sample.kept, part["kept"]),
+            memories=chosen(sample.memories, part["kept"]),
             noise=chosen(sample.noise, part["noise"]),
             clock=clock,
         )
 
     @staticmethod
-    def _known(loop: Stepped, counter: Any, step: float, seen: Any, ahead: int) -> Values:
+    def _inputs(loop: Stepped, counter: Any, step: float, seen: Any, ahead: int) -> Values:
         """Values of the signals of one sample, the next expected so many steps ahead."""
         now, later = loop.reference(counter * step), loop.reference((counter + ahead) * step)
         return {

@@ -96,19 +96,19 @@ class Compensated(Sampled):
         return super().settings | {"weight": self.weight} | {name: getattr(self, name) for name in names}
 
     @classmethod
-    def decide(cls, found: tuple[sp.Expr, ...], law: DiscreteLaw, known: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
         begun, before, ahead_before, estimate, weight, *limit = own
-        pull, feed_forward, slope = found
-        gain, rate_error = known[discrete_law.step] * known[discrete_law.authority], known[discrete_law.rate_error]
-        pushed = known[discrete_law.held] - ahead_before
+        pull, feed_forward, slope = expressions
+        gain, rate_error = values[discrete_law.step] * values[discrete_law.authority], values[discrete_law.rate_error]
+        pushed = values[discrete_law.held] - ahead_before
         follows = begun > 0 if pull != 0 else False
         estimate = ca.if_else(follows, followed(rate_error, before, pushed, estimate, weight, gain), 0)
-        solved = inclusion(pull).solve(known)
+        solved = inclusion(pull).solve(values)
         ahead, share = discrete_law.values((feed_forward, slope), solved)
-        asked = compensation_answered(rate_error, solved[end_rate], estimate, gain) + ahead
-        reference = known[discrete_law.slip] - known[discrete_law.slip_error]
-        passing = dict(zip(_LIMIT, (asked, known[discrete_law.slip], reference, *limit), strict=True))
+        commanded = compensation_answered(rate_error, solved[end_rate], estimate, gain) + ahead
+        reference = values[discrete_law.slip] - values[discrete_law.slip_error]
+        passing = dict(zip(_LIMIT, (commanded, values[discrete_law.slip], reference, *limit), strict=True))
         pressure, *passed = discrete_law.values(_CUT, passing)
         after = [ca.SX(0) if slope == 0 else -estimate / share for _ in law.integrals]
         numbers = limit[: len(_NUMBERS)]

@@ -26,10 +26,10 @@ class Explicit(Sampled):
         return law.pressure, *law.rates
 
     @classmethod
-    def decide(cls, found: tuple[sp.Expr, ...], law: DiscreteLaw, known: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`."""
-        pressure, *rates = discrete_law.values(found, known)
-        after = [known[s] + known[discrete_law.step] * rate for s, rate in zip(law.integrals, rates, strict=True)]
+        pressure, *rates = discrete_law.values(expressions, values)
+        after = [values[s] + values[discrete_law.step] * rate for s, rate in zip(law.integrals, rates, strict=True)]
         return Decision(pressure, after, [])
 
 

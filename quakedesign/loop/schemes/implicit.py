@@ -68,8 +68,8 @@ def direction(expression: sp.Expr) -> int | None:
 
 
 def _same(ways: list[int | None]) -> int | None:
-    found = {way for way in ways if way != 0}
-    return found.pop() if len(found) == 1 else None if found else 0
+    signs = {way for way in ways if way != 0}
+    return signs.pop() if len(signs) == 1 else None if signs else 0
 
 
 @dataclass(frozen=True)
@@ -128,31 +128,31 @@ class Inclusion:
 
         return expression.replace(SignedPower, select)
 
-    def solve(self, known: InclusionValues) -> InclusionValues:
+    def solve(self, inputs: InclusionValues) -> InclusionValues:
         """Values (SX) of `end_slip`, `end_rate` and the signs, from those of all other symbols."""
         excess = self.selected(end_rate - self.free - self.pull)
-        jumps = [self._jump(argument, known) for argument in self.arguments]
+        jumps = [self._jump(argument, inputs) for argument in self.arguments]
         sides, there = [], []
         for number, point in enumerate(jumps):
-            low, high = (self._beside(excess, known, jumps, number, s) for s in (-1.0, 1.0))
+            low, high = (self._beside(excess, inputs, jumps, number, s) for s in (-1.0, 1.0))
             at = ca.logic_and(low <= 0, high >= 0)
             share = -(high + low) / ca.if_else(high > low, high - low, 1)
             there.append((at, point | self._signs(jumps, number, share)))
             sides.append(ca.if_else(high < 0, 1, -1))
         elsewhere = ca.logic_not(reduce(ca.logic_or, (at for at, _ in there), ca.SX(0)))
-        smooth = self._smooth(known | dict(zip(self.signs, sides, strict=True)), elsewhere)
-        return known | reduce(lambda other, case: _choose(case[0], case[1], other), reversed(there), smooth)
+        smooth = self._smooth(inputs | dict(zip(self.signs, sides, strict=True)), elsewhere)
+        return inputs | reduce(lambda other, case: _choose(case[0], case[1], other), reversed(there), smooth)
 
-    def _jump(self, argument: sp.Expr, known: InclusionValues) -> InclusionValues:
+    def _jump(self, argument: sp.Expr, inputs: InclusionValues) -> InclusionValues:
         """Ends of the step at which an argument vanishes."""
         if argument == end_slip:
-            return {end_slip: 0.0 * known[self.slip_error], end_rate: -known[self.slip_error] / known[self.step]}
+            return {end_slip: 0.0 * inputs[self.slip_error], end_rate: -inputs[self.slip_error] / inputs[self.step]}
         if argument == end_rate:
-            return {end_slip: known[self.slip_error], end_rate: 0.0 * known[self.slip_error]}
+            return {end_slip: inputs[self.slip_error], end_rate: 0.0 * inputs[self.slip_error]}
         slope = self._linear(argument)
-        start = self._value(argument, known, 0.0)
-        bound = start / to_casadi([slope], known)[0]
-        return self._ends(known, self._quarter(-argument, known, -bound))
+        start = self._value(argument, inputs, 0.0)
+        bound = start / to_casadi([slope], inputs)[0]
+        return self._ends(inputs, self._quarter(-argument, inputs, -bound))
 
     def _linear(self, argument: sp.Expr) -> sp.Expr:
         """Slope that an argument has at least: that of its linear part."""
@@ -169,64 +169,64 @@ class Inclusion:
         """Selections at a jump; those whose jumps coincide with it go along."""
         here = jumps[number][end_rate]
         ways = [ca.sign(here - point[end_rate]) for point in jumps]
-        found = [own if i == number else ca.if_else(way == 0, own, way) for i, way in enumerate(ways)]
-        return dict(zip(self.signs, found, strict=True))
+        signs = [own if i == number else ca.if_else(way == 0, own, way) for i, way in enumerate(ways)]
+        return dict(zip(self.signs, signs, strict=True))
 
     def _beside(
-        self, excess: sp.Expr, known: InclusionValues, jumps: list[InclusionValues], number: int, side: float
+        self, excess: sp.Expr, inputs: InclusionValues, jumps: list[InclusionValues], number: int, side: float
     ) -> Any:
         """F on one side of a jump."""
-        return to_casadi([excess], known | jumps[number] | self._signs(jumps, number, side))[0]
+        return to_casadi([excess], inputs | jumps[number] | self._signs(jumps, number, side))[0]
 
-    def _smooth(self, known: InclusionValues, needed: Any) -> InclusionValues:
+    def _smooth(self, inputs: InclusionValues, needed: Any) -> InclusionValues:
         """Solution with all signs fixed; where it is not needed, any number."""
         target = self.free + self.selected(self.pull)
         straight = sp.Poly(_straight(target, self.slip_error, self.step), end_rate) if _is_straight(target) else None
         if straight is None:
-            end = _where(needed, self._used(target, known), partial(self._free_end, target))
+            end = _where(needed, self._used(target, inputs), partial(self._free_end, target))
         else:
-            end = to_casadi([straight.coeff_monomial(1) / (1 - straight.coeff_monomial(end_rate))], known)[0]
-        return {sign: known[sign] for sign in self.signs} | self._ends(known, end)
+            end = to_casadi([straight.coeff_monomial(1) / (1 - straight.coeff_monomial(end_rate))], inputs)[0]
+        return {sign: inputs[sign] for sign in self.signs} | self._ends(inputs, end)
 
-    def _free_end(self, target: sp.Expr, known: InclusionValues) -> Any:
+    def _free_end(self, target: sp.Expr, inputs: InclusionValues) -> Any:
         """Zero of target − w."""
-        return self._quarter(target - end_rate, known, self._value(target, known, 0.0))
+        return self._quarter(target - end_rate, inputs, self._value(target, inputs, 0.0))
 
-    def _quarter(self, falling: sp.Expr, known: InclusionValues, width: Any) -> Any:
+    def _quarter(self, falling: sp.Expr, inputs: InclusionValues, width: Any) -> Any:
         """Zero of a falling function of the end of the step, between 0 and `width`."""
-        test, known = _sign_only(falling), self._used(falling, known)
-        before = ca.SX.sym("before", 2 + len(known))
+        test, inputs = _sign_only(falling), self._used(falling, inputs)
+        before = ca.SX.sym("before", 2 + len(inputs))
         low, length, *values = ca.vertsplit(before)
-        by_symbol = dict(zip(known, values, strict=True))
+        by_symbol = dict(zip(inputs, values, strict=True))
         for _ in range(AT_ONCE):
             length = length / 4
             passed = sum(self._value(test, by_symbol, low + share * length) >= 0 for share in (1, 2, 3))
             low = low + passed * length
         rounds = ca.Function("rounds", [before], [ca.vertcat(low, length, *values)])
-        start = ca.vertcat(ca.fmin(width, 0), ca.fabs(width), *known.values())
+        start = ca.vertcat(ca.fmin(width, 0), ca.fabs(width), *inputs.values())
         return rounds.fold(ROUNDS // AT_ONCE, {"never_inline": True})(start)[0]
 
-    def _used(self, expression: sp.Expr, known: InclusionValues) -> InclusionValues:
+    def _used(self, expression: sp.Expr, inputs: InclusionValues) -> InclusionValues:
         """What the value of an expression depends on: what is told to a call counts as if it did."""
         names = expression.free_symbols | {self.slip_error, self.step}
-        return {symbol: value for symbol, value in known.items() if symbol in names}
+        return {symbol: value for symbol, value in inputs.items() if symbol in names}
 
-    def _value(self, expression: sp.Expr, known: InclusionValues, end: Any) -> Any:
-        return to_casadi([expression], known | self._ends(known, end))[0]
+    def _value(self, expression: sp.Expr, inputs: InclusionValues, end: Any) -> Any:
+        return to_casadi([expression], inputs | self._ends(inputs, end))[0]
 
-    def _ends(self, known: InclusionValues, end: Any) -> InclusionValues:
-        return {end_rate: ca.SX(end), end_slip: known[self.slip_error] + known[self.step] * end}
+    def _ends(self, inputs: InclusionValues, end: Any) -> InclusionValues:
+        return {end_rate: ca.SX(end), end_slip: inputs[self.slip_error] + inputs[self.step] * end}
 
 
 def _choose(at: Any, case: InclusionValues, other: InclusionValues) -> InclusionValues:
     return {symbol: ca.if_else(at, case[symbol], other[symbol]) for symbol in other}
 
 
-def _where(needed: Any, known: InclusionValues, solution: Callable[[InclusionValues], Any]) -> Any:
+def _where(needed: Any, inputs: InclusionValues, solution: Callable[[InclusionValues], Any]) -> Any:
     """Solution (SX) where it is needed, 0 elsewhere."""
-    given = ca.SX.sym("given", len(known))
-    found = solution(dict(zip(known, ca.vertsplit(given), strict=True)))
-    return where_needed(ca.Function("solved", [given], [found]))(needed, ca.vertcat(*known.values()))
+    given = ca.SX.sym("given", len(inputs))
+    solved = solution(dict(zip(inputs, ca.vertsplit(given), strict=True)))
+    return where_needed(ca.Function("solved", [given], [solved]))(needed, ca.vertcat(*inputs.values()))
 
 
 def where_needed(function: Any) -> Any:
@@ -237,11 +237,11 @@ def where_needed(function: Any) -> Any:
     function : casadi.Function
         Of scalar operations, one vector in and one out; its name is ``solved``.
     """
-    vector, told = ca.SX.sym("given", function.size1_in(0)), ca.MX.sym("needed")
+    vector, needed = ca.SX.sym("given", function.size1_in(0)), ca.MX.sym("needed")
     left_out = ca.Function("left_out", [vector], [ca.SX.zeros(function.size1_out(0))])
     given = ca.MX.sym("given", function.size1_in(0))
-    either = ca.Function.if_else("either", function, left_out)(told, given)
-    return ca.Function("where_needed", [told, given], [either], {"never_inline": True})
+    either = ca.Function.if_else("either", function, left_out)(needed, given)
+    return ca.Function("where_needed", [needed, given], [either], {"never_inline": True})
 
 
 def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:
@@ -334,11 +334,11 @@ class Implicit(Sampled):
         return backward_euler(law)
 
     @classmethod
-    def decide(cls, found: tuple[sp.Expr, ...], law: DiscreteLaw, known: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`."""
-        pull, feed_forward, *ends = found
+        pull, feed_forward, *ends = expressions
         problem = inclusion(pull)
-        solved = problem.solve(known)
+        solved = problem.solve(values)
         gain = solved[discrete_law.step] * solved[discrete_law.authority]
         pressure = (solved[end_rate] - solved[discrete_law.rate_error]) / gain
         ahead, *after = discrete_law.values((feed_forward, *map(problem.selected, ends)), solved)

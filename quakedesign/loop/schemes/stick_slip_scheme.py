@@ -79,19 +79,19 @@ class StickSlip(Sampled):
         return super().settings | own
 
     @classmethod
-    def decide(cls, found: tuple[sp.Expr, ...], law: DiscreteLaw, known: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
         """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
         weight, slip_weight, rest_slip, *states = own
-        pull, feed_forward, slope = found
-        gain, step = known[discrete_law.step] * known[discrete_law.authority], known[discrete_law.step]
+        pull, feed_forward, slope = expressions
+        gain, step = values[discrete_law.step] * values[discrete_law.authority], values[discrete_law.step]
         gains = weight / gain, slip_weight / (gain * step), rest_slip
         entries = dict(zip((*_STATES, *_GAINS), (*states, *gains), strict=True))
-        level = discrete_law.values((_LEVEL,), known | entries)[0] if pull != 0 else ca.SX(0)
-        solved = inclusion(pull).solve(known)
+        level = discrete_law.values((_LEVEL,), values | entries)[0] if pull != 0 else ca.SX(0)
+        solved = inclusion(pull).solve(values)
         ahead, share = discrete_law.values((feed_forward, slope), solved)
-        rate, rate_error = known[discrete_law.rate], known[discrete_law.rate_error]
+        rate, rate_error = values[discrete_law.rate], values[discrete_law.rate_error]
         pressure = compensation_answered(rate_error, solved[end_rate], level, gain) + ahead
         predicted = ca.fmax(rate - rate_error + solved[end_rate], 0)
         after = [ca.SX(0) if slope == 0 else -level / share for _ in law.integrals]
         numbers = [weight, slip_weight, rest_slip]
-        return Decision(pressure, after, [*numbers, level, predicted, rate, known[discrete_law.slip]])
+        return Decision(pressure, after, [*numbers, level, predicted, rate, values[discrete_law.slip]])

@@ -283,13 +283,13 @@ class Differentiator:
 
 
 def _without_lag(derivatives: list[Any], step: Any) -> list[Any]:
-    found = []
+    totals = []
     for i, shares in enumerate(lag_free(len(derivatives) - 1)):
         total: Any = 0.0
         for share, value in reversed(list(zip(shares, derivatives[i:], strict=True))):
             total = total * step + float(share) * value
-        found.append(total)
-    return found
+        totals.append(total)
+    return totals
 
 
 # ----------------------------------------------------------------------
@@ -354,12 +354,12 @@ class OutputFeedback(Sensor):
     def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
         """See `Sensor.measure`."""
         own, past = iter(numbers), iter(memory)
-        slip, kept = x[0], []
+        slip, memories = x[0], []
         for stage in self.stages:
             slip, after = stage.pass_on(_next(own, len(stage.numbers(self.step))), _next(past, len(stage.start)), slip)
-            kept += after
+            memories += after
         estimates, after = self.differentiator.estimate(list(own), list(past), slip)
-        return ca.vertcat(estimates[0], estimates[1]), [*kept, *after]
+        return ca.vertcat(estimates[0], estimates[1]), [*memories, *after]
 
 
 def _next(entries: Iterator[Any], count: int) -> list[Any]:
@@ -397,7 +397,7 @@ def rate_shares(order: int = ORDER) -> tuple[Fraction, ...]:
     )
 
 
-def told_by_differences(law: LinearLaw, step: Fraction, order: int = ORDER) -> LinearLaw:
+def by_differences(law: LinearLaw, step: Fraction, order: int = ORDER) -> LinearLaw:
     """A law of slip and slip rate, the latter told by differences of slips every T_s [s]: one of the slip alone."""
     now, *before = (share / step for share in rate_shares(order))
     zero, names = Fraction(0), names_before(order)
@@ -408,13 +408,13 @@ def told_by_differences(law: LinearLaw, step: Fraction, order: int = ORDER) -> L
     def remembered(own: tuple[Fraction, ...], seen: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
         return (*own, *(seen[1] * share for share in before))
 
-    kept = [
+    shifted = [
         (*[zero] * len(law.states), *(Fraction(i == place) for i in range(order))) for place in range(-1, order - 1)
     ]
     return replace(
         law,
         states=(*law.states, *names),
-        update=(*(remembered(own, seen) for own, seen in zip(law.update, law.measured, strict=True)), *kept),
+        update=(*(remembered(own, seen) for own, seen in zip(law.update, law.measured, strict=True)), *shifted),
         measured=(*map(fed, law.measured), *((Fraction(place == 0), zero) for place in range(order))),
         output=remembered(law.output, law.feedback),
         feedback=fed(law.feedback),

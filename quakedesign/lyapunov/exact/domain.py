@@ -22,9 +22,9 @@ from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.fault_bounds import (
     Errors,
     coefficient_range,
-    known_ranges,
     largest_matched_rate,
     largest_sensitivities,
+    parameter_ranges,
     rate_expression,
     sensitivity_expressions,
     stage,
@@ -211,7 +211,7 @@ def _whole_limit(question: DomainProblem, errors: Errors) -> str:
     For each cause the symbols of all others are set to zero.
     """
     expression = rate_expression(question.fault, question.controller.divisor, question.controller.feedforward)
-    box = known_ranges(question.fault) | errors.ranges()
+    box = parameter_ranges(question.fault) | errors.ranges()
     every = _FROM_ERRORS | _GIVEN
 
     def alone(cause: str) -> Fraction:
@@ -235,7 +235,7 @@ def _split_limit(question: DomainProblem, level: Fraction) -> str:
     fault, controller = question.fault, question.controller
     expressions = sensitivity_expressions(fault, controller.divisor, controller.feedforward)
     expression = dict(zip(_ERRORS, expressions, strict=True))[error]
-    box = known_ranges(fault) | question.sets.errors(level).ranges()
+    box = parameter_ranges(fault) | question.sets.errors(level).ranges()
     straight = expression.xreplace({slope: sp.Integer(0)})
     calm = straight.xreplace(dict.fromkeys((plant.phi_1, plant.phi_2), sp.Integer(0)))
     less = "" if controller.feedforward.name == "none" else " less its feed-forward"

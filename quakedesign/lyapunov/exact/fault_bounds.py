@@ -70,7 +70,7 @@ def coefficient_range(fault: Fault, divisor: Fraction) -> Range:
 
 @lru_cache(maxsize=16)
 def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> sp.Expr:
-    """h' along a solution [unit of ν per s], in what `known_ranges` and the errors bound."""
+    """h' along a solution [unit of ν per s], in what `parameter_ranges` and the errors bound."""
     bending, flat = plant.matched_rate_in_parts()
     moved = (plant.r3, plant.r2, plant.r1, plant.phi_t, plant.acceleration_error, plant.e2)
     x1, x2, push = sp.symbols("x1 x2 push", real=True)
@@ -114,7 +114,7 @@ def _reference_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
     return {name: sp.factor(sp.expand(r).diff(stage, n) / t_op**n) for n, name in enumerate(names)}
 
 
-def known_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
+def parameter_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
     """Ranges of all that h' and its sensitivities depend on, but the errors: friction in its bounds and slopes."""
     friction, disturbance = friction_bounds(fault.friction), fault.disturbance
     value, change = fault.disturbance_bounds
@@ -160,7 +160,7 @@ def largest_matched_rate(
         As in `upper_bound`, where it is asked only whether the bound is below that [unit of ν per s].
     """
     expression = rate_expression(fault, divisor, feedforward)
-    return upper_bound(expression, known_ranges(fault) | errors.ranges(), pieces=pieces, limit=limit)
+    return upper_bound(expression, parameter_ranges(fault) | errors.ranges(), pieces=pieces, limit=limit)
 
 
 @lru_cache(maxsize=256)
@@ -168,7 +168,7 @@ def largest_sensitivities(
     fault: Fault, divisor: Fraction, errors: Errors, *, pieces: int = 60, feedforward: FeedForward = NONE
 ) -> tuple[Fraction, Fraction]:
     """Rigorous bounds g1 on |∂h/∂e1| [1/s²] and g2 on |∂h/∂e2| [1/s], as `largest_matched_rate`."""
-    box = known_ranges(fault) | errors.ranges()
+    box = parameter_ranges(fault) | errors.ranges()
     first, second = sensitivity_expressions(fault, divisor, feedforward)
     return upper_bound(first, box, pieces=pieces), upper_bound(second, box, pieces=pieces)
 

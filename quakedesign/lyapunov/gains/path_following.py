@@ -500,7 +500,7 @@ class Objective(ABC):
         """Bound on the norm of the gains."""
         return self.bound
 
-    def kept(self, gains: Mapping[str, float], loop: Loop, exponents: Mapping[str, Fraction]) -> dict[str, float]:
+    def clipped(self, gains: Mapping[str, float], loop: Loop, exponents: Mapping[str, Fraction]) -> dict[str, float]:
         """Gains drawn back to the bound on their norm, if they are beyond."""
         scale = float(loop.uncertain["d"][1])
         norm = sum((k / scale ** float(exponents[name])) ** 2 for name, k in gains.items()) ** 0.5
@@ -644,7 +644,7 @@ def _step(setting: PathSetting, state: State, share: float) -> State | None:
     first = len(around.monomials)
     for name, size, x in zip(changes, sizes, proposal.decision[first : first + len(sizes)], strict=True):
         chosen[name] += size * x
-    moved = with_gains(loop, short(loop, objective.kept(chosen, loop, setting.exponents)))
+    moved = with_gains(loop, short(loop, objective.clipped(chosen, loop, setting.exponents)))
     beyond = state.level if share else None
     return look(setting, moved, objective.reached(level, moved, setting.exponents), state.lyapunov, beyond)
 

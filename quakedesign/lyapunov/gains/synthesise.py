@@ -229,7 +229,7 @@ class SynthesisProblem:
     loop: Loop  # With gains of one
     setting: PathSetting  # With the lowest degree
     degrees: tuple[int, ...]
-    known: tuple[Loop, ...]  # With gains from the literature, scaled to the same ranges
+    published: tuple[Loop, ...]  # With gains from the literature, scaled to the same ranges
 
 
 def question(
@@ -266,7 +266,7 @@ def question(
         units={str(state): unit for state, unit in model.units.items()},
         degree=chosen[0],
     )
-    return SynthesisProblem(subject=subject, loop=loop, setting=setting, degrees=chosen, known=published)
+    return SynthesisProblem(subject=subject, loop=loop, setting=setting, degrees=chosen, published=published)
 
 
 def _literature(name: str, loop: Loop, exponents: Mapping[str, Fraction]) -> list[dict[str, Fraction]]:
@@ -296,10 +296,10 @@ def begin_with(problem: SynthesisProblem, seed: int) -> Iterator[Loop]:
 
     Random ones of any size where there are none in the literature.
     """
-    yield from sorted(problem.known, key=lambda one: _beyond(problem.setting, one))
+    yield from sorted(problem.published, key=lambda one: _beyond(problem.setting, one))
     loop, rng = problem.loop, np.random.default_rng(seed)
     while True:
-        near = problem.known[int(rng.integers(len(problem.known)))].gains if problem.known else {}
+        near = problem.published[int(rng.integers(len(problem.published)))].gains if problem.published else {}
         spread = rng.normal(0, _SPREAD, len(loop.gains)) if near else rng.uniform(0, _WIDTH, len(loop.gains))
         factors = dict(zip(loop.gains, np.exp(spread).tolist(), strict=True))
         if near:
@@ -439,7 +439,7 @@ def _synthesis(problem: SynthesisProblem, certificate: Certificate, value: float
 def _beside(problem: SynthesisProblem, mine: Synthesis | None) -> Synthesis | None:
     """Gains found beside known ones, which take their place where they are better within the same bound on the norm."""
     objective = problem.setting.objective
-    compared = [given(problem, one) for one in problem.known]
+    compared = [given(problem, one) for one in problem.published]
     for one in compared:
         if one.certificate is None or one.value is None or one.norm > (objective.bound or one.norm) * (1 + 1e-9):
             continue

@@ -88,14 +88,14 @@ class Screener:
         low, high = 0, len(possible)
         level = min(start, high)
         while low < high:
-            if self._found(place, level):
+            if self._solvable(place, level):
                 low = level
             else:
                 high = level - 1
             level = low + 1 if low >= start else high
         return limit, low
 
-    def _found(self, place: Place, level: int) -> bool:
+    def _solvable(self, place: Place, level: int) -> bool:
         loop = self.sheet.at(place, level)
         sweep = self._sweep(loop)
         if sweep is None:
@@ -106,7 +106,7 @@ class Screener:
     def _follow(self, sweep: Sweep, loop: Loop) -> bool | None:
         """Answer from the neighbours in the row, in the units of the first of them; None where that gives none."""
         path = self._followed.get(sweep) or self._path(sweep, sweep.frame(loop))
-        answer = path.found(loop)
+        answer = path.feasible(loop)
         if answer is None:
             self._followed.pop(sweep, None)
         else:
@@ -127,7 +127,7 @@ class Screener:
         sweep = self._sweep(loop)
         answer = None if sweep is None else sweep.solve(loop, anew=True)
         certificate = None
-        if sweep is not None and answer is not None and answer.found:
+        if sweep is not None and answer is not None and answer.feasible:
             certificate = prove(sweep, loop, answer, self.sheet.subject)
         return place, level, certificate_text(certificate) if certificate else None, self._solves() - before
 
@@ -149,7 +149,7 @@ def _solved(sweep: Sweep, loop: Loop) -> bool:
     answer = sweep.solve(loop, accuracy=_FAST)
     if answer is not None and abs(answer.margin) < CLEAR:
         answer = sweep.solve(loop)
-    return answer is not None and answer.found
+    return answer is not None and answer.feasible
 
 
 class Screeners:

@@ -145,7 +145,7 @@ class Screened:
     slopes: Mapping[str, float]
 
     @property
-    def found(self) -> bool:
+    def feasible(self) -> bool:
         """Whether the search finds a Lyapunov function of the family."""
         return self.margin > SURE
 
@@ -394,7 +394,7 @@ class _Step:
         return max(-self.least, self.most)
 
     @property
-    def found(self) -> bool | None:
+    def feasible(self) -> bool | None:
         """Whether the margin is above `SURE`; None where the bounds do not tell."""
         if self.most < 1 and -self.tau * self.multipliers[0] > max(SURE, _ROOM * self.missed):
             return True
@@ -427,7 +427,7 @@ class Path:
         del self._places[1:]
         return self
 
-    def found(self, loop: Loop) -> bool | None:
+    def feasible(self, loop: Loop) -> bool | None:
         """Whether there is a Lyapunov function with a margin above `SURE`; None where that was not decided."""
         table = self.sweep.cones(self.frame).table(self.sweep.parts_at(loop, self.frame))
         tables = [kind.of(table) for kind in self._kinds]
@@ -436,12 +436,12 @@ class Path:
             try:
                 newton = _Newton(self._kinds, tables, self._means, place)
                 step = newton.step()
-                if step.found is None and step.size < _NEAR:
+                if step.feasible is None and step.size < _NEAR:
                     step = newton.further(step)
             except np.linalg.LinAlgError:
                 step = None
-            if step is not None and step.found is not None:
-                return step.found
+            if step is not None and step.feasible is not None:
+                return step.feasible
             if at_neighbour and len(self._places) > 1 and (step is None or step.size > _FAR):
                 self._places.pop()
                 place = self._places[-1]

@@ -85,7 +85,7 @@ def _swept(loop: Loop, subject: Subject) -> Certificate | None:
             answer = sweep.solve(loop)
         except CertificateError:  # no candidates of this degree, or numbers too far apart
             continue
-        if answer is not None and answer.found:
+        if answer is not None and answer.feasible:
             certificate = prove(sweep, loop, answer, subject)
             if certificate is not None:
                 return certificate
@@ -228,18 +228,18 @@ class Bracket:
     # Smallest number at which it did not; None where none was tried, as a limit makes it needless
     high: Fraction | None = None
     best: Screened | None = None  # Answer at `low`
-    asked: int = 0  # How often it was told something
+    answers: int = 0  # How many answers it was given
 
     def closed(self, limit: Fraction | None) -> bool:
         """Whether `low` is within the tolerance of `high` or of a limit."""
         ends = [end for end in (self.high, limit) if end is not None]
         return self.low is not None and any(end <= self.low * (1 + TOLERANCE) for end in ends)
 
-    def told(self, x: Fraction, answer: Screened | None) -> "Bracket":
+    def updated(self, x: Fraction, answer: Screened | None) -> "Bracket":
         """The bracket after one more answer."""
-        if answer is not None and answer.found:
-            return Bracket(low=x, high=self.high, best=answer, asked=self.asked + 1)
-        return Bracket(low=self.low, high=x, best=self.best, asked=self.asked + 1)
+        if answer is not None and answer.feasible:
+            return Bracket(low=x, high=self.high, best=answer, answers=self.answers + 1)
+        return Bracket(low=self.low, high=x, best=self.best, answers=self.answers + 1)
 
 
 def last_success(
@@ -276,7 +276,7 @@ def last_success(
     bracket, x = Bracket(), first
     for _ in range(_MOST):
         answer, slope = ask(x)
-        bracket = bracket.told(x, answer)
+        bracket = bracket.updated(x, answer)
         enough = most is not None and bracket.low is not None and bracket.low >= most
         if bracket.closed(limit) or enough or bracket.high == floor or (only_above and bracket.low is None):
             break
@@ -294,12 +294,12 @@ def _root(x: Fraction, answer: Screened | None, slope: float) -> Fraction | None
 def _next(bracket: Bracket, x: Fraction, root: Fraction | None, floor: Fraction, limit: Fraction | None) -> Fraction:
     """Number to ask about: near the tangent's root, on the side that is still open; else halfway."""
     low, high = bracket.low, bracket.high
-    astray = root is None or root <= floor or bracket.asked > _BELIEVED
-    if low is None and bracket.asked > 1 and astray:
+    astray = root is None or root <= floor or bracket.answers > _BELIEVED
+    if low is None and bracket.answers > 1 and astray:
         return floor
     ceiling = None if limit is None else first_below(limit)
     middle = _middle(x, low, high, floor, ceiling)
-    if root is None or (bracket.asked > _BELIEVED and bracket.asked % 3 == 0):
+    if root is None or (bracket.answers > _BELIEVED and bracket.answers % 3 == 0):
         return middle
     near = abs(root - x) < _NEAR * x
     guess = root * (1 - _BELOW) if not near or x == high else root * (1 + _ABOVE)
@@ -575,7 +575,7 @@ class _Search:
         for step in _STEPS_BACK:
             x = max(self.line.floor, bracket.low * (1 - step))
             answer = answer if x == bracket.low else self.ask(x)[0]
-            if answer is not None and answer.found:
+            if answer is not None and answer.feasible:
                 certificate = prove(self.sweep, self.line.at(x), answer, self.subject)
                 if certificate is not None:
                     return x, certificate

@@ -338,11 +338,11 @@ _NOTHING = "null\n"
 Search = Callable[[Loop, int, Subject | None], Certificate | None]
 
 
-def kept(search: Search) -> Search:
+def cached(search: Search) -> Search:
     """Take what a search has found before from the folder; search where it has nothing that holds."""
 
     @wraps(search)
-    def known(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
+    def stored(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
         path, certificates = place(loop, degree), list[Certificate | None]()
 
         def searched() -> str:
@@ -363,7 +363,7 @@ def kept(search: Search) -> Search:
                 return certificate
         return search(loop, degree, subject)
 
-    return known
+    return stored
 
 
 def place(loop: Loop, degree: int) -> Path:
@@ -418,7 +418,7 @@ def find_certificate(
     return next(filter(None, (_of_degree(loop, degree, subject) for degree in chosen)), None)
 
 
-@kept
+@cached
 def _of_degree(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
     scale = balance(loop)
     family = family_of(loop, degree, scale)

@@ -137,7 +137,7 @@ def region_words(region: Region) -> list[str]:
     return [*lines, *filter(None, [region.remark])]
 
 
-def region_facts(region: Region) -> dict[str, Any]:
+def region_entries(region: Region) -> dict[str, Any]:
     """The same for JSON; exact numbers are texts."""
     shown = region.proved or region.refuted
     point = region.refuted.proof if region.refuted is not None else None

@@ -127,8 +127,8 @@ def test_bounds_of_the_disturbance_are_those_of_the_decimals():
     assert uncertain_plant(constant).amplitude == F("0.8")
     shaken = fault.with_disturbance(Disturbance(amplitude=0.7, frequency=0.1))
     assert uncertain_plant(shaken, rate_limited=True).change == F("0.07")
-    assert matched.known_ranges(constant)[plant.phi] == (F("-0.8"), F("0.8"))
-    assert matched.known_ranges(shaken)[plant.phi_t] == (F("-0.07"), F("0.07"))
+    assert matched.parameter_ranges(constant)[plant.phi] == (F("-0.8"), F("0.8"))
+    assert matched.parameter_ranges(shaken)[plant.phi_t] == (F("-0.07"), F("0.07"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -85,7 +85,7 @@ def test_a_pump_changes_as_far_as_it_can_until_the_next_sample_is_expected(clock
 def test_a_law_is_told_the_reference_of_now_and_of_the_next_sample_expected():
     """A reference of t, t² and t³ at 1.5 s, and the next sample four steps of 0.5 s later."""
     loop = SimpleNamespace(reference=lambda t: (t, t**2, t**3))
-    told = Sampled._known(loop, 3, 0.5, (10.0, 20.0), 4)
+    told = Sampled._inputs(loop, 3, 0.5, (10.0, 20.0), 4)
     assert {symbol: float(value) for symbol, value in told.items()} == {
         discrete_law.slip: 10.0,
         discrete_law.rate: 20.0,

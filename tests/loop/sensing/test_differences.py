@@ -9,11 +9,11 @@ import pytest
 from quakedesign.laws import LinearLaw
 from quakedesign.loop.sensing.differentiator import (
     Differentiator,
+    by_differences,
     lag_free,
     least_bound,
     names_before,
     rate_shares,
-    told_by_differences,
 )
 
 ACCELERATION, NOISE, STEP = F("2e-3"), F("2e-6"), F("0.184")
@@ -88,7 +88,7 @@ def test_a_law_that_is_told_so_is_a_law_of_the_slip_alone():
         feedback=(F(4), F(6)),
         applied=(F(1), F(9)),
     )
-    told = told_by_differences(law, STEP)
+    told = by_differences(law, STEP)
     assert told.of_slip_alone
     assert (told.states, told.applied) == (("a", "b", *names_before()), (1, 9, 0, 0))
     slips = [F(0), F(0), *(F(int(v), 1000) for v in np.random.default_rng(1).integers(-99, 99, 8))]

@@ -18,10 +18,10 @@ from quakedesign.lyapunov.exact.fault_bounds import (
     Errors,
     equilibrium_pressure,
     initial_perturbation,
-    known_ranges,
     largest_matched_rate,
     largest_sensitivities,
     least_authority,
+    parameter_ranges,
     rest_pressure,
     sectors,
     static_friction,
@@ -100,7 +100,7 @@ def test_the_chords_of_a_hardening_law_are_inside_the_sectors():
 
 
 def test_the_slope_of_a_hardening_law_has_either_sign():
-    assert known_ranges(hardening())[plant.slip_slope] == (-6, 6)
+    assert parameter_ranges(hardening())[plant.slip_slope] == (-6, 6)
 
 
 @dataclass(frozen=True, kw_only=True)

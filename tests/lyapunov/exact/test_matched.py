@@ -12,10 +12,10 @@ from quakedesign.fault import Disturbance, friction_law
 from quakedesign.lyapunov.exact.fault_bounds import (
     Errors,
     initial_perturbation,
-    known_ranges,
     largest_matched_rate,
     largest_sensitivities,
     least_authority,
+    parameter_ranges,
     static_friction,
 )
 from quakedesign.symbolic import plant
@@ -159,5 +159,5 @@ def test_errors_are_zero_unless_told():
 
 
 def test_friction_falls_or_turns_where_its_law_does():
-    assert known_ranges(faulty(SLIP))[plant.slip_slope] == (F(-1, 10), 0)
-    assert known_ranges(faulty(RATE))[plant.rate_slope][0] < 0 < known_ranges(faulty(RATE))[plant.rate_slope][1]
+    assert parameter_ranges(faulty(SLIP))[plant.slip_slope] == (F(-1, 10), 0)
+    assert parameter_ranges(faulty(RATE))[plant.rate_slope][0] < 0 < parameter_ranges(faulty(RATE))[plant.rate_slope][1]

@@ -156,7 +156,7 @@ def test_points_that_cannot_be_expressed_are_not_found():
         subject, ("4", "20", "1", "0.1"), ("kI1", "kI4"), (("4", "5"), (0, "0.1")), 2, ("0.3",), (1, 1), 5
     )
     screener = Screener(replace(sheet, degree=5))
-    assert [screener._found(place, 1) for place in ((0, 1), (1, 0), (1, 1))] == [True, False, False]
+    assert [screener._solvable(place, 1) for place in ((0, 1), (1, 0), (1, 1))] == [True, False, False]
     assert sheet.rows == [[(0, 0), (0, 1)], [(1, 0), (1, 1)]]
 
 

@@ -35,12 +35,12 @@ def test_the_sign_is_that_of_the_margin_that_a_solver_finds(law):
     every = loops(sheet_of(law))
     sweep = Sweep(every[0], SHEETS[law][-1])
     path = Path(sweep, sweep.frame(every[0]))
-    answers = [path.found(loop) for loop in every]
+    answers = [path.feasible(loop) for loop in every]
     assert {True, False} <= set(answers)
     assert sum(answer is None for answer in answers) <= 0.1 * len(every)
     for loop, answer in list(zip(every, answers, strict=True))[:: 3 if law == "dia" else 1]:
         solved = sweep.solve(loop, path.frame)
-        assert answer in (None, solved.found) or abs(solved.margin) < 1e-9
+        assert answer in (None, solved.feasible) or abs(solved.margin) < 1e-9
 
 
 def test_a_path_leaves_shapes_alone_that_others_share():
@@ -49,7 +49,7 @@ def test_a_path_leaves_shapes_alone_that_others_share():
     every = loops(sheet)
     sweep = Sweep(every[0], sheet.degree)
     frame = sweep.frame(every[0])
-    assert Path(sweep, frame).found(every[0]) is not None
+    assert Path(sweep, frame).feasible(every[0]) is not None
     assert [shape._solver for shape in sweep.cones(frame).shapes] == [None] * len(sweep.cones(frame).shapes)
 
 
@@ -70,7 +70,7 @@ def test_both_bounds_hold_wherever_a_step_has_them(monkeypatch):
     reached = bounds = 0
     for loop in every[::7]:
         steps.clear()
-        path.found(loop)
+        path.feasible(loop)
         margin = sweep.solve(loop, path.frame).margin
         for step in steps:
             if step.most < 1:
@@ -84,7 +84,7 @@ def test_both_bounds_hold_wherever_a_step_has_them(monkeypatch):
 
 def test_a_bound_counts_only_where_it_holds_and_beyond_what_its_equations_are_missed_by():
     given = {"tau": 1.0, "moves": (), "least": -0.5, "most": 0.5, "missed": 1e-6}
-    found = lambda **other: paths._Step(**given | other).found  # noqa: E731
+    found = lambda **other: paths._Step(**given | other).feasible  # noqa: E731
     assert found(multipliers=np.array([-1e-3]), bound=2.0) is True
     assert found(multipliers=np.array([-1e-3]), bound=2.0, most=1.5) is None
     assert found(multipliers=np.array([-1e-3]), bound=2.0, missed=1e-3) is None
@@ -134,7 +134,7 @@ def test_neighbours_help(monkeypatch):
         counted.clear()
         for loop in every[:32]:
             begin()
-            path.found(loop)
+            path.feasible(loop)
         return len(counted)
 
     assert 2 * steps(lambda: None) < steps(lambda: path.begin(path.frame))
@@ -144,7 +144,7 @@ def test_a_solver_decides_where_no_path_does(monkeypatch):
     sheet = sheet_of("super-twisting")
     row = sheet.rows[3]
     told, _ = Screener(sheet).row(row)
-    monkeypatch.setattr(Path, "found", lambda self, loop: None)
+    monkeypatch.setattr(Path, "feasible", lambda self, loop: None)
     alone, solves = Screener(sheet).row(row)
     assert alone == told
     assert solves >= len([limit for _, limit, _ in told if limit is None or limit > F("0.5")])
@@ -155,7 +155,7 @@ def test_a_solver_decides_where_no_path_does(monkeypatch):
 def test_problems_are_solved_by_cvxpy_while_they_are_handed_back(monkeypatch):
     sheet = sheet_of("super-twisting")
     monkeypatch.setattr(workers, "handing_back", lambda: True)
-    monkeypatch.setattr(Path, "found", lambda self, loop: pytest.fail("a path was asked"))
+    monkeypatch.setattr(Path, "feasible", lambda self, loop: pytest.fail("a path was asked"))
     assert Screener(sheet).row(sheet.rows[0][:2])[1] >= 2
 
 
@@ -163,4 +163,4 @@ def test_a_cone_without_interior_gives_no_answer(monkeypatch):
     every = loops(sheet_of("super-twisting"))
     sweep = Sweep(every[0], 6)
     monkeypatch.setattr(MomentProgram, "solve", lambda self, target: None)
-    assert Path(sweep, sweep.frame(every[0])).found(every[0]) is None
+    assert Path(sweep, sweep.frame(every[0])).feasible(every[0]) is None

@@ -75,7 +75,7 @@ def test_a_search_finds_as_much_again(monkeypatch):
 def test_a_file_that_proves_nothing_is_not_believed(monkeypatch, tmp_path):
     known = load_certificate(next(path for path in PROOFS if path.stem.startswith("cta")))
     monkeypatch.setattr(kept, "FOLDER", tmp_path)
-    searched = kept.kept(lambda loop, degree, subject: "searched")
+    searched = kept.cached(lambda loop, degree, subject: "searched")
     assert searched(known.loop, 5, None) == "searched"
     kept.keep(known.loop, 5, known)
     assert searched(known.loop, 5, None) == known
@@ -103,7 +103,7 @@ def test_what_was_searched_for_on_this_machine_is_decided_anew(monkeypatch, tmp_
         return known
 
     monkeypatch.setattr(kept, "FOLDER", tmp_path)
-    answered = kept.kept(searched)
+    answered = kept.cached(searched)
     assert [answered(known.loop, 5, None) for _ in range(2)] == [known, known]
     assert len(searches) == 1
     other = replace(known.loop, uncertain={**known.loop.uncertain, "d": (Fraction(-1, 9), Fraction(1, 9))})

@@ -22,7 +22,7 @@ from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact.attraction import Region, load, read_field, text
 from quakedesign.sos.exact.polynomial_files import load as load_polynomial
 from quakedesign.sos.exact.proofs import Point
-from quakedesign.sos.exact.words import region_facts, region_words
+from quakedesign.sos.exact.words import region_entries, region_words
 from quakedesign.sos.solve import attraction_search as attraction
 
 ROOT = Path(__file__).parents[3]
@@ -287,7 +287,7 @@ def test_a_search_for_v_that_ends_without_one_says_which_degree_and_why():
     forced = sos.stability({"x": "-x + x*y", "y": "-y"}, degrees=(2,)).reason
     assert "so the coefficient of x^2 = 0" in forced  # -dV/dt has 2*c*x^2*y, which no square produces
     assert region_words(Region.of(searched))[-1] == searched.reason
-    assert region_facts(Region.of(searched))["remark"] == searched.reason
+    assert region_entries(Region.of(searched))["remark"] == searched.reason
 
 
 @pytest.mark.parametrize(
