@@ -460,10 +460,10 @@ BUDGETS = {
     "linear": 2390,
     "synthesis": 1928,
     "rocq": 843,
-    "simulation": 9756,
+    "simulation": 9788,
     "identification": 4042,
-    "studies": 4220,
-    "report": 4132,
+    "studies": 4139,
+    "report": 4129,
     "cli": 3502,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

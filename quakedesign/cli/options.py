@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from quakedesign.laws import Controller
     from quakedesign.loop.sensing import Sensor
     from quakedesign.simulation import Load
-    from quakedesign.simulation.trajectory import Recording
+    from quakedesign.simulation.trajectory import Trajectory
     from quakedesign.studies.runs import Choice
 
 
@@ -688,7 +688,7 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
     from quakedesign.studies.runs import run_held, run_state
 
     asked, changed = _single(options), changed_options(command, options)
-    trajectory: Recording
+    trajectory: Trajectory
     certificate = changed.pop("certificate", None)
     if certificate is not None:
         told = _as_proved(fault, certificate, changed, options)
@@ -701,8 +701,8 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
         trajectory, answer = run_held(fault, **_instruments(fault, changed, options), **options["state"].of_control())
         lines = sliding_run_lines
     else:
-        free = run_state(fault, **_told(fault, changed, _FREE), **options["state"].of_free())
-        trajectory, answer, lines = free.trajectory, free.to_dict(), state_run_lines
+        trajectory, answer = run_state(fault, **_told(fault, changed, _FREE), **options["state"].of_free())
+        lines = state_run_lines
     if options["out"] is not None:
         trajectory.save(Path(options["out"]))
     options["output"].show(answer, [trajectory.name, *(f"  {line}" for line in lines(answer))])

@@ -18,9 +18,9 @@ from quakedesign.laws import control_laws
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Entry, Run
+    from quakedesign.studies.comparison import Entry
 
-    Shown: TypeAlias = Run | tuple[Entry, Run]
+    Shown: TypeAlias = Trajectory | tuple[Entry, Trajectory]
 
 
 # ----------------------------------------------------------------------

@@ -28,7 +28,7 @@ from quakedesign.lyapunov import Verdict
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
     beside_guarantee,
-    cycle_sentence,
+    cycle_sentences,
     domain_sentence,
     feedforward_rows,
     grade,
@@ -41,7 +41,6 @@ from quakedesign.report.sentences import (
 from quakedesign.report.summary import SUMMARY_COLUMNS, summary, summary_cells
 from quakedesign.report.tables import COLUMNS, rows
 from quakedesign.studies.facts import coordinates, fault_sentences, law_latex, plant_latex, stick_slip_latex
-from quakedesign.studies.runs import StateRun
 from quakedesign.text import quantity, visible
 
 if TYPE_CHECKING:
@@ -469,8 +468,8 @@ def _figure(name: str, drawn: Markup) -> dict[str, str]:
 def _natural(comparison: "Compared") -> str:
     """What the fault does without control."""
     fault, run = comparison.fault, comparison.uncontrolled
-    if isinstance(run, StateRun):
-        return cycle_sentence(run)
+    if said := cycle_sentences(comparison):
+        return said[0]
     size = (
         f" of magnitude {fault.magnitude:.2f}" if run.outcome.kind == "earthquake" and fault.seismic_moment > 0 else ""
     )

@@ -14,7 +14,7 @@ from quakedesign.loop import simulation_scheme
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import RunSetting, loop_class, run
-from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, OutcomeCriterion, Trajectory
+from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, LoopTrajectory, OutcomeCriterion, Trajectory
 from quakedesign.symbolic import derive
 
 # ----------------------------------------------------------------------
@@ -38,7 +38,7 @@ def natural_earthquake(
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
     plant: str | None = None,
-) -> Trajectory:
+) -> LoopTrajectory:
     """Simulate an uncontrolled fault under a constant pressure and, if it is unstable, a tiny constant acceleration.
 
     A fault with healing starts at its release. The acceleration is 1e-9 of the largest change of friction. It and the
@@ -56,7 +56,7 @@ def natural_earthquake(
 
     Returns
     -------
-    Trajectory
+    LoopTrajectory
         Over 90 e-foldings of the unstable eigenvalue, or 30 of them and 10 natural periods if that is longer, or 100
         natural periods of a stable fault, which stays at rest; steps of at most 2e-3/ω_n. Of the metrics only
         `peak_slip_rate`, `steps` and `seconds` are given.
@@ -92,7 +92,7 @@ def natural_earthquake(
     return natural
 
 
-def _with_peak(earthquake: Trajectory, fault: Fault, growth: float) -> Trajectory:
+def _with_peak(earthquake: LoopTrajectory, fault: Fault, growth: float) -> LoopTrajectory:
     """Reference event of an unstable fault, if it moves more than by the nudge alone."""
     peak = earthquake.metrics.peak_slip_rate  # none where the run diverges
     if peak is not None and peak <= STILL * event_nudge(fault) / growth:
@@ -159,7 +159,7 @@ class Waiting:
 
 def waiting(run: Trajectory, fault: Fault) -> Waiting | None:
     """Event that has not begun in a run without control; None if it has begun, or if none will."""
-    natural, reached = run.criterion.natural_peak, run.outcome.share_of_natural
+    natural, reached = run.natural_peak, run.outcome.share_of_natural
     if run.provenance["controller"] != "none" or natural is None or reached is None or reached >= BEGUN_SHARE:
         return None
     growth = derive(fault).eigenvalues[0].real

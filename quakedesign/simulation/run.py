@@ -27,7 +27,7 @@ from quakedesign.simulation.integrators import FLOOR, AdaptiveIntegrator, Integr
 from quakedesign.simulation.recorder import Recorder, events, metrics
 from quakedesign.simulation.stepping import Advancer, Checkpoint, instants, march
 from quakedesign.simulation.stick_slip_plant import StickSlipLoop
-from quakedesign.simulation.trajectory import OutcomeCriterion, SampledTrajectory, Trajectory
+from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion, SampledTrajectory
 
 # ----------------------------------------------------------------------
 # How far and how finely a run goes.
@@ -88,7 +88,7 @@ def trajectory(
     criterion: OutcomeCriterion,
     provenance: dict[str, Any],
     began: tuple[float, float],
-) -> Trajectory:
+) -> LoopTrajectory:
     """Trajectory from the kept vectors, of which those before a divergence are shown.
 
     Parameters
@@ -133,7 +133,7 @@ def trajectory(
     columns["integrals"] = kept[4 : 4 + len(loop.integrals)]
     described = recorder.scheme.described
     further = {name: (columns.pop(name), *said) for name, said in described.items()}
-    kind = partial(SampledTrajectory, actuation=further) if further else Trajectory
+    kind = partial(SampledTrajectory, actuation=further) if further else LoopTrajectory
     return kind(
         **columns,
         moment_per_slip=loop.fault.shear_modulus * loop.fault.area,
@@ -235,7 +235,7 @@ def run(
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
     checkpoint: str | Path | None = None,
-) -> Trajectory:
+) -> LoopTrajectory:
     """Trajectory of a recorder's loop with a fixed step; see `simulate`."""
     began = perf_counter()
     step, start = _step(recorder, method), recorder.start(setting.settled_from)
@@ -263,7 +263,7 @@ def run_adaptive(
     rtol: float,
     progress: Callable[[float], None] | None = None,
     checkpoint: str | Path | None = None,
-) -> Trajectory:
+) -> LoopTrajectory:
     """Trajectory of a recorder's loop to a tolerance; see `simulate`."""
     if checkpoint:
         raise ParameterError(f"a checkpoint needs a fixed step. Received method {method.name}. Use dormand-prince.")

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
@@ -21,18 +21,12 @@ from quakedesign.simulation.run import RunSetting, by_no_clock, loop_class, own_
 from quakedesign.simulation.slow_sliding import PLANTS, simulate_sliding
 from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.stick_slip import disturbed, simulate_state
-from quakedesign.simulation.trajectory import OutcomeCriterion, StateTrajectory, Trajectory
+from quakedesign.simulation.trajectory import OutcomeCriterion, Trajectory
 
 _METHOD, _RTOL, _SAMPLES = "dormand-prince", 1e-9, 2000
 
 
-@overload
-def simulate(fault: Fault, controller: Controller, **options: Any) -> Trajectory: ...
-@overload
-def simulate(fault: Fault, controller: None = None, **options: Any) -> Any: ...
-
-
-def simulate(  # type: ignore[misc]  # the overloads leave out the options, which have one type each
+def simulate(
     fault: Fault,
     controller: Controller | None = None,
     *,
@@ -55,7 +49,7 @@ def simulate(  # type: ignore[misc]  # the overloads leave out the options, whic
     initial_slip: float = 0.0,
     initial_slip_rate: float = 0.0,
     tide: Tide | None = None,
-) -> Trajectory | StateTrajectory:
+) -> Trajectory:
     """Simulate a fault under a controller, from rest by default, with the fault's own disturbance and reference.
 
     A fault whose friction has a state starts in steady sliding at the mean rate of its task and is held there by a law
@@ -208,7 +202,7 @@ def simulate(  # type: ignore[misc]  # the overloads leave out the options, whic
 
 def _uncontrolled(
     fault: Fault, plant: str, method: str, duration: float | None, samples: int, refused: list[str]
-) -> StateTrajectory:
+) -> Trajectory:
     """Loaded at the operating rate of its friction, near steady sliding at first, under no pressure."""
     if refused:
         raise ParameterError(

@@ -36,7 +36,7 @@ from quakedesign.lyapunov.exact.premises import Variant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.integrators import amplification
 from quakedesign.studies.certified import certified_bound, largest_sampling_time, on_trajectory
-from quakedesign.studies.runs import StateRun, designed_run, natural_run
+from quakedesign.studies.runs import designed_run, natural_run
 from quakedesign.synthesis import Design, assess, designable, left_out
 from quakedesign.synthesis import design as synthesise
 
@@ -44,7 +44,6 @@ from quakedesign.synthesis import design as synthesise
 # Comparison of all controllers of one fault in closed loop.
 
 Tell = Callable[[str, float], None]
-Run = Trajectory | StateRun
 
 AS_IN_THE_PAPER = "continuous"
 """Scheme of the paper's simulations."""
@@ -142,12 +141,12 @@ class Compared:
 
     Attributes
     ----------
-    uncontrolled : Trajectory or StateRun
+    uncontrolled : Trajectory
         The natural earthquake; with friction state the seismic cycle.
     """
 
     fault: Fault
-    uncontrolled: Run
+    uncontrolled: Trajectory
     entries: tuple[Entry, ...]
 
     @property

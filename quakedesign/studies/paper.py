@@ -19,7 +19,7 @@ from quakedesign.guarantees import Guarantee, design_held
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.studies.comparison import Compared, Entry, Run
+from quakedesign.studies.comparison import Compared, Entry
 
 # ----------------------------------------------------------------------
 # The numbers behind the bars: every metric of every run, and the five of the paper over those of the e-LQR.
@@ -48,7 +48,7 @@ def baseline(comparison: Compared) -> Entry | None:
     return able[0] if able else None
 
 
-def relative(run: Run | None, basis: Run | None) -> dict[str, float | None]:
+def relative(run: Trajectory | None, basis: Trajectory | None) -> dict[str, float | None]:
     """Metrics of the bars over those of another run [-]; None where one of the two has none or the other is zero."""
     ratios: dict[str, float | None] = {}
     for name in BARS:
@@ -65,7 +65,7 @@ def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> li
     more : dict of str to Trajectory, optional
         Further runs without a controller, by name.
     """
-    runs: list[tuple[str, str, str, Run | None]] = [("uncontrolled", "none", "", comparison.uncontrolled)]
+    runs: list[tuple[str, str, str, Trajectory | None]] = [("uncontrolled", "none", "", comparison.uncontrolled)]
     runs += [(name, "none", "", run) for name, run in (more or {}).items()]
     runs += [(e.label, e.design.name, e.origin, e.run) for e in comparison.entries]
     basis = baseline(comparison)
@@ -78,7 +78,7 @@ def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> li
     ]
 
 
-def _outcome(run: Run) -> dict[str, Any]:
+def _outcome(run: Trajectory) -> dict[str, Any]:
     outcome = run.outcome
     return {"outcome": outcome.kind, "share_of_natural": outcome.share_of_natural}
 
@@ -86,7 +86,7 @@ def _outcome(run: Run) -> dict[str, Any]:
 def printed(comparison: Compared) -> list[dict[str, Any]]:
     """Numbers that the paper prints about these runs beside ours, their ratio, our plant, and why they differ."""
     data = tomllib.loads((files(__package__) / "printed.toml").read_text(encoding="utf-8"))
-    runs: dict[str, Run | None] = {"uncontrolled": comparison.uncontrolled}
+    runs: dict[str, Trajectory | None] = {"uncontrolled": comparison.uncontrolled}
     runs |= {f"{e.origin} {e.design.name}": e.run for e in comparison.entries}
     rows = []
     for said in data.get(comparison.fault.name, []):

@@ -10,6 +10,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.exact import UpperBound
 from quakedesign.report.summary import Row, Summary, summary, summary_lines
+from quakedesign.simulation import Metrics
 from quakedesign.text import plain, power_of, quantity
 
 REAL = qd.load_fault("real-fault")
@@ -117,7 +118,9 @@ def compared(monkeypatch, *entries, natural="earthquake"):
     fault = {"name": "mine", "source": "a paper", "assumed": ("a well",), "friction": REAL.friction, "box": REAL.box}
     return SimpleNamespace(
         fault=SimpleNamespace(**fault, magnitude=5.24),
-        uncontrolled=SimpleNamespace(outcome=outcome),
+        uncontrolled=SimpleNamespace(
+            outcome=outcome, cycle=None, metrics=Metrics(settled_from=0.0, steps=1, seconds=0.0)
+        ),
         of=lambda origin: tuple(e for e in entries if e.origin == origin),
         left_out={},
     )
