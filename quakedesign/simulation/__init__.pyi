@@ -42,5 +42,4 @@ from .stick_slip import velocity_step as velocity_step
 from .trajectory import LoopTrajectory as LoopTrajectory
 from .trajectory import Outcome as Outcome
 from .trajectory import OutcomeCriterion as OutcomeCriterion
-from .trajectory import SampledTrajectory as SampledTrajectory
 from .trajectory import Trajectory as Trajectory

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
 import numpy as np
 
@@ -99,12 +99,8 @@ class StateTrajectory(Trajectory):
     @cached_property
     def slip_events(self) -> tuple[SlipEvent, ...]:
         """Every event of a run that returned every step."""
-        slips, arrests = self.event_slips, self.arrests
-        ends = [*map(float, arrests), *[None] * (len(self.onsets) - len(arrests))]
-        return tuple(
-            self._event(float(onset), end, float(slips[i]) if i < len(slips) else None)
-            for i, (onset, end) in enumerate(zip(self.onsets, ends, strict=True))
-        )
+        ends = (self.onsets.tolist(), self.arrests.tolist(), self.event_slips.tolist())
+        return tuple(self._event(*one) for one in zip_longest(*ends))
 
     def _event(self, onset: float, arrest: float | None, slip: float | None) -> SlipEvent:
         during = (self.time >= onset) & (self.time <= (np.inf if arrest is None else arrest))

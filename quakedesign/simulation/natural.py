@@ -76,9 +76,13 @@ def natural_earthquake(
         )
     growth = derive(fault).eigenvalues[0].real
     nudge = event_nudge(fault) if growth > 0 else 0.0
-    nudged = _released(fault).with_disturbance(Disturbance(constant=nudge))
+    law: Any = fault.friction  # without its healing, from which the nudge could not release it
+    released = replace(fault, friction=replace(law, healing=0.0)) if law.rest_excess else fault
+    nudged = released.with_disturbance(Disturbance(constant=nudge))
     step = min(fault.sampling_time, FINENESS / fault.natural_frequency)
-    setting = RunSetting.of(nudged, step, _duration(fault, growth), 2000, 0.0)
+    period = 2 * pi / fault.natural_frequency
+    length = max(FOLDINGS / growth, ENDING[0] / growth + ENDING[1] * period) if growth > 0 else PERIODS * period
+    setting = RunSetting.of(nudged, step, length, 2000, 0.0)
     recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
     criterion = OutcomeCriterion.of(fault, natural_peak(fault) if pressure else None)
     earthquake = run(recorder, setting, integrator("dormand-prince"), criterion, progress=progress, compiled=compiled)
@@ -103,12 +107,6 @@ def _with_peak(earthquake: LoopTrajectory, fault: Fault, growth: float) -> LoopT
     return replace(earthquake, criterion=OutcomeCriterion.of(fault, peak))
 
 
-def _released(fault: Fault) -> Fault:
-    """The fault without its healing, from which the nudge could not release it."""
-    law: Any = fault.friction
-    return replace(fault, friction=replace(law, healing=0.0)) if law.rest_excess else fault
-
-
 def natural_peak(fault: Fault) -> float | None:
     """Largest slip rate [m/s] of a fault without control; None for a stable one. Computed once for every fault."""
     alone = _alone(fault)
@@ -126,14 +124,6 @@ def event_nudge(fault: Fault) -> float:
     """Acceleration [m/s²] that is small beside the forces of an event."""
     low, high = fault.friction.bounds
     return NUDGE * (high - low) * fault.authority * fault.effective_normal_stress
-
-
-def _duration(fault: Fault, growth: float) -> float:
-    """Time [s] in which an instability grows from the nudge and ends."""
-    period = 2 * pi / fault.natural_frequency
-    if growth <= 0:
-        return PERIODS * period
-    return max(FOLDINGS / growth, ENDING[0] / growth + ENDING[1] * period)
 
 
 # ----------------------------------------------------------------------

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
@@ -27,7 +26,7 @@ from quakedesign.simulation.integrators import FLOOR, AdaptiveIntegrator, Integr
 from quakedesign.simulation.recorder import Recorder, events, metrics
 from quakedesign.simulation.stepping import Advancer, Checkpoint, instants, march
 from quakedesign.simulation.stick_slip_plant import StickSlipLoop
-from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion, SampledTrajectory
+from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion
 
 # ----------------------------------------------------------------------
 # How far and how finely a run goes.
@@ -133,9 +132,9 @@ def trajectory(
     columns["integrals"] = kept[4 : 4 + len(loop.integrals)]
     described = recorder.scheme.described
     further = {name: (columns.pop(name), *said) for name, said in described.items()}
-    kind = partial(SampledTrajectory, actuation=further) if further else LoopTrajectory
-    return kind(
+    return LoopTrajectory(
         **columns,
+        actuation=further,
         moment_per_slip=loop.fault.shear_modulus * loop.fault.area,
         metrics=measured,
         energy=None if watched["diverged"] >= 0 else recorder.energy(end),

@@ -48,11 +48,6 @@ class SlidingRun(LoopTrajectory):
         """Values, long name and SI unit of every signal that this run has, by name."""
         return super().signals() | {"slip_error": (self.slip - self.reference, "slip less that of the reference", "m")}
 
-    @property
-    def opened(self) -> float | None:
-        """Time [s] at which the pressure would reach the effective normal stress, where the run ends."""
-        return self.events.get("opening")
-
 
 def simulate_sliding(
     fault: Fault,

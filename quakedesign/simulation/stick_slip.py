@@ -88,8 +88,7 @@ def simulate_state(
         When the method cannot go on, as when the slip rate grows without bound (no inertia and no damping).
     """
     slider = subject if isinstance(subject, SpringSlider) else SpringSlider.of(subject, inertia=inertia)
-    if not slider.law.state_names:
-        raise ParameterError(f"the friction law must have a state. Received {slider.law.name}. Use simulate.")
+    slider.law.require(simulate_state=subject)
     course = pressure if isinstance(pressure, PressureCourse) else PressureCourse.constant(pressure)
     if course.largest >= slider.normal_stress:
         raise ParameterError(
@@ -100,7 +99,8 @@ def simulate_state(
     first = pieces[0][1] if start_rate is None else start_rate
     start = slider.start(first, None if start_state is None else tuple(start_state), course.before(0.0))
     level = _ONSET * max(v for _, v in pieces) if onset_rate is None else onset_rate
-    scales = _scales(slider, start)
+    length = getattr(slider.law, "critical_slip", abs(start[1]) * _SHARE_OF_STRETCH)
+    scales = np.array([length, length, *[1.0] * (len(start) - 2)])  # 1 for the logarithms
     farthest = _FARTHEST * float(scales[0])
     travelled = sum(length * speed for length, speed in pieces)
     if travelled > farthest:
@@ -180,12 +180,6 @@ def _wanted(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None
     ):
         raise ParameterError(f"times must ascend between 0 and the duration ({end!r} s). Received {times!r}.")
     return np.asarray(np.minimum(wanted, end))
-
-
-def _scales(slider: SpringSlider, start: list[float]) -> "np.ndarray":
-    """Critical slip for the displacements (or a share of the stretch), 1 for the logarithms."""
-    length = getattr(slider.law, "critical_slip", abs(start[1]) * _SHARE_OF_STRETCH)
-    return np.array([length, length, *[1.0] * (len(start) - 2)])
 
 
 @dataclass(frozen=True)
@@ -370,6 +364,11 @@ class StartingState:
     slip_rate: float  # [m/s]
     state: tuple[float, ...]  # In the units of the law
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Arguments of `simulate_state`."""
+        return {"start_rate": self.slip_rate, "start_state": self.state}
+
 
 def sliding(fault: Fault, rate: float) -> StartingState:
     """Steady sliding at a rate [m/s]."""
@@ -415,9 +414,8 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
         )
     before, after = found.onsets[-2:]
     time = float(before + share * (after - before))
-    run = simulate_state(
-        fault, rate, duration=math.nextafter(time, math.inf), times=[time], **_disturbed(fault, rate), **settings
-    )
+    settings |= disturbed(fault, rate).settings
+    run = simulate_state(fault, rate, duration=math.nextafter(time, math.inf), times=[time], **settings)
     return StartingState(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
 
 
@@ -430,7 +428,7 @@ def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
     unit = direct_strength(fault) * fault.area / (fault.stiffness * rate)
     loads, most = _FIRST_LOADS, _MOST_LOADS if derive(fault).unstable else _FIRST_LOADS
     while True:
-        run = simulate_state(fault, rate, duration=loads * unit, **_disturbed(fault, rate), **settings)
+        run = simulate_state(fault, rate, duration=loads * unit, **disturbed(fault, rate).settings, **settings)
         loads *= 2
         if len(run.onsets) >= _CYCLES or loads > most:
             return run
@@ -439,8 +437,3 @@ def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
 def disturbed(fault: Fault, rate: float) -> StartingState:
     """Sliding at a rate [m/s] with a state that is older than steady."""
     return StartingState(slip_rate=rate, state=tuple(_OLDER * float(v) for v in fault.friction.steady_state(rate)))
-
-
-def _disturbed(fault: Fault, rate: float) -> dict[str, Any]:
-    start = disturbed(fault, rate)
-    return {"start_rate": start.slip_rate, "start_state": start.state}

@@ -1,6 +1,6 @@
 """Trajectories of runs with export to xarray, pandas and NetCDF, their outcome and figure.
 
-Every run is a `Trajectory`. Its classes here cover runs of a closed loop, with and without an actuator.
+Every run is a `Trajectory`; here also those of a closed loop, with and without an actuator.
 The outcome is tracked, slow slip, earthquake, diverged or opened.
 """
 
@@ -295,6 +295,7 @@ class OutcomeCriterion:
 
 Panel = tuple[str, str, Any, tuple[str, Any]]
 """Name, SI unit and values of a signal, and name and values of one that is drawn beside it."""
+Signal = tuple["np.ndarray", str, str]
 NOTHING = ("", None)
 _TIMES = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"), (2 * 60.0, 60.0, "min"), (0.0, 1.0, "s"))
 _PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -370,6 +371,10 @@ class LoopTrajectory(Trajectory):
     integrals : ndarray
         The law's own states ξ, shape (number of them, n), in `integral_units`.
     integral_units : tuple of str
+    actuation : mapping of str to tuple
+        Behind an actuator, where `pressure` is that in the fault: values, shape (n,), long name and SI unit of
+        ``well_pressure`` [Pa], and where the actuator stores fluid of ``injected_volume`` [m³] and ``flow_rate``
+        [m³/s].
     events : mapping of str to float
         Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'_n), ``reverse_slip`` (x2 < 0), ``stick``
         (friction holds the fault at rest after the start), ``load_reversed`` (the load at rest exceeds friction
@@ -384,6 +389,7 @@ class LoopTrajectory(Trajectory):
     moment_per_slip: float = field(repr=False)
     integrals: "np.ndarray" = field(repr=False)
     integral_units: tuple[str, ...]
+    actuation: Mapping[str, Signal] = field(default_factory=dict, repr=False)
     criterion: OutcomeCriterion = field(repr=False)
 
     @property
@@ -402,12 +408,12 @@ class LoopTrajectory(Trajectory):
         """Seismic moment rate G·A·x2 [N m/s], shape (n,)."""
         return self.moment_per_slip * self.slip_rate
 
-    def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
+    def signals(self) -> dict[str, Signal]:
         """Values, long name and SI unit of every signal that this run has, by name."""
         found = super().signals() | {"moment_rate": (self.moment_rate, "seismic moment rate", "N m/s")}
         for number, (values, unit) in enumerate(zip(self.integrals, self.integral_units, strict=True), 1):
             found[f"xi_{number}"] = (values, f"integral state xi{number}", unit)
-        return found
+        return found | dict(self.actuation)
 
     def attributes(self) -> dict[str, Any]:
         """Provenance, and outcome, metrics, events and energy as JSON text."""
@@ -446,16 +452,18 @@ class LoopTrajectory(Trajectory):
         return self.name + (f"\n{kept} of {self.metrics.steps} steps drawn" if kept < self.metrics.steps else "")
 
     def panels(self) -> list[Panel]:
-        """Slip, slip rate and pressure, and errors of a run with a reference."""
+        """Slip, slip rate, pressures in the fault and at the well, errors, and other signals of an actuator."""
+        further = dict(self.actuation)
+        well, *_ = further.pop("well_pressure", (None,))
         found: list[Panel] = [
             ("slip", "m", self.slip, ("reference", self.reference)),
             ("slip rate", "m/s", self.slip_rate, ("reference", self.reference_rate)),
-            ("pressure", "Pa", self.pressure, ("at the well", None)),
+            ("pressure", "Pa", self.pressure, ("at the well", well)),
         ]
-        if self.slip_error is None:
-            return found
-        errors = (("slip error", "m", self.slip_error), ("slip-rate error", "m/s", self.slip_rate_error))
-        return [*found, *((*error, NOTHING) for error in errors)]
+        if self.slip_error is not None:
+            errors = (("slip error", "m", self.slip_error), ("slip-rate error", "m/s", self.slip_rate_error))
+            found += ((*error, NOTHING) for error in errors)
+        return [*found, *((title, unit, values, NOTHING) for values, title, unit in further.values())]
 
     def plot(self) -> Any:
         """Return a matplotlib Figure of slip, slip rate, pressure, errors, and what an actuator adds."""
@@ -464,34 +472,3 @@ class LoopTrajectory(Trajectory):
     def plot_stress(self) -> Any:
         """Return a matplotlib Figure of the shear stress against slip, and of the moment rate over time."""
         return stress_figure(self.heading, self.time, self.slip, self.shear_stress, self.moment_rate)
-
-
-# ----------------------------------------------------------------------
-# Result of a simulation with an actuator.
-
-Signal = tuple["np.ndarray", str, str]
-
-
-@checked_dataclass(frozen=True, eq=False, kw_only=True)
-class SampledTrajectory(LoopTrajectory):
-    """A run whose pressure reaches the fault through an actuator; `pressure` is that in the fault.
-
-    Attributes
-    ----------
-    actuation : mapping of str to tuple
-        Values, shape (n,), long name and SI unit of ``well_pressure`` [Pa], and where the actuator stores fluid of
-        ``injected_volume`` [m³] and ``flow_rate`` [m³/s].
-    """
-
-    actuation: Mapping[str, Signal] = field(repr=False)
-
-    def signals(self) -> dict[str, Signal]:
-        """Values, long name and SI unit of every signal that this run has, by name."""
-        return super().signals() | dict(self.actuation)
-
-    def panels(self) -> list[Panel]:
-        """Pressures at the well and in the fault in one panel, and the other signals of the actuator."""
-        found, further = super().panels(), dict(self.actuation)
-        if "well_pressure" in further:
-            found[2] = (*found[2][:3], ("at the well", further.pop("well_pressure")[0]))
-        return [*found, *((title, unit, values, NOTHING) for values, title, unit in further.values())]
