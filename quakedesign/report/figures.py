@@ -309,7 +309,10 @@ def overviews(comparison: "Compared") -> dict[str, Any]:
 def overview(comparison: "Compared") -> Any:
     """Slip rate and slip with and without control over logarithmic time, with the proved bound and what limits it."""
     free = comparison.uncontrolled
-    best, own = min(runs_of(comparison.of("designed")), key=lambda pair: _peak(pair[0]))
+    best, own = min(
+        runs_of(comparison.of("designed")),
+        key=lambda pair: float(pair[0].guaranteed.peak_slip_rate) if pair[0].guaranteed else np.inf,
+    )
     drawing, ((rate,), (slip,)) = figure(2, 5.0, height_ratios=(3, 2))
     floor = 1e-3 * float(known(own.reference_rate).max())
     speed = np.abs(free.slip_rate)
@@ -347,10 +350,6 @@ def overview(comparison: "Compared") -> Any:
     note = f"largest value in each of 25 parts of a decade; gaps: slip rate below {floor:.1g} m/s, or at rest"
     title = f"{comparison.fault.name}: with and without control"
     return finish(drawing, title, ran, with_diverged(comparison.entries, note), legend=rate)
-
-
-def _peak(entry: "Entry") -> float:
-    return float("inf") if entry.guaranteed is None else float(entry.guaranteed.peak_slip_rate)
 
 
 def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":

@@ -312,7 +312,9 @@ def sentences(entry: "Entry") -> list[str]:
         *assumed,
     ]
     lines += [part_of_task(entry.run, design.fault)] if entry.run else []
-    return [sentence for sentence in (*lines, *_reversed(entry.run)) if sentence]
+    if entry.run and (share := entry.run.metrics.reverse_slip_fraction):
+        lines.append(f"on the plant without stick, the slip rate is negative in {100 * share:.3g} % of the steps")
+    return [sentence for sentence in lines if sentence]
 
 
 def part_of_task(run: Trajectory, fault: Fault) -> str:
@@ -328,7 +330,7 @@ def _verdict(design: Design, run: Trajectory | None) -> list[str]:
     if design.verdict is Verdict.PROVED:
         lasts = "for all t >= 0" if design.runs is None or not design.runs.proved else design.runs.lasts
         plant, proved = "for the loop that ran", getattr(design.runs, "plant", Guarantee.plant)
-        slides = bool(design.fault.friction.state_names)  # forward throughout, on either plant
+        slides = design.sliding is not None  # forward throughout, on either plant
         if run is not None and run.provenance["plant"] != proved and not slides:
             other = "stick-slip plant" if proved == STICK_SLIP else "plant without stick"
             plant = f"for this sampled loop on the {other}"
@@ -424,14 +426,6 @@ def scheme_sentence(comparison: "Compared") -> str:
     return (
         f"Schemes: {said}. Continuous evaluates the law in every Runge–Kutta stage, all others hold p over a "
         "step, which no certificate in continuous time covers"
-    )
-
-
-def _reversed(run: Trajectory | None) -> list[str]:
-    """Slip against the direction of the model."""
-    share = run.metrics.reverse_slip_fraction if run else None
-    return (
-        [f"on the plant without stick, the slip rate is negative in {100 * share:.3g} % of the steps"] if share else []
     )
 
 

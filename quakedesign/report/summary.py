@@ -14,7 +14,7 @@ from quakedesign.guarantees.search.adversary import WorstFound, WorstSliding
 from quakedesign.guarantees.search.stick_slip_design import WorstStickSlip
 from quakedesign.report.sentences import cycle_sentences, grade, left_out_lines
 from quakedesign.studies.comparison import pressure_extremes
-from quakedesign.studies.facts import box_sentence
+from quakedesign.studies.facts import box_sentences
 from quakedesign.text import PREFIXES, duration, plain, power_of, quantity
 
 if TYPE_CHECKING:
@@ -169,11 +169,10 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
         yield f"{fault.source}"
     yield from cycle_sentences(comparison)
     yield from (f"assumed: {said}" for said in fault.assumed)
-    if fault.friction.state_names and (beyond := beyond_rates(fault.friction, mean_rate(fault.reference))):
+    if beyond := beyond_rates(fault.friction, mean_rate(fault.reference)):
         yield beyond
-    if best is not None and not fault.friction.state_names:
-        yield box_sentence(fault)
     if best is not None:
+        yield from box_sentences(fault)
         yield "model: one block under a uniform pressure"
     for entry in designed:
         if (entry.guaranteed is None and best is not None) or ", but " in grade(entry):

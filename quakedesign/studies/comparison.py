@@ -13,6 +13,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import Enclosure, rational
 from quakedesign.fault import Fault, require_fault
+from quakedesign.fault.equilibrium import STEADY_SLIDING
 from quakedesign.guarantees import (
     CLASSES,
     ContinuousPeaks,
@@ -152,8 +153,7 @@ class Compared:
     @property
     def left_out(self) -> dict[str, str]:
         """Reasons why other laws do not apply to this fault or loop setup, by name."""
-        behind = self.path and not self.fault.friction.state_names
-        return behind_path(self.fault) if behind else left_out(self.fault)
+        return behind_path(self.fault) if self.path else left_out(self.fault)
 
     @property
     def path(self) -> dict[str, Fraction]:
@@ -181,11 +181,11 @@ def compared(
     Those of the designs that are `given` are verdicts on given laws.
     """
     require_fault(fault)
-    require_plant(fault, plant)
+    fault.friction.require(plant=plant)
     for name in schemes.values():
         simulation_scheme(name)
     tell("uncontrolled", 0.0)
-    if fault.friction.state_names:
+    if fault.friction.equilibrium is STEADY_SLIDING:
         return _slowly_compared(fault, designs, tell, whole=whole_task)
     uncontrolled = natural_earthquake(fault, plant=plant)
     entries: list[Entry] = []
@@ -199,15 +199,6 @@ def compared(
         tell(f"{entry.label}: worst cases", 0.0)
         entries.append(replace(entry, answer=_answer(fault, designed, given=known)))
     return Compared(fault=fault, uncontrolled=uncontrolled, entries=tuple(entries))
-
-
-def require_plant(fault: Fault, plant: str | None) -> None:
-    """Refuse a plant of the runs for friction with a state, which never rests."""
-    if plant is not None and fault.friction.state_names:
-        raise ParameterError(
-            f"plant is for friction without a state, got {plant!r} with {fault.friction.name}, which never rests: omit "
-            "it."
-        )
 
 
 def behind_path(fault: Fault) -> dict[str, str]:
@@ -329,9 +320,8 @@ def needed_pressure(fault: Fault, slip: float | None = None) -> Enclosure | None
 
     None for friction with a state, and where no finite range is found.
     """
-    if fault.friction.state_names:
-        return None
     try:
+        fault.require_memoryless("a pressure at rest")
         return Enclosure.of(
             *equilibrium_pressure(fault, rational(fault.reference.target_slip if slip is None else slip))
         )

@@ -5,7 +5,7 @@ The trade-off is between the certified peak of the slip rate and the tracking er
 
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib.resources import files
 from math import pi
@@ -15,6 +15,7 @@ import numpy as np
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.fault import Fault
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.guarantees import Guarantee, design_held
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
@@ -166,9 +167,9 @@ class PaperRuns:
     comparison: Compared
     # Without control, under a constant pressure of a tenth of the effective normal stress; None for friction with a
     # state, which has none of the short runs
-    induced: Trajectory | None
+    induced: Trajectory | None = None
     # By label of the entry: its first `PERIODS` natural periods with every step kept
-    close_ups: Mapping[str, Trajectory]
+    close_ups: Mapping[str, Trajectory] = field(default_factory=dict)
     front: tuple[FrontPoint, ...] = ()  # Peak against tracking, where a law of samples was designed
 
 
@@ -180,9 +181,10 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     progress : callable, optional
         Called with what is being done and the fraction done [-].
     """
-    tell, fault = progress or (lambda _what, _done: None), comparison.fault
-    if fault.friction.state_names:
-        return PaperRuns(comparison=comparison, induced=None, close_ups={})
+    return _runs(comparison.fault, comparison, progress or (lambda _what, _done: None))
+
+
+def _short_runs(fault: Fault, comparison: Compared, tell: Callable[[str, float], None]) -> PaperRuns:
     tell("induced earthquake", 0.0)
     plant = comparison.uncontrolled.provenance["plant"]
     induced = natural_earthquake(fault, INDUCING_SHARE * fault.effective_normal_stress, plant=plant)
@@ -206,6 +208,9 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     steps = [law.sampling.step for law in laws if law and law.sampling and law.lipschitz_limit is None]
     front = objective_front(fault, steps[0]) if steps else ()
     return PaperRuns(comparison=comparison, induced=induced, close_ups=close_ups, front=front)
+
+
+_runs = by_equilibrium(rest=_short_runs, sliding=lambda fault, comparison, tell: PaperRuns(comparison=comparison))
 
 
 def friction_curve(fault: Fault, largest: float, points: int = 400) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

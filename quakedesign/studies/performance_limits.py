@@ -9,6 +9,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.guarantees import (
     Guarantee,
     NoGuarantee,
@@ -31,7 +32,7 @@ from quakedesign.guarantees.exact.limit_theorems import (
     smallest_stick_slip_rate,
     smallest_withdrawal,
 )
-from quakedesign.guarantees.guarantee_result import SlidingAnswer, answer_sliding
+from quakedesign.guarantees.guarantee_result import answer_sliding
 from quakedesign.guarantees.search.lqg import near_path, sliding_model
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Quantity
 from quakedesign.plant import FaultPlant, uncertain_plant
@@ -40,6 +41,7 @@ from quakedesign.simulation.natural import natural_peak
 # ----------------------------------------------------------------------
 # Limits of every controller as values, each beside what a designed one is proved to do.
 
+_Size = float | None  # [Pa]
 _POINTS = 24  # of the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
@@ -354,10 +356,12 @@ def limits(
     """
     off = rational(spread, "spread")
     fault, setup = setup.with_given(**given).at_step(fault)
-    told = Told(setup=setup)
-    if fault.friction.state_names:
-        _require_plain(fault, told)
-        return _sliding_limits(fault, pressure, diffusivity, stress, told.setup if prove else None, off)
+    return _of_plant(fault, pressure, diffusivity, stress, Told(setup=setup), off, prove)
+
+
+def _limits_at_rest(
+    fault: Fault, pressure: _Size, diffusivity: float, stress: _Size, told: Told, off: Fraction, prove: bool
+) -> Limits:
     if stress is not None or off:
         raise ParameterError(
             f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Leave it "
@@ -375,8 +379,8 @@ def limits(
         longest = longest_delay(task, step, **told.around)
         proved["largest_delay"] = LowerBound(longest.held.delay) if longest else None
         proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
-        if (rock := _proved_rock(task, step, told)) is not None:
-            proved["largest_diffusion_time"] = rock
+        if (farthest := farthest_rock(task, step, **told.around)) is not None:
+            proved["largest_diffusion_time"] = rock = LowerBound(farthest.held.diffusion)
             proved["farthest_well"] = nearest_proved_well(rock, spread)
     return Limits(
         fault=fault,
@@ -446,18 +450,15 @@ def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fr
 
 
 def _sliding_limits(
-    fault: Fault,
-    pressure: float | None,
-    diffusivity: float,
-    stress: float | None,
-    setup: LoopSetup | None,
-    off: Fraction,
-) -> SlidingLimits:
+    fault: Fault, pressure: _Size, diffusivity: float, stress: _Size, plain: Told, off: Fraction, prove: bool
+) -> Limits:
     """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path.
 
     Unless a stress is told, it is that which the design stands, or that with a near well where none is found behind the
     path; behind a path that is impossible under the latter no design is looked for.
     """
+    _require_plain(fault, plain)
+    setup = plain.setup if prove else None
     withdrawal, spread = _given(fault, pressure, diffusivity)
     model, step = sliding_model(fault), rational(fault.sampling_time)
     asked = None if stress is None else rational(stress, "stress")
@@ -467,9 +468,10 @@ def _sliding_limits(
     found = answer.found if answer is not None and answer.found.proved else None
     amplitude = asked if asked is not None or found is None else found.task.stress
     if amplitude is None or amplitude <= 0:
+        why = f": {answer.found.reason}" if answer is not None and not answer.found.proved else ""
         raise ParameterError(
             "limits of slow sliding need a shear stress disturbance above 0. Received none, and no design was "
-            f"found that withstands any{_why(answer)}. Give --stress, such as '25 kPa'."
+            f"found that withstands any{why}. Give --stress, such as '25 kPa'."
         )
     push = SlidingPush(model=model, amplitude=amplitude)
     farthest, rock = longest_diffusion(push, withdrawal, step), (told or IDEAL).diffusion
@@ -499,8 +501,7 @@ def _sliding_limits(
     )
 
 
-def _why(answer: SlidingAnswer | None) -> str:
-    return f": {answer.found.reason}" if answer is not None and not answer.found.proved else ""
+_of_plant = by_equilibrium(rest=_limits_at_rest, sliding=_sliding_limits)
 
 
 def _proved_steps(task: FaultPlant, step: Fraction, told: Told) -> tuple[tuple[Guarantee, ...], Guarantee | None]:
@@ -522,9 +523,3 @@ def _best_at(least_peak: Guarantee, told: Told) -> Guarantee:
     tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.around)
     found = [least_peak, *([tracking] if tracking.proved else [])]
     return min(found, key=lambda g: g.claims.slip_rate_error)
-
-
-def _proved_rock(task: FaultPlant, step: Fraction, told: Told) -> LowerBound | None:
-    """L²/D [s] behind which a law that is told of a clock is proved."""
-    farthest = farthest_rock(task, step, **told.around)
-    return LowerBound(farthest.held.diffusion) if farthest else None

@@ -17,6 +17,7 @@ import numpy as np
 from quakedesign.errors import CertificateError, ParameterError, SimulationError, UnknownNameError, require_known
 from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, Fault
+from quakedesign.fault.equilibrium import STEADY_SLIDING
 from quakedesign.fault.model import require_positive
 from quakedesign.guarantees import ContinuousPeaks, Guarantee, SlidingGuarantee, load_guarantee
 from quakedesign.guarantees.exact.plant_guarantee import PlantGuarantee
@@ -127,8 +128,7 @@ def run_state(
         fault,
         rate,
         duration=fault.reference.operation_time if duration is None else duration,
-        start_rate=begun.slip_rate,
-        start_state=begun.state,
+        **begun.settings,
         pressure=pressure or 0.0,
         **settings,
     )
@@ -166,9 +166,7 @@ def natural_run(fault: Fault) -> StateTrajectory:
             continue
         return _natural_cycle(run, "smooth" if inertia else "quasi-dynamic", seconds=perf_counter() - began)
     moment = _MOMENT * min(start.state)
-    begun = simulate_state(
-        fault, rate, duration=moment, start_rate=rate, start_state=start.state, inertia=False, method="cvodes"
-    )
+    begun = simulate_state(fault, rate, duration=moment, **start.settings, inertia=False, method="cvodes")
     return replace(_natural_cycle(begun, "quasi-dynamic", seconds=0.0, peak_slip_rate=None), failed=failed)
 
 
@@ -472,13 +470,6 @@ class Choice:
         return Measurement(**off, seed=seed, bounded=True) if off else EXACT
 
 
-def chosen_controller(
-    fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
-) -> Controller:
-    """Controller of a `choice`, which see."""
-    return choice(fault, name, gains, scale=scale, feedforward=feedforward).controller
-
-
 def certified_choice(fault: Fault, path: str | Path) -> Choice:
     """Law of a file of `guarantee`, which must be about the fault and hold; its proof is checked anew.
 
@@ -495,7 +486,8 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
             f"the certificate of a law must be about a fault. Received {path}, about an uncertain plant. Give a "
             f"file of guarantee {fault.name} --out FILE."
         )
-    if isinstance(claim, ContinuousPeaks) or isinstance(claim, SlidingGuarantee) != bool(fault.friction.state_names):
+    slides = fault.friction.equilibrium is STEADY_SLIDING
+    if isinstance(claim, ContinuousPeaks) or isinstance(claim, SlidingGuarantee) != slides:
         raise CertificateError(
             "the law of a certificate runs once per sample, and is about friction with a state where that of the fault "
             f"has one. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."

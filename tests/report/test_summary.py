@@ -116,6 +116,7 @@ def compared(monkeypatch, *entries, natural="earthquake"):
     monkeypatch.setattr("quakedesign.report.summary.pressure_extremes", lambda run: (-1e6, 2e6))
     outcome = SimpleNamespace(kind=natural, peak_slip_rate=0.01)
     fault = {"name": "mine", "source": "a paper", "assumed": ("a well",), "friction": REAL.friction, "box": REAL.box}
+    fault["reference"] = REAL.reference
     return SimpleNamespace(
         fault=SimpleNamespace(**fault, magnitude=5.24),
         uncontrolled=SimpleNamespace(
