@@ -449,8 +449,8 @@ def test_the_name_of_a_class_and_of_a_file_occurs_once():
 
 
 BUDGETS = {
-    "fault": 3141,
-    "symbolic": 3112,
+    "fault": 3210,
+    "symbolic": 3139,
     "sos": 6328,
     "laws": 3105,
     "loop": 4219,
@@ -458,13 +458,13 @@ BUDGETS = {
     "guarantees": 13214,
     "lyapunov": 6957,
     "linear": 2390,
-    "synthesis": 1939,
+    "synthesis": 1949,
     "rocq": 843,
-    "simulation": 9756,
-    "identification": 4042,
-    "studies": 4227,
-    "report": 4106,
-    "cli": 3503,
+    "simulation": 9740,
+    "identification": 4051,
+    "studies": 4130,
+    "report": 4097,
+    "cli": 3508,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 
@@ -477,3 +477,16 @@ def test_a_package_keeps_to_its_budget_of_lines(package):
 
 def test_every_package_has_a_budget():
     assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} == set(BUDGETS)
+
+
+ASKED = re.compile(
+    r"\bif (not )?(?!len\()[\w.\[\]()]*\.state_names\b(?! ==)"
+    r"|bool\([\w.\[\]()]*\.state_names\)"
+    r"|\bis (not )?(STEADY_SLIDING|AT_REST)\b"
+)
+
+
+def test_few_places_ask_whether_friction_has_a_state():
+    """The others have one implementation for each equilibrium, or an entry of it."""
+    texts = (path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py"))
+    assert sum(len(ASKED.findall(text)) for text in texts) < 10

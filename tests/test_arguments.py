@@ -183,7 +183,7 @@ def test_what_differs(value, hint):
 
 def test_of_a_wrong_run_nothing_else_is_said(tmp_path):
     run = qd.simulate(LAB, qd.published("lab-fault")["elqr"], scheme="explicit", duration=0.01)
-    with pytest.raises(ParameterError, match=r"path of Recording.save must be a text or a Path. Received 3"):
+    with pytest.raises(ParameterError, match=r"path of Trajectory.save must be a text or a Path. Received 3"):
         run.save(3)
 
 

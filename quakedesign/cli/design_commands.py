@@ -101,15 +101,12 @@ class DesignOptions(WellOptions):
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
         loaded = with_accepted_fit(loaded, self.accept_poor_fit)
         given = vars(self)["diffusion"]
-        if loaded.friction.state_names and given is not None and not rational(given, "diffusion"):
-            raise ParameterError("diffusion must be above 0 s. Received 0 s. Omit --diffusion for a well at the fault.")
+        if given is not None and not rational(given, "diffusion"):
+            loaded.friction.require(no_diffusion=given)
         behind = bool(self.setup().path)  # a delay, a lag or rock, for which the e-LQR alone is designed
         laws = "elqr" if behind and self.controller == "all" else self._laws
         names = controllers(laws, loaded)
-        if self.plant is not None:
-            from quakedesign.studies.comparison import require_plant
-
-            require_plant(loaded, self.plant)
+        loaded.friction.require(plant=self.plant)
         shown = {"published_scheme": self.published_scheme, "plant": self.plant, "whole_task": self.whole_task}
         told = self.told()
         loaded, told["options"]["setup"] = told["options"]["setup"].at_step(loaded)

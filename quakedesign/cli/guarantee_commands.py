@@ -112,7 +112,7 @@ def guarantee(
     options = dict(locals())
     from quakedesign.cli.block_commands import guarantee_chain, require_loads, several_blocks
     from quakedesign.fault import load_fault, with_accepted_fit
-    from quakedesign.studies.facts import box_sentence
+    from quakedesign.studies.facts import box_sentences
     from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
 
@@ -142,7 +142,7 @@ def guarantee(
         if isinstance(found[0], QuakedesignError):
             raise found[0]
         written = f"written: {files[0]}" if _proved(found[0]) else f"{files[0]} is not written, as nothing is proved"
-        box_of = [box_sentence(faults[0])] if _proved(found[0]) and not faults[0].friction.state_names else []
+        box_of = box_sentences(faults[0]) if _proved(found[0]) else []
         lines = [*found[0].lines(), *box_of, *([written] if files[0] else [])]
         output.show(_facts(found[0], files[0]) | entries, chain(_first(faults[0], found[0]), lines))
     else:
@@ -167,8 +167,8 @@ def _first(fault: Any, answer: Any) -> Iterator[str]:
     from quakedesign.simulation.natural import natural_peak
 
     try:
-        peak = None if fault.friction.state_names else natural_peak(fault)
-    except SimulationError:  # whose earthquake cannot be computed
+        peak = natural_peak(fault)
+    except (ParameterError, SimulationError):  # of friction with a state, or whose earthquake cannot be computed
         peak = None
     yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', answer.proof, peak, fault.magnitude)}.", 80)
     yield ""
@@ -250,11 +250,7 @@ def blocks(
     from quakedesign.studies import one_block
 
     loaded = load_fault(fault, box=box, disturbance=disturbance)
-    if loaded.friction.state_names:
-        raise ParameterError(
-            f"blocks needs friction of slip and slip rate. Received {loaded.friction.name}. Write [[block]] and "
-            "[[well]] tables into the fault file, and run limits: it names unstable modes that no well reaches."
-        )
+    loaded.friction.require(blocks=fault)
     files = {count: out / f"{loaded.name}-{count}-blocks.json" for count in range(least, most + 1)} if out else {}
     if out is not None:
         require_room(out)

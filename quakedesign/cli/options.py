@@ -16,6 +16,7 @@ from cyclopts import Group, Parameter
 from quakedesign.cli.app import given, hush, print_json, print_lines, refuse
 from quakedesign.errors import ParameterError, UnitError
 from quakedesign.exact import rational
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.loop import Actuator, stages
 from quakedesign.loop.actuators.base import Option, Stage
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, quantities
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from quakedesign.laws import Controller
     from quakedesign.loop.sensing import Sensor
     from quakedesign.simulation import Load
-    from quakedesign.simulation.trajectory import Recording
+    from quakedesign.simulation.trajectory import Trajectory
     from quakedesign.studies.runs import Choice
 
 
@@ -688,7 +689,7 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
     from quakedesign.studies.runs import run_held, run_state
 
     asked, changed = _single(options), changed_options(command, options)
-    trajectory: Recording
+    trajectory: Trajectory
     certificate = changed.pop("certificate", None)
     if certificate is not None:
         told = _as_proved(fault, certificate, changed, options)
@@ -701,8 +702,8 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
         trajectory, answer = run_held(fault, **_instruments(fault, changed, options), **options["state"].of_control())
         lines = sliding_run_lines
     else:
-        free = run_state(fault, **_told(fault, changed, _FREE), **options["state"].of_free())
-        trajectory, answer, lines = free.trajectory, free.to_dict(), state_run_lines
+        trajectory, answer = run_state(fault, **_told(fault, changed, _FREE), **options["state"].of_free())
+        lines = state_run_lines
     if options["out"] is not None:
         trajectory.save(Path(options["out"]))
     options["output"].show(answer, [trajectory.name, *(f"  {line}" for line in lines(answer))])
@@ -743,36 +744,41 @@ class SpreadOptions:
         With a state it is the law that `design` finds for the nominal normal stress, stiffness and damping, whatever
         the box of the campaign.
         """
-        if not fault.friction.state_names:
+
+        def tracking(fault: "Fault") -> tuple["Choice | None", dict[str, Any]]:
             if self != SpreadOptions():
                 raise ParameterError(
                     f"spread and stress need friction with a state. Received {fault.friction.name}. Omit both."
                 )
             return law.choose(fault, step, path), {}
-        from quakedesign.exact import rational
-        from quakedesign.plant import slow_sliding_plant
-        from quakedesign.studies.runs import Choice
-        from quakedesign.synthesis import design
 
-        period = {} if self.stress_period is None else {"stress_period": self.stress_period}
-        if law.certificate is not None and (chosen := law.choose(fault.with_box("paper"))):
-            task: Any = chosen.claim.task  # type: ignore[union-attr]
-            if slow_sliding_plant(fault, task.stress).ramp != task.ramp:
-                raise ParameterError(
-                    "a campaign of slow sliding varies the fault that the certificate is about. Received "
-                    f"{fault.name}, with other constants than {task.name}. Give that fault, or use simulate "
-                    "--certificate."
-                )
-            return chosen, _of_proof(chosen.claim, self.spread, self.stress) | period
-        _require_designed({"controller": law.controller, "gains": law.gains})
-        off = rational(self.spread, "spread")
-        diffusion = path.get("diffusion")
-        designed = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=self.stress, spread=off)
-        if designed.controller is None or designed.sliding is None:
-            reason = designed.details["reason"]
-            raise ParameterError(f"a campaign needs a law. Received a design without one: {reason}.")
-        entries = {"spread": off, "stress": float(designed.sliding.task.stress)}
-        return Choice(controller=designed.controller), entries | period
+        def sliding(fault: "Fault") -> tuple["Choice | None", dict[str, Any]]:
+            from quakedesign.exact import rational
+            from quakedesign.plant import slow_sliding_plant
+            from quakedesign.studies.runs import Choice
+            from quakedesign.synthesis import design
+
+            period = {} if self.stress_period is None else {"stress_period": self.stress_period}
+            if law.certificate is not None and (chosen := law.choose(fault.with_box("paper"))):
+                task: Any = chosen.claim.task  # type: ignore[union-attr]
+                if slow_sliding_plant(fault, task.stress).ramp != task.ramp:
+                    raise ParameterError(
+                        "a campaign of slow sliding varies the fault that the certificate is about. Received "
+                        f"{fault.name}, with other constants than {task.name}. Give that fault, or use simulate "
+                        "--certificate."
+                    )
+                return chosen, _of_proof(chosen.claim, self.spread, self.stress) | period
+            _require_designed({"controller": law.controller, "gains": law.gains})
+            off = rational(self.spread, "spread")
+            diffusion = path.get("diffusion")
+            designed = design(fault.with_box("paper"), "elqr", diffusion=diffusion, stress=self.stress, spread=off)
+            if designed.controller is None or designed.sliding is None:
+                reason = designed.details["reason"]
+                raise ParameterError(f"a campaign needs a law. Received a design without one: {reason}.")
+            entries = {"spread": off, "stress": float(designed.sliding.task.stress)}
+            return Choice(controller=designed.controller), entries | period
+
+        return by_equilibrium(rest=tracking, sliding=sliding)(fault)
 
 
 def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:

@@ -36,10 +36,12 @@ from quakedesign.cli.options import (
     surroundings,
 )
 from quakedesign.errors import ParameterError, require_known
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.files import hold
 from quakedesign.parallel import remedy
 
 if TYPE_CHECKING:
+    from quakedesign.fault import Fault
     from quakedesign.simulation.campaign import Campaign, CampaignProblem
 
 
@@ -119,50 +121,54 @@ def simulate(
         of_law: dict[str, Any] = {"controller": kind, "certificate": law.certificate}
         return run_chain(blocks, out, force, output, duration=run.duration, **of_law)
     new_file(out, "output file", force=force)
-    loaded = load_fault(fault)
-    if loaded.friction.state_names:
-        return show_state_run(loaded, simulate, options)
-    require_no_state_options(state, loaded)
-    loaded = start.task(loaded)
-    chosen, load = law.choose(loaded, run.step, actuator.path()), run.load()
-    way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
-    period = loaded.sampling_time if step is None else step
-    substeps, chain, told = surroundings(chosen, period, run, actuator, sensors, seed)
-    with progress() as tell:
-        tell("compiling", 0.0)
-        trajectory, premises = run_single(
-            loaded,
-            chosen,
-            tell=lambda done: tell("simulation", done),
-            duration=run.duration,
-            load=load if load != Load() else None,
-            step=step,
-            scheme=way,
-            method=run.method,
-            plant=run.plant,
-            substeps=substeps,
-            actuator=chain,
-            noise=told,
-            initial=start.state(),
-            tuning=given({"weight": weight, "authority": authority}),
+
+    def run_loop(found: "Fault") -> int:
+        require_no_state_options(state, found)
+        loaded = start.task(found)
+        chosen, load = law.choose(loaded, run.step, actuator.path()), run.load()
+        way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
+        period = loaded.sampling_time if step is None else step
+        substeps, chain, told = surroundings(chosen, period, run, actuator, sensors, seed)
+        with progress() as tell:
+            tell("compiling", 0.0)
+            trajectory, premises = run_single(
+                loaded,
+                chosen,
+                tell=lambda done: tell("simulation", done),
+                duration=run.duration,
+                load=load if load != Load() else None,
+                step=step,
+                scheme=way,
+                method=run.method,
+                plant=run.plant,
+                substeps=substeps,
+                actuator=chain,
+                noise=told,
+                initial=start.state(),
+                tuning=given({"weight": weight, "authority": authority}),
+            )
+        if out is not None:
+            trajectory.save(out)
+        proved, outside, exceeded = None, list[str](), ""
+        if chosen and chosen.claim:
+            changed = changed_options(simulate, options)
+            proved, outside = chosen.claim.sentence(), _outside(changed, chosen.claim, trajectory.provenance["plant"])
+            pressures = getattr(chosen.claim.claims, "pressures", ())
+            exceeded = exceeded_line(trajectory.metrics, *pressures[-1]) if trajectory.metrics and pressures else ""
+        answer = _answer(trajectory, loaded, premises) | {
+            "guarantee": {"sentence": proved} if proved else None,
+            "outside": outside,
+        }
+        warning = chosen.controller.warning_at_rest if chosen else ""
+        output.show(
+            answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside, exceeded), warning)
         )
-    if out is not None:
-        trajectory.save(out)
-    proved, outside, exceeded = None, list[str](), ""
-    if chosen and chosen.claim:
-        changed = changed_options(simulate, options)
-        proved, outside = chosen.claim.sentence(), _outside(changed, chosen.claim, trajectory.provenance["plant"])
-        pressures = getattr(chosen.claim.claims, "pressures", ())
-        exceeded = exceeded_line(trajectory.metrics, *pressures[-1]) if trajectory.metrics and pressures else ""
-    answer = _answer(trajectory, loaded, premises) | {
-        "guarantee": {"sentence": proved} if proved else None,
-        "outside": outside,
-    }
-    warning = chosen.controller.warning_at_rest if chosen else ""
-    output.show(
-        answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside, exceeded), warning)
-    )
-    return 0
+        return 0
+
+    def run_with_state(found: "Fault") -> int:
+        return show_state_run(found, simulate, options)
+
+    return by_equilibrium(rest=run_loop, sliding=run_with_state)(load_fault(fault))
 
 
 def _outside(changed: dict[str, Any], claim: Any, plant: str) -> list[str]:
@@ -247,7 +253,7 @@ def sampling(
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare
     from quakedesign.report.sampling_table import print_sampling, write_sampling
-    from quakedesign.studies.runs import CONTINUOUS, DESIGNED, chosen_controller
+    from quakedesign.studies.runs import CONTINUOUS, DESIGNED, choice
     from quakedesign.studies.sampling import sampling_report
     from quakedesign.synthesis import design
 
@@ -261,7 +267,7 @@ def sampling(
         law = (
             design(loaded, controller, continuous=True)
             if gains in (DESIGNED, CONTINUOUS)
-            else chosen_controller(loaded, controller, gains)
+            else choice(loaded, controller, gains).controller
         )
         report = sampling_report(loaded, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
         results = write_sampling(report, folder, format)
@@ -409,7 +415,7 @@ def campaign(
     controller = chosen.controller if chosen else None
     way, step, own = run.way(controller)
     period = loaded.sampling_time if step is None else step
-    around = surroundings(None if loaded.friction.state_names else chosen, period, run, actuator, sensors, 0)
+    around = surroundings(None if told else chosen, period, run, actuator, sensors, 0)
     problem = campaign_problem(
         loaded,
         controller,

@@ -94,16 +94,12 @@ class BlockChain:
             )
         if self.diffusivity is not None:
             require_positive(diffusivity=self.diffusivity)
-            if self.ages:
-                raise ParameterError(
-                    "diffusivity along the fault needs friction without a state. Received "
-                    f"{self.blocks[0].friction.name}. Omit diffusivity, for steady pressures along the fault."
-                )
+            self.friction.require(diffusivity=self.diffusivity)
         for place, block in enumerate(self.blocks, 1):
-            if bool(block.friction.state_names) != self.ages:
+            if block.friction.equilibrium is not self.friction.equilibrium:
                 raise ParameterError(
                     "blocks of a fault need friction with a state in all of them, or in none. Received "
-                    f"{self.blocks[0].friction.name} in block 1 and {block.friction.name} in block {place}. Change one."
+                    f"{self.friction.name} in block 1 and {block.friction.name} in block {place}. Change one."
                 )
 
     @property
@@ -191,9 +187,14 @@ class BlockChain:
         )
 
     @property
+    def friction(self) -> FrictionLaw:
+        """That of the first block, whose equilibrium is that of all."""
+        return self.blocks[0].friction
+
+    @property
     def ages(self) -> bool:
         """Whether friction has a state, as rate-and-state friction."""
-        return bool(self.blocks[0].friction.state_names)
+        return bool(self.friction.state_names)
 
     @property
     def alike(self) -> bool:

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from quakedesign.discovery import user_code
-from quakedesign.errors import ParameterError, ScenarioError, UnknownNameError
+from quakedesign.errors import ScenarioError, UnknownNameError
 from quakedesign.exact import float_below, rational
 from quakedesign.fault.entries import FileEntry, Table, entries_of
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.friction import friction_law, friction_laws
 from quakedesign.fault.friction.base import FrictionLaw
 from quakedesign.fault.model import (
@@ -203,17 +204,22 @@ def _target(fault: Fault, assumed: list[str]) -> float:
     return target
 
 
-def _step(fault: Fault, task: Reference, assumed: list[str]) -> float:
-    if fault.friction.state_names:
-        step = sliding_step(fault.friction, task)
-        assumed.append(f"{_STEP} {step:g} s, near D_c/({AGEINGS:g} V) in slow sliding at the task's mean rate V")
-        return step
+def _step_of_sliding(fault: Fault, task: Reference, assumed: list[str]) -> float:
+    step = sliding_step(fault.friction, task)
+    assumed.append(f"{_STEP} {step:g} s, near D_c/({AGEINGS:g} V) in slow sliding at the task's mean rate V")
+    return step
+
+
+def _step_at_rest(fault: Fault, task: Reference, assumed: list[str]) -> float:
     pace = max(fault.natural_frequency, _growth(fault))
     step = _cut(min(1 / (SAMPLES * pace), task.operation_time / _SHARE), digits=2)
     assumed.append(
         f"{_STEP} {step:g} s, at least {SAMPLES:g} samples while an error grows e-fold or oscillates by 1 rad"
     )
     return step
+
+
+_step = by_equilibrium(rest=_step_at_rest, sliding=_step_of_sliding)
 
 
 def _growth(fault: Fault) -> float:
@@ -280,10 +286,7 @@ def load_fault(
     fault = fault.with_box(box) if box else fault
     if disturbance is None:
         return fault
-    if fault.friction.state_names:
-        raise ParameterError(
-            f"a disturbance of friction with a state is a stress of its own. Received {disturbance!r}. Give --stress."
-        )
+    fault.friction.require(disturbance=disturbance)
     amplitude, stressed = acceleration(disturbance, fault.exact_authority, "disturbance")
     stresses = {*fault.disturbance.stresses} - {"amplitude"} | ({"amplitude"} if stressed else set())
     changed = replace(fault.disturbance, amplitude=amplitude, stresses=tuple(sorted(stresses)))
@@ -363,7 +366,7 @@ def _authority(parts: Mapping[str, Any]) -> Fraction:
 
 def _assumed(parts: Mapping[str, Any], table: Table) -> tuple[str, ...]:
     """What a file leaves open of its disturbance, for friction without a state."""
-    if parts["friction"].state_names:
+    if "disturbance" in parts["friction"].equilibrium.refused:
         return ()
     if "disturbance" not in table.entries:
         return (_UNDISTURBED,)

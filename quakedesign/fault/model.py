@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import field, fields, replace
 from fractions import Fraction
 from functools import cached_property
-from math import inf, nan, nextafter
+from math import inf, nextafter
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -26,6 +26,7 @@ from quakedesign.errors import (
     require_known,
 )
 from quakedesign.exact import rational
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.friction.base import FrictionLaw
 from quakedesign.fault.units import quantity, si_value
 from quakedesign.text import shown
@@ -89,6 +90,9 @@ _SCAN = 4096
 _DIGITS = 40  # the slip of a fault that is only just unstable is a small difference
 
 
+_strength_drop = by_equilibrium(rest=lambda law: law.bounds[1] - law.bounds[0], sliding=lambda law: math.nan)
+
+
 def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
     """Smallest positive slip [m] where the excess of load over strength turns from driving to resisting.
 
@@ -97,8 +101,9 @@ def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
     (μ_max − μ_min)σ'_n A/k. A fault whose origin is stable stays where it is; friction with a state has no strength
     of its own at rest, and nan is returned.
     """
-    if friction.state_names:
-        return nan
+    furthest = float(_strength_drop(friction)) * load / stiffness * 1.0001
+    if not furthest > 0:
+        return furthest
     import mpmath
     import sympy as sp
 
@@ -106,10 +111,6 @@ def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
     law = friction.exact().coefficient
     excess = law(sp.Integer(0), 0) - law(x, 0) - stiffness / load * x
     drive, drive_in_floats = (sp.lambdify(x, excess, module) for module in ("mpmath", "math"))
-    low, high = friction.bounds
-    furthest = (high - low) * load / stiffness * 1.0001
-    if furthest == 0:
-        return 0.0
     try:
         ends = _turn(drive_in_floats, furthest)
     except (NameError, ArithmeticError, ValueError):  # a function that floats do not have, or beyond their range
@@ -559,11 +560,7 @@ class Fault:
         with problems.collected():
             require_ordinary(**{name: getattr(self.friction, name) for name in self.friction.quantities()})
         problems.refuse()
-        if self.reference.ramp is not None and not self.friction.state_names:
-            raise ParameterError(
-                f"ramp needs friction with a state, whose reference has a constant rate. Received the ramp "
-                f"{self.reference.ramp!r} with {self.friction.name}, whose reference is smooth already. Omit ramp."
-            )
+        self.friction.require(ramp=self.reference.ramp)
         if self.reference.operation_time < 1000 * self.sampling_time:
             raise ParameterError(
                 f"sampling_time must be at most a thousandth of the operation time "
@@ -572,12 +569,7 @@ class Fault:
 
     def require_memoryless(self, purpose: str) -> None:
         """Refuse friction with a state variable where only slip and slip rate are covered."""
-        if self.friction.state_names:
-            raise ParameterError(
-                f"{purpose} needs a friction law of slip and slip rate alone. Received {self.friction.name}, with the "
-                f"state {', '.join(self.friction.state_names)}. "
-                "Use fault, derive, simulate, guarantee or design for it."
-            )
+        self.friction.require(purpose=purpose)
 
     def with_box(self, name: str) -> "Fault":
         """Return the same fault with a named uncertainty box."""
@@ -658,10 +650,7 @@ class Fault:
     @property
     def stress_drop(self) -> float:
         """Δτ = (μ_max − μ_res)σ'_n [Pa]; nan for friction with a state, whose drop is that of an event."""
-        if self.friction.state_names:
-            return math.nan
-        low, high = self.friction.bounds
-        return (high - low) * self.effective_normal_stress
+        return float(_strength_drop(self.friction)) * self.effective_normal_stress
 
     @property
     def seismic_moment(self) -> float:

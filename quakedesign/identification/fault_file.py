@@ -20,6 +20,7 @@ from typing import Any
 from quakedesign.errors import RecordError
 from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox, friction_laws
+from quakedesign.fault.equilibrium import STEADY_SLIDING
 from quakedesign.fault.fault_toml import beyond_rates, fault_toml, mean_rate, sliding_step, step_assumed
 from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.files import write_whole
@@ -127,9 +128,9 @@ def other_parts(identification: Identification, fault: Fault) -> str:
     shared = "normal stress, size, task"
     if _gains_a_state(identification, fault):
         return shared
-    loaded = ", reference rate, working range" if identification.law.state_names else ""
-    step = "" if _step_follows(identification, fault) else ", T_s"
-    return f"{shared}{step}, disturbance{loaded}"
+    loaded = ", reference rate, working range" if "reference_rate" in identification.law.quantities() else ""
+    kept = "" if _step_follows(identification, fault) else ", T_s"
+    return f"{shared}{kept}, disturbance{loaded}"
 
 
 def task_remarks(identification: Identification, fault: Fault) -> list[str]:
@@ -144,14 +145,13 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
         old, new = (quantity(each.reference_rate, "m/s", 4) for each in (law, moved))
         text = f"mu0 = {law.reference_coefficient:.5g} at {old} was converted to {moved.reference_coefficient:.5g}"
         lines.append(f"{text} at {new} for the file")
-    beyond = beyond_rates(law, mean_rate(task), source="of the record") if law.state_names else ""
-    return [*lines, *filter(None, [beyond])]
+    return [*lines, *filter(None, [beyond_rates(law, mean_rate(task), source="of the record")])]
 
 
 def law_remarks(identification: Identification, fault: Fault) -> list[str]:
     """Whether a record has another law with state than the fault names, where it was not told which to take."""
     named, law = fault.friction, identification.law
-    if identification.rival is None or not named.state_names or named.name == law.name:
+    if identification.rival is None or named.equilibrium is not law.equilibrium or named.name == law.name:
         return []
     why = "the record prefers" if named.name == identification.rival.law else "the record was fitted without it, by"
     return [f"{fault.name} names {named.name}, {why} {law.name}; --law {named.name} takes the other"]
@@ -197,11 +197,12 @@ def _at_rate_of(fault: Fault, law: FrictionLaw) -> Any:
 
 def _step_follows(identification: Identification, fault: Fault) -> bool:
     """Whether T_s is that of the identified friction: the fault has one for friction of another kind, or none."""
-    return bool(identification.law.state_names) and (step_assumed(fault) or not fault.friction.state_names)
+    slides = identification.law.equilibrium is STEADY_SLIDING
+    return slides and (step_assumed(fault) or _gains_a_state(identification, fault))
 
 
 def _gains_a_state(identification: Identification, fault: Fault) -> bool:
-    return bool(identification.law.state_names) and not fault.friction.state_names
+    return identification.law.equilibrium is STEADY_SLIDING is not fault.friction.equilibrium
 
 
 def covers(law: FrictionLaw) -> bool:

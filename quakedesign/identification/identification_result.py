@@ -16,6 +16,7 @@ from quakedesign.identification.assessment import DECISIVE, EXPLAINS, EXPLAINS_N
 from quakedesign.identification.fitting import CONFIDENCE, Fit, Profile
 from quakedesign.identification.record import Record
 
+_OTHER_LAW = {"rest": "another --law", "sliding": "no --law, which fits both laws with a state"}
 _BESIDE = "delay", "start_rate"  # which may stay open: nothing else hangs on them then
 
 
@@ -150,10 +151,9 @@ class Identification:
 
     def to_try(self) -> list[str]:
         """What may explain a record better."""
-        other = "no --law, which fits both laws with a state" if self.law.state_names else "another --law"
         return [
             "--figure, which shows where",
-            *([other] if self.rival is None else []),
+            *([_OTHER_LAW[self.law.equilibrium.name]] if self.rival is None else []),
             *(["--states 2"] if self.law.state_names == ("theta",) else []),
             *(["--stiffness of the machine, if it was measured"] if "stiffness" in self.estimates else []),
             "one step alone, cut out with --from and --to",

@@ -12,6 +12,7 @@ from numpy import ndarray
 
 from quakedesign.errors import RecordError, UnknownNameError, require_known
 from quakedesign.fault import FrictionLaw, friction_law
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.model import require_positive, require_seed
 from quakedesign.identification.assessment import (
     DECISIVE,
@@ -57,6 +58,7 @@ class Setup:
     experiment: Experiment
     used: ndarray
     notes: tuple[str, ...]
+    starts: tuple[Coordinate, ...] = ()  # Of a beginning off the equilibrium, where there are any
 
 
 def set_up(
@@ -71,16 +73,7 @@ def set_up(
     `nuisance` is what is fitted besides law and stiffness: `TREND` or `TREND_IN_TIME`, `START_STATE` (with
     `START_RATE`). Raises `RecordError` when the law is of neither kind, or something is missing.
     """
-    if law.state_names:
-        setup = _sliding(record, law, stiffness, loading, START_STATE in nuisance)
-    else:
-        slip, rate = sp.symbols("slip rate", positive=True)
-        if sp.sympify(_template(law).symbolic().coefficient(slip, rate)).has(rate):
-            raise RecordError(
-                f"a law that is identified must depend on slip or on a state. Received {law.name}, which depends on "
-                "the slip rate alone. Take another."
-            )
-        setup = _measured_slip(record, law) if record.slip is not None else _drawn(record, law, stiffness)
+    setup = _setup(law, record, stiffness, loading, START_STATE in nuisance)
     for name, along in ((TREND, record.path), (TREND_IN_TIME, record.time)):
         if name in nuisance and along is not None and np.ptp(along[setup.used]) > 0:
             along = along[setup.used] - along[0]
@@ -95,7 +88,7 @@ def _template(law: type[FrictionLaw]) -> FrictionLaw:
 def _coordinate(name: str, law: type[FrictionLaw], record: Record, path: float) -> Coordinate:
     """Where one quantity of a law is sought; `path` is how far the block can have slipped [m]."""
     unit = law.quantities()[name].metadata["unit"]
-    if law.state_names and name in ("evolution_effect", SECOND_EFFECT):
+    if name in ("evolution_effect", SECOND_EFFECT):
         start = (-0.005, 0.025) if name == "evolution_effect" else (-0.01, 0.01)
         return Coordinate(name=name, unit=unit, low=-1.0, high=1.0, start=start, logarithmic=False)
     size, (low, high, start) = record.largest, _EFFECTS
@@ -110,8 +103,20 @@ def _coordinate(name: str, law: type[FrictionLaw], record: Record, path: float) 
     return Coordinate(name=name, unit=unit, low=low, high=high, start=start)
 
 
+def _of_slip(
+    law: type[FrictionLaw], record: Record, stiffness: float | None, loading: Loading | None, unsteady: bool
+) -> Setup:
+    slip, rate = sp.symbols("slip rate", positive=True)
+    if sp.sympify(_template(law).symbolic().coefficient(slip, rate)).has(rate):
+        raise RecordError(
+            f"a law that is identified must depend on slip or on a state. Received {law.name}, which depends on the "
+            "slip rate alone. Take another."
+        )
+    return _measured_slip(record, law) if record.slip is not None else _drawn(record, law, stiffness)
+
+
 def _sliding(
-    record: Record, law: type[FrictionLaw], stiffness: float | None, loading: Loading | None, unsteady: bool
+    law: type[FrictionLaw], record: Record, stiffness: float | None, loading: Loading | None, unsteady: bool
 ) -> Setup:
     if record.load_point is None or loading is None:
         raise RecordError(
@@ -147,7 +152,10 @@ def _sliding(
     begins = f"in {'a state off that of ' if unsteady else ''}steady sliding at {first:.4g} m/s"
     notes = (f"the record begins {begins}", *loading.notes)
     late = delayed(experiment, *loading.delays(record))
-    return Setup(experiment=late, used=np.ones(len(record.time), dtype=bool), notes=notes)
+    return Setup(experiment=late, used=np.ones(len(record.time), dtype=bool), notes=notes, starts=_START)
+
+
+_setup = by_equilibrium(rest=_of_slip, sliding=_sliding)
 
 
 def _stiffness(record: Record, path: float, given: float | None) -> list[Coordinate]:
@@ -491,7 +499,7 @@ class _Choice:
 
     def _extended(self, fitted: _Fitted) -> _Fitted:
         """With a beginning off steady sliding, where that is likelier."""
-        if not fitted.kind.state_names:
+        if not fitted.setup.starts:
             return fitted
         wider, _ = self._among(fitted, {*_nuisance(fitted), START_STATE})
         return _again(wider) if needed(wider.best, fitted.best.squares, len(_START)) else fitted

@@ -11,7 +11,6 @@ from quakedesign.report.figures import figures
 from quakedesign.report.page import table_html
 from quakedesign.report.sentences import headline, remarks, said
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared, designs_of
-from quakedesign.studies.runs import StateRun
 from quakedesign.synthesis import Design, assess
 
 
@@ -33,7 +32,7 @@ class Comparison(Compared):
                 "metrics": run.metrics.to_dict(),
                 "events": dict(run.events),
                 "run": dict(run.provenance),
-                "cycle": run.cycle if isinstance(run, StateRun) else None,
+                "cycle": run.cycle,
             },
             "not_applicable": self.left_out,
         }

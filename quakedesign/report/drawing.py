@@ -18,9 +18,9 @@ from quakedesign.laws import control_laws
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Entry, Run
+    from quakedesign.studies.comparison import Entry
 
-    Shown: TypeAlias = Run | tuple[Entry, Run]
+    Shown: TypeAlias = Trajectory | tuple[Entry, Trajectory]
 
 
 # ----------------------------------------------------------------------
@@ -201,16 +201,11 @@ def figure_bytes(drawing: Any, kind: str, name: str) -> bytes:
     stream = io.BytesIO()
     style: Any = _STYLE | {"svg.hashsalt": name}
     with mpl.rc_context(style):
-        _lay_out(drawing)
+        if (engine := drawing.get_layout_engine()) is not None:  # which `savefig` would call again in every format
+            engine.execute(drawing)
+            drawing.set_layout_engine(None)
         drawing.savefig(stream, format=kind, metadata=_UNDATED[kind])
     return stream.getvalue()
-
-
-def _lay_out(drawing: Any) -> None:
-    """Place what is in a figure, for good: `savefig` would draw all of it once more for that, in every format."""
-    if (engine := drawing.get_layout_engine()) is not None:
-        engine.execute(drawing)
-        drawing.set_layout_engine(None)
 
 
 def write_figures(folder: Path, drawn: Mapping[str, Any], formats: Sequence[str]) -> None:

@@ -30,14 +30,12 @@ from quakedesign.report.drawing import (
     style,
     with_diverged,
 )
-from quakedesign.simulation.slow_sliding import SlidingRun
 from quakedesign.studies.facts import Plane, StabilityRegions, stability_regions
-from quakedesign.studies.runs import StateRun
 from quakedesign.text import quantity
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
-    from quakedesign.studies.comparison import Compared, Entry, Run
+    from quakedesign.studies.comparison import Compared, Entry
 
 
 # ----------------------------------------------------------------------
@@ -198,31 +196,32 @@ _BANDS = 600  # of a run at most: more are not seen, and make a file of many meg
 _PER_BAND = 16  # instants at least, four periods
 
 
-def state_figures(comparison: "Compared", natural: "StateRun") -> dict[str, Any]:
+def state_figures(comparison: "Compared") -> dict[str, Any]:
     """``cycle``, where it is known, and ``slow-sliding`` and ``sliding-errors`` of the first law that ran."""
-    held = next(((e, e.run) for e in comparison.entries if isinstance(e.run, SlidingRun)), None)
-    drawn = {} if natural.failed else {"cycle": cycle(comparison, natural)}
-    return drawn if held is None else drawn | {"slow-sliding": slow_sliding(*held), "sliding-errors": errors(*held)}
+    drawn = {} if comparison.uncontrolled.failed else {"cycle": cycle(comparison)}
+    for held in runs_of(comparison.entries)[:1]:
+        drawn |= {"slow-sliding": slow_sliding(*held), "sliding-errors": errors(*held)}
+    return drawn
 
 
-def cycle(comparison: "Compared", natural: "StateRun") -> Any:
+def cycle(comparison: "Compared") -> Any:
     """Slip and slip rate without control."""
-    run, name = natural.trajectory, comparison.fault.name
+    run, fault = comparison.uncontrolled, comparison.fault
     drawing, ((slip,), (rate,)) = figure(2, 3.6)
     size, unit = length(float(run.slip.max()))
     divisor, passing = clock(float(run.time[-1]))
     slip.plot(run.time / divisor, run.slip / size, color=NATURAL)
     slip.set_ylabel(f"slip [{unit}]")
     rate.semilogy(run.time / divisor, run.slip_rate, color=NATURAL)
-    rate.axhline(natural.loading_rate, color="grey", linestyle=":", label="loading rate")
+    rate.axhline(fault.friction.operating_rate, color="grey", linestyle=":", label="loading rate")
     rate.set_ylabel("slip rate [m/s]")
     rate.set_xlabel(f"time [{passing}]")
-    moved = "with inertia" if natural.provenance["plant"] == "smooth" else natural.provenance["plant"]
+    moved = "with inertia" if run.provenance["plant"] == "smooth" else run.provenance["plant"]
     made = f"method {run.provenance['method']}, tolerance {run.provenance['rtol']:g}, {moved}"
-    return finish(drawing, f"{name} without control", [], made, legend=rate)
+    return finish(drawing, f"{fault.name} without control", [], made, legend=rate)
 
 
-def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
+def slow_sliding(entry: "Entry", run: "Trajectory") -> Any:
     """Slip, slip rate, pressure and state of a law that holds slow sliding."""
     fault, shade = entry.design.fault, colour(entry.design.name)
     drawing, ((slip,), (rate,), (pressure,), (state,)) = figure(4, 6.6)
@@ -243,16 +242,16 @@ def slow_sliding(entry: "Entry", run: SlidingRun) -> Any:
     _filled(pressure, time, run.pressure / largest, shade)
     pressure.set_ylabel(f"pressure [{pascal}]")
     (steady,) = map(float, fault.friction.steady_state(first))
-    _filled(state, time, run.theta / steady, shade)
+    _filled(state, time, run.signals()["theta"][0] / steady, shade)
     state.set_ylabel("state / steady [-]")
     state.set_ylim(min(state.get_ylim()[0], 0.99), max(state.get_ylim()[1], 1.01))
     state.set_xlabel(f"time [{unit}]")
-    shaken = f"shear stress up to {float(np.abs(run.stress).max()) / 1e3:.3g} kPa"
+    shaken = f"shear stress up to {float(np.abs(run.signals()['stress'][0]).max()) / 1e3:.3g} kPa"
     note = f"V = {first:.4g} m/s; bands between the extremes of {_width(run.time)} instants; {shaken}"
     return finish(drawing, f"{fault.name} held in slow sliding", [run], note, legend=rate)
 
 
-def errors(entry: "Entry", run: SlidingRun) -> Any:
+def errors(entry: "Entry", run: "Trajectory") -> Any:
     """Slip and slip rate less their references."""
     drawing, axes = figure(2, 3.6)
     divisor, unit = clock(float(run.time[-1]))
@@ -286,8 +285,8 @@ def figures(comparison: "Compared") -> dict[str, Any]:
     ``overview``, ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``; with a state ``overview``,
     ``cycle``, ``slow-sliding``, ``sliding-errors``.
     """
-    if isinstance(comparison.uncontrolled, StateRun):
-        return overviews(comparison) | state_figures(comparison, comparison.uncontrolled)
+    if comparison.uncontrolled.cycle is not None:
+        return overviews(comparison) | state_figures(comparison)
     drawn = overviews(comparison) | {"uncontrolled": uncontrolled(comparison)}
     if runs_of(comparison.entries):
         drawn |= {
@@ -301,16 +300,17 @@ def figures(comparison: "Compared") -> dict[str, Any]:
 
 def overviews(comparison: "Compared") -> dict[str, Any]:
     """``overview`` where there are both a natural earthquake and a run under control."""
-    natural = comparison.uncontrolled
-    failed = isinstance(natural, StateRun) and natural.failed
+    failed = comparison.uncontrolled.failed
     return {} if failed or not runs_of(comparison.of("designed")) else {"overview": overview(comparison)}
 
 
 def overview(comparison: "Compared") -> Any:
     """Slip rate and slip with and without control over logarithmic time, with the proved bound and what limits it."""
-    natural = comparison.uncontrolled
-    free: Any = natural.trajectory if isinstance(natural, StateRun) else natural
-    best, own = min(runs_of(comparison.of("designed")), key=lambda pair: _peak(pair[0]))
+    free = comparison.uncontrolled
+    best, own = min(
+        runs_of(comparison.of("designed")),
+        key=lambda pair: float(pair[0].guaranteed.peak_slip_rate) if pair[0].guaranteed else np.inf,
+    )
     drawing, ((rate,), (slip,)) = figure(2, 5.0, height_ratios=(3, 2))
     floor = 1e-3 * float(known(own.reference_rate).max())
     speed = np.abs(free.slip_rate)
@@ -348,10 +348,6 @@ def overview(comparison: "Compared") -> Any:
     note = f"largest value in each of 25 parts of a decade; gaps: slip rate below {floor:.1g} m/s, or at rest"
     title = f"{comparison.fault.name}: with and without control"
     return finish(drawing, title, ran, with_diverged(comparison.entries, note), legend=rate)
-
-
-def _peak(entry: "Entry") -> float:
-    return float("inf") if entry.guaranteed is None else float(entry.guaranteed.peak_slip_rate)
 
 
 def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":
@@ -395,7 +391,7 @@ def uncontrolled(comparison: "Compared") -> Any:
     return finish(drawing, f"{fault.name} without control: {event}", [run])
 
 
-def end(*runs: "Run") -> float:
+def end(*runs: "Trajectory") -> float:
     """Time [s] until which earthquakes are shown: somewhat longer than the last takes to complete its slip."""
     settled = [run.time[int(np.argmax(np.abs(run.slip) >= 0.995 * np.abs(run.slip).max()))] for run in runs]
     return float(min(1.4 * max(settled), min(run.time[-1] for run in runs))) or float(runs[0].time[-1])

@@ -121,7 +121,8 @@ def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
 def _warnings(identification: Identification) -> list[str]:
     """What looks wrong, noise that is not white, and outliers."""
     told, critical = [], identification.estimates.get("critical_slip")
-    if critical is not None and identification.law.state_names and not _SHORT <= critical.value <= _LONG:
+    evolves = "evolution_effect" in identification.law.quantities()
+    if critical is not None and evolves and not _SHORT <= critical.value <= _LONG:
         size = critical.value
         long = f"{1e9 * size:.3g} nm is far shorter" if size < _SHORT else f"{100 * size:.3g} cm is far longer"
         told.append(f"D_c of {long} than the some 1 to 100 µm of laboratories: check the unit of the displacement")

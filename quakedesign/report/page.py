@@ -19,6 +19,7 @@ from latex2mathml.converter import convert
 from markupsafe import Markup, escape
 
 from quakedesign.fault import Fault, fault_toml
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, WIDTHS
 from quakedesign.laws import LinearLaw
 from quakedesign.laws.stick_slip_controller import StickSlipController
@@ -27,7 +28,7 @@ from quakedesign.lyapunov import Verdict
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
     beside_guarantee,
-    cycle_sentence,
+    cycle_sentences,
     domain_sentence,
     feedforward_rows,
     grade,
@@ -39,8 +40,7 @@ from quakedesign.report.sentences import (
 )
 from quakedesign.report.summary import SUMMARY_COLUMNS, summary, summary_cells
 from quakedesign.report.tables import COLUMNS, rows
-from quakedesign.studies.facts import coordinates, fault_sentences, law_latex, plant_latex, stick_slip_latex
-from quakedesign.studies.runs import StateRun
+from quakedesign.studies.facts import fault_sentences, law_latex, plant_latex, stick_slip_latex
 from quakedesign.text import quantity, visible
 
 if TYPE_CHECKING:
@@ -306,12 +306,13 @@ def parameter_rows(fault: Fault) -> list[Row]:
 
     No disturbance of friction with a state: what pushes such a fault is the stress of its guarantee.
     """
+    refused = fault.friction.equilibrium.refused
     rows = [
         *_told(fault, PLANT, "fault"),
         *_told(fault.friction, fault.friction.quantities(), "friction"),
         *_told(fault.reference, [name for name in TASK if name != _STEP], "task"),
         *_told(fault, [_STEP], "task"),
-        *([] if fault.friction.state_names else _told(fault.disturbance, DISTURBANCE, "disturbance")),
+        *_told(fault.disturbance, () if "disturbance" in refused else DISTURBANCE, "disturbance"),
     ]
     rows += [
         _parameter_row(f"half-width of {name}", float(getattr(fault.box, name)), "", "uncertainty", "±")
@@ -440,7 +441,7 @@ def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Repro
             said=said,
             overview=_figure("overview", figures["overview"]) if "overview" in figures else None,
             facts=fault_sentences(comparison.fault),
-            coordinates=coordinates(comparison.fault),
+            coordinates=comparison.fault.friction.equilibrium.coordinates,
             plant=[mathml(equation) for equation in plant_latex(comparison.fault)],
             **_tables(comparison),
             accounts=told,
@@ -468,8 +469,8 @@ def _figure(name: str, drawn: Markup) -> dict[str, str]:
 def _natural(comparison: "Compared") -> str:
     """What the fault does without control."""
     fault, run = comparison.fault, comparison.uncontrolled
-    if isinstance(run, StateRun):
-        return cycle_sentence(run)
+    if said := cycle_sentences(comparison):
+        return said[0]
     size = (
         f" of magnitude {fault.magnitude:.2f}" if run.outcome.kind == "earthquake" and fault.seismic_moment > 0 else ""
     )
@@ -496,8 +497,12 @@ def _limits(comparison: "Compared", told: list[Account]) -> list[str]:
         if shares
         else []
     )
-    about_runs = SLIDING_LIMITS if comparison.fault.friction.state_names else (*REST_LIMITS, _way(comparison))
-    return [*own, *reverse, *MODEL_LIMITS, *about_runs]
+    return [*own, *reverse, *MODEL_LIMITS, *_of_runs(comparison.fault, comparison)]
+
+
+_of_runs = by_equilibrium(
+    rest=lambda fault, comparison: (*REST_LIMITS, _way(comparison)), sliding=lambda fault, comparison: SLIDING_LIMITS
+)
 
 
 def _way(comparison: "Compared") -> str:
@@ -516,7 +521,7 @@ def _tables(comparison: "Compared") -> dict[str, Any]:
 def _terms(fault: "Fault") -> list[list[str]]:
     """Symbol, meaning and unit of what a report of the fault may speak of."""
     terms: dict[str, list[list[str]]] = tomllib.loads(_text("glossary.toml"))
-    own = terms["state" if fault.friction.state_names else "stateless"]
+    own = terms[fault.friction.equilibrium.name]
     return sorted(terms["every"] + own, key=lambda term: not term[0])  # symbols first
 
 

@@ -29,7 +29,6 @@ from quakedesign.text import lasting, quantity
 if TYPE_CHECKING:
     from quakedesign.guarantees import FaultProof
     from quakedesign.simulation.recorder import Metrics
-    from quakedesign.studies.runs import StateRun
 
 
 # ----------------------------------------------------------------------
@@ -148,7 +147,7 @@ def _way(pressure: float) -> str:
 
 
 def _beside_natural(run: Trajectory) -> str:
-    share, natural = run.outcome.share_of_natural, run.criterion.natural_peak
+    share, natural = run.outcome.share_of_natural, run.natural_peak
     if share is None or natural is None:
         return "and the fault has no natural earthquake"
     return f"{_percent(share)} of the natural earthquake's {natural:.3g} m/s"
@@ -313,7 +312,9 @@ def sentences(entry: "Entry") -> list[str]:
         *assumed,
     ]
     lines += [part_of_task(entry.run, design.fault)] if entry.run else []
-    return [sentence for sentence in (*lines, *_reversed(entry.run)) if sentence]
+    if entry.run and (share := entry.run.metrics.reverse_slip_fraction):
+        lines.append(f"on the plant without stick, the slip rate is negative in {100 * share:.3g} % of the steps")
+    return [sentence for sentence in lines if sentence]
 
 
 def part_of_task(run: Trajectory, fault: Fault) -> str:
@@ -428,14 +429,6 @@ def scheme_sentence(comparison: "Compared") -> str:
     )
 
 
-def _reversed(run: Trajectory | None) -> list[str]:
-    """Slip against the direction of the model."""
-    share = run.metrics.reverse_slip_fraction if run else None
-    return (
-        [f"on the plant without stick, the slip rate is negative in {100 * share:.3g} % of the steps"] if share else []
-    )
-
-
 def _holds(premises: Iterable[Any], name: str) -> bool:
     return all(p.holds for p in premises if p.name == name)
 
@@ -465,7 +458,7 @@ _LABORATORY = 10.0  # length of a fault [m] below which what loads it is a machi
 
 
 def state_run_lines(answer: dict[str, Any]) -> list[str]:
-    """Lines for people, from `StateRun.to_dict`: outcome, cycle, events."""
+    """Lines for people, from the JSON of `run_state`: outcome, cycle, events."""
     outcome, cycle, events = answer["outcome"], answer["cycle"], answer["slip_events"]
     least, largest = (p / 1e6 for p in answer["pressure"])
     state = ", ".join(f"{name} = {value:.4g} s" for name, value in answer["start"]["state"].items())
@@ -494,22 +487,28 @@ def state_run_lines(answer: dict[str, Any]) -> list[str]:
     return lines
 
 
-def cycle_sentence(run: "StateRun") -> str:
+def cycle_sentences(comparison: "Compared") -> list[str]:
+    """Seismic cycle of a fault without control, and where its run and proof begin; none without a cycle."""
+    run, fault = comparison.uncontrolled, comparison.fault
+    return [] if run.cycle is None else [_cycle(run, run.cycle, fault), steady_start_sentence(run, fault)]
+
+
+def _cycle(run: Trajectory, cycle: dict[str, float | None], fault: Fault) -> str:
     """What a fault whose friction has a state does without control, with its last complete event."""
     if run.failed:
         return f"Without control: unknown, since its cycle could not be computed ({run.failed.rstrip('.')})"
-    cycle, peak = run.cycle, f"slip rate up to {run.outcome.peak_slip_rate:.3g} m/s"
-    if not run.slip_events:
+    peak = f"slip rate up to {run.outcome.peak_slip_rate:.3g} m/s"
+    if run.natural_peak is None:
         return f"Without control: the fault creeps, {peak}"
     size = "" if cycle["magnitude"] is None else f" of magnitude {cycle['magnitude']:.2f}"
     again = "" if cycle["recurrence_interval"] is None else f" every {lasting(cycle['recurrence_interval'])}"
-    return f"Without control: {run.outcome.kind}{size}{again}, {peak}, {_loading(run)}"
+    return f"Without control: {run.outcome.kind}{size}{again}, {peak}, {_loading(run, fault)}"
 
 
-def steady_start_sentence(run: "StateRun") -> str:
+def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
     """Where run and proof of slow sliding begin, and how much of the slip of an earthquake their task takes."""
-    task = run.fault.reference
-    rate, slip = float(SlidingReference(task=task).first_rate), None if run.failed else run.cycle["slip"]
+    task = fault.reference
+    rate, slip = float(SlidingReference(task=task).first_rate), run.cycle["slip"] if run.cycle else None
     text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; bringing a locked fault there is not"
     share = (
         ""
@@ -519,11 +518,12 @@ def steady_start_sentence(run: "StateRun") -> str:
     return f"{text} covered{share}"
 
 
-def _loading(run: "StateRun") -> str:
+def _loading(run: Trajectory, fault: Fault) -> str:
     """The rate of loading of a cycle, its plant, and that the rate may be one that nobody has chosen."""
     moved = "with inertia" if run.provenance["plant"] == "smooth" else "quasi-dynamic"
-    loaded = f"loaded at {run.loading_rate:.3g} m/s ({moved})"
-    if run.loading_rate <= FASTEST_PLATE or run.fault.length < _LABORATORY:
+    rate = fault.friction.operating_rate
+    loaded = f"loaded at {rate:.3g} m/s ({moved})"
+    if rate <= FASTEST_PLATE or fault.length < _LABORATORY:
         return loaded
     return (
         f"{loaded}, FASTER than any plate: that is reference_rate of [friction]; for how often it breaks put in the "

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 from quakedesign.exact import Bound, UpperBound
 from quakedesign.fault.fault_toml import beyond_rates, mean_rate
-from quakedesign.report.sentences import cycle_sentence, grade, left_out_lines, steady_start_sentence
+from quakedesign.report.sentences import cycle_sentences, grade, left_out_lines
 from quakedesign.studies.comparison import pressure_extremes
-from quakedesign.studies.facts import box_sentence
-from quakedesign.studies.runs import StateRun
+from quakedesign.studies.facts import box_sentences
 from quakedesign.text import PREFIXES, plain, power_of, quantity
 
 if TYPE_CHECKING:
     from quakedesign.guarantees import FaultProof, Guarantee
-    from quakedesign.studies.comparison import Compared, Entry, Run
+    from quakedesign.simulation import Trajectory
+    from quakedesign.studies.comparison import Compared, Entry
 
 WIDTH = 80
 _NAME, _OUTCOME, _NUMBERS, _PRESSURE = 17, 10, (7, 6, 6), 15
@@ -103,15 +103,14 @@ def _conditions(designed: Sequence["Entry"], best: "Entry | None") -> str:
     return "; ".join(f"{label}: {reason or 'undecided'}" for label, reason in parts)
 
 
-def _uncontrolled(run: "Run") -> Row:
-    pressure = None if isinstance(run, StateRun) else pressure_extremes(run)
+def _uncontrolled(run: "Trajectory") -> Row:
     peak = run.outcome.peak_slip_rate
     return Row(
         name="uncontrolled",
         outcome=run.outcome.kind,
         slip_rate=(None, None, peak),
         slip=(None, None, None),
-        pressure=pressure,
+        pressure=pressure_extremes(run),
     )
 
 
@@ -142,15 +141,12 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
     fault, designed = comparison.fault, comparison.of("designed")
     if fault.source.startswith("poor fit accepted"):
         yield f"{fault.source}"
-    if isinstance(comparison.uncontrolled, StateRun):
-        yield cycle_sentence(comparison.uncontrolled)
-        yield steady_start_sentence(comparison.uncontrolled)
+    yield from cycle_sentences(comparison)
     yield from (f"assumed: {said}" for said in fault.assumed)
-    if fault.friction.state_names and (beyond := beyond_rates(fault.friction, mean_rate(fault.reference))):
+    if beyond := beyond_rates(fault.friction, mean_rate(fault.reference)):
         yield beyond
-    if best is not None and not fault.friction.state_names:
-        yield box_sentence(fault)
     if best is not None:
+        yield from box_sentences(fault)
         yield "model: one block under a uniform pressure"
     for entry in designed:
         if (entry.guaranteed is None and best is not None) or ", but " in grade(entry):

@@ -9,7 +9,7 @@ from quakedesign.report.comparison_table import Comparison
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
     beside_guarantee,
-    cycle_sentence,
+    cycle_sentences,
     domain_sentence,
     feedforward_rows,
     grade,
@@ -23,7 +23,6 @@ from quakedesign.report.sentences import (
 from quakedesign.report.summary import summary, summary_lines
 from quakedesign.report.tables import COLUMNS, rows
 from quakedesign.studies.facts import fault_sentences
-from quakedesign.studies.runs import StateRun
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
@@ -46,8 +45,8 @@ def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True
     console.print()
     for line in fault_sentences(comparison.fault):
         console.print(f"  {line}")
-    if isinstance(comparison.uncontrolled, StateRun):
-        console.print(f"  {cycle_sentence(comparison.uncontrolled)}")
+    for line in cycle_sentences(comparison)[:1]:
+        console.print(f"  {line}")
     for line in left_out_lines(comparison):
         console.print(f"  {line}")
     entries = (*comparison.of("designed"), *comparison.of("published"))

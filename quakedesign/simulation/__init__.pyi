@@ -7,6 +7,7 @@ from .coupled_sliders import CoupledSliders as CoupledSliders
 from .coupled_sliders import natural_cycles as natural_cycles
 from .coupled_sliders import simulate_held_blocks as simulate_held_blocks
 from .coupled_sliders import simulate_sliders as simulate_sliders
+from .cycle import StateTrajectory as StateTrajectory
 from .export import ControllerStep as ControllerStep
 from .export import block_step as block_step
 from .export import controller_step as controller_step
@@ -38,8 +39,7 @@ from .state_plant import SpringSlider as SpringSlider
 from .state_plant import Tide as Tide
 from .stick_slip import simulate_state as simulate_state
 from .stick_slip import velocity_step as velocity_step
+from .trajectory import LoopTrajectory as LoopTrajectory
 from .trajectory import Outcome as Outcome
 from .trajectory import OutcomeCriterion as OutcomeCriterion
-from .trajectory import SampledTrajectory as SampledTrajectory
-from .trajectory import StateTrajectory as StateTrajectory
 from .trajectory import Trajectory as Trajectory

@@ -306,7 +306,8 @@ def controller_step(
     require_positive(step=period)
     chosen = _software(simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme)
     loop, measurement = ClosedLoop(fault, controller), {"slip": "m", "slip_rate": "m/s"}
-    if not _uses_rate(_function(loop, chosen, float(period), 2)[0]):
+    both = _function(loop, chosen, float(period), 2)[0]
+    if not any(1 in both.jac_sparsity(output, 0).get_col() for output in range(both.n_out())):
         measurement.pop("slip_rate")
     function, start = _function(loop, chosen, float(period), len(measurement))
     facts = _facts(fault, controller, chosen)
@@ -466,11 +467,6 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     later += [scheme.push(loop, counter, state, step), *own[:count]] if count else []
     outputs = ca.cse([ca.vertcat(*later), scheme.pressure(loop, counter, state, step)])
     return ca.Function("sampled_step", [measurement, applied, memory], outputs), start
-
-
-def _uses_rate(function: Any) -> bool:
-    """Whether any output depends on the second measurement."""
-    return any(1 in function.jac_sparsity(output, 0).get_col() for output in range(function.n_out()))
 
 
 def _after(loop: ClosedLoop, scheme: Sampled, counter: Any, state: Any, step: float) -> Any:

@@ -14,7 +14,7 @@ from quakedesign.loop import simulation_scheme
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run import RunSetting, loop_class, run
-from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, OutcomeCriterion, Trajectory
+from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, LoopTrajectory, OutcomeCriterion, Trajectory
 from quakedesign.symbolic import derive
 
 # ----------------------------------------------------------------------
@@ -38,7 +38,7 @@ def natural_earthquake(
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
     plant: str | None = None,
-) -> Trajectory:
+) -> LoopTrajectory:
     """Simulate an uncontrolled fault under a constant pressure and, if it is unstable, a tiny constant acceleration.
 
     A fault with healing starts at its release. The acceleration is 1e-9 of the largest change of friction. It and the
@@ -56,7 +56,7 @@ def natural_earthquake(
 
     Returns
     -------
-    Trajectory
+    LoopTrajectory
         Over 90 e-foldings of the unstable eigenvalue, or 30 of them and 10 natural periods if that is longer, or 100
         natural periods of a stable fault, which stays at rest; steps of at most 2e-3/ω_n. Of the metrics only
         `peak_slip_rate`, `steps` and `seconds` are given.
@@ -76,9 +76,13 @@ def natural_earthquake(
         )
     growth = derive(fault).eigenvalues[0].real
     nudge = event_nudge(fault) if growth > 0 else 0.0
-    nudged = _released(fault).with_disturbance(Disturbance(constant=nudge))
+    law: Any = fault.friction  # without its healing, from which the nudge could not release it
+    released = replace(fault, friction=replace(law, healing=0.0)) if law.rest_excess else fault
+    nudged = released.with_disturbance(Disturbance(constant=nudge))
     step = min(fault.sampling_time, FINENESS / fault.natural_frequency)
-    setting = RunSetting.of(nudged, step, _duration(fault, growth), 2000, 0.0)
+    period = 2 * pi / fault.natural_frequency
+    length = max(FOLDINGS / growth, ENDING[0] / growth + ENDING[1] * period) if growth > 0 else PERIODS * period
+    setting = RunSetting.of(nudged, step, length, 2000, 0.0)
     recorder = Recorder(loop_class(plant)(nudged, None, pressure), simulation_scheme("continuous"), step)
     criterion = OutcomeCriterion.of(fault, natural_peak(fault) if pressure else None)
     earthquake = run(recorder, setting, integrator("dormand-prince"), criterion, progress=progress, compiled=compiled)
@@ -92,7 +96,7 @@ def natural_earthquake(
     return natural
 
 
-def _with_peak(earthquake: Trajectory, fault: Fault, growth: float) -> Trajectory:
+def _with_peak(earthquake: LoopTrajectory, fault: Fault, growth: float) -> LoopTrajectory:
     """Reference event of an unstable fault, if it moves more than by the nudge alone."""
     peak = earthquake.metrics.peak_slip_rate  # none where the run diverges
     if peak is not None and peak <= STILL * event_nudge(fault) / growth:
@@ -101,12 +105,6 @@ def _with_peak(earthquake: Trajectory, fault: Fault, growth: float) -> Trajector
             f"{peak!r} m/s. Rounding may drown its friction; check the numbers of the law."
         )
     return replace(earthquake, criterion=OutcomeCriterion.of(fault, peak))
-
-
-def _released(fault: Fault) -> Fault:
-    """The fault without its healing, from which the nudge could not release it."""
-    law: Any = fault.friction
-    return replace(fault, friction=replace(law, healing=0.0)) if law.rest_excess else fault
 
 
 def natural_peak(fault: Fault) -> float | None:
@@ -126,14 +124,6 @@ def event_nudge(fault: Fault) -> float:
     """Acceleration [m/s²] that is small beside the forces of an event."""
     low, high = fault.friction.bounds
     return NUDGE * (high - low) * fault.authority * fault.effective_normal_stress
-
-
-def _duration(fault: Fault, growth: float) -> float:
-    """Time [s] in which an instability grows from the nudge and ends."""
-    period = 2 * pi / fault.natural_frequency
-    if growth <= 0:
-        return PERIODS * period
-    return max(FOLDINGS / growth, ENDING[0] / growth + ENDING[1] * period)
 
 
 # ----------------------------------------------------------------------
@@ -159,7 +149,7 @@ class Waiting:
 
 def waiting(run: Trajectory, fault: Fault) -> Waiting | None:
     """Event that has not begun in a run without control; None if it has begun, or if none will."""
-    natural, reached = run.criterion.natural_peak, run.outcome.share_of_natural
+    natural, reached = run.natural_peak, run.outcome.share_of_natural
     if run.provenance["controller"] != "none" or natural is None or reached is None or reached >= BEGUN_SHARE:
         return None
     growth = derive(fault).eigenvalues[0].real

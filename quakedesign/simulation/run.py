@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
@@ -27,7 +26,7 @@ from quakedesign.simulation.integrators import FLOOR, AdaptiveIntegrator, Integr
 from quakedesign.simulation.recorder import Recorder, events, metrics
 from quakedesign.simulation.stepping import Advancer, Checkpoint, instants, march
 from quakedesign.simulation.stick_slip_plant import StickSlipLoop
-from quakedesign.simulation.trajectory import OutcomeCriterion, SampledTrajectory, Trajectory
+from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion
 
 # ----------------------------------------------------------------------
 # How far and how finely a run goes.
@@ -88,7 +87,7 @@ def trajectory(
     criterion: OutcomeCriterion,
     provenance: dict[str, Any],
     began: tuple[float, float],
-) -> Trajectory:
+) -> LoopTrajectory:
     """Trajectory from the kept vectors, of which those before a divergence are shown.
 
     Parameters
@@ -133,9 +132,9 @@ def trajectory(
     columns["integrals"] = kept[4 : 4 + len(loop.integrals)]
     described = recorder.scheme.described
     further = {name: (columns.pop(name), *said) for name, said in described.items()}
-    kind = partial(SampledTrajectory, actuation=further) if further else Trajectory
-    return kind(
+    return LoopTrajectory(
         **columns,
+        actuation=further,
         moment_per_slip=loop.fault.shear_modulus * loop.fault.area,
         metrics=measured,
         energy=None if watched["diverged"] >= 0 else recorder.energy(end),
@@ -235,7 +234,7 @@ def run(
     progress: Callable[[float], None] | None = None,
     compiled: bool | None = None,
     checkpoint: str | Path | None = None,
-) -> Trajectory:
+) -> LoopTrajectory:
     """Trajectory of a recorder's loop with a fixed step; see `simulate`."""
     began = perf_counter()
     step, start = _step(recorder, method), recorder.start(setting.settled_from)
@@ -263,7 +262,7 @@ def run_adaptive(
     rtol: float,
     progress: Callable[[float], None] | None = None,
     checkpoint: str | Path | None = None,
-) -> Trajectory:
+) -> LoopTrajectory:
     """Trajectory of a recorder's loop to a tolerance; see `simulate`."""
     if checkpoint:
         raise ParameterError(f"a checkpoint needs a fixed step. Received method {method.name}. Use dormand-prince.")

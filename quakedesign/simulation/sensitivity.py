@@ -279,5 +279,5 @@ def _errors(run: "Trajectory", matched: bool) -> dict[str, float]:
     if matched:
         settled = run.time > metrics.settled_from
         assert run.matched_perturbation is not None
-        errors["matched_error"] = float(np.max(np.abs(run.integrals[0] + run.matched_perturbation)[settled]))
+        errors["matched_error"] = float(np.max(np.abs(run.signals()["xi_1"][0] + run.matched_perturbation)[settled]))
     return {name: float(value) for name, value in errors.items() if value is not None}

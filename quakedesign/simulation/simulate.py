@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.fault import Fault, require_fault
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.model import require_nonnegative
 from quakedesign.laws import Controller
 from quakedesign.loop import Actuator, Scheme
@@ -21,18 +22,12 @@ from quakedesign.simulation.run import RunSetting, by_no_clock, loop_class, own_
 from quakedesign.simulation.slow_sliding import PLANTS, simulate_sliding
 from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.stick_slip import disturbed, simulate_state
-from quakedesign.simulation.trajectory import OutcomeCriterion, StateTrajectory, Trajectory
+from quakedesign.simulation.trajectory import OutcomeCriterion, Trajectory
 
 _METHOD, _RTOL, _SAMPLES = "dormand-prince", 1e-9, 2000
 
 
-@overload
-def simulate(fault: Fault, controller: Controller, **options: Any) -> Trajectory: ...
-@overload
-def simulate(fault: Fault, controller: None = None, **options: Any) -> Any: ...
-
-
-def simulate(  # type: ignore[misc]  # the overloads leave out the options, which have one type each
+def simulate(
     fault: Fault,
     controller: Controller | None = None,
     *,
@@ -55,7 +50,7 @@ def simulate(  # type: ignore[misc]  # the overloads leave out the options, whic
     initial_slip: float = 0.0,
     initial_slip_rate: float = 0.0,
     tide: Tide | None = None,
-) -> Trajectory | StateTrajectory:
+) -> Trajectory:
     """Simulate a fault under a controller, from rest by default, with the fault's own disturbance and reference.
 
     A fault whose friction has a state starts in steady sliding at the mean rate of its task and is held there by a law
@@ -121,8 +116,7 @@ def simulate(  # type: ignore[misc]  # the overloads leave out the options, whic
     Returns
     -------
     Trajectory
-        A `SampledTrajectory`, which has the signals of the actuator too, where there is one; a `SlidingRun` of friction
-        with a state, and a `StateTrajectory` without a controller.
+        A `LoopTrajectory`; a `SlidingRun` of friction with a state, and a `StateTrajectory` without a controller.
         One that diverges ends there, says so in `events`, and has no metrics.
 
     Raises
@@ -135,10 +129,11 @@ def simulate(  # type: ignore[misc]  # the overloads leave out the options, whic
         When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
         cannot go on, or when the checkpoint is that of another run.
     """
-    if require_fault(fault).friction.state_names:
-        plant = plant or next(iter(PLANTS))
-        require_known(plant, PLANTS, "plant of a fault with a state", UnknownNameError)
-        refused = {
+
+    def slid(fault: Fault) -> Trajectory:
+        moved = plant or next(iter(PLANTS))
+        require_known(moved, PLANTS, "plant of a fault with a state", UnknownNameError)
+        wrong = {
             "compiled": compiled is not None,
             "load": load is not None,
             "variation": isinstance(variation, Variation),
@@ -150,7 +145,7 @@ def simulate(  # type: ignore[misc]  # the overloads leave out the options, whic
             "initial_slip_rate": bool(initial_slip_rate),
         }
         if controller is None:
-            refused |= {
+            wrong |= {
                 "step": step is not None,
                 "scheme": scheme is not None,
                 "settled_from": settled_from is not None,
@@ -159,10 +154,10 @@ def simulate(  # type: ignore[misc]  # the overloads leave out the options, whic
                 "measurement": measurement is not None,
                 "tide": tide is not None,
             }
-            return _uncontrolled(
-                fault, plant, method, duration, samples, [name for name, given in refused.items() if given]
-            )
-        law, path = _sampled_law(fault, controller, actuator, [name for name, given in refused.items() if given])
+        refused = [name for name, given in wrong.items() if given]
+        if controller is None:
+            return _uncontrolled(fault, moved, method, duration, samples, refused)
+        law, path = _sampled_law(fault, controller, actuator, refused)
         own_way(controller, scheme, step)
         return simulate_sliding(
             fault,
@@ -174,41 +169,46 @@ def simulate(  # type: ignore[misc]  # the overloads leave out the options, whic
             transducer=measurement if isinstance(measurement, Transducer) else None,
             variation=variation if isinstance(variation, SlidingVariation) else None,
             tide=tide,
-            inertia=PLANTS[plant],
+            inertia=PLANTS[moved],
             method="cvodes" if method == _METHOD else method,
             duration=duration,
             samples=samples,
             settled_from=settled_from,
             progress=progress or (lambda _: None),
         )
-    if tide is not None or isinstance(variation, SlidingVariation) or isinstance(measurement, Transducer):
-        raise ParameterError(
-            "a tide, a sliding variation and a transducer alone need friction with a state. Received "
-            f"{fault.friction.name}. Give a load, a variation or a measurement."
-        )
-    require_tolerance(rtol)
-    scheme, step, own = own_way(controller, scheme, step, "continuous")
-    step, own = by_no_clock(controller, scheme, step, own)
-    setting = RunSetting.of(fault, step, duration, samples, settled_from)
-    if variation:
-        variation.require_within(fault)
-    factors = variation.values if variation else ()
-    criterion = OutcomeCriterion.of(fault, natural_peak(fault))
-    loop = loop_class(plant)(fault, controller, load=load or Load(), factors=factors)
-    require_nonnegative(initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
-    if isinstance(scheme, str):
-        actuator, substeps = own_path(controller, actuator, substeps)
-    carried = sampled_scheme(scheme, substeps, actuator, measurement, **own)
-    recorder = Recorder(loop, carried, setting.step, (float(initial_slip), float(initial_slip_rate)))
-    chosen = any_integrator(method)
-    if issubclass(chosen, AdaptiveIntegrator):
-        return run_adaptive(recorder, setting, chosen, criterion, rtol=rtol, progress=progress, checkpoint=checkpoint)
-    return run(recorder, setting, chosen, criterion, progress=progress, compiled=compiled, checkpoint=checkpoint)
+
+    def stepped(fault: Fault) -> Trajectory:
+        if tide is not None or isinstance(variation, SlidingVariation) or isinstance(measurement, Transducer):
+            raise ParameterError(
+                "a tide, a sliding variation and a transducer alone need friction with a state. Received "
+                f"{fault.friction.name}. Give a load, a variation or a measurement."
+            )
+        require_tolerance(rtol)
+        way, period, own = own_way(controller, scheme, step, "continuous")
+        period, own = by_no_clock(controller, way, period, own)
+        setting = RunSetting.of(fault, period, duration, samples, settled_from)
+        if variation:
+            variation.require_within(fault)
+        factors = variation.values if variation else ()
+        criterion = OutcomeCriterion.of(fault, natural_peak(fault))
+        loop = loop_class(plant)(fault, controller, load=load or Load(), factors=factors)
+        require_nonnegative(initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
+        path, parts = own_path(controller, actuator, substeps) if isinstance(way, str) else (actuator, substeps)
+        carried = sampled_scheme(way, parts, path, measurement, **own)
+        recorder = Recorder(loop, carried, setting.step, (float(initial_slip), float(initial_slip_rate)))
+        chosen = any_integrator(method)
+        if issubclass(chosen, AdaptiveIntegrator):
+            return run_adaptive(
+                recorder, setting, chosen, criterion, rtol=rtol, progress=progress, checkpoint=checkpoint
+            )
+        return run(recorder, setting, chosen, criterion, progress=progress, compiled=compiled, checkpoint=checkpoint)
+
+    return by_equilibrium(rest=stepped, sliding=slid)(require_fault(fault))
 
 
 def _uncontrolled(
     fault: Fault, plant: str, method: str, duration: float | None, samples: int, refused: list[str]
-) -> StateTrajectory:
+) -> Trajectory:
     """Loaded at the operating rate of its friction, near steady sliding at first, under no pressure."""
     if refused:
         raise ParameterError(
@@ -217,13 +217,11 @@ def _uncontrolled(
         )
     whole = fault.reference.operation_time if duration is None else duration
     rate = fault.friction.operating_rate
-    start = disturbed(fault, rate)
     return simulate_state(
         fault,
         rate,
         duration=whole,
-        start_rate=start.slip_rate,
-        start_state=start.state,
+        **disturbed(fault, rate).settings,
         inertia=PLANTS[plant],
         method="radau" if method == _METHOD else method,
         times=None if samples == _SAMPLES else np.linspace(0, whole, samples),

@@ -22,7 +22,7 @@ from quakedesign.simulation.recorder import NEVER, metrics
 from quakedesign.simulation.run import RunSetting, library_versions
 from quakedesign.simulation.state_plant import Instruments, PressurePath, SlidingVariation, SpringSlider, Tide
 from quakedesign.simulation.stick_slip import dynamic_rate
-from quakedesign.simulation.trajectory import OutcomeCriterion, Trajectory, signal
+from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion, signal
 
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run is recorded
 _RTOL = 1e-11
@@ -30,7 +30,7 @@ PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
-class SlidingRun(Trajectory):
+class SlidingRun(LoopTrajectory):
     """One run of a law around slow sliding: four instants a period, all of them kept; no energy.
 
     Attributes
@@ -47,11 +47,6 @@ class SlidingRun(Trajectory):
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
         """Values, long name and SI unit of every signal that this run has, by name."""
         return super().signals() | {"slip_error": (self.slip - self.reference, "slip less that of the reference", "m")}
-
-    @property
-    def opened(self) -> float | None:
-        """Time [s] at which the pressure would reach the effective normal stress, where the run ends."""
-        return self.events.get("opening")
 
 
 def simulate_sliding(

@@ -1,26 +1,27 @@
 """Uncontrolled runs with rate-and-state friction: velocity steps and stick–slip cycles.
 
-Further chapters: slip events (nucleation, event, arrest, recurrence) and initial conditions (steady
-sliding, after a hold, or late in a cycle).
+A further chapter has initial conditions: steady sliding, after a hold, or late in a cycle.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault, FrictionLaw
-from quakedesign.fault.model import magnitude, require_positive
+from quakedesign.fault.model import require_positive
 from quakedesign.simulation.closed_loop import EnergyBudget
+from quakedesign.simulation.cycle import StateTrajectory
 from quakedesign.simulation.inputs import PressureCourse
+from quakedesign.simulation.recorder import Metrics
 from quakedesign.simulation.run import library_versions
 from quakedesign.simulation.smooth import Ramp, SmoothProblem, SmoothSolution
 from quakedesign.simulation.state_plant import SpringSlider
-from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, Outcome, StateTrajectory
 from quakedesign.symbolic import derive
 
 # ----------------------------------------------------------------------
@@ -87,8 +88,7 @@ def simulate_state(
         When the method cannot go on, as when the slip rate grows without bound (no inertia and no damping).
     """
     slider = subject if isinstance(subject, SpringSlider) else SpringSlider.of(subject, inertia=inertia)
-    if not slider.law.state_names:
-        raise ParameterError(f"the friction law must have a state. Received {slider.law.name}. Use simulate.")
+    slider.law.require(simulate_state=subject)
     course = pressure if isinstance(pressure, PressureCourse) else PressureCourse.constant(pressure)
     if course.largest >= slider.normal_stress:
         raise ParameterError(
@@ -99,7 +99,8 @@ def simulate_state(
     first = pieces[0][1] if start_rate is None else start_rate
     start = slider.start(first, None if start_state is None else tuple(start_state), course.before(0.0))
     level = _ONSET * max(v for _, v in pieces) if onset_rate is None else onset_rate
-    scales = _scales(slider, start)
+    length = getattr(slider.law, "critical_slip", abs(start[1]) * _SHARE_OF_STRETCH)
+    scales = np.array([length, length, *[1.0] * (len(start) - 2)])  # 1 for the logarithms
     farthest = _FARTHEST * float(scales[0])
     travelled = sum(length * speed for length, speed in pieces)
     if travelled > farthest:
@@ -109,9 +110,7 @@ def simulate_state(
         )
     problem = SmoothProblem(slider.rates, scales, 2, math.log(level) if level > 0 else math.inf)
     history = _History(slider, problem, pieces, course, _wanted(times, pieces), method, rtol)
-    name = f"{subject.name if isinstance(subject, Fault) else slider.law.name}, loaded from afar"
-    area = subject.area if isinstance(subject, Fault) else 1.0
-    return _trajectory(name, slider, history, history.run(start), level, area)
+    return _trajectory(subject, slider, history, level, start)
 
 
 def velocity_step(
@@ -181,12 +180,6 @@ def _wanted(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None
     ):
         raise ParameterError(f"times must ascend between 0 and the duration ({end!r} s). Received {times!r}.")
     return np.asarray(np.minimum(wanted, end))
-
-
-def _scales(slider: SpringSlider, start: list[float]) -> "np.ndarray":
-    """Critical slip for the displacements (or a share of the stretch), 1 for the logarithms."""
-    length = getattr(slider.law, "critical_slip", abs(start[1]) * _SHARE_OF_STRETCH)
-    return np.array([length, length, *[1.0] * (len(start) - 2)])
 
 
 @dataclass(frozen=True)
@@ -262,18 +255,23 @@ class _History:
 
 
 def _trajectory(
-    name: str, slider: SpringSlider, history: _History, solution: SmoothSolution, level: float, area: float
+    subject: Fault | SpringSlider, slider: SpringSlider, history: _History, level: float, start: list[float]
 ) -> StateTrajectory:
+    began, solution = perf_counter(), history.run(start)
     loaded = history.load_point(solution.time)
     pressure = history.course.sampled(solution.time)
     readings = slider.readings.map(len(solution.time))(solution.values, pressure)
     friction, excess = (row.full().ravel() for row in readings)
+    rate = np.exp(solution.values[2])
+    name, area, dynamic, moment = slider.law.name, 1.0, math.inf, math.nan
+    if isinstance(subject, Fault):
+        name, area, dynamic, moment = subject.name, subject.area, dynamic_rate(subject), subject.moment_of(1.0)
     return StateTrajectory(
-        name=name,
+        name=f"{name}, loaded from afar",
         time=solution.time,
         load_point=loaded,
         slip=solution.values[0],
-        slip_rate=np.exp(solution.values[2]),
+        slip_rate=rate,
         stretch=solution.values[1],
         friction=friction,
         pressure=pressure,
@@ -283,6 +281,16 @@ def _trajectory(
         imbalance=excess / slider.normal_stress,
         onsets=solution.crossings,
         onset_rate=level,
+        loading_rate=max(load for _, load in history.pieces),
+        dynamic_rate=dynamic,
+        moment_per_slip=moment,
+        metrics=Metrics(
+            peak_slip_rate=float(np.max(rate)),
+            settled_from=0.0,
+            steps=len(solution.time) - 1,
+            seconds=perf_counter() - began,
+        ),
+        events={},
         energy=_energy(slider, area, loaded, solution.values, friction, pressure),
         provenance={
             "friction": slider.law.name,
@@ -324,71 +332,7 @@ def _energy(
 
 
 # ----------------------------------------------------------------------
-# What a fault with a state did without control: nucleation, event and arrest, and how often.
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SlipEvent:
-    """One event of a fault, as far as the run shows it."""
-
-    # Time [s] at which the slip rate last rose through the loading rate before the onset; None if it began above
-    nucleation: float | None
-    onset: float  # Time [s] at which it rises through the `onset_rate` of the run
-    # Time [s] at which it falls below that again; None where the run ends before, as are the three last ones then
-    arrest: float | None
-    peak_slip_rate: float  # [m/s]
-    slip: float | None  # From onset to arrest [m]
-    moment: float | None  # GA times that slip [N·m]
-    magnitude: float | None  # M_w of that moment [-]
-
-
-def slip_events(fault: Fault, run: StateTrajectory, loading_rate: float) -> tuple[SlipEvent, ...]:
-    """Every event of a run of a fault that was loaded at a rate [m/s] and returned at every step."""
-    slips, arrests = run.event_slips, run.arrests
-    ends = [*map(float, arrests), *[None] * (len(run.onsets) - len(arrests))]
-    return tuple(
-        _event(fault, run, loading_rate, float(onset), end, float(slips[i]) if i < len(slips) else None)
-        for i, (onset, end) in enumerate(zip(run.onsets, ends, strict=True))
-    )
-
-
-def last_cycle(events: Sequence[SlipEvent]) -> dict[str, float | None]:
-    """Recurrence interval [s], slip [m] and magnitude of the last one that is complete; None for none."""
-    intervals = [later.onset - event.onset for event, later in pairwise(events)]
-    whole = [event for event in events if event.arrest is not None]
-    return {
-        "recurrence_interval": intervals[-1] if intervals else None,
-        "slip": whole[-1].slip if whole else None,
-        "magnitude": whole[-1].magnitude if whole else None,
-    }
-
-
-def _event(
-    fault: Fault, run: StateTrajectory, loading_rate: float, onset: float, arrest: float | None, slip: float | None
-) -> SlipEvent:
-    during = (run.time >= onset) & (run.time <= (np.inf if arrest is None else arrest))
-    moment = None if slip is None else fault.moment_of(slip)
-    return SlipEvent(
-        nucleation=_last_rise(run, loading_rate, onset),
-        onset=onset,
-        arrest=arrest,
-        peak_slip_rate=float(np.max(run.slip_rate[during], initial=run.onset_rate)),
-        slip=slip,
-        moment=moment,
-        magnitude=None if moment is None else magnitude(moment),
-    )
-
-
-def _last_rise(run: StateTrajectory, rate: float, before: float) -> float | None:
-    """Last time [s] before another at which the slip rate rises through a rate, by straight lines in its logarithm."""
-    if rate <= 0:
-        return None
-    ahead = np.log(run.slip_rate[run.time <= before]) - np.log(rate)
-    rises = np.flatnonzero((ahead[:-1] < 0) & (ahead[1:] >= 0))
-    if not len(rises):
-        return None
-    i = rises[-1]
-    return float(run.time[i] + (run.time[i + 1] - run.time[i]) * ahead[i] / (ahead[i] - ahead[i + 1]))
+# Where damping and inertia take as much stress as the direct effect gives.
 
 
 def direct_strength(fault: Fault) -> float:
@@ -405,14 +349,6 @@ def dynamic_rate(fault: Fault) -> float:
     return direct_strength(fault) * fault.area / resisting
 
 
-def cycle_outcome(fault: Fault, run: StateTrajectory) -> Outcome:
-    """``earthquake`` where a tenth of the `dynamic_rate` is reached, ``slow slip`` with an event, or else ``creep``."""
-    peak = float(np.max(run.slip_rate))
-    fast = peak >= EARTHQUAKE_SHARE * dynamic_rate(fault)
-    kind = "earthquake" if fast else "slow slip" if peak >= run.onset_rate else "creep"
-    return Outcome(kind=kind, peak_slip_rate=peak, share_of_natural=None)
-
-
 # ----------------------------------------------------------------------
 # Where a fault with a state starts: in steady sliding, after a hold, or late in its cycle.
 
@@ -427,6 +363,11 @@ class StartingState:
 
     slip_rate: float  # [m/s]
     state: tuple[float, ...]  # In the units of the law
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Arguments of `simulate_state`."""
+        return {"start_rate": self.slip_rate, "start_state": self.state}
 
 
 def sliding(fault: Fault, rate: float) -> StartingState:
@@ -473,9 +414,8 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
         )
     before, after = found.onsets[-2:]
     time = float(before + share * (after - before))
-    run = simulate_state(
-        fault, rate, duration=math.nextafter(time, math.inf), times=[time], **_disturbed(fault, rate), **settings
-    )
+    settings |= disturbed(fault, rate).settings
+    run = simulate_state(fault, rate, duration=math.nextafter(time, math.inf), times=[time], **settings)
     return StartingState(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
 
 
@@ -488,7 +428,7 @@ def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
     unit = direct_strength(fault) * fault.area / (fault.stiffness * rate)
     loads, most = _FIRST_LOADS, _MOST_LOADS if derive(fault).unstable else _FIRST_LOADS
     while True:
-        run = simulate_state(fault, rate, duration=loads * unit, **_disturbed(fault, rate), **settings)
+        run = simulate_state(fault, rate, duration=loads * unit, **disturbed(fault, rate).settings, **settings)
         loads *= 2
         if len(run.onsets) >= _CYCLES or loads > most:
             return run
@@ -497,8 +437,3 @@ def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
 def disturbed(fault: Fault, rate: float) -> StartingState:
     """Sliding at a rate [m/s] with a state that is older than steady."""
     return StartingState(slip_rate=rate, state=tuple(_OLDER * float(v) for v in fault.friction.steady_state(rate)))
-
-
-def _disturbed(fault: Fault, rate: float) -> dict[str, Any]:
-    start = disturbed(fault, rate)
-    return {"start_rate": start.slip_rate, "start_state": start.state}

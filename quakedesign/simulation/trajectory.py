@@ -1,13 +1,13 @@
 """Trajectories of runs with export to xarray, pandas and NetCDF, their outcome and figure.
 
-The trajectory classes cover runs with a law, with an actuator, and uncontrolled runs with friction state.
+Every run is a `Trajectory`; here also those of a closed loop, with and without an actuator.
 The outcome is tracked, slow slip, earthquake, diverged or opened.
 """
 
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, field, fields
+from dataclasses import MISSING, asdict, field, fields
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -27,31 +27,86 @@ from quakedesign.simulation.recorder import Metrics
 CONVENTIONS = "CF-1.11"
 
 
-def signal(title: str, unit: str) -> Any:
+def signal(title: str, unit: str, default: Any = MISSING) -> Any:
     """Field that is a signal, with its long name and SI unit; None means that the run does not have the signal."""
-    return field(repr=False, metadata={"title": title, "unit": unit})
+    return field(repr=False, metadata={"title": title, "unit": unit}, default=default)
 
 
-class Recording(ABC):
-    """Signals over time, each with its long name and SI unit.
+@checked_dataclass(frozen=True, eq=False, kw_only=True)
+class Trajectory(ABC):
+    """Result of a run: signals over time with their SI units, metrics, outcome; None where a run does not have it.
 
     Attributes
     ----------
+    name : str
     time : ndarray
         [s], shape (n,).
+    slip, slip_rate, pressure : ndarray
+        x1 [m], x2 [m/s], p [Pa], shape (n,).
+    reference, reference_rate, matched_perturbation : ndarray or None
+        r [m], r' [m/s], h [unit of ν], shape (n,); None without a controller.
+    friction : ndarray
+        Friction coefficient [-], shape (n,).
+    metrics : Metrics
+        From all instants.
+    energy : EnergyBudget or None
+        None for a run that diverged, and in slow sliding.
+    events : mapping of str to float
+        Time of first occurrence [s] by name.
+    provenance : mapping
+        Method, settings and versions.
+    failed : str
+        Why the run is but its first instants, where it is for a reason other than divergence.
     """
 
     name: str
-    time: "np.ndarray"
+    time: "np.ndarray" = field(repr=False)
+    slip: "np.ndarray" = signal("slip x1", "m")
+    slip_rate: "np.ndarray" = signal("slip rate x2", "m/s")
+    pressure: "np.ndarray" = signal("fluid pressure p", "Pa")
+    reference: "np.ndarray | None" = signal("reference slip r", "m", default=None)
+    reference_rate: "np.ndarray | None" = signal("reference slip rate r'", "m/s", default=None)
+    matched_perturbation: "np.ndarray | None" = signal("matched perturbation h", "m/s^2", default=None)
+    friction: "np.ndarray" = signal("friction coefficient", "")
+    metrics: Metrics
+    energy: EnergyBudget | None = field(repr=False)
+    events: Mapping[str, float]
+    provenance: Mapping[str, Any] = field(repr=False)
+    failed: str = field(default="", repr=False)
+
+    @property
+    @abstractmethod
+    def outcome(self) -> "Outcome":
+        """Outcome of the run."""
+
+    @property
+    @abstractmethod
+    def natural_peak(self) -> float | None:
+        """Largest slip rate of the fault without control [m/s]; None where there is no earthquake."""
+
+    @property
+    def cycle(self) -> dict[str, float | None] | None:
+        """Recurrence interval [s], slip [m] and magnitude of its last event; None without a seismic cycle."""
+        return None
+
+    @property
+    def slip_error(self) -> "np.ndarray | None":
+        """x1 − r [m]."""
+        return None if self.reference is None else self.slip - self.reference
+
+    @property
+    def slip_rate_error(self) -> "np.ndarray | None":
+        """x2 − r' [m/s]."""
+        return None if self.reference_rate is None else self.slip_rate - self.reference_rate
 
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
         """Values, long name and SI unit of every signal that this run has, by name."""
-        known = ((each.name, getattr(self, each.name), each.metadata) for each in fields(self))  # type: ignore[arg-type]
+        known = ((each.name, getattr(self, each.name), each.metadata) for each in fields(self))
         return {name: (v, told["title"], told["unit"]) for name, v, told in known if told and v is not None}
 
-    @abstractmethod
     def attributes(self) -> Mapping[str, Any]:
         """Texts and numbers about the run as a whole."""
+        return self.provenance
 
     def to_xarray(self) -> Any:
         """Return an xarray Dataset over ``time``, with the attributes of the CF conventions.
@@ -114,101 +169,6 @@ class Recording(ABC):
         self.to_xarray().to_netcdf(content, engine="h5netcdf")
         write_whole(target, content.getvalue())
         return target
-
-
-# ----------------------------------------------------------------------
-# Result of a simulation of a spring-slider with friction state.
-
-
-@checked_dataclass(frozen=True, eq=False, kw_only=True)
-class StateTrajectory(Recording):
-    """One run of a spring-slider without control.
-
-    Attributes
-    ----------
-    name : str
-    time : ndarray
-        [s], shape (n,); at a step of the pressure an instant occurs twice, before and after.
-    load_point, slip, stretch : ndarray
-        Displacement of the load point, slip, and stretch of the spring [m], shape (n,).
-    slip_rate : ndarray
-        [m/s], shape (n,).
-    friction : ndarray
-        Friction coefficient [-], shape (n,).
-    pressure : ndarray
-        Fluid pressure [Pa], shape (n,).
-    states : ndarray
-        State of friction, shape (number of variables, n), named `state_names`, in `state_units`.
-    state_names, state_units : tuple of str
-    imbalance : ndarray
-        Driving minus resisting stress over normal stress [-], shape (n,), which accelerates the mass.
-        Without mass it must vanish, and its value is an integration error.
-    onsets : ndarray
-        Times [s] at which the slip rate rises through `onset_rate`.
-    onset_rate : float
-        [m/s].
-    energy : EnergyBudget
-        [J], of the fault, or of 1 m² of a `SpringSlider`. Works are forces along the path through the instants of
-        `time`; without mass the residual is the work of `imbalance`.
-    provenance : mapping
-        Method, tolerance, evaluations and versions.
-    """
-
-    name: str
-    time: "np.ndarray" = field(repr=False)
-    load_point: "np.ndarray" = signal("displacement of the load point", "m")
-    slip: "np.ndarray" = signal("slip", "m")
-    slip_rate: "np.ndarray" = signal("slip rate", "m/s")
-    stretch: "np.ndarray" = signal("stretch of the spring", "m")
-    friction: "np.ndarray" = signal("friction coefficient", "")
-    pressure: "np.ndarray" = signal("fluid pressure", "Pa")
-    states: "np.ndarray" = field(repr=False)
-    state_names: tuple[str, ...]
-    state_units: tuple[str, ...]
-    imbalance: "np.ndarray" = field(repr=False)
-    onsets: "np.ndarray" = field(repr=False)
-    onset_rate: float
-    energy: EnergyBudget = field(repr=False)
-    provenance: Mapping[str, Any] = field(repr=False)
-
-    @property
-    def recurrence_intervals(self) -> "np.ndarray":
-        """Times between successive onsets [s]."""
-        return np.diff(self.onsets)
-
-    @property
-    def event_slips(self) -> "np.ndarray":
-        """Slip [m] of every event that has ended: from its onset until the slip rate is back at `onset_rate`.
-
-        Linear interpolation between the instants of `time`. `Fault.moment_of` gives the seismic moment.
-        """
-        at = self._at_arrest(self.slip)
-        return np.asarray(at - np.interp(self.onsets[: len(at)], self.time, self.slip))
-
-    @property
-    def arrests(self) -> "np.ndarray":
-        """Times [s] at which the slip rate is back at `onset_rate`, of every event that has ended."""
-        return self._at_arrest(self.time)
-
-    def _at_arrest(self, values: "np.ndarray") -> "np.ndarray":
-        """Values where the slip rate falls through `onset_rate` after every onset, by linear interpolation."""
-        below = self.slip_rate <= self.onset_rate
-        falls = np.flatnonzero(~below[:-1] & below[1:]).tolist()
-        ends = [next((i for i in falls if self.time[i + 1] > onset), None) for onset in self.onsets]
-        at = np.array([i for i in ends if i is not None], dtype=int)
-        fast, slow = self.slip_rate[at], self.slip_rate[at + 1]
-        return np.asarray(values[at] + (values[at + 1] - values[at]) * (fast - self.onset_rate) / (fast - slow))
-
-    def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
-        """Values, long name and SI unit of every signal, by name."""
-        found = super().signals()
-        for name, values, unit in zip(self.state_names, self.states, self.state_units, strict=True):
-            found[name] = (values, f"state of friction {name}", unit)
-        return found
-
-    def attributes(self) -> Mapping[str, Any]:
-        """Provenance."""
-        return self.provenance
 
 
 # ----------------------------------------------------------------------
@@ -335,6 +295,7 @@ class OutcomeCriterion:
 
 Panel = tuple[str, str, Any, tuple[str, Any]]
 """Name, SI unit and values of a signal, and name and values of one that is drawn beside it."""
+Signal = tuple["np.ndarray", str, str]
 NOTHING = ("", None)
 _TIMES = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"), (2 * 60.0, 60.0, "min"), (0.0, 1.0, "s"))
 _PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -398,20 +359,11 @@ def _prefix(largest: float) -> tuple[float, str]:
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
-class Trajectory(Recording):
-    """One run, at some of its instants, with metrics from all of them.
+class LoopTrajectory(Trajectory):
+    """One run, at some of its instants, with metrics from all of them; see `Trajectory`.
 
     Attributes
     ----------
-    name : str
-    time : ndarray
-        [s], shape (n,).
-    slip, slip_rate, pressure : ndarray
-        x1 [m], x2 [m/s], p [Pa], shape (n,).
-    reference, reference_rate, matched_perturbation : ndarray or None
-        r [m], r' [m/s], h [unit of ν], shape (n,); None without a controller.
-    friction : ndarray
-        Friction coefficient [-], shape (n,).
     shear_stress : ndarray
         Shear stress of friction [Pa], μ(σ' − p) in forward slip, shape (n,).
     moment_per_slip : float
@@ -419,9 +371,10 @@ class Trajectory(Recording):
     integrals : ndarray
         The law's own states ξ, shape (number of them, n), in `integral_units`.
     integral_units : tuple of str
-    metrics : Metrics
-    energy : EnergyBudget or None
-        From all of its steps; None for a run that diverged.
+    actuation : mapping of str to tuple
+        Behind an actuator, where `pressure` is that in the fault: values, shape (n,), long name and SI unit of
+        ``well_pressure`` [Pa], and where the actuator stores fluid of ``injected_volume`` [m³] and ``flow_rate``
+        [m³/s].
     events : mapping of str to float
         Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'_n), ``reverse_slip`` (x2 < 0), ``stick``
         (friction holds the fault at rest after the start), ``load_reversed`` (the load at rest exceeds friction
@@ -432,24 +385,12 @@ class Trajectory(Recording):
         Method, step, scheme, backend and versions; the fault as a TOML file (``scenario``).
     """
 
-    name: str
-    time: "np.ndarray" = field(repr=False)
-    slip: "np.ndarray" = signal("slip x1", "m")
-    slip_rate: "np.ndarray" = signal("slip rate x2", "m/s")
-    pressure: "np.ndarray" = signal("fluid pressure p", "Pa")
-    reference: "np.ndarray | None" = signal("reference slip r", "m")
-    reference_rate: "np.ndarray | None" = signal("reference slip rate r'", "m/s")
-    matched_perturbation: "np.ndarray | None" = signal("matched perturbation h", "m/s^2")
-    friction: "np.ndarray" = signal("friction coefficient", "")
     shear_stress: "np.ndarray" = signal("shear stress that resists slip", "Pa")
     moment_per_slip: float = field(repr=False)
     integrals: "np.ndarray" = field(repr=False)
     integral_units: tuple[str, ...]
-    metrics: Metrics
-    energy: EnergyBudget | None = field(repr=False)
-    events: Mapping[str, float]
+    actuation: Mapping[str, Signal] = field(default_factory=dict, repr=False)
     criterion: OutcomeCriterion = field(repr=False)
-    provenance: Mapping[str, Any] = field(repr=False)
 
     @property
     def outcome(self) -> Outcome:
@@ -458,26 +399,21 @@ class Trajectory(Recording):
         return self.criterion.outcome(figures.peak_slip_rate, figures.max_slip_error, self.events, followed=followed)
 
     @property
-    def slip_error(self) -> "np.ndarray | None":
-        """x1 − r [m]."""
-        return None if self.reference is None else self.slip - self.reference
-
-    @property
-    def slip_rate_error(self) -> "np.ndarray | None":
-        """x2 − r' [m/s]."""
-        return None if self.reference_rate is None else self.slip_rate - self.reference_rate
+    def natural_peak(self) -> float | None:
+        """Largest slip rate of the natural earthquake [m/s], where it was simulated."""
+        return self.criterion.natural_peak
 
     @property
     def moment_rate(self) -> "np.ndarray":
         """Seismic moment rate G·A·x2 [N m/s], shape (n,)."""
         return self.moment_per_slip * self.slip_rate
 
-    def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
+    def signals(self) -> dict[str, Signal]:
         """Values, long name and SI unit of every signal that this run has, by name."""
         found = super().signals() | {"moment_rate": (self.moment_rate, "seismic moment rate", "N m/s")}
         for number, (values, unit) in enumerate(zip(self.integrals, self.integral_units, strict=True), 1):
             found[f"xi_{number}"] = (values, f"integral state xi{number}", unit)
-        return found
+        return found | dict(self.actuation)
 
     def attributes(self) -> dict[str, Any]:
         """Provenance, and outcome, metrics, events and energy as JSON text."""
@@ -487,7 +423,7 @@ class Trajectory(Recording):
             "events": dict(self.events),
             "energy": self.energy and self.energy.to_dict(),
         }
-        return dict(self.provenance) | {name: json.dumps(value, allow_nan=False) for name, value in entries.items()}
+        return {**self.provenance} | {name: json.dumps(value, allow_nan=False) for name, value in entries.items()}
 
     @property
     def response(self) -> Any:
@@ -516,16 +452,18 @@ class Trajectory(Recording):
         return self.name + (f"\n{kept} of {self.metrics.steps} steps drawn" if kept < self.metrics.steps else "")
 
     def panels(self) -> list[Panel]:
-        """Slip, slip rate and pressure, and errors of a run with a reference."""
+        """Slip, slip rate, pressures in the fault and at the well, errors, and other signals of an actuator."""
+        further = dict(self.actuation)
+        well, *_ = further.pop("well_pressure", (None,))
         found: list[Panel] = [
             ("slip", "m", self.slip, ("reference", self.reference)),
             ("slip rate", "m/s", self.slip_rate, ("reference", self.reference_rate)),
-            ("pressure", "Pa", self.pressure, ("at the well", None)),
+            ("pressure", "Pa", self.pressure, ("at the well", well)),
         ]
-        if self.slip_error is None:
-            return found
-        errors = (("slip error", "m", self.slip_error), ("slip-rate error", "m/s", self.slip_rate_error))
-        return [*found, *((*error, NOTHING) for error in errors)]
+        if self.slip_error is not None:
+            errors = (("slip error", "m", self.slip_error), ("slip-rate error", "m/s", self.slip_rate_error))
+            found += ((*error, NOTHING) for error in errors)
+        return [*found, *((title, unit, values, NOTHING) for values, title, unit in further.values())]
 
     def plot(self) -> Any:
         """Return a matplotlib Figure of slip, slip rate, pressure, errors, and what an actuator adds."""
@@ -534,34 +472,3 @@ class Trajectory(Recording):
     def plot_stress(self) -> Any:
         """Return a matplotlib Figure of the shear stress against slip, and of the moment rate over time."""
         return stress_figure(self.heading, self.time, self.slip, self.shear_stress, self.moment_rate)
-
-
-# ----------------------------------------------------------------------
-# Result of a simulation with an actuator.
-
-Signal = tuple["np.ndarray", str, str]
-
-
-@checked_dataclass(frozen=True, eq=False, kw_only=True)
-class SampledTrajectory(Trajectory):
-    """A run whose pressure reaches the fault through an actuator; `pressure` is that in the fault.
-
-    Attributes
-    ----------
-    actuation : mapping of str to tuple
-        Values, shape (n,), long name and SI unit of ``well_pressure`` [Pa], and where the actuator stores fluid of
-        ``injected_volume`` [m³] and ``flow_rate`` [m³/s].
-    """
-
-    actuation: Mapping[str, Signal] = field(repr=False)
-
-    def signals(self) -> dict[str, Signal]:
-        """Values, long name and SI unit of every signal that this run has, by name."""
-        return super().signals() | dict(self.actuation)
-
-    def panels(self) -> list[Panel]:
-        """Pressures at the well and in the fault in one panel, and the other signals of the actuator."""
-        found, further = super().panels(), dict(self.actuation)
-        if "well_pressure" in further:
-            found[2] = (*found[2][:3], ("at the well", further.pop("well_pressure")[0]))
-        return [*found, *((title, unit, values, NOTHING) for values, title, unit in further.values())]

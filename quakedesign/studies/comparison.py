@@ -14,6 +14,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import Enclosure, rational
 from quakedesign.fault import Fault, require_fault
+from quakedesign.fault.equilibrium import STEADY_SLIDING
 from quakedesign.guarantees import (
     CLASSES,
     ContinuousProof,
@@ -36,7 +37,7 @@ from quakedesign.parallel import Background, in_background
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.integrators import amplification
 from quakedesign.studies.certified import certified_bound, largest_sampling_time, on_trajectory
-from quakedesign.studies.runs import StateRun, designed_run, natural_run
+from quakedesign.studies.runs import designed_run, natural_run
 from quakedesign.synthesis import Design, assess, designable, left_out
 from quakedesign.synthesis import design as synthesise
 
@@ -44,7 +45,6 @@ from quakedesign.synthesis import design as synthesise
 # Comparison of all controllers of one fault in closed loop.
 
 Tell = Callable[[str, float], None]
-Run = Trajectory | StateRun
 
 AS_IN_THE_PAPER = "continuous"
 """Scheme of the paper's simulations."""
@@ -142,19 +142,18 @@ class Compared:
 
     Attributes
     ----------
-    uncontrolled : Trajectory or StateRun
+    uncontrolled : Trajectory
         The natural earthquake; with friction state the seismic cycle.
     """
 
     fault: Fault
-    uncontrolled: Run
+    uncontrolled: Trajectory
     entries: tuple[Entry, ...]
 
     @property
     def left_out(self) -> dict[str, str]:
         """Reasons why other laws do not apply to this fault or loop setup, by name."""
-        behind = self.path and not self.fault.friction.state_names
-        return behind_path(self.fault) if behind else left_out(self.fault)
+        return behind_path(self.fault) if self.path else left_out(self.fault)
 
     @property
     def path(self) -> dict[str, Fraction]:
@@ -182,11 +181,11 @@ def compared(
     made, if these come from a generator.
     """
     require_fault(fault)
-    require_plant(fault, plant)
+    fault.friction.require(plant=plant)
     for name in schemes.values():
         simulation_scheme(name)
     tell("uncontrolled", 0.0)
-    if fault.friction.state_names:
+    if fault.friction.equilibrium is STEADY_SLIDING:
         return _slowly_compared(fault, [designed for designed, _ in designs], tell, whole=whole_task)
     begun: list[tuple[Entry, Future[Trajectory] | None]] = []
     with in_background() as runs:
@@ -205,15 +204,6 @@ def compared(
             for entry, run in begun
         ]
     return Compared(fault=fault, uncontrolled=natural, entries=tuple(entries))
-
-
-def require_plant(fault: Fault, plant: str | None) -> None:
-    """Refuse a plant of the runs for friction with a state, which never rests."""
-    if plant is not None and fault.friction.state_names:
-        raise ParameterError(
-            f"plant is for friction without a state, got {plant!r} with {fault.friction.name}, which never rests: omit "
-            "it."
-        )
 
 
 def behind_path(fault: Fault) -> dict[str, str]:
@@ -335,9 +325,8 @@ def needed_pressure(fault: Fault, slip: float | None = None) -> Enclosure | None
 
     None for friction with a state, and where no finite range is found.
     """
-    if fault.friction.state_names:
-        return None
     try:
+        fault.require_memoryless("a pressure at rest")
         return Enclosure.of(
             *equilibrium_pressure(fault, rational(fault.reference.target_slip if slip is None else slip))
         )

@@ -18,6 +18,7 @@ import sympy as sp
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault, fault_toml
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, mean_rate, sliding_step
 from quakedesign.guarantees.exact.limit_theorems import longest_reaction
 from quakedesign.guarantees.search.lqg import sliding_model, sliding_poles
@@ -37,17 +38,12 @@ from quakedesign.text import lasting
 _LONG = 100  # numerators and denominators of more are written as decimals
 
 
-def coordinates(fault: Fault) -> str:
-    """What the plant is written in, for a sentence that goes on with its equations."""
-    if not fault.friction.state_names:
-        return "Slip x₁ and slip rate x₂, measured from the equilibrium without pressure,"
-    return "Slip x₁, slip rate v, the stretch s of the spring, whose far end rests, and the state of friction"
-
-
 def plant_latex(fault: Fault) -> list[str]:
     """Plant of a fault, and its friction law."""
-    if fault.friction.state_names:
-        return _with_state(fault)
+    return _latex(fault)
+
+
+def _at_rest(fault: Fault) -> list[str]:
     friction = plant.mu(plant.x1, plant.x2)
     acceleration = plant.shifted_acceleration().subs(friction, sp.Symbol("mu"))
     law = sp.sympify(fault.friction.symbolic().coefficient(plant.x1, plant.x2))
@@ -65,6 +61,9 @@ def _with_state(fault: Fault) -> list[str]:
         rf"\mu = {sp.latex(sp.sympify(law.coefficient(plant.x1, rate, *states)))}",
         *(rf"\dot {{{sp.latex(state)}}} = {sp.latex(sp.sympify(change))}" for state, change in moved),
     ]
+
+
+_latex = by_equilibrium(rest=_at_rest, sliding=_with_state)
 
 
 def law_latex(law: Controller | None) -> list[str]:
@@ -283,15 +282,10 @@ def sampling_adequacy(fault: Fault) -> SamplingAdequacy:
     try:
         poles, over_box = _box_poles(fault), True
     except ParameterError:
-        poles, over_box = _nominal_poles(fault), False
+        one = len(fault.friction.state_names) == 1
+        poles, over_box = [*(sliding_poles(sliding_model(fault)) if one else derive(fault).eigenvalues)], False
     pole = max((abs(z) for z in poles if z.real > 0), default=0.0)
     return SamplingAdequacy(step=fault.sampling_time, pole=pole, over_box=over_box)
-
-
-def _nominal_poles(fault: Fault) -> list[complex]:
-    if len(fault.friction.state_names) == 1:
-        return list(sliding_poles(sliding_model(fault)))
-    return [complex(z) for z in derive(fault).eigenvalues]
 
 
 def _box_poles(fault: Fault) -> list[complex]:
@@ -356,7 +350,7 @@ def fault_sentences(fault: Fault) -> list[str]:
     """The same for people."""
     model = derive(fault)
     poles = ", ".join(f"{z.real:.4g}{z.imag:+.4g}i" if z.imag else f"{z.real:.4g}" for z in model.eigenvalues)
-    mean = mean_rate(fault.reference)
+    mean, about = mean_rate(fault.reference), fault.friction.equilibrium.poles
     state = "unstable: " + "; ".join(model.reasons) if model.unstable else "stable without control"
     return [
         f"mass {fault.mass:.4g} kg, stiffness {fault.stiffness:.4g} N/m, natural frequency "
@@ -364,17 +358,12 @@ def fault_sentences(fault: Fault) -> list[str]:
         *_rock(fault),
         *_event(fault),
         *(f"assumed: {said}" for said in fault.assumed),
-        f"{state}; eigenvalues {poles} 1/s{_about(fault, fault.friction.operating_rate, '')}",
-        f"{sampling_sentence(sampling_adequacy(fault))}{_about(fault, mean, '; the pole is that')}",
-        *_sliding_sentence(fault),
+        f"{state}; eigenvalues {poles} 1/s{about.format(fault.friction.operating_rate)}",
+        f"{sampling_sentence(sampling_adequacy(fault))}{about and '; the pole is that'}{about.format(mean)}",
+        *_of_sliding(fault),
         *beyond_control(fault),
         *([need_sentence(needed)] if (needed := needed_pressure(fault)) else []),
     ]
-
-
-def _about(fault: Fault, rate: float, before: str) -> str:
-    """About which steady sliding poles are; nothing for friction without a state, whose fault rests."""
-    return f"{before} about steady sliding at {rate:.4g} m/s" if fault.friction.state_names else ""
 
 
 def beyond_rest(fault: Fault) -> str:
@@ -401,13 +390,14 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
 
 def _sliding_sentence(fault: Fault) -> list[str]:
     """That friction is extrapolated, and which T_s suits a guarantee of slow sliding, where it is a factor two off."""
-    if not fault.friction.state_names:
-        return []
     beyond = list(filter(None, [beyond_rates(fault.friction, mean_rate(fault.reference))]))
     suits = sliding_step(fault.friction, fault.reference)
     if suits / 2 <= fault.sampling_time <= 2 * suits:
         return beyond
     return [*beyond, f"a guarantee of slow sliding wants sampling_time near D_c/({AGEINGS:g} V), here {suits:g} s"]
+
+
+_of_sliding = by_equilibrium(rest=lambda fault: [], sliding=_sliding_sentence)
 
 
 def beyond_control(fault: Fault) -> list[str]:
@@ -441,7 +431,7 @@ def _rock(fault: Fault) -> list[str]:
         f"{name} {getattr(law, name):.4g} {told.metadata['unit']}".strip() for name, told in law.quantities().items()
     )
     rock = f"shear waves {speed:.4g} m/s{unlikely}, effective normal stress {stress}"
-    return [f"{rock}, friction {law.name}: {numbers}", *([] if law.state_names else [box_sentence(fault)])]
+    return [f"{rock}, friction {law.name}: {numbers}", *box_sentences(fault)]
 
 
 def box_sentence(fault: Fault) -> str:
@@ -458,14 +448,24 @@ def box_sentence(fault: Fault) -> str:
     return f"box {fault.box.name}: {friction}; {', '.join(off) or exact}"
 
 
+box_sentences = by_equilibrium(rest=lambda fault: [box_sentence(fault)], sliding=lambda fault: [])
+
+
 def _event(fault: Fault) -> list[str]:
     """What an earthquake of the fault is, as far as it is known without simulating one, and the task."""
     task = f"target slip {fault.reference.target_slip:.4g} m in {lasting(fault.reference.operation_time, 6)}"
-    if fault.friction.state_names:
-        depends = "stress drop, magnitude and slip of an event depend on its history"
-        return [f"{depends}: simulate a cycle (simulate --start late)", task]
+    return _earthquake(fault, task)
+
+
+_HISTORY = "stress drop, magnitude and slip of an event depend on its history: simulate a cycle (simulate --start late)"
+
+
+def _natural_earthquake(fault: Fault, task: str) -> list[str]:
     moment = f"seismic moment {fault.seismic_moment:.4g} N·m, magnitude {fault.magnitude:.2f}"
     return [
         moment if fault.seismic_moment > 0 else "no earthquake, so no seismic moment and no magnitude",
         f"the uncontrolled earthquake slips {fault.rest_slip:.4g} m (next rest slip), {task}{beyond_rest(fault)}",
     ]
+
+
+_earthquake = by_equilibrium(rest=_natural_earthquake, sliding=lambda fault, task: [_HISTORY, task])

@@ -5,7 +5,7 @@ The trade-off is between the certified peak of the slip rate and the tracking er
 
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib.resources import files
 from math import pi
@@ -15,11 +15,12 @@ import numpy as np
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.fault import Fault
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.guarantees import TrackingProof, design_held
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.closed_loop import ClosedLoop
-from quakedesign.studies.comparison import Compared, Entry, Run
+from quakedesign.studies.comparison import Compared, Entry
 
 # ----------------------------------------------------------------------
 # The numbers behind the bars: every metric of every run, and the five of the paper over those of the e-LQR.
@@ -48,7 +49,7 @@ def baseline(comparison: Compared) -> Entry | None:
     return able[0] if able else None
 
 
-def relative(run: Run | None, basis: Run | None) -> dict[str, float | None]:
+def relative(run: Trajectory | None, basis: Trajectory | None) -> dict[str, float | None]:
     """Metrics of the bars over those of another run [-]; None where one of the two has none or the other is zero."""
     ratios: dict[str, float | None] = {}
     for name in BARS:
@@ -65,7 +66,7 @@ def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> li
     more : dict of str to Trajectory, optional
         Further runs without a controller, by name.
     """
-    runs: list[tuple[str, str, str, Run | None]] = [("uncontrolled", "none", "", comparison.uncontrolled)]
+    runs: list[tuple[str, str, str, Trajectory | None]] = [("uncontrolled", "none", "", comparison.uncontrolled)]
     runs += [(name, "none", "", run) for name, run in (more or {}).items()]
     runs += [(e.label, e.design.name, e.origin, e.run) for e in comparison.entries]
     basis = baseline(comparison)
@@ -78,7 +79,7 @@ def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> li
     ]
 
 
-def _outcome(run: Run) -> dict[str, Any]:
+def _outcome(run: Trajectory) -> dict[str, Any]:
     outcome = run.outcome
     return {"outcome": outcome.kind, "share_of_natural": outcome.share_of_natural}
 
@@ -86,7 +87,7 @@ def _outcome(run: Run) -> dict[str, Any]:
 def printed(comparison: Compared) -> list[dict[str, Any]]:
     """Numbers that the paper prints about these runs beside ours, their ratio, our plant, and why they differ."""
     data = tomllib.loads((files(__package__) / "printed.toml").read_text(encoding="utf-8"))
-    runs: dict[str, Run | None] = {"uncontrolled": comparison.uncontrolled}
+    runs: dict[str, Trajectory | None] = {"uncontrolled": comparison.uncontrolled}
     runs |= {f"{e.origin} {e.design.name}": e.run for e in comparison.entries}
     rows = []
     for said in data.get(comparison.fault.name, []):
@@ -166,9 +167,9 @@ class PaperRuns:
     comparison: Compared
     # Without control, under a constant pressure of a tenth of the effective normal stress; None for friction with a
     # state, which has none of the short runs
-    induced: Trajectory | None
+    induced: Trajectory | None = None
     # By label of the entry: its first `PERIODS` natural periods with every step kept
-    close_ups: Mapping[str, Trajectory]
+    close_ups: Mapping[str, Trajectory] = field(default_factory=dict)
     front: tuple[FrontPoint, ...] = ()  # Peak against tracking, where a law of samples was designed
 
 
@@ -180,9 +181,10 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     progress : callable, optional
         Called with what is being done and the fraction done [-].
     """
-    tell, fault = progress or (lambda _what, _done: None), comparison.fault
-    if fault.friction.state_names:
-        return PaperRuns(comparison=comparison, induced=None, close_ups={})
+    return _runs(comparison.fault, comparison, progress or (lambda _what, _done: None))
+
+
+def _short_runs(fault: Fault, comparison: Compared, tell: Callable[[str, float], None]) -> PaperRuns:
     tell("induced earthquake", 0.0)
     plant = comparison.uncontrolled.provenance["plant"]
     induced = natural_earthquake(fault, INDUCING_SHARE * fault.effective_normal_stress, plant=plant)
@@ -206,6 +208,9 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     steps = [law.sampling.step for law in laws if law and law.sampling and law.lipschitz_limit is None]
     front = objective_front(fault, steps[0]) if steps else ()
     return PaperRuns(comparison=comparison, induced=induced, close_ups=close_ups, front=front)
+
+
+_runs = by_equilibrium(rest=_short_runs, sliding=lambda fault, comparison, tell: PaperRuns(comparison=comparison))
 
 
 def friction_curve(fault: Fault, largest: float, points: int = 400) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.guarantees import (
     NoProof,
     SlidingProof,
@@ -41,6 +42,7 @@ from quakedesign.simulation.natural import natural_peak
 # ----------------------------------------------------------------------
 # Limits of every controller as values, each beside what a designed one is proved to do.
 
+_Size = float | None  # [Pa]
 _POINTS = 24  # of the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
@@ -357,10 +359,12 @@ def limits(
     """
     off = rational(spread, "spread")
     fault, setup = setup.with_given(**given).at_step(fault)
-    told = Told(setup=setup)
-    if fault.friction.state_names:
-        _require_plain(fault, told)
-        return _sliding_limits(fault, pressure, diffusivity, stress, told.setup if prove else None, off)
+    return _of_plant(fault, pressure, diffusivity, stress, Told(setup=setup), off, prove)
+
+
+def _limits_at_rest(
+    fault: Fault, pressure: _Size, diffusivity: float, stress: _Size, told: Told, off: Fraction, prove: bool
+) -> Limits:
     if stress is not None or off:
         raise ParameterError(
             f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Leave it "
@@ -378,8 +382,8 @@ def limits(
         longest = longest_delay(task, step, **told.wanted)
         proved["largest_delay"] = LowerBound(longest.held.delay) if longest else None
         proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
-        if (rock := _proved_rock(task, step, told)) is not None:
-            proved["largest_diffusion_time"] = rock
+        if (farthest := farthest_rock(task, step, **told.wanted)) is not None:
+            proved["largest_diffusion_time"] = rock = LowerBound(farthest.held.diffusion)
             proved["farthest_well"] = nearest_proved_well(rock, spread)
     return Limits(
         fault=fault,
@@ -449,18 +453,15 @@ def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fr
 
 
 def _sliding_limits(
-    fault: Fault,
-    pressure: float | None,
-    diffusivity: float,
-    stress: float | None,
-    setup: LoopSetup | None,
-    off: Fraction,
-) -> SlidingLimits:
+    fault: Fault, pressure: _Size, diffusivity: float, stress: _Size, plain: Told, off: Fraction, prove: bool
+) -> Limits:
     """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path.
 
     Unless a stress is told, it is that which the design stands, or that with a near well where none is found behind the
     path; behind a path that is impossible under the latter no design is looked for.
     """
+    _require_plain(fault, plain)
+    setup = plain.setup if prove else None
     withdrawal, spread = _given(fault, pressure, diffusivity)
     model, step = sliding_model(fault), rational(fault.sampling_time)
     asked = None if stress is None else rational(stress, "stress")
@@ -503,6 +504,9 @@ def _sliding_limits(
     )
 
 
+_of_plant = by_equilibrium(rest=_limits_at_rest, sliding=_sliding_limits)
+
+
 def _proved_steps(
     task: FaultPlant, step: Fraction, told: Told
 ) -> tuple[tuple[TrackingProof, ...], TrackingProof | None]:
@@ -524,9 +528,3 @@ def _best_at(least_peak: TrackingProof, told: Told) -> TrackingProof:
     tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.wanted)
     found = [least_peak, *([tracking] if tracking.proved else [])]
     return min(found, key=lambda g: g.claims.slip_rate_error)
-
-
-def _proved_rock(task: FaultPlant, step: Fraction, told: Told) -> LowerBound | None:
-    """L²/D [s] behind which a law that is told of a clock is proved."""
-    farthest = farthest_rock(task, step, **told.wanted)
-    return LowerBound(farthest.held.diffusion) if farthest else None

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
-from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 from quakedesign.errors import CertificateError, ParameterError, SimulationError, UnknownNameError, require_known
 from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, Fault
+from quakedesign.fault.equilibrium import STEADY_SLIDING
 from quakedesign.fault.model import require_positive
 from quakedesign.guarantees import FaultProof, SlidingProof, load_guarantee
 from quakedesign.guarantees.search.compensated_search import recovered
@@ -55,24 +55,19 @@ from quakedesign.simulation import (
     simulate_state,
 )
 from quakedesign.simulation import simulate as run_loop
-from quakedesign.simulation.recorder import Metrics
 from quakedesign.simulation.run import PRINTED, STICK_SLIP
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
 from quakedesign.simulation.state_plant import TIDE, Tide
 from quakedesign.simulation.stick_slip import (
-    SlipEvent,
     StartingState,
-    cycle_outcome,
     cycles,
     disturbed,
     dynamic_rate,
-    last_cycle,
     late_in_cycle,
     locked,
     sliding,
-    slip_events,
 )
-from quakedesign.simulation.trajectory import Outcome
+from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE
 from quakedesign.studies.certified import certified_bound, trajectory_premise
 from quakedesign.symbolic import derive
 from quakedesign.synthesis import Design, design, guarantee
@@ -88,101 +83,6 @@ _SWINGS = 4  # of the stress at least, in a run that is shown
 _SHOWN = 500  # D_c/V of a slow task that are run: the loop settles within some tens
 
 
-@dataclass(frozen=True, kw_only=True)
-class StateRun:
-    """A simulation of a fault with a state, and its result."""
-
-    fault: Fault
-    loading_rate: float  # v_∞ [m/s]
-    start: StartingState
-    trajectory: StateTrajectory
-    seconds: float = 0.0  # Time that it took [s], where that was measured
-    failed: str = ""  # Why what the fault does is not known: the trajectory is but the first instants. Empty otherwise.
-
-    @property
-    def outcome(self) -> Outcome:
-        """Earthquake, slow slip or creep; unknown where that could not be computed."""
-        if self.failed:
-            return Outcome(kind="unknown", peak_slip_rate=None, share_of_natural=None)
-        return cycle_outcome(self.fault, self.trajectory)
-
-    @property
-    def time(self) -> "np.ndarray":
-        """[s], shape (n,)."""
-        return self.trajectory.time
-
-    @property
-    def slip(self) -> "np.ndarray":
-        """[m], shape (n,)."""
-        return self.trajectory.slip
-
-    @property
-    def slip_rate(self) -> "np.ndarray":
-        """[m/s], shape (n,)."""
-        return self.trajectory.slip_rate
-
-    @cached_property
-    def slip_events(self) -> tuple[SlipEvent, ...]:
-        """Every event."""
-        return slip_events(self.fault, self.trajectory, self.loading_rate)
-
-    @property
-    def cycle(self) -> dict[str, float | None]:
-        """Recurrence interval [s], slip [m] and magnitude of the last one that is complete; None for none."""
-        return last_cycle(self.slip_events)
-
-    @property
-    def natural_peak(self) -> float | None:
-        """Largest slip rate of its events [m/s]; None without any."""
-        return self.outcome.peak_slip_rate if self.slip_events else None
-
-    @property
-    def metrics(self) -> Metrics:
-        """Largest slip rate and number of steps: nothing is followed."""
-        run = self.trajectory
-        return Metrics(
-            peak_slip_rate=self.outcome.peak_slip_rate, settled_from=0.0, steps=len(run.time) - 1, seconds=self.seconds
-        )
-
-    @property
-    def events(self) -> dict[str, float]:
-        """Nothing that ends a run happened."""
-        return {}
-
-    @property
-    def provenance(self) -> dict[str, Any]:
-        """How it was made, as of runs with a controller."""
-        run, plant = self.trajectory.provenance, "smooth" if self.trajectory.provenance["inertia"] == "True" else ""
-        return {**run, "scheme": "continuous", "step": None, "plant": plant or "quasi-dynamic", "controller": "none"}
-
-    @property
-    def resting(self) -> bool:
-        """Whether the run slides steadily at the law's reference rate, where that is unstable: nothing disturbs it."""
-        still = np.all(np.abs(np.log(self.trajectory.slip_rate / self.fault.friction.operating_rate)) < _UNDISTURBED)
-        return bool(still) and derive(self.fault).unstable
-
-    def to_dict(self) -> dict[str, Any]:
-        """Answer of ``simulate`` for such a fault, SI units; the cycle is the last one that is complete."""
-        run = self.trajectory
-        return {
-            "outcome": self.outcome.to_dict() | {"earthquake_from": 0.1 * dynamic_rate(self.fault)},
-            "resting": self.resting,
-            "loading_rate": self.loading_rate,
-            "start": {
-                "slip_rate": self.start.slip_rate,
-                "state": dict(zip(run.state_names, self.start.state, strict=True)),
-            },
-            "cycle": self.cycle,
-            "slip_events": [asdict(event) for event in self.slip_events],
-            "pressure": [float(run.pressure.min()), float(run.pressure.max())],
-            "slip": float(run.slip[-1]),
-            "duration": float(run.time[-1]),
-            "energy": run.energy.to_dict() | {"relative_residual": run.energy.relative_residual},
-            "steps": len(run.time),
-            "run": dict(run.provenance),
-        }
-
-
 def run_state(
     fault: Fault,
     *,
@@ -194,8 +94,8 @@ def run_state(
     duration: float | None = None,
     plant: str = "smooth",
     method: str = "radau",
-) -> StateRun:
-    """Run a fault whose friction has a state under loading from afar and a prescribed pressure.
+) -> tuple[StateTrajectory, dict[str, Any]]:
+    """Run a fault whose friction has a state under loading from afar and a prescribed pressure; with its JSON.
 
     Parameters
     ----------
@@ -226,15 +126,29 @@ def run_state(
         fault,
         rate,
         duration=fault.reference.operation_time if duration is None else duration,
-        start_rate=begun.slip_rate,
-        start_state=begun.state,
+        **begun.settings,
         pressure=pressure or 0.0,
         **settings,
     )
-    return StateRun(fault=fault, loading_rate=rate, start=begun, trajectory=run)
+    still = np.all(np.abs(np.log(run.slip_rate / fault.friction.operating_rate)) < _UNDISTURBED)
+    answer = {
+        "outcome": run.outcome.to_dict() | {"earthquake_from": EARTHQUAKE_SHARE * run.dynamic_rate},
+        "resting": bool(still) and derive(fault).unstable,
+        "loading_rate": rate,
+        "start": {"slip_rate": begun.slip_rate, "state": dict(zip(run.state_names, begun.state, strict=True))},
+        "cycle": run.cycle,
+        "slip_events": [asdict(event) for event in run.slip_events],
+        "pressure": [float(run.pressure.min()), float(run.pressure.max())],
+        "slip": float(run.slip[-1]),
+        "duration": float(run.time[-1]),
+        "energy": run.energy.to_dict() | {"relative_residual": run.energy.relative_residual},
+        "steps": len(run.time),
+        "run": dict(run.provenance),
+    }
+    return run, answer
 
 
-def natural_run(fault: Fault) -> StateRun:
+def natural_run(fault: Fault) -> StateTrajectory:
     """Natural behaviour at the reference rate of the friction law, with inertia: cycle or creep.
 
     Where one method cannot go on another one is taken, and without inertia if there is none: the run says which. Where
@@ -246,14 +160,18 @@ def natural_run(fault: Fault) -> StateRun:
         try:
             run = cycles(fault, rate, inertia=inertia, method=method, rtol=_RTOL)
         except SimulationError as error:
-            failed = error
+            failed = str(error)
             continue
-        return StateRun(fault=fault, loading_rate=rate, start=start, trajectory=run, seconds=perf_counter() - began)
+        return _natural_cycle(run, "smooth" if inertia else "quasi-dynamic", seconds=perf_counter() - began)
     moment = _MOMENT * min(start.state)
-    begun = simulate_state(
-        fault, rate, duration=moment, start_rate=rate, start_state=start.state, inertia=False, method="cvodes"
-    )
-    return StateRun(fault=fault, loading_rate=rate, start=start, trajectory=begun, failed=str(failed))
+    begun = simulate_state(fault, rate, duration=moment, **start.settings, inertia=False, method="cvodes")
+    return replace(_natural_cycle(begun, "quasi-dynamic", seconds=0.0, peak_slip_rate=None), failed=failed)
+
+
+def _natural_cycle(run: StateTrajectory, plant: str, **figures: Any) -> StateTrajectory:
+    """A run with the settings that those with a controller name, and with other figures in its metrics."""
+    told = {"scheme": "continuous", "step": None, "plant": plant, "controller": "none"}
+    return replace(run, provenance={**run.provenance, **told}, metrics=replace(run.metrics, **figures))
 
 
 def shown_time(fault: Fault, *, whole: bool = False) -> float:
@@ -550,13 +468,6 @@ class Choice:
         return Measurement(**off, seed=seed, bounded=True) if off else EXACT
 
 
-def chosen_controller(
-    fault: Fault, name: str, gains: tuple[str, ...], *, scale: str | None = None, feedforward: str = "none"
-) -> Controller:
-    """Controller of a `choice`, which see."""
-    return choice(fault, name, gains, scale=scale, feedforward=feedforward).controller
-
-
 def certified_choice(fault: Fault, path: str | Path) -> Choice:
     """Law of a file of `guarantee`, which must be about the fault and hold; its proof is checked anew.
 
@@ -573,7 +484,7 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
             f"the certificate of a law must be about a fault. Received {path}, about an uncertain plant. Give a "
             f"file of guarantee {fault.name} --out FILE."
         )
-    if not claim.sampled or claim.slides != bool(fault.friction.state_names):
+    if not claim.sampled or claim.slides != (fault.friction.equilibrium is STEADY_SLIDING):
         raise CertificateError(
             "the law of a certificate runs once per sample, and is about friction with a state where that of the fault "
             f"has one. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."

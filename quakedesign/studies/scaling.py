@@ -20,7 +20,7 @@ from quakedesign.laws.dimensions import (
     printed_gains,
 )
 from quakedesign.lyapunov.exact.fault_bounds import least_authority
-from quakedesign.studies.runs import chosen_controller
+from quakedesign.studies.runs import choice
 
 SCALED = {
     "slip": ("λ_δ", "slip_m"),
@@ -72,7 +72,7 @@ def scale_answer(
     """
     start, end = (f if isinstance(f, Fault) else load_fault(f) for f in (source, target))
     given = (gains,) if isinstance(gains, str) else tuple(gains)
-    law = chosen_controller(start, controller_name, given)
+    law = choice(start, controller_name, given).controller
     own = given != ("published",) and law.divisor is not None
     relation = similarity(start, end, clock=clock)
     carried = carry(law, relation.scales, divisor=least_authority(end) if own else None)

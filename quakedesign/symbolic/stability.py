@@ -4,11 +4,12 @@ Decisions use exact rationals where these suffice and ball arithmetic otherwise.
 equations of one fault, its eigenvalues and the cause of its instability.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property
+from typing import NamedTuple
 
 import mpmath
 import sympy as sp
@@ -17,7 +18,8 @@ from flint import arb, ctx
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import end_of, fraction_of, rational, shortly, to_sympy
-from quakedesign.fault import Fault, require_fault
+from quakedesign.fault import Fault, FrictionLaw, require_fault
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.symbolic import plant, rate_and_state_plant
 from quakedesign.symbolic import rate_and_state_plant as state_plant
 from quakedesign.symbolic.enclosure import BallBox, enclose
@@ -273,6 +275,33 @@ def _number(expression: sp.Expr, fault: Fault, pressure: float, rate: float | No
 _DIGITS = 50
 
 
+class _Forms(NamedTuple):
+    """Expressions of a plant without a friction law, by the names of the state, and with one; why it is unstable."""
+
+    general: Callable[[tuple[str, ...]], sp.Expr]
+    jacobian: Callable[[tuple[str, ...]], sp.Matrix]
+    acceleration: Callable[[FrictionLaw], sp.Expr]
+    instability: Callable[[FrictionLaw], sp.Basic]
+    soft: str
+
+
+_AT_REST = _Forms(
+    general=lambda names: plant.shifted_acceleration(),
+    jacobian=lambda names: plant.jacobian(),
+    acceleration=lambda law: plant.with_law(plant.shifted_acceleration(), law),
+    instability=lambda law: plant.instability(),
+    soft="the spring unloads slower than friction weakens with slip",
+)
+_SLIDING = _Forms(
+    general=state_plant.sliding_acceleration,
+    jacobian=state_plant.jacobian,
+    acceleration=lambda law: state_plant.third_order_rates(law)[1],
+    instability=state_plant.instability,
+    soft="the spring is softer than steady sliding needs",
+)
+_forms_of = by_equilibrium(rest=lambda fault: _AT_REST, sliding=lambda fault: _SLIDING)
+
+
 @checked_dataclass(frozen=True)
 class Model:
     """Equations of one fault, derived from its force balance.
@@ -287,13 +316,14 @@ class Model:
     def _names(self) -> tuple[str, ...]:
         return self.fault.friction.state_names
 
+    @property
+    def _forms(self) -> "_Forms":
+        return _forms_of(self.fault)
+
     @cached_property
     def acceleration(self) -> sp.Expr:
         """x2' of eq. shift [m/s²] with the fault's friction law, in symbols; v' about steady sliding with state."""
-        law = self.fault.friction.symbolic()
-        if self._names:
-            return state_plant.third_order_rates(law)[1]
-        return plant.with_law(plant.shifted_acceleration(), law)
+        return self._forms.acceleration(self.fault.friction.symbolic())
 
     @cached_property
     def error_dynamics(self) -> ErrorDynamics:
@@ -303,12 +333,12 @@ class Model:
     @cached_property
     def jacobian(self) -> sp.Matrix:
         """Jacobian at the origin (ERRATA 1), or in steady sliding, in symbols."""
-        return state_plant.jacobian(self._names) if self._names else plant.jacobian()
+        return self._forms.jacobian(self._names)
 
     @cached_property
     def instability(self) -> sp.Basic:
         """Condition for an unstable origin (ERRATA 2) or unstable steady sliding (Routh–Hurwitz), in symbols."""
-        return state_plant.instability(self.fault.friction.symbolic()) if self._names else plant.instability()
+        return self._forms.instability(self.fault.friction.symbolic())
 
     @cached_property
     def values(self) -> dict[sp.Symbol, sp.Expr]:
@@ -340,11 +370,9 @@ class Model:
         if not self.unstable:
             return ()
         templates = {
-            plant.k_hat: "the spring unloads slower than friction weakens with slip: stiffness {} < {} 1/s²",
+            plant.k_hat: self._forms.soft + ": stiffness {} < {} 1/s²",
             plant.eta_hat: "damping is weaker than the rate weakening of friction: {} < {} 1/s",
         }
-        if self._names:
-            templates[plant.k_hat] = "the spring is softer than steady sliding needs: stiffness {} < {} 1/s²"
         other = "a condition of Routh and Hurwitz fails: {} < {}"
         conditions = self.instability.args if isinstance(self.instability, sp.Or) else (self.instability,)
         sides = [(c, [sp.N(side.subs(self.values), _DIGITS) for side in c.args]) for c in conditions]
@@ -368,9 +396,8 @@ class Model:
         return f"x1'' = {self.acceleration}\nunstable without control if {self.instability}"
 
     def _repr_latex_(self) -> str:
-        acceleration = state_plant.sliding_acceleration(self._names) if self._names else plant.shifted_acceleration()
         rows = [
-            rf"\ddot x_1 &= {sp.latex(acceleration)}",
+            rf"\ddot x_1 &= {sp.latex(self._forms.general(self._names))}",
             rf"J(0,0) &= {sp.latex(self.jacobian)}",
             rf"\text{{unstable}} &\iff {sp.latex(self.instability)}",
         ]

@@ -12,6 +12,7 @@ from typing import Any
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError, require_known
 from quakedesign.fault import Fault, require_fault, with_accepted_fit
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.units import exact_value
 from quakedesign.guarantees import (
     CLASSES,
@@ -300,9 +301,12 @@ def design(
             "Use guarantee, which designs for all of them."
         )
     fault, setup = setup.at_step(fault)
-    if fault.friction.state_names and given.get("diffusion") is not None and not setup.diffusion:
-        raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit it for a well near the fault.")
-    sliding = _sliding(fault, law, setup, stress, spread)
+    asked = SlowSlidingDesign(
+        diffusion=setup.diffusion or None,
+        stress=None if stress is None else exact_value(stress, "Pa", "stress"),
+        spread=exact_value(spread, "", "spread"),
+    )
+    setup, sliding = _request(fault, law, setup, asked, given.get("diffusion") is not None)
     added = NONE if feedforward == NONE.name else feed_forward(feedforward, fault, least_authority(fault))
     require_known(objective, OBJECTIVES, "objective")
     require_known(disturbance_class, CLASSES, "class")
@@ -314,8 +318,7 @@ def design(
             "Omit objective, or continuous."
         )
     entries: Any = {"objective": objective, "continuous": continuous, "disturbance_class": disturbance_class}
-    entries |= {"plant": plant}
-    entries["setup"] = replace(setup, diffusion=Fraction(0)) if fault.friction.state_names else setup
+    entries |= {"plant": plant, "setup": setup}
     entries |= {"tell": progress} if progress else {}
     return law.design(GainProblem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **entries))
 
@@ -323,20 +326,23 @@ def design(
 _DESIGNED_FOR = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", "rate_noise")
 
 
-def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any, spread: Any) -> SlowSlidingDesign:
-    """Request for slow sliding, which only friction with a state has; refuses laws that do not apply to it."""
-    asked = SlowSlidingDesign(
-        diffusion=setup.diffusion or None,
-        stress=None if stress is None else exact_value(stress, "Pa", "stress"),
-        spread=exact_value(spread, "", "spread"),
-    )
-    if not fault.friction.state_names:
-        if asked.stress is not None or asked.spread:
-            raise ParameterError(
-                f"stress and spread of a design need friction with a state. Received {fault.friction.name}. "
-                "Omit stress and spread."
-            )
-        return SlowSlidingDesign()
+def _tracking(
+    fault: Fault, law: type[Controller], setup: LoopSetup, asked: SlowSlidingDesign, path: bool
+) -> tuple[LoopSetup, SlowSlidingDesign | None]:
+    if asked.stress is not None or asked.spread:
+        raise ParameterError(
+            f"stress and spread of a design need friction with a state. Received {fault.friction.name}. "
+            "Omit stress and spread."
+        )
+    return setup, None
+
+
+def _sliding(
+    fault: Fault, law: type[Controller], setup: LoopSetup, asked: SlowSlidingDesign, path: bool
+) -> tuple[LoopSetup, SlowSlidingDesign | None]:
+    """The request, and the setup without the diffusion path, which is in it; refuses laws that do not apply."""
+    if path and not setup.diffusion:
+        raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit it for a well near the fault.")
     if setup.delay or setup.lag:
         raise ParameterError(
             f"a design for friction with a state has no delay or lag, only a diffusion path. Received a delay or lag "
@@ -344,7 +350,10 @@ def _sliding(fault: Fault, law: type[Controller], setup: LoopSetup, stress: Any,
         )
     if why := method_of(law).without_state:
         raise UnsupportedError(f"{why}. Received {law.name}. Design an elqr.")
-    return asked
+    return replace(setup, diffusion=Fraction(0)), asked
+
+
+_request = by_equilibrium(rest=_tracking, sliding=_sliding)
 
 
 def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **given: Quantity | None) -> Design:

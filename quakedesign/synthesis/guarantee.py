@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from quakedesign.errors import ParameterError, QuakedesignError, require_known
 from quakedesign.exact import exact_text, rational
 from quakedesign.fault import BlockChain, Fault, with_accepted_fit
+from quakedesign.fault.equilibrium import STEADY_SLIDING
 from quakedesign.fault.units import exact_value
 from quakedesign.guarantees import (
     CLASSES,
@@ -207,9 +208,10 @@ def guarantee(
         law = controller
     elif law is not None and controller != "elqr":
         raise ParameterError("law and controller are the same argument. Received both. Omit controller.")
+    slides = fault.friction.equilibrium is STEADY_SLIDING
     if law is not None:
         wrong = {
-            f"{fault.friction.name} friction": fault.friction.state_names,
+            f"{fault.friction.name} friction": slides,
             f"plant {plant!r}": plant not in (None, PRINTED),
             f"objective {objective!r}": objective != OBJECTIVES[0],
             "gains": len(gains),
@@ -227,11 +229,7 @@ def guarantee(
         return method_of(type(law)).given(fault, task, law, setup)
     assert not isinstance(controller, Controller)
     if STICK_SLIP in (plant, scheme) and plant != PRINTED:
-        if fault.friction.state_names:
-            raise ParameterError(
-                f"friction with a state never rests, so that the stick-slip plant is no other. Received "
-                f"{fault.friction.name}. Omit plant."
-            )
+        fault.friction.require(stick_slip=True)
         require_known(disturbance_class, CLASSES, "class")  # what is proved for the first holds for the second
         family = control_law(controller)
         usual = (family.name, tuple(gains), scheme) == ("elqr", (), None)
@@ -247,7 +245,7 @@ def guarantee(
         return guarantee_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
     least = None if stress is None else exact_value(stress, "Pa", "stress")
     off = exact_value(spread, "", "spread")
-    if fault.friction.state_names:
+    if slides:
         usual = (tuple(gains), scheme, objective, disturbance_class) == ((), None, OBJECTIVES[0], CLASSES[0])
         if not usual or setup.given().keys() - set(_OF_SLOW_SLIDING):
             raise ParameterError(

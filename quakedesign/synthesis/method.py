@@ -4,7 +4,7 @@ The base method also judges a law that belongs to no family.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from typing import Any, ClassVar, Generic, TypeVar
@@ -15,6 +15,7 @@ from quakedesign.discovery import discovered
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import apart, to_sympy
 from quakedesign.fault import Fault
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.guarantees import (
     CLASSES,
     OBJECTIVES,
@@ -82,7 +83,7 @@ class GainProblem(Generic[Designed]):
     continuous : bool
     feedforward : FeedForward
     setup : LoopSetup
-    sliding : SlowSlidingDesign
+    sliding : SlowSlidingDesign or None
         Of friction with a state.
     disturbance_class : str
         Class of the disturbances of a guarantee, ``amplitude`` or ``rate``.
@@ -98,7 +99,7 @@ class GainProblem(Generic[Designed]):
     continuous: bool = False
     feedforward: FeedForward = NONE
     setup: LoopSetup = IDEAL
-    sliding: SlowSlidingDesign = field(default_factory=SlowSlidingDesign)
+    sliding: SlowSlidingDesign | None = None
     disturbance_class: str = CLASSES[0]
     plant: str | None = None
     tell: Callable[[str, float], None] = lambda what, done: None
@@ -313,8 +314,10 @@ def designable(fault: Fault | None = None) -> tuple[str, ...]:
 def left_out(fault: Fault) -> dict[str, str]:
     """Why laws of the package that find gains for others find none for a fault, by name."""
     able = {name: method_of(law) for name, law in control_laws().items()}
-    found = {name: method.without_state for name, method in able.items() if method.designs and method.without_state}
-    return found if fault.friction.state_names else {}
+    return {name: why for name, method in able.items() if method.designs and (why := _why_none(fault, method))}
+
+
+_why_none = by_equilibrium(rest=lambda fault, method: "", sliding=lambda fault, method: method.without_state)
 
 
 # ----------------------------------------------------------------------

@@ -42,7 +42,7 @@ from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.search.search import claims_of, find_certificate, finish, quadratic_margin
 from quakedesign.plant import FaultPlant
-from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted, method_of
+from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, SlowSlidingDesign, Wanted, method_of
 from quakedesign.text import quantity
 
 
@@ -62,8 +62,8 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
                 "Omit feedforward."
             )
         problem.require_exact_in_continuous_time()
-        if problem.fault.friction.state_names:
-            return _sliding(problem, law)
+        if problem.sliding is not None:
+            return _sliding(problem, problem.sliding, law)
         return _continuous(problem, law) if problem.continuous else _sampled(problem, law)
 
     def assess(self, problem: GainProblem[Designed], controller: ExtendedLQR) -> Designed:
@@ -178,7 +178,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=found.premises())
 
 
-def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
+def _sliding(problem: GainProblem[Designed], wanted: SlowSlidingDesign, law: type[ExtendedLQR]) -> Designed:
     """A law of the slip alone that holds slow sliding along the task."""
     usual = OBJECTIVES[0], CLASSES[0]
     if problem.continuous or (problem.objective, problem.disturbance_class) != usual or problem.setup.noise:
@@ -187,7 +187,7 @@ def _sliding(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
             f"{OBJECTIVES[0]} and the disturbance class {CLASSES[0]}. Received continuous, noise, another objective "
             "or class. Omit these options, or use guarantee, which takes slip noise."
         )
-    wanted, fault = problem.sliding, problem.fault
+    fault = problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))
     answer = guarantee_sliding(
         fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, setup=ExactSetup(diffusion=path)

@@ -504,8 +504,7 @@ def run_with_state(monkeypatch, tmp_path, capsys):
         def run(_fault, **told):
             asked.clear()
             asked.update(told, kind=kind)
-            answer = {"kind": kind}
-            return (saved, answer) if kind == "held" else SimpleNamespace(trajectory=saved, to_dict=lambda: answer)
+            return saved, {"kind": kind}
 
         return run
 

@@ -26,7 +26,7 @@ from quakedesign.report.figures import cycle, errors, overviews, slow_sliding
 from quakedesign.report.folder import write_folder
 from quakedesign.report.page import accounts, parameter_rows
 from quakedesign.report.sentences import (
-    cycle_sentence,
+    cycle_sentences,
     part_of_task,
     sentences,
     state_run_lines,
@@ -35,7 +35,6 @@ from quakedesign.report.sentences import (
 from quakedesign.report.summary import summary
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
-from quakedesign.simulation.stick_slip import sliding
 from quakedesign.studies import comparison as compared_in
 from quakedesign.studies import runs as state_runs
 from quakedesign.synthesis import design, designable, left_out, state_feedback
@@ -51,7 +50,8 @@ def comparison():
     guarantee = parse_guarantee(PROOF.read_text())
     answer = SlidingGuarantee(proof=guarantee, task=guarantee.task, held=guarantee.held)
     still = simulate_state(SHORT, 1e-9, duration=1e7, inertia=False, method="dop853")
-    natural = state_runs.StateRun(fault=SHORT, loading_rate=1e-9, start=sliding(SHORT, 1e-9), trajectory=still)
+    of_runs = {"scheme": "continuous", "step": None, "plant": "quasi-dynamic", "controller": "none"}
+    natural = replace(still, provenance={**still.provenance, **of_runs})
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(state_feedback, "guarantee_sliding", lambda fault, **asked: answer)
         patched.setattr(compared_in, "natural_run", lambda fault: natural)
@@ -242,10 +242,10 @@ def test_one_command_takes_a_preset_from_file_to_a_guaranteed_controller(preset,
 @pytest.mark.parametrize(("last", "unit"), [(3264.0, "min"), (30.0, "s"), (168 * 31_557_600.0, "years")])
 def test_a_cycle_is_drawn_in_a_unit_that_suits_it(last, unit):
     time = np.linspace(0, last, 5)
-    run = SimpleNamespace(time=time, slip=time / last, slip_rate=1 + time, provenance={"method": "radau", "rtol": 1e-8})
     moved = {"min": "smooth", "s": "quasi-dynamic", "years": "smooth"}[unit]
-    natural = SimpleNamespace(trajectory=run, loading_rate=1e-6, provenance={"plant": moved})
-    drawn = cycle(SimpleNamespace(fault=SimpleNamespace(name="own")), natural)
+    made = {"method": "radau", "rtol": 1e-8, "plant": moved}
+    natural = SimpleNamespace(time=time, slip=time / last, slip_rate=1 + time, provenance=made)
+    drawn = cycle(SimpleNamespace(fault=SHORT, uncontrolled=natural))
     assert drawn.texts[-1].get_text().endswith({"smooth": "with inertia", "quasi-dynamic": "quasi-dynamic"}[moved])
     assert not any(axis.get_legend() for axis in drawn.axes)  # it would hide events
     assert drawn.axes[1].get_xlabel() == f"time [{unit}]"
@@ -265,7 +265,7 @@ def test_a_cycle_that_one_method_cannot_follow_is_computed_by_another(monkeypatc
         return still
 
     monkeypatch.setattr(state_runs, "cycles", cycles)
-    assert state_runs.natural_run(SHORT).trajectory is still
+    assert state_runs.natural_run(SHORT).slip is still.slip
     assert tried == [(True, "radau"), (True, "cvodes"), (False, "cvodes")]
     monkeypatch.setattr(state_runs, "_NATURAL", ((True, "radau"),))
     unknown = state_runs.natural_run(SHORT)
@@ -294,8 +294,10 @@ def test_a_design_goes_on_where_no_cycle_can_be_computed(comparison, monkeypatch
 def test_a_fault_that_is_loaded_faster_than_any_plate_is_told_which_key_says_so(rate, length, warned):
     event = {"magnitude": 5.7, "recurrence_interval": 9e5}
     outcome = SimpleNamespace(kind="earthquake", peak_slip_rate=0.3)
-    run = {"cycle": event, "outcome": outcome, "slip_events": (event,), "provenance": {"plant": "smooth"}, "failed": ""}
-    said = cycle_sentence(SimpleNamespace(fault=SimpleNamespace(length=length), loading_rate=rate, **run))
+    run = {"cycle": event | {"slip": 0.6}, "outcome": outcome, "natural_peak": 0.3, "provenance": {"plant": "smooth"}}
+    friction = SimpleNamespace(operating_rate=rate)
+    fault = SimpleNamespace(length=length, friction=friction, reference=SHORT.reference)
+    said, _ = cycle_sentences(SimpleNamespace(fault=fault, uncontrolled=SimpleNamespace(failed="", **run)))
     assert f"loaded at {rate:.3g} m/s (with inertia)" in said
     assert ("FASTER than any plate: that is reference_rate of [friction]" in said) == warned
 
@@ -368,7 +370,8 @@ def test_the_figure_of_a_long_run_has_no_more_bands_than_are_seen(comparison):
 def test_the_slip_that_a_task_takes_stands_beside_that_of_an_earthquake(comparison):
     """0.3 m at 1 µm/s of a cycle whose last event slipped 0.65 m; nothing of an event that is not known."""
     run = comparison.uncontrolled
-    whole = SimpleNamespace(fault=SHORT, failed="", cycle={"slip": 0.649})
-    assert steady_start_sentence(whole).endswith("; the task uses up 0.3 m of the 0.649 m of slip of an earthquake")
-    for other in (run, SimpleNamespace(fault=SHORT, failed="stopped", cycle=None)):
-        assert steady_start_sentence(other).endswith("a locked fault there is not covered")
+    whole = SimpleNamespace(cycle={"slip": 0.649})
+    said = steady_start_sentence(whole, SHORT)
+    assert said.endswith("; the task uses up 0.3 m of the 0.649 m of slip of an earthquake")
+    for other in (run, SimpleNamespace(cycle=None)):
+        assert steady_start_sentence(other, SHORT).endswith("a locked fault there is not covered")

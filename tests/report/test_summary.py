@@ -11,6 +11,7 @@ import quakedesign as qd
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.report.summary import Row, Summary, summary, summary_lines
+from quakedesign.simulation import Metrics
 from quakedesign.text import plain, power_of, quantity
 
 REAL = qd.load_fault("real-fault")
@@ -124,9 +125,12 @@ def compared(monkeypatch, *entries, natural="earthquake"):
     monkeypatch.setattr("quakedesign.report.summary.pressure_extremes", lambda run: (-1e6, 2e6))
     outcome = SimpleNamespace(kind=natural, peak_slip_rate=0.01)
     fault = {"name": "mine", "source": "a paper", "assumed": ("a well",), "friction": REAL.friction, "box": REAL.box}
+    fault["reference"] = REAL.reference
     return SimpleNamespace(
         fault=SimpleNamespace(**fault, magnitude=5.24),
-        uncontrolled=SimpleNamespace(outcome=outcome),
+        uncontrolled=SimpleNamespace(
+            outcome=outcome, cycle=None, metrics=Metrics(settled_from=0.0, steps=1, seconds=0.0)
+        ),
         of=lambda origin: tuple(e for e in entries if e.origin == origin),
         left_out={},
     )

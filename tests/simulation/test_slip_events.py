@@ -9,7 +9,7 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.simulation import simulate_state
-from quakedesign.simulation.stick_slip import cycle_outcome, dynamic_rate, late_in_cycle, locked, sliding, slip_events
+from quakedesign.simulation.stick_slip import dynamic_rate, late_in_cycle, locked, sliding
 
 RATE, YEAR = 1e-9, 3.15576e7
 QUASI = {"inertia": False, "method": "dop853", "rtol": 1e-8}
@@ -36,7 +36,7 @@ def cycles():
 
 
 def test_events_begin_at_the_loading_rate_and_end_at_ten_times_it(cycles):
-    events = slip_events(fault(), cycles, RATE)
+    events = cycles.slip_events
     assert len(events) == len(cycles.onsets) >= 2
     for event in events[1:]:
         assert event.nucleation < event.onset < event.arrest
@@ -56,7 +56,7 @@ def test_events_begin_at_the_loading_rate_and_end_at_ten_times_it(cycles):
 def test_an_event_that_is_not_over_has_no_size(cycles):
     end = float(cycles.onsets[1]) * 1.00001
     run = simulate_state(fault(), RATE, duration=end, start_rate=2 * RATE, **QUASI)
-    first, last = slip_events(fault(), run, RATE)
+    first, last = run.slip_events
     assert first.slip is not None
     assert (last.arrest, last.slip, last.moment, last.magnitude) == (None,) * 4
 
@@ -66,11 +66,11 @@ def test_what_a_run_comes_to_is_measured_by_the_direct_effect_over_damping_and_i
     assert dynamic_rate(fault()) == pytest.approx(
         0.005 * 50e6 * 25e6 / (5e14 + math.sqrt(1.5e14 * 3.125e14)), rel=1e-12
     )
-    assert cycle_outcome(fault(), cycles).kind == "earthquake"
+    assert cycles.outcome.kind == "earthquake"
     slow = simulate_state(fault(), [(1e5, RATE), (1e5, 30 * RATE)], onset_rate=20 * RATE, start_rate=RATE, **QUASI)
-    assert cycle_outcome(fault(), slow).kind == "creep"
+    assert slow.outcome.kind == "creep"
     step = simulate_state(fault(), [(1e5, RATE)], onset_rate=2 * RATE, start_rate=3 * RATE, **QUASI)
-    assert cycle_outcome(fault(), step).kind == "slow slip"
+    assert step.outcome.kind == "slow slip"
 
 
 def test_steady_sliding_stays_as_it_is():

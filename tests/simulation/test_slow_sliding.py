@@ -446,7 +446,7 @@ def test_a_law_that_asks_for_all_of_the_normal_stress_opens_the_fault():
     tide = Tide(amplitude=40e3, period=1000.0)
     run = simulate_sliding(fault(), greedy, STEP, tide=tide, duration=4000.0, settled_from=3999.0)
     assert run.outcome.kind == "opened"
-    assert run.opened == pytest.approx(run.time[-1], rel=1e-12)
+    assert run.events["opening"] == pytest.approx(run.time[-1], rel=1e-12)
     assert (run.metrics.max_slip_error, run.metrics.rms_pressure) == (None, None)  # it ends before errors count
     assert run.metrics.peak_slip_rate == max(run.slip_rate)
 

@@ -14,7 +14,7 @@ from quakedesign.laws import published
 from quakedesign.loop import Actuator, Diffusion, Lag, Saturation
 from quakedesign.simulation import natural_earthquake, simulate, velocity_step
 from quakedesign.simulation import trajectory as trajectory_module
-from quakedesign.simulation.trajectory import Recording
+from quakedesign.simulation.trajectory import Trajectory
 
 LAB = load_fault("lab-fault")
 
@@ -181,7 +181,8 @@ def test_its_text_shows_figures_not_arrays(run, twice, actuated):
         assert "array" not in repr(each)
     of_a_law = {"name", "integral_units", "metrics", "events"}
     assert [shown_fields(each) for each in (run, actuated)] == [of_a_law, of_a_law]
-    assert shown_fields(twice) == {"name", "state_names", "state_units", "onset_rate"}
+    rates = {"onset_rate", "loading_rate"}
+    assert shown_fields(twice) == {"name", "state_names", "state_units", "metrics", "events"} | rates
 
 
 def shown_fields(run):
@@ -334,7 +335,7 @@ def test_a_run_with_state_is_saved_by_the_same_calls(tmp_path):
         fastest_rate=1.0,
     )
     run = velocity_step(law, 1e3, [(1.0, 1e-6), (1.0, 1e-5)])
-    assert isinstance(run, Recording)
+    assert isinstance(run, Trajectory)
     with xr.open_dataset(run.save(tmp_path / "state.nc"), engine="h5netcdf") as data:
         assert data.attrs["Conventions"].startswith("CF-1.")
         assert np.array_equal(data.theta, run.states[0])

@@ -17,7 +17,7 @@ from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.loop.sensing import Measurement
 from quakedesign.simulation import Load, simulate
 from quakedesign.studies import runs as single
-from quakedesign.studies.runs import Choice, choice, chosen_controller, run_single, sensor
+from quakedesign.studies.runs import Choice, choice, run_single, sensor
 
 LAB = load_fault("lab-fault")
 USUAL = {"step": None, "scheme": "continuous", "method": "dormand-prince", "plant": None, "substeps": 1}
@@ -31,21 +31,21 @@ def told(law, **more):
 
 
 def test_scale_and_feed_forward_are_exact():
-    law = chosen_controller(LAB, "cta", BASE, scale="1/1000", feedforward="centred")
+    law = choice(LAB, "cta", BASE, scale="1/1000", feedforward="centred").controller
     assert law.scale == Fraction(1, 1000)
     assert law.feedforward == feed_forward("centred", LAB, law.divisor)
-    assert chosen_controller(LAB, "cta", BASE).feedforward.name == "none"
+    assert choice(LAB, "cta", BASE).controller.feedforward.name == "none"
 
 
 @pytest.mark.parametrize("more", [{"scale": "2"}, {"feedforward": "nominal"}])
 def test_a_linear_law_has_neither_scale_nor_feed_forward(more):
     with pytest.raises(ParameterError, match="scale and feedforward are for sliding modes"):
-        chosen_controller(LAB, "elqr", ("published",), **more)
+        choice(LAB, "elqr", ("published",), **more)
 
 
 def test_an_unknown_feed_forward_is_refused():
     with pytest.raises(UnknownNameError, match="centred"):
-        chosen_controller(LAB, "cta", BASE, feedforward="magic")
+        choice(LAB, "cta", BASE, feedforward="magic")
 
 
 def test_designed_gains_are_those_of_the_design(monkeypatch):
@@ -53,15 +53,15 @@ def test_designed_gains_are_those_of_the_design(monkeypatch):
 
     from quakedesign.studies import runs as single
 
-    law = chosen_controller(LAB, "cta", BASE)
+    law = choice(LAB, "cta", BASE).controller
     for found in (law, None):
         design = SimpleNamespace(controller=found, certificate=None)
         monkeypatch.setattr(single, "design", lambda fault, name, design=design, **_: design)
         if found is None:
             with pytest.raises(ParameterError, match="no gains with a proof"):
-                chosen_controller(LAB, "cta", ("designed",))
+                choice(LAB, "cta", ("designed",))
         else:
-            assert chosen_controller(LAB, "cta", ("designed",)) is law
+            assert choice(LAB, "cta", ("designed",)).controller is law
 
 
 def test_without_a_law_a_duration_decides_what_is_run():
@@ -88,7 +88,7 @@ def test_the_natural_earthquake_takes_no_options(more, named):
 
 @pytest.mark.slow
 def test_a_differentiator_comes_with_its_premise():
-    law = chosen_controller(LAB, "cta", ("published",))
+    law = choice(LAB, "cta", ("published",)).controller
     found = {}
     for bound in (1.0, 1e4):
         run, premises = told(law, scheme="implicit", duration=0.2, noise=sensor(1e-3, Measurement(), bound))
@@ -103,7 +103,7 @@ def test_a_differentiator_comes_with_its_premise():
 
 
 def test_without_a_certificate_the_premise_on_the_run_says_so():
-    _, (premise,) = told(chosen_controller(LAB, "cta", BASE), duration=0.02)
+    _, (premise,) = told(choice(LAB, "cta", BASE).controller, duration=0.02)
     assert (premise.name, premise.certified, premise.ratio, premise.holds) == ("on_trajectory", 0, None, False)
     assert "no certificate is at hand, and none of these gains exceeds 1.2 m/s^3" in premise.note
 
@@ -112,7 +112,7 @@ def test_a_certified_bound_goes_with_the_scale(monkeypatch):
     """λ multiplies what is certified for λ = 1."""
     from quakedesign.studies import runs as single
 
-    law = chosen_controller(LAB, "cta", BASE)
+    law = choice(LAB, "cta", BASE).controller
     monkeypatch.setattr(single, "design", lambda fault, name, **_: law)
     monkeypatch.setattr(single, "certified_bound", lambda design: Fraction(9, 10))
     monkeypatch.setattr(type(law), "controller", property(lambda self: self), raising=False)
@@ -129,7 +129,7 @@ def test_the_bound_of_a_proved_design_is_that_of_its_certificate():
     from quakedesign.lyapunov import Verdict
     from quakedesign.studies.certified import certified_bound
 
-    law = chosen_controller(LAB, "cta", BASE)
+    law = choice(LAB, "cta", BASE).controller
     design = SimpleNamespace(controller=law, certificate=None, verdict=Verdict.PROVED)
     assert certified_bound(design) is None
     assert certified_bound(None) is None

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import Field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from quakedesign.errors import ParameterError
 from quakedesign.exact import rational
+from quakedesign.fault.equilibrium import AT_REST, STEADY_SLIDING, FaultEquilibrium
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -29,6 +31,11 @@ class FrictionLaw(ABC):
     domain: ClassVar[str]
     state_names: ClassVar[tuple[str, ...]] = ()
     state_units: ClassVar[tuple[str, ...]] = ()
+    equilibrium: ClassVar[FaultEquilibrium] = AT_REST
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        cls.equilibrium = STEADY_SLIDING if cls.state_names else AT_REST
 
     @abstractmethod
     def coefficient(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
@@ -84,6 +91,12 @@ class FrictionLaw(ABC):
     @abstractmethod
     def rate_slope(self) -> float:
         """Largest chord slope |Δμ/Δrate| [s/m] at a fixed state."""
+
+    def require(self, **given: Any) -> None:
+        """Reject what is given, not None, and does not apply to the equilibrium of a fault with this friction."""
+        for name in self.equilibrium.refused.keys() & {name for name, value in given.items() if value is not None}:
+            told = {"value": given[name], "law": self.name, "states": ", ".join(self.state_names)}
+            raise ParameterError(self.equilibrium.refused[name].format(**told))
 
     def _holding(self, values: Mapping[str, Any]) -> Self:
         law = object.__new__(type(self))

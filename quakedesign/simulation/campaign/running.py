@@ -14,6 +14,7 @@ import numpy as np
 from quakedesign.errors import ParameterError
 from quakedesign.exact import rational
 from quakedesign.fault import Fault
+from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.model import require_seed
 from quakedesign.files import sole_writer, temporary_folder
 from quakedesign.laws import Controller
@@ -201,18 +202,22 @@ def campaign_problem(
     """
     require_seed(seed)
     way, step, own = own_way(controller, scheme, step)
-    if isinstance(way, str):
-        actuator, substeps = (None, 1) if fault.friction.state_names else own_path(controller, None)
-        way = sampled_scheme(way, substeps, actuator, **own)
-    entries: dict[str, Any] = {
-        "fault": fault,
-        "controller": controller,
-        "scheme": way,
-        "setting": RunSetting.of(fault, step, duration, 1, settled_from),
-        "plant": plant or (next(iter(PLANTS)) if fault.friction.state_names else STICK_SLIP),
-        "seed": seed,
-    }
-    if fault.friction.state_names:
+    entries: dict[str, Any] = {"fault": fault, "controller": controller, "seed": seed}
+    entries["setting"] = RunSetting.of(fault, step, duration, 1, settled_from)
+
+    def stepped(fault: Fault) -> CampaignProblem:
+        actuator, substeps = own_path(controller, None) if isinstance(way, str) else (None, 1)
+        entries["scheme"] = sampled_scheme(way, substeps, actuator, **own)
+        if spread or stress:
+            raise ParameterError(
+                f"spread and stress need friction with a state. Received {fault.friction.name}. Omit both."
+            )
+        space = Space.of(fault, initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
+        entries.update(space=space, plant=plant or STICK_SLIP, load=load or Load())
+        return SteppedProblem(**entries, method=integrator(method))
+
+    def slid(fault: Fault) -> CampaignProblem:
+        entries["scheme"] = sampled_scheme(way, **own)
         if load not in (None, Load()) or initial_slip or initial_slip_rate:
             raise ParameterError(
                 "friction with a state needs steady sliding as initial condition and a stress as disturbance. Received "
@@ -220,13 +225,10 @@ def campaign_problem(
             )
         space = sliding_space(fault, rational(spread, "spread"))
         solver = "cvodes" if method == DormandPrince.name else method
-        return SlidingProblem(**entries, space=space, method=solver, stress=stress, stress_period=stress_period)
-    if spread or stress:
-        raise ParameterError(
-            f"spread and stress need friction with a state. Received {fault.friction.name}. Omit both."
-        )
-    space = Space.of(fault, initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
-    return SteppedProblem(**entries, space=space, method=integrator(method), load=load or Load())
+        entries.update(space=space, plant=plant or next(iter(PLANTS)), stress=stress, stress_period=stress_period)
+        return SlidingProblem(**entries, method=solver)
+
+    return by_equilibrium(rest=stepped, sliding=slid)(fault)
 
 
 def run_campaign(

@@ -1,0 +1,63 @@
+"""Equilibria of faults, rest or steady sliding, and functions with one implementation for each."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+S = TypeVar("S")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FaultEquilibrium:
+    """Equilibrium about which a fault is studied and controlled."""
+
+    name: str
+    coordinates: str  # Of the plant, for a sentence that goes on with its equations
+    poles: str  # About which equilibrium poles are, for a slip rate [m/s]
+    refused: Mapping[str, str]  # What does not apply, by name, with the message to a value
+
+
+AT_REST = FaultEquilibrium(
+    name="rest",
+    coordinates="Slip x₁ and slip rate x₂, measured from the equilibrium without pressure,",
+    poles="",
+    refused={
+        "ramp": "ramp needs friction with a state, whose reference has a constant rate. Received the ramp {value!r} "
+        "with {law}, whose reference is smooth already. Omit ramp.",
+        "simulate_state": "the friction law must have a state. Received {law}. Use simulate.",
+    },
+)
+STEADY_SLIDING = FaultEquilibrium(
+    name="sliding",
+    coordinates="Slip x₁, slip rate v, the stretch s of the spring, whose far end rests, and the state of friction",
+    poles=" about steady sliding at {:.4g} m/s",
+    refused={
+        "disturbance": "a disturbance of friction with a state is a stress of its own. Received {value!r}. Give "
+        "--stress.",
+        "diffusivity": "diffusivity along the fault needs friction without a state. Received {law}. Omit diffusivity, "
+        "for steady pressures along the fault.",
+        "purpose": "{value} needs a friction law of slip and slip rate alone. Received {law}, with the state {states}. "
+        "Use fault, derive, simulate, guarantee or design for it.",
+        "blocks": "blocks needs friction of slip and slip rate. Received {law}. Write [[block]] and [[well]] tables "
+        "into the fault file, and run limits: it names unstable modes that no well reaches.",
+        "no_diffusion": "diffusion must be above 0 s. Received 0 s. Omit --diffusion for a well at the fault.",
+        "plant": "plant is for friction without a state, got {value!r} with {law}, which never rests: omit it.",
+        "stick_slip": "friction with a state never rests, so that the stick-slip plant is no other. Received {law}. "
+        "Omit plant.",
+    },
+)
+
+
+def by_equilibrium(
+    *, rest: Callable[Concatenate[S, P], R], sliding: Callable[Concatenate[S, P], R]
+) -> Callable[Concatenate[S, P], R]:
+    """Function with one implementation for each equilibrium, that of its first argument: a fault or a friction law."""
+
+    def chosen(subject: S, /, *positional: P.args, **named: P.kwargs) -> R:
+        given: Any = subject
+        law = given if hasattr(given, "equilibrium") else given.friction
+        return (rest if law.equilibrium is AT_REST else sliding)(subject, *positional, **named)
+
+    return chosen
