@@ -455,7 +455,7 @@ BUDGETS = {
     "laws": 3105,
     "loop": 4229,
     "plant": 1356,
-    "guarantees": 13087,
+    "guarantees": 13083,
     "lyapunov": 6958,
     "linear": 2390,
     "synthesis": 1928,
