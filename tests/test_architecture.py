@@ -453,7 +453,7 @@ BUDGETS = {
     "symbolic": 3112,
     "sos": 6334,
     "laws": 3105,
-    "loop": 4229,
+    "loop": 4198,
     "plant": 1356,
     "guarantees": 13083,
     "lyapunov": 6958,
