@@ -707,7 +707,7 @@ _ROOM = Fraction((1 << 32) + 1, 1 << 32)  # for sums that are solved for to boun
 def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     """Gains of every (output, input), rounded up, one for each part of the period; the same parts for all.
 
-    A start that is not 0 is one input more, `free_response.START`, of size 1. Gains of loops that came before are
+    A start that is not 0 is one input more, `START`, of size 1. Gains of loops that came before are
     remembered: a proof is found, checked, told and written of one loop.
 
     Raises
