@@ -24,7 +24,7 @@ from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import controller_step, simulate, to_casadi, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.studies.comparison import Entry
-from quakedesign.studies.runs import chosen_controller
+from quakedesign.studies.runs import choice
 from quakedesign.synthesis import assess
 
 pytestmark = pytest.mark.slow  # tests/laws/test_rest_limit.py designs one by default
@@ -236,10 +236,10 @@ def test_where_no_step_has_a_guarantee_it_is_the_design_in_continuous_time(monke
 
 def test_gains_of_the_command_line_are_designed_either_way(unproved, monkeypatch):
     monkeypatch.setattr("quakedesign.studies.runs.design", lambda fault, name, continuous: designed())
-    assert chosen_controller(REAL, "cta", ("designed",)) is designed().controller
+    assert choice(REAL, "cta", ("designed",)).controller is designed().controller
     with pytest.raises(ParameterError, match="Give --gains continuous"):
-        chosen_controller(REAL, "cta", ("designed",), feedforward="centred")
-    assert chosen_controller(REAL, "cta", ("designed",), scale="1").scale == 1
+        choice(REAL, "cta", ("designed",), feedforward="centred")
+    assert choice(REAL, "cta", ("designed",), scale="1").controller.scale == 1
 
 
 UNUSUAL = {
