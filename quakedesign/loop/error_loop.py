@@ -21,7 +21,7 @@ from quakedesign.laws.sampled_law import (
     require_sizes,
     steady_states,
 )
-from quakedesign.loop.layer import MODES, Layer
+from quakedesign.loop.diffusion_layer import MODES, Layer
 from quakedesign.loop.periodic import EVEN, Fading, Instants, PeriodicLoop, Pulse, Segment
 from quakedesign.loop.signals import Interconnection, Signal
 

@@ -21,7 +21,7 @@ from quakedesign.fault import load_fault
 from quakedesign.fault.fault_toml import source_text as load_text
 from quakedesign.guarantees import Held, NoProof, TrackingGuarantee, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.loop.loop_setup import LoopSetup

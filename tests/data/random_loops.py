@@ -8,7 +8,7 @@ from scipy.linalg import LinAlgError
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Held, SlowGain
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import summed_integrals
 from quakedesign.plant import FaultPlant, uncertain_plant

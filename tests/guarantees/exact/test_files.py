@@ -19,7 +19,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Held, continuous_peaks, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, save_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import (
     ErrorModel,
@@ -33,7 +33,7 @@ from quakedesign.laws import (
 from quakedesign.loop import exact_integrals
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant import ranges as package_task
+from quakedesign.plant import fault_plant as package_task
 from quakedesign.plant import uncertain_plant
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"

@@ -17,8 +17,8 @@ from standalone_guarantee import checker
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.guarantees import Held, TrackingProof, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
 from quakedesign.guarantees.exact.norms import free_peaks, norms
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import THROUGH_ROCK, family_of
 from quakedesign.laws import ImplicitRoot, Power, compensated
 from quakedesign.loop import PeriodicLoop, Segment

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from quakedesign.guarantees.exact.norms import BALLS, START, norms
-from quakedesign.guarantees.search.estimate import FLOATS, gains_of
+from quakedesign.guarantees.search.float_bounds import FLOATS, gains_of
 from quakedesign.loop import PeriodicLoop, Segment
 
 FLOW = ((F(-1), F(2), F(0)), (F(-2), F(-3), F(1)), (F(0), F(1, 2), F(-1, 2)))
