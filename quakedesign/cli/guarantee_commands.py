@@ -164,7 +164,7 @@ def _first(fault: Any, answer: Any) -> Iterator[str]:
     from textwrap import wrap
 
     from quakedesign.report.summary import guaranteed_sentence
-    from quakedesign.simulation.natural_earthquake import natural_peak
+    from quakedesign.simulation.earthquake import natural_peak
 
     try:
         peak = natural_peak(fault)

@@ -185,7 +185,7 @@ def _outside(changed: dict[str, Any], claim: Any, plant: str) -> list[str]:
 
 
 def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
-    from quakedesign.simulation.natural_earthquake import waiting
+    from quakedesign.simulation.earthquake import waiting
     from quakedesign.studies.comparison import shortfall
 
     metrics, energy = trajectory.metrics.to_dict(), trajectory.energy

@@ -15,8 +15,8 @@ from quakedesign.loop import Actuator, Scheme
 from quakedesign.loop.schemes import own_way
 from quakedesign.loop.sensing import Sensor, Transducer
 from quakedesign.simulation.closed_loop import Load, Variation
+from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator, require_tolerance
-from quakedesign.simulation.natural_earthquake import natural_peak
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run_settings import (
     RunSetting,

@@ -1,7 +1,7 @@
+from .block_adequacy import one_block as one_block
 from .block_limits import ChainLimits as ChainLimits
 from .block_limits import chain_limits as chain_limits
 from .comparison import Entry as Entry
-from .one_block import one_block as one_block
 from .paper import FrontPoint as FrontPoint
 from .paper import objective_front as objective_front
 from .performance_limits import Limit as Limit

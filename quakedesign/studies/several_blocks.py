@@ -31,7 +31,7 @@ from quakedesign.simulation.coupled_sliders import (
     natural_cycles,
     simulate_held_blocks,
 )
-from quakedesign.simulation.natural_earthquake import STILL, event_nudge
+from quakedesign.simulation.earthquake import STILL, event_nudge
 from quakedesign.simulation.state_plant import TIDE
 from quakedesign.studies.block_limits import chain_limits
 from quakedesign.synthesis import guarantee

@@ -16,7 +16,7 @@ from quakedesign.simulation import Outcome, OutcomeCriterion, natural_earthquake
 from quakedesign.simulation import natural_earthquake as memoryless_earthquake
 from quakedesign.simulation.campaign import SampleResult, campaign_problem
 from quakedesign.simulation.campaign.campaign_result import Campaign
-from quakedesign.simulation.natural_earthquake import natural_peak
+from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.trajectory import KINDS
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")

@@ -23,7 +23,7 @@ from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.simulation.coupled_sliders import BlockEvent
-from quakedesign.simulation.natural_earthquake import natural_peak
+from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.studies import several_blocks as chains
 
 PATH = Path(__file__).parents[1] / "data" / "three_blocks.toml"
