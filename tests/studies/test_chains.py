@@ -84,7 +84,7 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
         def to_dict(self):
             return {"notes": list(self.notes)}
 
-    for place in ("synthesis", "studies.chains"):
+    for place in ("synthesis", "studies.several_blocks"):
         monkeypatch.setattr(f"quakedesign.{place}.guarantee", lambda *_, **__: SimpleNamespace(proof=Proved()))
     assert run("guarantee", PATH) == 0
     told = " ".join(capsys.readouterr().out.split())
