@@ -230,10 +230,11 @@ def holds(statement: Statement, proof: Proof) -> bool:
         is negative at a point of the set. False proves nothing.
     """
     try:
-        if isinstance(proof, SumOfSquares):
-            return multiplier_is_positive(statement, proof.multiplier) and _identity_holds(statement, proof)
-        if isinstance(proof, Functional):
-            return _functional_holds(statement, proof)
+        match proof:
+            case SumOfSquares():
+                return multiplier_is_positive(statement, proof.multiplier) and _identity_holds(statement, proof)
+            case Functional():
+                return _functional_holds(statement, proof)
         return _point_holds(statement, proof)
     except (ValueError, TypeError, AttributeError):
         return False
@@ -370,13 +371,4 @@ def residual(statement: Statement, squares: Sequence[Square], cofactors: Sequenc
     return mapping(_target(statement) - _right_side(statement, _with_integers(squares), cofactors))
 
 
-__all__ = [
-    "Functional",
-    "Point",
-    "Proof",
-    "Square",
-    "SumOfSquares",
-    "holds",
-    "localizing_matrix",
-    "residual",
-]
+__all__ = ["Functional", "Point", "Proof", "Square", "SumOfSquares", "holds", "localizing_matrix", "residual"]

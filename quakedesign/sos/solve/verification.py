@@ -18,12 +18,12 @@ import numpy as np
 
 from quakedesign.errors import ParameterError, PolynomialError
 from quakedesign.exact import UpperBound, rational
-from quakedesign.files import read_bytes
+from quakedesign.files import Json, read_bytes
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.polynomial import Exponents, degree, full_matrix
 from quakedesign.sos.exact.polynomial_statement import Statement, statement
 from quakedesign.sos.exact.polynomial_text import read, read_element
-from quakedesign.sos.exact.proofs import Element, Square, SumOfSquares, as_polynomial, in_echelon_form, residual
+from quakedesign.sos.exact.proofs import Square, SumOfSquares, as_polynomial, in_echelon_form, residual
 from quakedesign.sos.exact.strict import unique
 from quakedesign.sos.solve.decide import KERNELS
 from quakedesign.sos.solve.engine import decide, versions
@@ -84,7 +84,7 @@ def verify(
     products = [(), *((i,) for i in range(len(inequalities)))]
     squares = [_square(s, q, b, names) for s, q, b in zip(products, grams, bases, strict=True)]
     degrees = [0, *map(degree, inequalities)]
-    reached = [d + 2 * max(map(_degree, s.basis)) for d, s in zip(degrees, squares, strict=True)]
+    reached = [d + 2 * max(degree(as_polynomial(b)) for b in s.basis) for d, s in zip(degrees, squares, strict=True)]
     problem = statement(
         names, exact, inequalities=inequalities, products=False, degree_bound=max(degree(exact), *reached)
     )
@@ -95,10 +95,6 @@ def _listed(given: Any) -> list[Any]:
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise PolynomialError(f"matrices and bases must be sequences. Received {shown(given)}.")
     return list(given)
-
-
-def _degree(element: Element) -> int:
-    return degree(as_polynomial(element))
 
 
 def _square(product: tuple[int, ...], gram: Any, basis: Any, names: tuple[str, ...]) -> Square:
@@ -266,7 +262,7 @@ def _number(written: str) -> Fraction | str:
         return written
 
 
-def _gram_file(raw: dict[str, Any]) -> GramFile:
+def _gram_file(raw: Json) -> GramFile:
     names, polynomial, basis = raw["variables"], raw["polynomial"], raw["basis"]
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or not isinstance(basis, list):
         raise PolynomialError(
