@@ -35,6 +35,8 @@ from quakedesign.text import shown
 # ----------------------------------------------------------------------
 # Gram matrices that somebody else's solver has found: rounded and put right exactly, or answered otherwise.
 
+Array = np.ndarray
+Matrixed = tuple[Block, Array]
 _NEAR = Fraction(1, 100)  # of the largest coefficient: a matrix with a larger error is about another polynomial
 
 
@@ -147,7 +149,7 @@ def _verified(problem: Statement, squares: Sequence[Square]) -> Answer:
     return replace(answer, remark=f"no proof comes from {matrix}; {why} without it")
 
 
-def _block(moved: Statement, square: Square) -> tuple[Block, Any]:
+def _block(moved: Statement, square: Square) -> Matrixed:
     """Block and matrix of a square."""
     support = sorted({e for b in square.basis for e in as_polynomial(b)})
     monomials = tuple(b for b in square.basis if isinstance(b, tuple))
@@ -162,7 +164,7 @@ def _block(moved: Statement, square: Square) -> tuple[Block, Any]:
     return block, np.array([[float(v) for v in row] for row in full_matrix(square.gram, len(square.basis))])
 
 
-def _proposed(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Any]) -> Iterator[tuple[str, Any]]:
+def _proposed(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Array]) -> Iterator[tuple[str, Any]]:
     """Proofs from the matrices as they are, then from what is left of them beside their kernels."""
     yield "rounded", _rounded(moved, blocks, grams)
     for threshold, tolerance in KERNELS:
@@ -171,7 +173,7 @@ def _proposed(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Any]) -> I
         yield "rounded beside its kernel", _rounded(moved, *zip(*left, strict=True)) if left else None
 
 
-def _beside(block: Block, gram: Any, threshold: float, tolerance: float, moved: Scaled) -> tuple[Block, Any] | None:
+def _beside(block: Block, gram: Array, threshold: float, tolerance: float, moved: Scaled) -> Matrixed | None:
     """Block without the numerical kernel of its matrix, and the matrix there; None if nothing is left."""
     smaller = at_kernels([block], [gram], threshold, tolerance, decimal_units(moved.scale))
     if smaller is None:
@@ -183,13 +185,13 @@ def _beside(block: Block, gram: Any, threshold: float, tolerance: float, moved: 
     return smaller[0], inverse.T @ full.T @ gram @ full @ inverse
 
 
-def _rows(block: Block, monomials: Sequence[Exponents]) -> Any:
+def _rows(block: Block, monomials: Sequence[Exponents]) -> np.ndarray:
     """Basis of a block in monomials, one element a row."""
     polynomials = [as_polynomial(b) for b in block.basis]
     return np.array([[float(p.get(e, 0)) for e in monomials] for p in polynomials])
 
 
-def _rounded(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Any]) -> SumOfSquares | None:
+def _rounded(moved: Scaled, blocks: Sequence[Block], grams: Sequence[np.ndarray]) -> SumOfSquares | None:
     least = min(float(np.linalg.eigvalsh(g)[0]) for g in grams)
     if not least > 0:
         return None
