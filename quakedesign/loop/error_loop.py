@@ -22,7 +22,7 @@ from quakedesign.laws.sampled_law import (
     steady_states,
     unit_row,
 )
-from quakedesign.loop.layer import MODES, Layer
+from quakedesign.loop.diffusion_layer import MODES, Layer
 from quakedesign.loop.periodic import EVEN, Fading, Instants, PeriodicLoop, Pulse, Segment
 
 # ----------------------------------------------------------------------

@@ -14,7 +14,7 @@ from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.closed_loop import Variation
-from quakedesign.simulation.run import PRINTED
+from quakedesign.simulation.run_settings import PRINTED
 from quakedesign.simulation.simulate import simulate
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from thinned import few
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import friction_law, load_fault
-from quakedesign.simulation import natural as memoryless_earthquake
+from quakedesign.simulation import earthquake as memoryless_earthquake
 from quakedesign.simulation import natural_earthquake
 
 REAL = load_fault("real-fault")

@@ -16,15 +16,15 @@ from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees import NoProof, PlantGuarantee
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantProof
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
+from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof
 from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.simulation.coupled_sliders import BlockEvent
-from quakedesign.simulation.natural import natural_peak
-from quakedesign.studies import chains
+from quakedesign.simulation.earthquake import natural_peak
+from quakedesign.studies import several_blocks as chains
 
 PATH = Path(__file__).parents[1] / "data" / "three_blocks.toml"
 CHAIN = qd.load_chain(PATH)

@@ -33,12 +33,12 @@ from flint import arb, arb_mat, ctx, fmpq, fmpq_mat
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
-from quakedesign.guarantees.exact.loop import Channel, Held, channels_of
 from quakedesign.guarantees.exact.norms import absolute, ball, column, majorant, matrix, upper
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import Channel, Held, channels_of
 from quakedesign.guarantees.exact.small_gain import Bounds, unshifted
 from quakedesign.loop import PeriodicLoop
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 
 _BITS, _ZERO = 128, Fraction(0)
 SOONEST = 4  # pieces of the shortest interval, for integrals

@@ -32,7 +32,7 @@ from quakedesign.laws import (
 from quakedesign.loop import exact_integrals
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant import ranges as package_task
+from quakedesign.plant import fault_plant as package_task
 from quakedesign.plant import uncertain_plant
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"

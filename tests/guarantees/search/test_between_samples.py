@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 import quakedesign as qd
 from quakedesign.guarantees import Held, guarantee
-from quakedesign.guarantees.search.adversary import worst_found
+from quakedesign.guarantees.search.worst_case import worst_found
 from quakedesign.laws import LinearLaw
 from quakedesign.plant import uncertain_plant
 

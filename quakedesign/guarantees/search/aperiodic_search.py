@@ -9,12 +9,12 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.invariant_set import SOONEST, InvariantPolytope, reduced
-from quakedesign.guarantees.exact.loop import Held, channels_of
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import Held, channels_of
 from quakedesign.guarantees.exact.small_gain import Bounds
-from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
-from quakedesign.guarantees.search.estimate import BoundsEstimate, gains_of, short
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.guarantees.exact.tracking_proof import TrackingProof, guarantee
+from quakedesign.guarantees.search.float_bounds import BoundsEstimate, gains_of, short
+from quakedesign.plant.fault_plant import FaultPlant
 
 MOST_SIZE = 3  # entries of the state at a sample: hulls of more take too long
 _SAMPLE_PIECES, _BETWEEN_PIECES = 6, 8

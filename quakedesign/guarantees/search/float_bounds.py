@@ -13,13 +13,13 @@ from math import floor, inf, log10
 import numpy as np
 from scipy.linalg import expm
 
-from quakedesign.guarantees.exact.loop import GainSpread, Held
 from quakedesign.guarantees.exact.norms import START
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import GainSpread, Held
 from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain, bounds_from
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 
 # ----------------------------------------------------------------------
 # Floating-point estimates of the bounds of a guarantee, for searches; no decision depends on them.
