@@ -1,5 +1,6 @@
 """Exceptions of quakedesign: each message gives quantity, condition, value and remedy."""
 
+import math
 import re
 from collections.abc import Iterable
 from typing import ClassVar
@@ -87,6 +88,17 @@ class SimulationError(QuakedesignError, RuntimeError):
 
 class OutputError(QuakedesignError, OSError):
     """A result that cannot be written."""
+
+
+def is_whole(value: object, least: float, most: float = math.inf) -> bool:
+    """Whether a value is a whole number from `least` to `most`; True and False are none."""
+    return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
+
+
+def require_whole(least: int, **values: object) -> None:
+    """Raise for values that are no whole numbers of at least `least`; the keyword is the name."""
+    for name in (name for name, value in values.items() if not is_whole(value, least)):
+        raise ParameterError(f"{name} must be a whole number of at least {least}. Received {values[name]!r}.")
 
 
 def require_known(

@@ -24,11 +24,14 @@ from quakedesign.errors import OutputError, QuakedesignError
 # ----------------------------------------------------------------------
 # Files of users are read whole, from a regular file of bounded size: nothing waits, nothing is endless.
 
+Json = dict[str, Any]
+"""Object of a JSON file: values by key."""
+
 _MOST_DOTS = 400
 """In a line of TOML: memory and time for a key of n parts grow as n²."""
 
 
-def parse_toml(text: str) -> dict[str, Any]:
+def parse_toml(text: str) -> Json:
     """Entries of a TOML file of some 64 KiB.
 
     Raises

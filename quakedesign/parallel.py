@@ -33,7 +33,7 @@ from time import monotonic
 from types import FrameType
 from typing import Any, Self, TypeVar
 
-from quakedesign.errors import ParameterError, SimulationError
+from quakedesign.errors import ParameterError, SimulationError, require_whole
 from quakedesign.files import discard_all, number_placed, sweep_system
 from quakedesign.text import one_line
 
@@ -408,8 +408,7 @@ def cores() -> int:
 
 def require_workers(count: int) -> int:
     """Refuse a number of workers that is none."""
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        raise ParameterError(f"workers must be a whole number of at least 1. Received {count!r}.")
+    require_whole(1, workers=count)
     return count
 
 

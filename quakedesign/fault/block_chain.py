@@ -248,7 +248,7 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
     return problems.resolved(along.built(BlockChain, parts | values), str(source))
 
 
-def _tables(given: Any, key: str, problems: Problems) -> list[Table]:
+def _tables(given: object, key: str, problems: Problems) -> list[Table]:
     if not isinstance(given, list) or not all(isinstance(one, Mapping) for one in given):
         with problems.collected():
             kind = type(given).__name__

@@ -10,16 +10,17 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, fields
 from fractions import Fraction
 from functools import cache
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from quakedesign.errors import ScenarioError
 from quakedesign.fault.friction.base import FrictionLaw
 from quakedesign.fault.model import Problems
 from quakedesign.fault.units import si_value
+from quakedesign.files import Json
 from quakedesign.text import nearest_name, shown
 
 _Value = TypeVar("_Value")
-Reader = Callable[[Any, str, str], float | Fraction]
+Reader = Callable[[object, str, str], float | Fraction]
 """Value in an SI unit of an entry, with the entry's name for messages."""
 
 
@@ -110,17 +111,17 @@ class Table:
         Dotted name of the table, empty for the whole file, and for a table that is not given.
     """
 
-    def __init__(self, entries: Mapping[str, Any], problems: Problems, where: str = "") -> None:
+    def __init__(self, entries: Json, problems: Problems, where: str = "") -> None:
         self.entries, self.problems, self.where = entries, problems, where
         self._keys: list[str] = []
         self._missing: list[str] = []
 
-    def read(self, entries: Mapping[str, FileEntry], quantity: Reader = si_value) -> dict[str, Any]:
+    def read(self, entries: Mapping[str, FileEntry], quantity: Reader = si_value) -> Json:
         """Texts, and quantities in SI units, by name: None for one that is wrong or missing.
 
         An optional entry that is not given has no value.
         """
-        values: dict[str, Any] = {}
+        values: Json = {}
         for entry in entries.values():
             key = self._key(entry)
             if self._given(key, not entry.required):
@@ -152,7 +153,7 @@ class Table:
             return _of(str, value, self._name(key), "a name or a table")
         return None
 
-    def built(self, kind: Callable[..., _Value], values: Mapping[str, Any]) -> _Value | None:
+    def built(self, kind: Callable[..., _Value], values: Json) -> _Value | None:
         """Object of these values; None if one of them is wrong."""
         with self.problems.collected():
             return None if None in values.values() else kind(**values)
@@ -196,7 +197,7 @@ class Table:
         return f"{self.where}.{key}".strip(".")
 
 
-def _of(kind: type[_Value], value: Any, name: str, what: str) -> _Value:
+def _of(kind: type[_Value], value: object, name: str, what: str) -> _Value:
     """Return a value of a type, given with its name and a description of the type for the message."""
     if not isinstance(value, kind):
         raise ScenarioError(f"{name} must be {what}. Received {shown(value)}. Compare with a preset.")

@@ -11,6 +11,7 @@ from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, TEXTS, WIDTHS
 from quakedesign.fault.friction import friction_law, friction_laws
 from quakedesign.fault.friction.base import FrictionLaw
 from quakedesign.fault.model import BOXES, UncertaintyBox
+from quakedesign.files import Json
 
 SCHEMA_NAME = "fault.schema.json"
 _COME_TO_REST = ("exponential-slip-weakening", "linear-slip-weakening")
@@ -80,7 +81,7 @@ def _first_paragraph(kind: type) -> str:
     return (inspect.getdoc(kind) or "").split("\n\n")[0].replace("\n", " ")
 
 
-def fault_schema() -> dict[str, Any]:
+def fault_schema() -> Json:
     """JSON Schema (draft 2020-12) of fault files, for editors that complete and check TOML."""
     friction = {"oneOf": [_law_schema(law) for _, law in sorted(friction_laws().items())]}
     box = [{"enum": sorted(BOXES)}, _table(WIDTHS)]
@@ -102,24 +103,24 @@ def fault_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "fault of quakedesign"} | schema
 
 
-def _table(entries: Mapping[str, FileEntry], **tables: Any) -> dict[str, Any]:
+def _table(entries: Mapping[str, FileEntry], **tables: Any) -> Json:
     """Schema of a table of these entries and of tables inside it."""
     properties = {name: _property(entry) for name, entry in entries.items()} | tables
     return _object(properties, [name for name, entry in entries.items() if entry.required])
 
 
-def _object(properties: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
+def _object(properties: Json, required: list[str]) -> Json:
     return {"type": "object", "additionalProperties": False, "required": required, "properties": properties}
 
 
-def _property(entry: FileEntry) -> dict[str, Any]:
+def _property(entry: FileEntry) -> Json:
     if entry.unit is None:
         return {"type": "string", "description": entry.description}
     kind = "string" if entry.unit else ["number", "string"]
     return {"type": kind, "description": entry.description, "examples": [entry.example]}
 
 
-def _law_schema(law: type[FrictionLaw]) -> dict[str, Any]:
+def _law_schema(law: type[FrictionLaw]) -> Json:
     """Schema of a table of friction, whose parameters are given by their names or symbols."""
     entries = entries_of(law)
     properties = {"law": {"const": law.name, "description": _first_paragraph(law)}} | _table(entries)["properties"]

@@ -12,7 +12,6 @@ from decimal import ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from math import inf, nextafter
 from pathlib import Path
-from typing import Any
 
 from quakedesign.discovery import user_code
 from quakedesign.errors import ScenarioError, UnknownNameError
@@ -37,7 +36,7 @@ from quakedesign.fault.model import (
     uncertainty_box,
 )
 from quakedesign.fault.units import si_value
-from quakedesign.files import parse_toml, read_text
+from quakedesign.files import Json, parse_toml, read_text
 from quakedesign.text import nearest_name
 
 # ----------------------------------------------------------------------
@@ -139,7 +138,7 @@ def step_assumed(fault: Fault) -> bool:
     return any(text.startswith(_STEP) for text in fault.assumed)
 
 
-def completed(parts: Mapping[str, Any], task: Mapping[str, float], remarks: tuple[str, ...] = ()) -> Fault:
+def completed(parts: Json, task: Mapping[str, float], remarks: tuple[str, ...] = ()) -> Fault:
     """Fault of what a file has, the rest filled in and told in `Fault.assumed`.
 
     Parameters
@@ -313,7 +312,7 @@ def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
 
 def fault_of_tables(table: Table, allow_code: bool) -> Fault | None:
     """Fault of a whole file; None if the table has problems."""
-    parts: dict[str, Any] = {"source": TEXTS["source"].default_text} | table.read(TEXTS | PLANT)
+    parts: Json = {"source": TEXTS["source"].default_text} | table.read(TEXTS | PLANT)
     parts["friction"] = read_friction(table.table("friction"), allow_code)
     task = _task(table.table("task", optional=True))
     parts["disturbance"] = _disturbance(table.table("disturbance", optional=True), _authority(parts))
@@ -355,7 +354,7 @@ def _task(table: Table) -> dict[str, float] | None:
     return None
 
 
-def _authority(parts: Mapping[str, Any]) -> Fraction:
+def _authority(parts: Json) -> Fraction:
     """A/m [m²/kg]; any number for a plant that is wrong, whose error is reported elsewhere."""
     density, *sides = (parts.get(name) for name in ("density", "length", "width"))
     given = [value for value in (density, *sides) if value is not None]
@@ -364,7 +363,7 @@ def _authority(parts: Mapping[str, Any]) -> Fraction:
     return 1 / (rational(density) * rational(min(given[1:])))
 
 
-def _assumed(parts: Mapping[str, Any], table: Table) -> tuple[str, ...]:
+def _assumed(parts: Json, table: Table) -> tuple[str, ...]:
     """What a file leaves open of its disturbance, for friction without a state."""
     if "disturbance" in parts["friction"].equilibrium.refused:
         return ()
@@ -377,7 +376,7 @@ def _assumed(parts: Mapping[str, Any], table: Table) -> tuple[str, ...]:
 def _disturbance(table: Table, authority: Fraction) -> Disturbance | None:
     stresses = []
 
-    def value(quantity: Any, unit: str, name: str) -> float:
+    def value(quantity: object, unit: str, name: str) -> float:
         if unit != "m/s^2":
             return si_value(quantity, unit, name)
         size, stressed = acceleration(quantity, authority, name)
@@ -408,13 +407,13 @@ def fault_toml(fault: Fault) -> str:
     law = type(fault.friction)
     name = law.name if law in friction_laws().values() else f"{law.__module__}:{law.__qualname__}"
     friction = _values(fault.friction, entries_of(law))
-    tables: dict[str, Mapping[str, Any]] = {
+    tables: dict[str, Json] = {
         "friction": {"law": name} | {key: value for key, value in friction.items() if key != "healing" or value},
         "task": _values(fault.reference, TASK) | {"sampling_time": f"{fault.sampling_time!r} s"},
         "disturbance": _values(fault.disturbance, DISTURBANCE) | _stresses(fault),
         "uncertainty": _values(fault.box, WIDTHS),
     }
-    top: dict[str, Any] = {"name": fault.name, "source": fault.source} | _values(fault, PLANT)
+    top: Json = {"name": fault.name, "source": fault.source} | _values(fault, PLANT)
     if fault.poor_fit:
         top["poor_fit"] = fault.poor_fit
     if fault.box == BOXES.get(fault.box.name):
@@ -427,7 +426,7 @@ def fault_toml(fault: Fault) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _values(part: object, entries: Mapping[str, FileEntry]) -> dict[str, Any]:
+def _values(part: object, entries: Mapping[str, FileEntry]) -> Json:
     """Values of the entries that a part has, quantities with their units."""
     return {
         name: f"{value!r} {entry.unit}" if entry.unit else value
@@ -448,7 +447,7 @@ def _stresses(fault: Fault) -> dict[str, str]:
     return stresses
 
 
-def written(value: Any) -> str:
+def written(value: str | float) -> str:
     """Text or number in TOML."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -121,7 +121,7 @@ def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
         return float(mpmath.findroot(drive, ends, solver="anderson", tol=1e-60, maxsteps=100, verify=False))
 
 
-def _turn(drive: Callable[[float], Any], furthest: float) -> tuple[float, float] | None:
+def _turn(drive: Callable[[float], float], furthest: float) -> tuple[float, float] | None:
     """Slips [m] between which an excess turns from driving to resisting; None where it does not drive at the start."""
     grid = [furthest * i / _SCAN for i in range(_SCAN + 1)]
     if drive(grid[1] / _SCAN) <= 0:
@@ -183,12 +183,6 @@ def require_all(*checks: Callable[[], None]) -> None:
         with problems.collected():
             check()
     problems.refuse()
-
-
-def require_seed(seed: int) -> None:
-    """Refuse what is no seed."""
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise ParameterError(f"seed must be a whole number of at least 0. Received {seed!r}.")
 
 
 def require_positive(remedy: str = "", **values: float | Fraction) -> None:
@@ -376,7 +370,7 @@ class SlidingReference:
 STRESSES = ("constant", "amplitude")
 
 
-def acceleration(quantity: Any, authority: Fraction, name: str) -> tuple[float, bool]:
+def acceleration(quantity: object, authority: Fraction, name: str) -> tuple[float, bool]:
     """Value [m/s²] of a text such as ``"1e-4 m/s^2"``, or of a shear stress such as ``"35 kPa"``; whether it was that.
 
     A stress τ accelerates a fault by τA/m: rounded up in size, so that what is proved of the float is so of the stress.

@@ -120,7 +120,7 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
     return {n: Quantity(n, unit, rational(value, n)) for n, (unit, value) in named.items() if value is not None}
 
 
-def _friction_unit(metadata: Mapping[str, Any]) -> str:
+def _friction_unit(metadata: Mapping[str, str]) -> str:
     """Unit with directed lengths: a law may state it as ``directed_unit``; a number is a friction coefficient."""
     return str(metadata.get("directed_unit", metadata["unit"] or _FRICTION))
 
@@ -458,7 +458,7 @@ def similarity(source: Fault, target: Fault, *, clock: str | None = None) -> Sim
     )
 
 
-def _law(fault: Fault) -> tuple[Any, ...]:
+def _law(fault: Fault) -> "tuple[sp.Expr, ...]":
     """Friction as a function, in symbols: equal for equal laws, whatever their parameters' values."""
     law, arguments = fault.friction.symbolic(), _arguments(fault.friction)
     return law.coefficient(*arguments), *law.state_rates(*arguments)

@@ -36,7 +36,7 @@ to load."""
 _WRITTEN = re.compile(r"([+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d{1,3})?)(?: ([A-Za-z1][A-Za-z0-9/^]*))?", re.ASCII)
 
 
-def _plain(quantity: Any, unit: str) -> Decimal | None:
+def _plain(quantity: object, unit: str) -> Decimal | None:
     """Value of a number with a common unit; None for any other text."""
     match = _WRITTEN.fullmatch(quantity) if isinstance(quantity, str) and len(quantity) <= 100 else None
     size = _PLAIN.get(unit, {}).get(match[2] or "") if match else None
@@ -70,7 +70,7 @@ def _registry() -> Any:
     return pint.UnitRegistry(non_int_type=Decimal, autoconvert_offset_to_baseunit=False)
 
 
-def si_value(quantity: Any, unit: str, name: str) -> float:
+def si_value(quantity: object, unit: str, name: str) -> float:
     """Value in an SI unit of a text such as ``"30 GPa"``; conversion in decimal arithmetic, rounded once.
 
     Parameters

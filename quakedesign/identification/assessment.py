@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
+from quakedesign.files import Json
 from quakedesign.identification.experiment import TREND, TREND_IN_TIME
 from quakedesign.identification.fitting import Fit, weighed
 from quakedesign.identification.loading import Loading
@@ -64,7 +65,7 @@ class Assessment:
             return f"{self.verdict}: residuals are {self.factor:.2g} times the noise"
         return self.verdict
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Everything that JSON can hold."""
         checks = [asdict(check) for check in self.checks]
         return {"verdict": self.verdict, "factor": self.factor, "checks": checks, "experiments": list(self.experiments)}

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy import ndarray
@@ -12,6 +11,7 @@ from numpy import ndarray
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import FrictionLaw
+from quakedesign.files import Json
 from quakedesign.identification.assessment import DECISIVE, EXPLAINS, EXPLAINS_NOT, Assessment, Check
 from quakedesign.identification.fitting import CONFIDENCE, Fit, Profile
 from quakedesign.identification.record import Record
@@ -63,7 +63,7 @@ class ParameterEstimate:
         """Whether the record sets both ends, of the joint region too."""
         return all(math.isfinite(end) for end in (self.low, self.high, self.least, self.most))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Value and ends, None for an end that the record does not set."""
         ends = {name: _finite(getattr(self, name)) for name in ("value", "low", "high")}
         return {**ends, "unit": self.unit, "identified": self.identified}
@@ -198,7 +198,7 @@ class Identification:
             open_ = [estimate for estimate in open_ if estimate.name not in pair]
         return texts + [f"{e.name} is not identifiable from this record: {_one_sided(e)}" for e in open_]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Everything that JSON can hold; SI units."""
         fit, difference = self.fit, self.difference
         return {

@@ -10,10 +10,10 @@ import numpy as np
 import sympy as sp
 from numpy import ndarray
 
-from quakedesign.errors import RecordError, UnknownNameError, require_known
+from quakedesign.errors import RecordError, UnknownNameError, require_known, require_whole
 from quakedesign.fault import FrictionLaw, friction_law
 from quakedesign.fault.equilibrium import by_equilibrium
-from quakedesign.fault.model import require_positive, require_seed
+from quakedesign.fault.model import require_positive
 from quakedesign.identification.assessment import (
     DECISIVE,
     Assessment,
@@ -298,7 +298,7 @@ def identified_as(
     seed: int = 0,
 ) -> Identification:
     """`identify` by given laws, of which the likeliest is taken."""
-    require_seed(seed)
+    require_whole(0, seed=seed)
     require_positive(stiffness=1.0 if stiffness is None else stiffness)
     require_known(trend, TREND_CHOICES, "trend", UnknownNameError)
     if len(record.time) < 2 or not np.ptp(record.friction) > 0:

@@ -26,7 +26,7 @@ ORDER = 3
 _DIAGONAL = 0.5
 
 
-def step(field: Callable[[Any], Any], y: Any, length: Any) -> tuple[Any, Any]:
+def step(field: Callable[[ca.SX], ca.SX], y: ca.SX, length: ca.SX) -> tuple[ca.SX, ca.SX]:
     """State after one L-stable step of order 3, and the estimate of its error (that of an embedded order 2).
 
     `field` gives dy/dt of y, both CasADi SX columns; time must not enter. Nothing changes in a step of length 0 [s].
@@ -35,7 +35,7 @@ def step(field: Callable[[Any], Any], y: Any, length: Any) -> tuple[Any, Any]:
     rates = field(y)
     inverse = ca.inv(ca.SX.eye(y.numel()) - _DIAGONAL * length * ca.jacobian(rates, y))
 
-    def stage(at: Any, memory: Any) -> Any:
+    def stage(at: ca.SX, memory: ca.SX | float) -> ca.SX:
         return _DIAGONAL * (inverse @ (length * at + memory))
 
     first = stage(rates, 0)
@@ -219,11 +219,11 @@ def _built(
     friction = without_overflow(symbolic.coefficient(x1, *moving))
     rows = [friction, *(friction.diff(x) for x in moving), *symbolic.state_rates(x1, *moving)]
 
-    def at(expressions: Any, y: Any) -> list[Any]:
+    def at(expressions: list[Any], y: ca.SX) -> list[ca.SX]:
         now = {x: ca.exp(y[i]) for i, x in enumerate(moving)}
         return to_casadi(expressions, fitted_quantities(law, names, q, linear) | now)
 
-    def field(y: Any) -> Any:
+    def field(y: ca.SX) -> ca.SX:
         """d/dt of the logarithms of rate and states, from d(σ'μ)/dt = k(load rate − rate)."""
         mu, mu_rate, *others = at(rows, y)
         load, growth, compliance = u[1], u[2], u[3]

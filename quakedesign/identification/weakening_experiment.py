@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -35,17 +34,17 @@ class _Weakening(Experiment):
         rows = self._rows(self._expressions[2:], slip, fitted)
         return np.asarray(np.array(rows).T * np.exp(fitted[: len(self._symbols)]))
 
-    def _rows(self, expressions: Any, slip: ndarray, fitted: ndarray) -> list[ndarray]:
+    def _rows(self, expressions: list[sp.Expr], slip: ndarray, fitted: ndarray) -> list[ndarray]:
         values = dict(zip(self._symbols, np.exp(fitted[: len(self._symbols)]), strict=True))
-        return [row + np.zeros_like(slip) for row in to_numpy(expressions, values | {x1: slip})]
+        return [np.asarray(row + np.zeros_like(slip)) for row in to_numpy(expressions, values | {x1: slip})]
 
     @cached_property
-    def _symbols(self) -> list[Any]:
+    def _symbols(self) -> list[sp.Symbol]:
         symbols = self.law.symbols()
         return [symbols[c.name] for c in self.coordinates if c.name in symbols]
 
     @cached_property
-    def _expressions(self) -> list[Any]:
+    def _expressions(self) -> list[sp.Expr]:
         friction = sp.sympify(self.law.symbolic().coefficient(x1, 0)).rewrite(sp.Piecewise)
         return [friction, *(friction.diff(symbol) for symbol in (x1, *self._symbols))]
 

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from typing import Any
 
 import numpy as np
 from flint import arb, fmpq, fmpq_mat
@@ -31,17 +30,17 @@ Rows = Sequence[Sequence[Fraction]]
 Matrix = tuple[tuple[Fraction, ...], ...]
 
 
-def floats(matrix: Any) -> Any:
+def floats(matrix: Sequence[Sequence[Fraction | float]] | np.ndarray) -> np.ndarray:
     """Array of floats."""
     return np.array([[float(v) for v in row] for row in matrix])
 
 
-def exact(matrix: Any) -> Matrix:
+def exact(matrix: Sequence[Sequence[Fraction | float]] | np.ndarray) -> Matrix:
     """Rational matrix with the exact values of floats."""
     return tuple(tuple(Fraction(float(v)) for v in row) for row in matrix)
 
 
-def rounded(matrix: Any, bits: int = 60) -> Matrix:
+def rounded(matrix: Sequence[Sequence[Fraction | float]] | np.ndarray, bits: int = 60) -> Matrix:
     """Symmetric rational matrix near a symmetric one: entry (i, j) to `bits` binary digits of √(m_ii m_jj)."""
     n = len(matrix)
     sizes = [max(abs(float(matrix[i][i])), 1e-300) for i in range(n)]
@@ -302,7 +301,7 @@ class Polytope:
     states: tuple[str, ...]
     vertices: Mapping[str, Matrix]  # Exact, by the name of the vertex
 
-    def floats(self) -> list[Any]:
+    def floats(self) -> list[np.ndarray]:
         """Vertices as arrays (n × n)."""
         return list(map(floats, self.vertices.values()))
 
@@ -347,18 +346,18 @@ class ModalScaling:
     They do not depend on the units of x; time is counted in 1/pace.
     """
 
-    transform: Any  # ndarray, shape (n, n): T
-    inverse: Any  # ndarray, shape (n, n)
-    poles: Any  # ndarray, shape (n,): Moduli of the mean's eigenvalues over `pace` [-]
+    transform: np.ndarray  # shape (n, n): T
+    inverse: np.ndarray  # shape (n, n)
+    poles: np.ndarray  # shape (n,): Moduli of the mean's eigenvalues over `pace` [-]
     pace: float  # Largest modulus [rad/s]
 
-    def matrices(self, polytope: Polytope) -> list[Any]:
+    def matrices(self, polytope: Polytope) -> list[np.ndarray]:
         """Vertices in z and scaled time."""
         return [self.inverse @ A @ self.transform / self.pace for A in polytope.floats()]
 
-    def back(self, form: Any) -> Any:
+    def back(self, form: np.ndarray) -> np.ndarray:
         """Matrix of the quadratic form zᵀFz in x."""
-        return self.inverse.T @ form @ self.inverse
+        return np.asarray(self.inverse.T @ form @ self.inverse)
 
 
 def modal_scaling(polytope: Polytope, entries: Sequence[Sequence[float]]) -> ModalScaling:
@@ -382,7 +381,7 @@ def modal_scaling(polytope: Polytope, entries: Sequence[Sequence[float]]) -> Mod
     return ModalScaling(transform=T, inverse=np.linalg.inv(T), poles=poles, pace=pace)
 
 
-def _modes(mean: Any) -> tuple[Any, Any]:
+def _modes(mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Real eigenvectors as columns (real and imaginary part of a pair) and the moduli of their eigenvalues."""
     values, vectors = np.linalg.eig(mean)
     columns, moduli = [], []

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
@@ -44,6 +43,7 @@ from quakedesign.symbolic.terms import Term
 # ----------------------------------------------------------------------
 # Continuous algebraic Riccati equations: proposed by python-control, refined with exact residuals.
 
+Entries = Sequence[Sequence[Fraction | float]] | np.ndarray
 METHOD = "scipy"
 _STEPS = 12
 _ENOUGH = Fraction(1, 10**30)
@@ -59,7 +59,7 @@ class RiccatiSolution:
     residual: Fraction
 
 
-def solve_care(a: Any, g: Any, q: Any) -> RiccatiSolution:
+def solve_care(a: Entries, g: Entries, q: Entries) -> RiccatiSolution:
     """Stabilising solution of Q + AᵀX + XA − XGX = 0.
 
     python-control's `care` (method "scipy") proposes X, first in the given states, then in states scaled by powers
@@ -89,11 +89,11 @@ def solve_care(a: Any, g: Any, q: Any) -> RiccatiSolution:
     return RiccatiSolution(X=back, residual=residual)
 
 
-def _rational(matrix: Any) -> Matrix:
+def _rational(matrix: Entries) -> Matrix:
     return tuple(tuple(v if isinstance(v, Fraction) else Fraction(float(v)) for v in row) for row in matrix)
 
 
-def _scaled(a: Matrix, g: Matrix, q: Matrix, units: Any) -> tuple[Matrix, Matrix, Matrix]:
+def _scaled(a: Matrix, g: Matrix, q: Matrix, units: Sequence[Fraction]) -> tuple[Matrix, Matrix, Matrix]:
     """Data in states y with x = diag(units)·y."""
 
     def change(m: Matrix, left: int, right: int) -> Matrix:
@@ -105,7 +105,7 @@ def _scaled(a: Matrix, g: Matrix, q: Matrix, units: Any) -> tuple[Matrix, Matrix
     return change(a, -1, 1), change(g, -1, -1), change(q, 1, 1)
 
 
-def _propose(a: Matrix, g: Matrix, q: Matrix) -> Any:
+def _propose(a: Matrix, g: Matrix, q: Matrix) -> np.ndarray:
     """Floating-point X from python-control, with BR⁻¹Bᵀ = G by its eigenvalues."""
     import control
 
@@ -122,7 +122,7 @@ def _propose(a: Matrix, g: Matrix, q: Matrix) -> Any:
     return np.asarray(solution)
 
 
-def _refined(a: Matrix, g: Matrix, q: Matrix, proposal: Any) -> tuple[Matrix, Fraction]:
+def _refined(a: Matrix, g: Matrix, q: Matrix, proposal: np.ndarray) -> tuple[Matrix, Fraction]:
     """Newton steps, Lyapunov equations in floating point, residuals exact; the best X and its relative residual."""
     best = rounded(proposal, 100)
     least = relative_residual(a, g, q, best)
@@ -178,11 +178,11 @@ class ScaledDesign:
         self.B = np.array([[0.0], [1.0], [0.0], [0.0]])
         self.g = tuple(float(g) for g in self.inside.bounds)
 
-    def bound(self, split: float | Fraction) -> Any:
+    def bound(self, split: float | Fraction) -> np.ndarray:
         """W with h² ≤ xᵀWx."""
         return floats(sound_bound(self.inside.bounds, Fraction(split)))
 
-    def solve(self, R: float, split: float | None = None) -> tuple[Any, Any, Any, float]:
+    def solve(self, R: float, split: float | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         """K, S, E and the split of W for a weight R; the best split unless one is given.
 
         Raises
@@ -214,11 +214,11 @@ class ScaledDesign:
         )
         return round(float(best.x), 6)
 
-    def gains(self, K: Any) -> list[float]:
+    def gains(self, K: Entries) -> list[float]:
         """K in SI."""
         return [float(k) for k in self.scales.gains_outside([Fraction(float(v)) for v in K[0]])]
 
-    def fastest_pole(self, K: Any) -> float:
+    def fastest_pole(self, K: Entries) -> float:
         """Largest modulus of a pole over the vertices of the uncertainty [rad/s]."""
         return max(abs(pole) for pole in vertex_poles(self.outside.sectors, self.gains(K)))
 
@@ -302,11 +302,11 @@ class RiccatiDesign:
 
     controller: ExtendedLQR
     lyapunov: tuple[Term, ...]
-    K: Any
-    Q: Any
+    K: np.ndarray
+    Q: np.ndarray
     R: float
-    S: Any
-    E: Any
+    S: np.ndarray
+    E: np.ndarray
     split: float
     residual: float
     fastest_pole: float

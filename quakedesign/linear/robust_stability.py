@@ -15,6 +15,7 @@ from scipy.linalg import eigh
 from quakedesign.errors import CertificateError, WorkError
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, nearest, rational
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.linear.frequency import FrequencyFacts, circle_limit, frequency_properties, slip_limit
 from quakedesign.linear.linear_problem import FeedbackLoop, Polytope, Vertex, modal_scaling, polytope_of
@@ -40,7 +41,7 @@ _DECADES, _GOOD = 13, 0.85
 class QuadraticProposal:
     """Floating-point V = xᵀPx for a polytope; proves nothing."""
 
-    form: Any  # ndarray, shape (n, n): P
+    form: np.ndarray  # shape (n, n): P
     rate: float  # Largest a with V′ ≤ −2aV at every vertex [1/s]
 
 
@@ -71,7 +72,7 @@ class CommonQuadratic:
         form = (form + form.T) / 2
         return QuadraticProposal(form=self.scaling.back(form), rate=self._decay(form) * self.scaling.pace)
 
-    def _decay(self, form: Any) -> float:
+    def _decay(self, form: np.ndarray) -> float:
         return min(float(eigh(-(A.T @ form + form @ A), 2 * form, eigvals_only=True)[0]) for A in self.systems)
 
     def fastest(self, tolerance: float = 1e-3) -> QuadraticProposal | None:
@@ -199,7 +200,7 @@ class SlopeMargin:
     working_slope: Fraction
     certificate: Certificate | None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact numbers as texts, measured ones as numbers."""
         return {
             "friction_slope_margin": self.certified.exact,
@@ -293,7 +294,7 @@ class GainRange:
     low_limit: LowerBound
     certificates: tuple[Certificate, ...]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact numbers as texts."""
         return {"beta_low": self.low.exact, "beta_high": self.high.exact, "beta_low_limit": self.low_limit.exact}
 
@@ -393,7 +394,7 @@ class Analysis:
             by_name["low-beta"], by_name["high-beta"] = self.span.certificates
         return {name: certificate for name, certificate in by_name.items() if certificate is not None}
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact numbers as texts, measured ones as numbers, SI."""
         return {
             "verdict": str(self.verdict),

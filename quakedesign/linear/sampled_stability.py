@@ -14,7 +14,7 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from flint import acb_mat, arb_mat, ctx
+from flint import acb, acb_mat, arb_mat, ctx
 
 from quakedesign.cache import search_once
 from quakedesign.exact import LowerBound, UpperBound, rational
@@ -137,14 +137,14 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
     return None
 
 
-def proposed(programme: Callable[..., list[Any]], *question: Any) -> list[Any]:
+def proposed(programme: Callable[..., list[Rows]], *question: object) -> list[Rows]:
     """What a programme proposes, or has proposed before; it is solved where somebody waits for it."""
     if handing_back():
         return programme(*question)
     return list(search_once(lambda: programme(*question), programme.__module__, *question))
 
 
-def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> list[Any]:
+def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> list[Rows]:
     """P and W with the largest margin, in units in which all parts of the law are as large."""
     import cvxpy as cp
 
@@ -184,10 +184,10 @@ def solved(program: Any, margin: Any) -> bool:
     return False
 
 
-def scaled(matrix: Rows, rows: Iterable[Fraction], columns: Iterable[Fraction]) -> Any:
+def scaled(matrix: Rows, rows: Iterable[Fraction], columns: Iterable[Fraction]) -> np.ndarray:
     """Matrix in other units of its rows and columns, in floating point."""
     across = np.array([float(u) for u in columns]) / np.array([[float(u)] for u in rows])
-    return floats(matrix) * across
+    return np.asarray(floats(matrix) * across)
 
 
 def balanced_units(K: Sequence[Fraction]) -> tuple[Fraction, ...]:
@@ -319,7 +319,7 @@ def clock_proof(
 
 def _propose_clock_dependent(
     problem: LinearProblem, K: Sequence[Fraction], lengths: Sequence[Fraction], degree: int
-) -> list[Any]:
+) -> list[Rows]:
     """P_0 … P_D with the largest margin, in units in which all parts of the law are as large."""
     import cvxpy as cp
 
@@ -352,7 +352,7 @@ _TOLERANCE = 0.01  # relative width at which the bisection stops
 _BITS = (100, 2000)  # the second for a plant that grows far within a period
 
 
-def poles(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, vertex: Vertex) -> list[Any]:
+def poles(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, vertex: Vertex) -> list[acb]:
     """Eigenvalues of one period in x1, x2, ξ1, ξ2 at constant (β, s, w), as complex balls; not finite if not isolated.
 
     Parameters
@@ -368,7 +368,7 @@ def poles(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, ver
     flow = ((_ZERO, _ONE, _ZERO), (s, -w, beta * problem.sectors.authority), (_ZERO,) * 3)
     start = ((_ONE, _ZERO, _ZERO, _ZERO), (_ZERO, _ONE, _ZERO, _ZERO), tuple(-k for k in gains))
     sums = ((step, _ZERO, _ONE, _ZERO), (_ZERO, _ZERO, step, _ONE))
-    values = list[Any]()
+    values = list[acb]()
     for bits in _BITS:
         with ctx.workprec(bits):
             moved = (matrix(times(step, flow)).exp() * matrix(start)).tolist()
@@ -386,7 +386,7 @@ class HeldPoles:
     problem: LinearProblem  # In SI
     gains: Sequence[Fraction]
 
-    def at(self, step: Fraction) -> dict[Vertex, list[Any]]:
+    def at(self, step: Fraction) -> dict[Vertex, list[acb]]:
         """Poles by corner (β, s [1/s²], w [1/s]) at a period [s]."""
         scales = self.problem.scales()
         inside, push = self.problem.nondimensional(scales), scales.gains_inside(self.gains)

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from quakedesign.errors import OutputError
 from quakedesign.exact import rational
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.guarantees import ContinuousProof, NoProof
 from quakedesign.guarantees.exact.guarantee_files import save_guarantee
 from quakedesign.guarantees.search.linear_design import certified_peaks
@@ -96,12 +96,12 @@ class LinearVerdict:
     fault: Fault
     controller: ExtendedLQR
     analysis: Analysis
-    facts: Mapping[str, Any]  # mapping: See `linear_entries`
+    facts: Json  # See `linear_entries`
     held: HeldLoop  # What is decided when p is held over the sampling period asked for
     peaks: ContinuousProof | NoProof | None  # In continuous time; None when they were not asked for
     asked: str | None = None  # Class of the disturbance for which peaks were asked for
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values: exact numbers as texts, measured ones as numbers, SI."""
         return {
             **self.analysis.to_dict(),
@@ -185,7 +185,7 @@ def judge(
     )
 
 
-def linear_entries(fault: Fault, controller: ExtendedLQR, sampled: HeldLoop) -> dict[str, Any]:
+def linear_entries(fault: Fault, controller: ExtendedLQR, sampled: HeldLoop) -> Json:
     """Bounds of the uncertainty, smallest gains and sampled stability.
 
     Parameters

@@ -1,13 +1,12 @@
 """Invariant polytopes of the stick–slip plant in Gallina: loop, facets, responses, multipliers."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from itertools import product
 from math import ceil, floor, log10
-from typing import Any
 
-from flint import ctx
+from flint import arb, ctx
 
 from quakedesign.errors import UnsupportedError
 from quakedesign.exact import fraction_of
@@ -111,7 +110,7 @@ def _responses(period: Period) -> str:
     return f"Responses {nodes}\n  ({_near(period.of_force[0])}) ({_near(period.of_force[1])})"
 
 
-def _near(value: Any) -> str:
+def _near(value: arb) -> str:
     """Middle and radius of a ball, in units."""
     middle, radius = (fraction_of(part.fmpq()) * (1 << _BITS) for part in (value.mid(), value.rad()))
     return f"Near ({gallina.integer(floor(middle))}) {gallina.integer(ceil(radius) + (2 << _BITS - _OFF) + 2)}"
@@ -147,12 +146,12 @@ class _Hint:
     turn: int | None = None  # the constraint that the target rate is not negative
 
     @classmethod
-    def of(cls, verifier: Verifier, basis: Any, shares: Any) -> "_Hint":
+    def of(cls, verifier: Verifier, basis: Iterable[int], shares: Iterable[float]) -> "_Hint":
         """By a vertex."""
         return cls(False, tuple(zip(map(int, basis), shares, strict=True)))
 
     @classmethod
-    def itself(cls, verifier: Verifier, left: Any) -> "_Hint":
+    def itself(cls, verifier: Verifier, left: Sequence[float]) -> "_Hint":
         """By the facet itself, and what `Verifier.largest` uses besides."""
         more = [(len(verifier.rows) - 1, left[3])] if len(left) > 3 else []
         more += [(verifier.last, left[0])] if verifier.last is not None else []

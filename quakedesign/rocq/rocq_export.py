@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.files import made_folder, sole_writer, write_whole
@@ -38,7 +38,7 @@ _KINDS = (
 _DATA = "(* " + "=" * 16 + " the certificate *)\n\nLocal Open Scope nat_scope.\n"
 
 
-def rocq_text(raw: Any) -> str:
+def rocq_text(raw: object) -> str:
     """Text of the file for ``coqc``, from a parsed certificate file; the same for the same certificate.
 
     Raises
@@ -52,7 +52,7 @@ def rocq_text(raw: Any) -> str:
     return "\n".join([*library(parts), _DATA, statement_text(raw)])
 
 
-def statement_text(raw: Any) -> str:
+def statement_text(raw: object) -> str:
     """Statement, data and theorem, without the library. Raises as `rocq_text`."""
     written = {ATTRACTION: _attraction, POLYNOMIAL: _polynomial, STICK_SLIP: _stick_slip}.get(kind_of(raw), _loop)
     return "\n".join(written(raw)) + "\n"
@@ -125,11 +125,11 @@ def library(names: Sequence[str] = _LIBRARY) -> list[str]:
     raise UnsupportedError(f"the Rocq library must be in {places[0]}. Found nothing. Install the package again.")
 
 
-def _stick_slip(raw: Any) -> Iterator[str]:
+def _stick_slip(raw: object) -> Iterator[str]:
     yield from polytope_theorem(cast(StickSlipProof, read_guarantee(raw)))
 
 
-def _polynomial(raw: Any) -> Iterator[str]:
+def _polynomial(raw: object) -> Iterator[str]:
     statement, proof = read_polynomial_file(raw)
     yield f"(* variables 0, 1, ...: {', '.join(statement.variables)} *)"
     yield f"Definition asked : question := {gallina.question(statement)}."
@@ -164,7 +164,7 @@ def _nonnegative(statement: Statement, proof: SumOfSquares) -> Iterator[str]:
     )
 
 
-def _attraction(raw: Any) -> Iterator[str]:
+def _attraction(raw: object) -> Iterator[str]:
     claim = read_attraction_file(raw)
     if not isinstance(claim.proof, LyapunovProof):
         raise UnsupportedError(f"{_KINDS} Received a point that refutes an attraction. Use check.py.")
@@ -202,7 +202,7 @@ def _part(statement: Statement, proof: SumOfSquares | Witness, check: str, tail:
     )
 
 
-def _loop(raw: Any) -> Iterator[str]:
+def _loop(raw: object) -> Iterator[str]:
     if isinstance(raw, dict) and ("kind" in raw or "refutation" in raw):
         raise UnsupportedError(f"{_KINDS} Received a {raw.get('kind', 'refutation')}. Use check.py.")
     evidence = evidence_of(raw)

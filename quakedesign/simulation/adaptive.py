@@ -113,12 +113,12 @@ def _piece(
     return vectors
 
 
-def field(recorder: Recorder) -> Any:
+def field(recorder: Recorder) -> ca.Function:
     """CasADi Function (t [s], state, factors) → its time derivative, works per unit mass and time."""
     time, state = ca.SX.sym("t"), ca.SX.sym("state", recorder.state_size)
     factors = ca.SX.sym("factors", len(recorder.loop.factors))
     loop = recorder.loop.with_factors(tuple(ca.vertsplit(factors)) if recorder.loop.factors else ())
     counter = time / recorder.step
-    rates = recorder.scheme.rates(loop, counter, state, recorder.step)
+    rates: Any = recorder.scheme.rates(loop, counter, state, recorder.step)
     pressure = recorder.scheme.pressure(loop, counter, state, recorder.step)
     return ca.Function("field", [time, state, factors], [rates, loop.powers(time, state[:2], pressure)])

@@ -70,7 +70,7 @@ class BlockRun:
         }
 
 
-def reference(chain: BlockChain, time: Any) -> tuple[Any, Any]:
+def reference(chain: BlockChain, time: ca.SX | float) -> tuple[ca.SX, ca.SX]:
     """r [m] and r' [m/s] at a time [s], in CasADi."""
     task = chain.fault.reference
     stage = ca.fmin(time / task.operation_time, 1)
@@ -78,7 +78,7 @@ def reference(chain: BlockChain, time: Any) -> tuple[Any, Any]:
     return task.target_slip * task.shape(stage), mean * 30 * stage**2 * (1 - stage) ** 2
 
 
-def decided(chain: BlockChain, law: Any, count: Any, x: Any, v: Any, z: Any) -> tuple[Any, Any]:
+def decided(chain: BlockChain, law: Any, count: ca.SX, x: ca.SX, v: ca.SX, z: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Pressures of the wells [Pa] that a law decides, and its states after that, in CasADi.
 
     In slow sliding the pressures are those beside the plan.
@@ -116,7 +116,7 @@ class _Period:
     law: Any
     substeps: int
 
-    def function(self) -> Any:
+    def function(self) -> ca.Function:
         """What is carried from period to period: see `sizes`."""
         slip, speed = sp.Symbol("slip", real=True), sp.Symbol("speed", real=True)
         chain, fault, law = self.chain, self.chain.fault, self.law
@@ -133,7 +133,7 @@ class _Period:
         kicked = fault.disturbance
         phases = 2 * np.pi * np.arange(N) / N
 
-        def friction(slips: Any, rates: Any) -> Any:
+        def friction(slips: ca.SX, rates: ca.SX) -> ca.SX:
             laws = [block.friction.extended(slip, speed) for block in chain.blocks]
             values = [to_casadi([mu], {slip: slips[i], speed: rates[i]})[0] for i, mu in enumerate(laws)]
             return ca.vertcat(*values)

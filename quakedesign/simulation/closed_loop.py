@@ -6,7 +6,7 @@ without new derivation or compilation; energy budget of a run [J].
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, fields, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -23,10 +23,12 @@ from quakedesign.fault.model import require_nonnegative
 from quakedesign.laws import Controller
 from quakedesign.laws.feed_forward import NONE
 from quakedesign.laws.sampled_controller import integral_symbols, law_expressions, r, r_acceleration, r_rate
-from quakedesign.loop.schemes.base import Stepped
+from quakedesign.loop.schemes.base import Motion, Stepped
 from quakedesign.simulation.integrators import Integrator
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_casadi
+
+Number = ca.SX | float
 
 # ----------------------------------------------------------------------
 # What acts on a run beside the fault's own disturbance: the far field, and a perturbation of the user's.
@@ -146,7 +148,7 @@ def names() -> tuple[str, ...]:
     return tuple(field.name for field in fields(Variation))
 
 
-def complete(factors: tuple[Any, ...]) -> tuple[Any, ...]:
+def complete(factors: tuple[Number, ...]) -> tuple[Number, ...]:
     """All factors, those left out at the end as in the nominal fault."""
     return factors + astuple(Variation())[len(factors) :]
 
@@ -166,17 +168,17 @@ class WeakenedFriction:
     """A friction law of which only a share of the drop takes place."""
 
     law: FrictionLaw
-    share: Any
+    share: sp.Expr
 
-    def coefficient(self, slip: Any, rate: Any) -> Any:
+    def coefficient(self, slip: sp.Expr, rate: sp.Expr) -> sp.Expr:
         """Friction coefficient [-]."""
         return self._weakened(self.law.coefficient(slip, rate))
 
-    def extended(self, slip: Any, rate: Any) -> Any:
+    def extended(self, slip: sp.Expr, rate: sp.Expr) -> sp.Expr:
         """Friction coefficient [-] continued to all slips and rates."""
         return self._weakened(self.law.extended(slip, rate))
 
-    def _weakened(self, value: Any) -> Any:
+    def _weakened(self, value: sp.Expr) -> sp.Expr:
         residual = sp.sympify(self.law.bounds[0])
         return residual + self.share * (value - residual)
 
@@ -255,20 +257,20 @@ class Meter:
         So far, in the order of `WORKS`.
     """
 
-    def __init__(self, loop: Any, works: Any) -> None:
+    def __init__(self, loop: "ClosedLoop", works: ca.SX) -> None:
         self.loop, self.works = loop, works
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.loop, name)
 
-    def advance(self, method: Any, motion: Any, state: Any, step: float) -> Any:
+    def advance(self, method: type[Integrator], motion: Motion, state: ca.SX, step: float) -> ca.SX:
         """See `Stepped.advance`; the works are integrated along with the motion."""
         size = state.shape[0]
 
-        def with_powers(plant: Any, passed: Any, now: Any) -> Any:
-            seen: list[Any] = []
+        def with_powers(plant: Motion, passed: ca.SX, now: ca.SX) -> ca.SX:
+            seen: list[ca.SX] = []
 
-            def watched(time: Any, x: Any, pressure: Any) -> Any:
+            def watched(time: ca.SX, x: ca.SX, pressure: ca.SX) -> ca.SX:
                 seen[:] = [self.loop.powers(time, x, pressure)]
                 return plant(time, x, pressure)
 
@@ -278,7 +280,9 @@ class Meter:
         self.works = self.works + end[size:]
         return end[:size]
 
-    def advance_often(self, method: Any, motion: Any, given: Any, state: Any, step: float, times: int) -> Any:
+    def advance_often(
+        self, method: type[Integrator], motion: Motion, given: ca.SX, state: ca.SX, step: float, times: int
+    ) -> ca.SX:
         """See `Stepped.advance_often`."""
         state, self.works = self.loop.metered_often(method, motion, given, (state, self.works), step, times)
         return state
@@ -294,24 +298,24 @@ class Metered(Stepped):
     """
 
     load: Load
-    factors: tuple[Any, ...]
+    factors: tuple[Number, ...]
 
     @property
     @abstractmethod
-    def friction(self) -> Any:
+    def friction(self) -> Motion:
         """Function x [m, m/s] → friction coefficient [-]."""
 
     @property
     @abstractmethod
-    def static_friction(self) -> Any:
+    def static_friction(self) -> Number:
         """Friction coefficient [-] on the verge of slip."""
 
     @property
     @abstractmethod
-    def shaken(self) -> Any:
+    def shaken(self) -> Motion:
         """Function (t [s], x [m, m/s]) → φ̂_e [m/s²]."""
 
-    def powers(self, time: Any, x: Any, pressure: Any) -> Any:
+    def powers(self, time: ca.SX, x: ca.SX, pressure: ca.SX) -> ca.SX:
         """Integrands per unit mass in the order of `WORKS` (SX): [W/kg], and x1 [m] for the last.
 
         Friction counts relative to its static value under the whole normal stress, whose work is exact in the slip.
@@ -330,7 +334,7 @@ class Metered(Stepped):
     def budget(self, integrals: Mapping[str, float], time: float, slip: float, rate: float) -> EnergyBudget:
         """Budget of a run from rest that has taken a time [s], from the integrals of `powers` and its last state."""
         mass, drift = self.fault.mass, self.load.drift
-        stiffness, normal, damping, stress = self.hats()
+        stiffness, normal, damping, stress = map(float, self.hats())
         static = normal * stress * float(self.static_friction)
         tension, opened = static - damping * drift, drift * time - slip
         pull = tension * time + stiffness * (drift * time**2 / 2 - integrals["sum_slip"]) + damping * opened
@@ -344,7 +348,7 @@ class Metered(Stepped):
             disturbance=mass * integrals["work_disturbance"],
         )
 
-    def hats(self) -> tuple[Any, Any, Any, float]:
+    def hats(self) -> tuple[Number, Number, Number, float]:
         """k̂ [1/s²], N̂ [m²/kg], η̂ [1/s] with the factors of the loop, and σ' [Pa]."""
         numbers = plant.plant_values(self.fault)
         stiffness, damping, authority = self.factors[:3] or (1.0,) * 3
@@ -355,7 +359,6 @@ class Metered(Stepped):
 # ----------------------------------------------------------------------
 # Plant, law and reference of one closed loop, from SymPy to CasADi functions.
 
-Motion = Callable[[Callable[[Any, Any, Any], Any], Any, Any], Any]
 
 phi = sp.Symbol("phi", real=True)
 
@@ -412,7 +415,7 @@ def _with_numbers(expression: sp.Expr, fault: Fault, varied: bool) -> sp.Expr:
     return _inserted(expression, law, varied_values(fault) if varied else plant.plant_values(fault))
 
 
-def _inserted(expression: sp.Expr, law: Any, values: Mapping[Any, Any]) -> sp.Expr:
+def _inserted(expression: sp.Expr, law: FrictionLaw, values: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
     """Insert law and values; e^u becomes 1 + (e^u − 1), so that small slips do not drown in rounding."""
     lawful = plant.with_law(expression, law, extended=True)
     numbers = lawful.replace(plant.disturbance, lambda *_: phi).subs(values)
@@ -431,13 +434,13 @@ class ClosedLoop(Metered):
     constant_pressure: float = 0.0  # p [Pa] where there is no controller
     load: Load = NOTHING  # What acts on the fault beside its own disturbance
     # tuple of float or SX: True over nominal parameters as in `Variation.values`; empty for the nominal fault
-    factors: tuple[Any, ...] = ()
+    factors: tuple[Number, ...] = ()
 
-    def with_factors(self, factors: tuple[Any, ...]) -> Self:
+    def with_factors(self, factors: tuple[Number, ...]) -> Self:
         """Return the same loop with other true parameters, which may be symbols of CasADi (SX)."""
         return replace(self, factors=factors) if factors else self
 
-    def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float, works: int = 0) -> Any:
+    def advance(self, method: type[Integrator], motion: Motion, state: ca.SX, step: float, works: int = 0) -> ca.SX:
         """State [x1, x2, ξ] (SX) after one step.
 
         Parameters
@@ -453,8 +456,8 @@ class ClosedLoop(Metered):
         return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)
 
     def advance_often(
-        self, method: type[Integrator], motion: Any, given: Any, state: Any, step: float, times: int
-    ) -> Any:
+        self, method: type[Integrator], motion: Motion, given: ca.SX, state: ca.SX, step: float, times: int
+    ) -> ca.SX:
         """State (SX) after a number of steps; what happens in one is a function in generated C, called in a loop.
 
         Parameters
@@ -469,11 +472,17 @@ class ClosedLoop(Metered):
         return self.metered_often(method, motion, given, (state, ca.SX(0, 1)), step, times)[0]
 
     def metered_often(
-        self, method: type[Integrator], motion: Any, given: Any, start: tuple[Any, Any], step: float, times: int
-    ) -> tuple[Any, Any]:
+        self,
+        method: type[Integrator],
+        motion: Motion,
+        given: ca.SX,
+        start: tuple[ca.SX, ca.SX],
+        step: float,
+        times: int,
+    ) -> tuple[ca.SX, ca.SX]:
         """State and works so far (SX) after a number of steps, see `advance_often`; works without entries stay so."""
 
-        def once(loop: Self, moving: Motion, state: Any, works: Any) -> tuple[Any, Any]:
+        def once(loop: Self, moving: Motion, state: ca.SX, works: ca.SX) -> tuple[ca.SX, ca.SX]:
             if not works.shape[0]:
                 return loop.advance(method, moving, state, step), works
             meter = Meter(loop, works)
@@ -505,30 +514,26 @@ class ClosedLoop(Metered):
         return sp.Rational(str(least)) * plant.plant_values(self.fault)[plant.N_hat]
 
     @property
-    def plant(self) -> Any:
+    def plant(self) -> Motion:
         """CasADi Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²]."""
         return self.printed
 
     @cached_property
-    def printed(self) -> Any:
+    def printed(self) -> Motion:
         """The same of the plant as the paper prints it, eq. shift, which holds for slip rates that are not negative."""
         rates = [plant.x2, acceleration_expression(self.fault, bool(self.factors))]
         inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p]}
         return self.function("plant", inputs, {"dx": rates})
 
     @cached_property
-    def reference(self) -> Any:
+    def reference(self) -> ca.Function:
         """CasADi Function t [s] → reference [m, m/s, m/s²]."""
         return casadi_function("reference", {"t": [plant.t]}, {"reference": list(reference_expressions(self.fault))})
 
     @cached_property
-    def law(self) -> Any:
+    def law(self) -> ca.Function:
         """CasADi Function (x, xi, reference) → p [Pa], dxi; without a controller p is constant."""
-        inputs = {
-            "x": [plant.x1, plant.x2],
-            "xi": list(self.integrals),
-            "reference": [r, r_rate, r_acceleration],
-        }
+        inputs = {"x": [plant.x1, plant.x2], "xi": list(self.integrals), "reference": [r, r_rate, r_acceleration]}
         if self.controller is None:
             return casadi_function("law", inputs, {"p": [sp.Float(self.constant_pressure)], "dxi": []})
         pressure, rates = law_expressions(self.controller)
@@ -541,13 +546,9 @@ class ClosedLoop(Metered):
         return known.acceleration(plant.x1, plant.x2, r_acceleration)
 
     @cached_property
-    def perturbation(self) -> Any:
+    def perturbation(self) -> Motion:
         """CasADi Function (t, x, reference) → h [unit of ν], the law's feed-forward included, and mu [-]."""
-        inputs = {
-            "t": [plant.t],
-            "x": [plant.x1, plant.x2],
-            "reference": [r, r_rate, r_acceleration],
-        }
+        inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "reference": [r, r_rate, r_acceleration]}
         outputs = {
             "h": [matched_perturbation(self.fault, self.divisor, bool(self.factors)) + self.known],
             "mu": [friction_expression(self.fault, bool(self.factors))],
@@ -555,31 +556,31 @@ class ClosedLoop(Metered):
         return self.function("perturbation", inputs, outputs)
 
     @cached_property
-    def friction(self) -> Any:
+    def friction(self) -> Motion:
         """CasADi Function x [m, m/s] → friction coefficient [-]."""
         law = friction_expression(self.fault, bool(self.factors))
         return self.function("friction", {"x": [plant.x1, plant.x2]}, {"mu": [law]})
 
     @property
-    def static_friction(self) -> Any:
+    def static_friction(self) -> Number:
         """Friction coefficient [-] on the verge of slip; an SX with symbolic factors, else a float."""
         value = self.friction([0, 0])
         return value if type(value).__name__ == "SX" else float(value)
 
     @cached_property
-    def shaken(self) -> Any:
+    def shaken(self) -> Motion:
         """CasADi Function (t [s], x [m, m/s]) → φ̂_e [m/s²], without the push of the far end."""
         return self.function("shaken", {"t": [plant.t], "x": [plant.x1, plant.x2]}, {"phi": [self.disturbance]})
 
-    def reversing(self, time: Any, state: Any, pressure: Any) -> Any:
+    def reversing(self, time: ca.SX, state: ca.SX, pressure: ca.SX) -> ca.SX:
         """Whether the load on a fault at rest exceeds friction backward (SX): never where nothing rests."""
         return ca.SX(0)
 
-    def shear_stress(self, time: Any, state: Any, pressure: Any, friction: Any) -> Any:
+    def shear_stress(self, time: ca.SX, state: ca.SX, pressure: ca.SX, friction: ca.SX) -> ca.SX:
         """Shear stress τ = μ(σ' − p) [Pa] that friction sets against slip (SX)."""
         return friction * (self.fault.effective_normal_stress - pressure)
 
-    def function(self, name: str, inputs: dict[str, list[sp.Symbol]], outputs: dict[str, list[sp.Expr]]) -> Any:
+    def function(self, name: str, inputs: dict[str, list[sp.Symbol]], outputs: dict[str, list[sp.Expr]]) -> Motion:
         """CasADi Function with the disturbance inserted; with factors, a callable that has inserted those too."""
         shaking = self.shaking if plant.t in inputs.get("t", ()) else None
         if not self.factors:
@@ -602,7 +603,7 @@ class ClosedLoop(Metered):
         return own + self.load.acceleration
 
 
-def _column(values: tuple[Any, ...]) -> Any:
+def _column(values: tuple[Number, ...]) -> Any:  # SX, or DM where all are numbers
     return ca.vertcat(*values)
 
 
@@ -611,7 +612,7 @@ def casadi_function(
     inputs: dict[str, list[sp.Symbol]],
     outputs: dict[str, list[sp.Expr]],
     named: dict[sp.Symbol, sp.Expr] | None = None,
-) -> Any:
+) -> ca.Function:
     """CasADi Function with names; `named` are expressions in the inputs that the outputs refer to.
 
     Derivatives at a kink are those of the side on which x1 and x2 grow.

@@ -116,22 +116,22 @@ _CUBE_ROOT = _economised(
 )
 
 
-def two_to(exponent: Any) -> Any:
+def two_to(exponent: ca.SX) -> ca.SX:
     """2ⁿ for whole n, −1022 … 1023, without rounding."""
     return ca.SX(2.0) ** exponent
 
 
-def choice(condition: Any, yes: Any, no: Any) -> Any:
+def choice(condition: ca.SX, yes: ca.SX, no: ca.SX) -> ca.SX:
     """One of two values; the other may be no number."""
     return ca.if_else(condition, yes, no)
 
 
-def rounded(x: Any) -> Any:
+def rounded(x: ca.SX) -> ca.SX:
     """Nearest whole number, the even one of two; for |x| < 2⁵¹."""
     return (x + _ROUNDER) + -_ROUNDER
 
 
-def _polynomial(x: Any, coefficients: list[float]) -> Any:
+def _polynomial(x: ca.SX, coefficients: list[float]) -> ca.SX:
     """Values of lower and upper half, joined by a power of x, in turn: short chains (Estrin 1960)."""
     powers, parts = x, [ca.SX(c) for c in coefficients]
     while len(parts) > 1:
@@ -140,38 +140,38 @@ def _polynomial(x: Any, coefficients: list[float]) -> Any:
     return parts[0]
 
 
-def _sum(a: Any, b: Any) -> tuple[Any, Any]:
+def _sum(a: ca.SX, b: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Rounded sum and what is missing (Knuth's two-sum)."""
     total = a + b
     of_b = total - a
     return total, (a - (total - of_b)) + (b - of_b)
 
 
-def _halves(x: Any) -> tuple[Any, Any]:
+def _halves(x: ca.SX) -> tuple[ca.SX, ca.SX]:
     """26 leading bits, and the others (Veltkamp's splitting)."""
     scaled = x * _SPLITTER
     first = scaled - (scaled - x)
     return first, x - first
 
 
-def _limited(x: Any, low: float, high: float) -> Any:
+def _limited(x: ca.SX, low: float, high: float) -> ca.SX:
     return choice(x < low, ca.SX(low), choice(x > high, ca.SX(high), x))
 
 
-def _scaled(x: Any, exponent: Any) -> Any:
+def _scaled(x: ca.SX, exponent: ca.SX) -> ca.SX:
     """x·2ⁿ for |n| < 2000."""
     half = rounded(exponent * 0.5)
     return x * two_to(half) * two_to(exponent - half)
 
 
-def _grown(first: Any, r: Any, rest: Any) -> Any:
+def _grown(first: ca.SX, r: ca.SX, rest: ca.SX) -> ca.SX:
     """First + e^(r + rest) − 1 for |r| ≤ ln2/2 and a small rest; |first| ≥ |r| or 0."""
     tail = rest + r * r * _polynomial(r, _EXP)
     total = first + r
     return total + (((first - total) + r) + tail)
 
 
-def _by_ln2(x: Any) -> tuple[Any, Any, Any]:
+def _by_ln2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """n, r and rest: x = n·ln2 + r + rest."""
     whole = rounded(x * float(1 / _LN2))
     rough, less = x - whole * _LN2_PIECES[0], whole * _LN2_PIECES[1]
@@ -179,20 +179,20 @@ def _by_ln2(x: Any) -> tuple[Any, Any, Any]:
     return whole, r, (rough - r) - less
 
 
-def exp(x: Any) -> Any:
+def exp(x: ca.SX) -> ca.SX:
     """e^x."""
     whole, r, rest = _by_ln2(_limited(x, -800, 800))
     return _scaled(_grown(ca.SX(1.0), r, rest), whole)
 
 
-def expm1(x: Any) -> Any:
+def expm1(x: ca.SX) -> ca.SX:
     """e^x − 1."""
     whole, r, rest = _by_ln2(_limited(x, -60, 710))
     first = 1 - two_to(-choice(whole > 600, ca.SX(600.0), whole))
     return (_grown(first, r, rest) * 2) * two_to(whole - 1)
 
 
-def _parted(x: Any) -> tuple[Any, Any]:
+def _parted(x: ca.SX) -> tuple[ca.SX, ca.SX]:
     """n and m: x = m·2ⁿ with √½ ≤ m < √2, for positive finite x."""
     small = x < _LEAST
     x = x * choice(small, ca.SX(2.0**54), ca.SX(1.0))
@@ -200,7 +200,7 @@ def _parted(x: Any) -> tuple[Any, Any]:
     return whole - choice(small, ca.SX(54.0), ca.SX(0.0)), mantissa
 
 
-def exponent_and_mantissa(x: Any) -> tuple[Any, Any]:
+def exponent_and_mantissa(x: ca.SX) -> tuple[ca.SX, ca.SX]:
     """As `_parted`, for x from 2⁻¹⁰²² on; exact, whatever the C library's logarithm has for last digits.
 
     Of it only a whole number counts, that of a power of two below x; where it changes, either serves.
@@ -213,7 +213,7 @@ def exponent_and_mantissa(x: Any) -> tuple[Any, Any]:
     return whole + high, mantissa * choice(high, ca.SX(0.5), ca.SX(1.0))
 
 
-def _logarithm(mantissa: Any) -> tuple[Any, Any, Any]:
+def _logarithm(mantissa: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """f = m − 1, and f²/2 and s(f²/2 + R) of log m = f − (f²/2 − s(f²/2 + R)), where s = f/(2 + f)."""
     f = mantissa - 1
     s, half = f / (2 + f), 0.5 * f * f
@@ -221,7 +221,7 @@ def _logarithm(mantissa: Any) -> tuple[Any, Any, Any]:
     return f, half, s * (half + z * _polynomial(z, _ATANH))
 
 
-def log(x: Any) -> Any:
+def log(x: ca.SX) -> ca.SX:
     """Natural logarithm; no number below zero."""
     whole, mantissa = _parted(x)
     f, half, product = _logarithm(mantissa)
@@ -231,7 +231,7 @@ def log(x: Any) -> Any:
     return choice(x >= 0, proper, ca.SX(math.nan))
 
 
-def power(x: Any, a: Any) -> Any:
+def power(x: ca.SX, a: ca.SX) -> ca.SX:
     """x^a, the cube root where a is the float next to ⅓; for negative x no number unless a is whole."""
     if not a.is_constant():
         return choice(a == THIRD, cube_root(x), any_power(x, a))
@@ -240,7 +240,7 @@ def power(x: Any, a: Any) -> Any:
     return cube_root(x) if float(a) == THIRD else _power(x, a)
 
 
-def near_cube_root(x: Any) -> Any:
+def near_cube_root(x: ca.SX) -> ca.SX:
     """A number of 17 bits whose cube is within a tenth of x, from 2⁻¹⁰²² on.
 
     The leading bits of a float, its exponent and 16 of its fraction as one whole number, are nearly its logarithm: a
@@ -257,7 +257,7 @@ def near_cube_root(x: Any) -> Any:
     return (1 + (third - exponent * 2.0**16) * 2.0**-16) * two_to(exponent - 1023)
 
 
-def cube_root(x: Any) -> Any:
+def cube_root(x: ca.SX) -> ca.SX:
     """x^⅓; no number below zero.
 
     With y near it, whose cube is exact, and z = (x − y³)/x it is y(1 − z)^(−⅓).
@@ -271,7 +271,7 @@ def cube_root(x: Any) -> Any:
     return choice(ca.logic_and(x > 0, x < math.inf), value, choice(x < 0, ca.SX(math.nan), x))
 
 
-def any_power(x: Any, a: Any) -> Any:
+def any_power(x: ca.SX, a: ca.SX) -> ca.SX:
     """Power with an exponent that is not known yet, but for that of a cube root."""
     size = ca.fabs(a)
     whole, even = (ca.logic_or(size >= 2.0**51, rounded(part) == part) for part in (a, 0.5 * a))
@@ -280,7 +280,7 @@ def any_power(x: Any, a: Any) -> Any:
     return choice(a == 0, ca.SX(1.0), choice(size >= 0, value, a))
 
 
-def _power(x: Any, a: Any) -> Any:
+def _power(x: ca.SX, a: ca.SX) -> ca.SX:
     """x^a for x that are not negative; a·log x in whole powers of two and a small rest."""
     whole, mantissa = _parted(x)
     f, half, product = _logarithm(mantissa)
@@ -294,7 +294,7 @@ def _power(x: Any, a: Any) -> Any:
     return choice(ca.logic_and(x > 0, x < math.inf), value, choice(a > 0, root, 1 / root))
 
 
-def _by_half_pi(x: Any) -> tuple[Any, Any, Any]:
+def _by_half_pi(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Turns beside whole ones, −½, −¼, 0, ¼ or ½, and r and rest: x = nπ/2 + r + rest."""
     x = x * (ca.fabs(x) < 2.0**52)
     whole = rounded(x * float(1 / _HALF_PI))
@@ -305,7 +305,7 @@ def _by_half_pi(x: Any) -> tuple[Any, Any, Any]:
     return turns - rounded(turns), r, rest
 
 
-def _sine_and_cosine(r: Any, rest: Any) -> tuple[Any, Any]:
+def _sine_and_cosine(r: ca.SX, rest: ca.SX) -> tuple[ca.SX, ca.SX]:
     z = r * r
     half = 0.5 * z
     nearly = 1 - half
@@ -313,7 +313,7 @@ def _sine_and_cosine(r: Any, rest: Any) -> tuple[Any, Any]:
     return sine, nearly + (((1 - nearly) - half) + (z * z * _polynomial(z, _COS) - r * rest))
 
 
-def sin(x: Any) -> Any:
+def sin(x: ca.SX) -> ca.SX:
     """Sine; beyond |x| = 2³¹ that of an argument within one unit in the last place, beyond 2⁵² zero."""
     turns, r, rest = _by_half_pi(x)
     sine, cosine = _sine_and_cosine(r, rest)
@@ -321,7 +321,7 @@ def sin(x: Any) -> Any:
     return choice(size == 0.25, 4 * turns * cosine, (1 - 4 * size) * sine)
 
 
-def cos(x: Any) -> Any:
+def cos(x: ca.SX) -> ca.SX:
     """Cosine; of large arguments see `sin`."""
     turns, r, rest = _by_half_pi(x)
     sine, cosine = _sine_and_cosine(r, rest)
@@ -329,23 +329,23 @@ def cos(x: Any) -> Any:
     return choice(size == 0.25, -4 * turns * sine, (1 - 4 * size) * cosine)
 
 
-def tanh(x: Any) -> Any:
+def tanh(x: ca.SX) -> ca.SX:
     """Hyperbolic tangent."""
     grown = expm1(2 * _limited(ca.fabs(x), 0, 22))
     return ca.sign(x) * (grown / (grown + 2))
 
 
-def fmax(x: Any, y: Any) -> Any:
+def fmax(x: ca.SX, y: ca.SX) -> ca.SX:
     """The larger of two numbers, or the one that is a number."""
     return choice(ca.logic_or(x > y, ca.logic_not(y <= math.inf)), x, y)
 
 
-def fmin(x: Any, y: Any) -> Any:
+def fmin(x: ca.SX, y: ca.SX) -> ca.SX:
     """The smaller of two numbers, or the one that is a number."""
     return choice(ca.logic_or(x < y, ca.logic_not(y <= math.inf)), x, y)
 
 
-def floor(x: Any) -> Any:
+def floor(x: ca.SX) -> ca.SX:
     """Largest whole number that is not above x."""
     size = ca.fabs(x)
     near = (size + 2.0**52) + -(2.0**52)
@@ -353,7 +353,7 @@ def floor(x: Any) -> Any:
     return choice(size < 2.0**52, near - (near > x), x)
 
 
-FUNCTIONS: dict[int, Callable[..., Any]] = {
+FUNCTIONS: dict[int, Callable[..., ca.SX]] = {
     ca.OP_EXP: exp,
     ca.OP_EXPM1: expm1,
     ca.OP_LOG: log,
@@ -390,7 +390,7 @@ class Instruction:
     constant: float
 
 
-def instructions(function: Any) -> Iterator[Instruction]:
+def instructions(function: ca.Function) -> Iterator[Instruction]:
     """The work of a CasADi Function of scalar operations, in order."""
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)
@@ -402,19 +402,19 @@ def instructions(function: Any) -> Iterator[Instruction]:
 class Called:
     """What one instruction of a function calls."""
 
-    function: Any  # casadi.Function: Of scalar operations, one vector in and one out
+    function: ca.Function  # casadi.Function: Of scalar operations, one vector in and one out
     # How often, on its own result; 0: once if the first argument, which it does not take, is not zero, else its result
     # is 0
     times: int
 
-    def __call__(self, function: Any, arguments: list[Any]) -> Any:
+    def __call__(self, function: ca.Function, arguments: list[ca.SX]) -> ca.SX:
         """Result (SX) with another function in the place of this one."""
         if self.times:
             return function.fold(self.times, {"never_inline": True})(ca.vertcat(*arguments))
         return where_needed(function)(arguments[0], ca.vertcat(*arguments[1:]))
 
 
-def called(function: Any, work: Instruction) -> Called:
+def called(function: ca.Function, work: Instruction) -> Called:
     """What an instruction of a function calls.
 
     Raises
@@ -433,22 +433,22 @@ def called(function: Any, work: Instruction) -> Called:
     raise NotPortableError(f"a call in {function.name()} is neither a repetition nor a branch")
 
 
-def expanded(function: Any) -> Any:
+def expanded(function: ca.Function) -> ca.Function:
     """Function with the elementary functions written out, for CasADi's virtual machine."""
     with verbatim():
         return _expanded(function)
 
 
-def expanded_size(function: Any) -> int:
+def expanded_size(function: ca.Function) -> int:
     """About how many instructions a function has when it is expanded."""
     operations = [function.instruction_id(k) for k in range(function.n_instructions())]
     return len(operations) + _WRITTEN_OUT * sum(operation in FUNCTIONS for operation in operations)
 
 
-def _expanded(function: Any) -> Any:
+def _expanded(function: ca.Function) -> ca.Function:
     inputs = [ca.SX.sym(f"i{n}", function.sparsity_in(n)) for n in range(function.n_in())]
     results = [ca.SX(function.sparsity_out(n)) for n in range(function.n_out())]
-    values: dict[int, Any] = {}
+    values: dict[int, ca.SX] = {}
     for work in instructions(function):
         if work.operation == ca.OP_INPUT:
             values[work.given[0]] = inputs[work.taken[0]].nz[work.taken[1]]
@@ -463,7 +463,7 @@ def _expanded(function: Any) -> Any:
     return ca.Function(function.name(), inputs, results, function.name_in(), function.name_out())
 
 
-def _operated(work: Instruction, arguments: list[Any]) -> Any:
+def _operated(work: Instruction, arguments: list[ca.SX]) -> ca.SX:
     if work.operation == ca.OP_CONST:
         return ca.SX(work.constant)
     if work.operation in FUNCTIONS:
@@ -573,12 +573,12 @@ def called_alone(code: int) -> str | None:
 @cache
 def elementary_c() -> str:
     """The elementary functions in C, to be inlined."""
-    parts: list[Callable[..., Any]] = [*dict.fromkeys(FUNCTIONS.values()), cube_root, any_power]
+    parts: list[Callable[..., ca.SX]] = [*dict.fromkeys(FUNCTIONS.values()), cube_root, any_power]
     written = "".join(_function_c(function) for function in parts if function is not power)
     return c_file("portable.c") + written + c_file("power.c", third=constant(THIRD))
 
 
-def _function_c(function: Callable[..., Any]) -> str:
+def _function_c(function: Callable[..., ca.SX]) -> str:
     count = function.__code__.co_argcount
     with verbatim(bits=True):
         arguments = [ca.SX.sym(f"x{i}") for i in range(count)]
@@ -648,13 +648,13 @@ class Backend:
 
     # tuple of casadi.Function: That advance it by 1, 64 and 4096 steps, one input and one output each; none beside
     # machine code
-    functions: tuple[Any, ...]
+    functions: tuple[ca.Function, ...]
     name: str  # ``"compiled"`` or ``"virtual-machine"``
     reason: str  # The compiler, or why there is none
     machine_code: MachineCode | None = None  # Advances the floats at a pointer by a number of steps; not 0 if it fails
 
 
-def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
+def prepare(step: ca.Function, compiled: bool | None, steps: int) -> Backend:
     """Backend of a step function; both kinds give the same digits.
 
     Parameters
@@ -687,11 +687,11 @@ def prepare(step: Any, compiled: bool | None, steps: int) -> Backend:
         return _virtual_machine(step, reason)
 
 
-def _virtual_machine(step: Any, reason: str) -> Backend:
+def _virtual_machine(step: ca.Function, reason: str) -> Backend:
     return Backend(ladder(expanded(step)), "virtual-machine", reason)
 
 
-def ladder(step: Any) -> tuple[Any, ...]:
+def ladder(step: ca.Function) -> tuple[ca.Function, ...]:
     """Functions for 1, RADIX, RADIX² … steps; each calls the one below, so that the code stays small."""
     rungs = [step]
     for level in range(1, LEVELS):
@@ -703,7 +703,7 @@ def ladder(step: Any) -> tuple[Any, ...]:
     return tuple(rungs)
 
 
-def _source(step: Any) -> str:
+def _source(step: ca.Function) -> str:
     generator = ca.CodeGenerator("steps.c")
     generator.add(step)
     sizes = {
@@ -825,7 +825,7 @@ def processor_flags(command: tuple[str, ...]) -> tuple[str, ...]:
     return next((flags for macro, flags in _WIDE.items() if macro in macros), ())
 
 
-def lanes_c(step: Any, diverged: int) -> str:
+def lanes_c(step: ca.Function, diverged: int) -> str:
     """C text with ``advance_samples``, which moves vectors that lie side by side on until they diverge.
 
     Parameters
@@ -846,7 +846,7 @@ def lanes_c(step: Any, diverged: int) -> str:
     return c_file("lanes.h", lanes=LANES) + "".join(parts) + loop
 
 
-def _add_body(parts: list[str], function: Any, name: str) -> None:
+def _add_body(parts: list[str], function: ca.Function, name: str) -> None:
     """Function in C that maps the vectors of all lanes in place, after those that it calls."""
     body = _Body(function, name)
     for number, call in body.called.items():
@@ -889,7 +889,7 @@ def _tasks(work: Iterable[Instruction]) -> list[_Task]:
 class _Body:
     """The work of a function as loops over lanes: one, but for what must not stand in a loop with others."""
 
-    def __init__(self, function: Any, name: str) -> None:
+    def __init__(self, function: ca.Function, name: str) -> None:
         self._name = name
         self.tasks = _tasks(instructions(function))
         calls = (task for task in self.tasks if task.work.operation == ca.OP_CALL)

@@ -72,13 +72,13 @@ class CoupledSliders:
     """
 
     laws: tuple[FrictionLaw, ...]
-    stiffness: Any
+    stiffness: np.ndarray
     normal_stress: tuple[float, ...]
     damping: float
     mass: float = 0.0
-    flow: Any = ()
-    source: Any = ()
-    shares: Any = ()
+    flow: np.ndarray | tuple[()] = ()
+    source: np.ndarray | tuple[()] = ()
+    shares: np.ndarray | tuple[()] = ()
 
     def __post_init__(self) -> None:
         wrong = [law.name for law in self.laws if len(law.state_names) != 1]
@@ -113,9 +113,9 @@ class CoupledSliders:
         return np.concatenate([np.zeros(len(rates)), np.log(rates), np.log(states), np.zeros(len(self.flow))])
 
     @cached_property
-    def _friction(self) -> list[Any]:
+    def _friction(self) -> list[ca.Function]:
         """CasADi Functions (log v, log θ) → μ, ∂μ/∂log v, ∂μ/∂log θ, (log θ)', and its share of (log N)', per block."""
-        known: dict[FrictionLaw, Any] = {}
+        known: dict[FrictionLaw, ca.Function] = {}
         for law in self.laws:
             if law not in known:
                 log_rate, log_state = ca.SX.sym("log_rate"), ca.SX.sym("log_state")
@@ -131,7 +131,7 @@ class CoupledSliders:
                 known[law] = ca.Function("friction", [log_rate, log_state], outputs)
         return [known[law] for law in self.laws]
 
-    def _of_friction(self, log_rate: Any, log_state: Any) -> list[Any]:
+    def _of_friction(self, log_rate: ca.MX, log_state: ca.MX) -> list[ca.MX]:
         """Outputs of `_friction` as columns, one entry a block."""
         functions, N = self._friction, len(self.laws)
         if len(set(self.laws)) == 1:
@@ -139,7 +139,7 @@ class CoupledSliders:
         rows = [f(log_rate[i], log_state[i]) for i, f in enumerate(functions)]
         return [ca.vertcat(*column) for column in zip(*rows, strict=True)]
 
-    def field(self, y: Any, load: Any, stress: Any = 0, stress_rate: Any = 0) -> Any:
+    def field(self, y: Any, load: Any, stress: Any = 0, stress_rate: Any = 0) -> ca.MX:
         """y' in CasADi.
 
         Parameters
@@ -174,7 +174,7 @@ class CoupledSliders:
             faster = loaded / (normal * by_rate + self.damping * v)
         return ca.vertcat(v - load[0], faster, aged, moved)
 
-    def rates(self, inputs: int = 0) -> Any:
+    def rates(self, inputs: int = 0) -> ca.Function:
         """CasADi Function (y, load) → y', and the Jacobian where the equations are written out."""
         N, n = self.sizes
         y, load = ca.MX.sym("y", 3 * N + n), ca.MX.sym("load", 3 + N * (self.mass > 0) + inputs)
@@ -337,10 +337,6 @@ def simulate_sliders(
         Ascending instants to return [s] beside the start, changes of inputs and the end; every step unless given.
     method, rtol
         As of `simulate_state`.
-
-    Raises
-    ------
-    ParameterError, SimulationError
     """
     require_positive(duration=duration)
     slips = [float(law.critical_slip) for law in sliders.laws]  # type: ignore[attr-defined]
@@ -357,7 +353,7 @@ def simulate_sliders(
     problem = SmoothProblem(sliders.rates(len(told)), scales, slice(N, 2 * N), level)
     breaks = {float(time) for time, _ in inputs if 0 < time < duration}
     breaks |= {i * _LONGEST for i in range(1, math.ceil(duration / _LONGEST))}
-    y, pieces, crossings, evaluations = start, list[tuple[Any, Any]](), [], 0
+    y, pieces, crossings, evaluations = start, list[tuple[np.ndarray, np.ndarray]](), [], 0
     for now, end in pairwise((0.0, *sorted(breaks), duration)):
         told = next((tuple(u) for time, u in reversed(inputs) if time <= now), told)
         load = (loading_rate, 0.0, 0.0, *prestress, *told)
@@ -460,10 +456,6 @@ def simulate_held_blocks(
     -------
     SlidersRun
         Four instants a period; its pressures are those of the wells beside the plan.
-
-    Raises
-    ------
-    ParameterError, SimulationError
     """
     length, step = chain.fault.reference.operation_time if duration is None else duration, float(law.step)
     require_positive(duration=length, stress_period=period, lag=lag)

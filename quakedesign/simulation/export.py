@@ -86,7 +86,7 @@ class ControllerStep:
         What is said first of it, a sentence each.
     """
 
-    function: Any
+    function: ca.Function
     measurement: Mapping[str, str]
     start: Mapping[str, float]
     step: float
@@ -156,7 +156,7 @@ def source_text(exported: ControllerStep, header: str) -> str:
     return generator.dump() + c_file("controller.c", header=header, start=start, **entries, **_sizes(exported.function))
 
 
-def _sizes(function: Any) -> dict[str, int]:
+def _sizes(function: ca.Function) -> dict[str, int]:
     sizes = {
         "arguments": function.sz_arg(),
         "results": function.sz_res(),
@@ -441,7 +441,7 @@ def _software(scheme: Scheme) -> Sampled:
     return replace(scheme, measurement=scheme.measurement.software, substeps=1)
 
 
-def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> tuple[Any, dict[str, float]]:
+def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> tuple[ca.Function, dict[str, float]]:
     """CasADi Function of the step, and the memory at the start; what never changes is written into the function."""
     numbers = scheme.memory(loop, step)
     names = [str(symbol) for symbol in loop.integrals] + list(numbers)
@@ -469,7 +469,7 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     return ca.Function("sampled_step", [measurement, applied, memory], outputs), start
 
 
-def _after(loop: ClosedLoop, scheme: Sampled, counter: Any, state: Any, step: float) -> Any:
+def _after(loop: ClosedLoop, scheme: Sampled, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
     """Integral states and memory at the next sample; they do not depend on how the plant moves meanwhile."""
     return scheme.advance(loop, integrator("rk4"), counter, state, step)[2:]
 
@@ -498,7 +498,7 @@ def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, s
     return entries | library_versions("quakedesign", "casadi")
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     """Exact numbers as p/q, values by their fields that hold something."""
     if isinstance(value, tuple):
         return f"[{', '.join(map(_text, value))}]"

@@ -9,7 +9,6 @@ import csv
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -63,7 +62,7 @@ def perturbation(text: str) -> "sp.Expr":
     return expression
 
 
-def _value(node: ast.expr, text: str) -> Any:
+def _value(node: ast.expr, text: str) -> sp.Expr:
     """SymPy expression of one node."""
     match node:
         case ast.Constant(value=int() | float()) if not isinstance(node.value, bool):
@@ -83,20 +82,20 @@ def _value(node: ast.expr, text: str) -> Any:
     raise _refusal(text, ast.get_source_segment(text, node) or text)
 
 
-def _power(base: Any, exponent: Any, text: str) -> Any:
+def _power(base: sp.Expr, exponent: sp.Expr, text: str) -> sp.Expr:
     digits = max(base.p.bit_length(), base.q.bit_length()) if base.is_Rational else 1
     if not (exponent.is_Rational and abs(exponent) * digits <= MOST_BITS):
         raise _refusal(text, f"the exponent {str(exponent)[:40]}")
     return base**exponent
 
 
-def _quotient(numerator: Any, denominator: Any, text: str) -> Any:
+def _quotient(numerator: sp.Expr, denominator: sp.Expr, text: str) -> sp.Expr:
     if denominator == 0:
         raise _refusal(text, "a division by zero")
     return numerator / denominator
 
 
-_OPERATIONS: dict[type[ast.operator], Callable[[Any, Any, str], Any]] = {
+_OPERATIONS: dict[type[ast.operator], Callable[[sp.Expr, sp.Expr, str], sp.Expr]] = {
     ast.Add: lambda a, b, _: a + b,
     ast.Sub: lambda a, b, _: a - b,
     ast.Mult: lambda a, b, _: a * b,

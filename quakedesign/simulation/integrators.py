@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction as F
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -18,6 +18,9 @@ from quakedesign.text import nearest_name
 
 # ----------------------------------------------------------------------
 # Explicit Runge–Kutta methods with a fixed step.
+
+
+State = TypeVar("State")
 
 
 class Integrator:
@@ -43,7 +46,7 @@ class Integrator:
     weights: ClassVar[tuple[F, ...]]
 
     @classmethod
-    def advance(cls, field: Callable[[Any, Any], Any], state: Any, step: Any) -> Any:
+    def advance(cls, field: Callable[[float, State], State], state: State, step: ca.SX | float) -> State:
         """State after one step.
 
         Parameters
@@ -55,13 +58,14 @@ class Integrator:
         step : SX or float
             [s].
         """
-        stages: list[Any] = []
+        stages: list[State] = []
         for node, row in zip(cls.nodes, cls.matrix, strict=True):
             stages.append(field(float(node), cls._moved(state, row, stages, step)))
-        return cls._moved(state, cls.weights, stages, step)
+        end: State = cls._moved(state, cls.weights, stages, step)
+        return end
 
     @staticmethod
-    def _moved(state: Any, shares: tuple[F, ...], stages: list[Any], step: float) -> Any:
+    def _moved(state: Any, shares: tuple[F, ...], stages: Sequence[Any], step: ca.SX | float) -> Any:
         parts = [float(share) * stage for share, stage in zip(shares, stages, strict=True) if share]
         return state + step * sum(parts[1:], start=parts[0]) if parts else state
 
@@ -129,7 +133,7 @@ class AdaptiveIntegrator:
     @classmethod
     def flow(
         cls,
-        rates: Any,
+        rates: ca.Function,
         scales: "Sequence[float] | np.ndarray",
         shares: "Sequence[float] | np.ndarray",
         *,
@@ -161,7 +165,7 @@ class AdaptiveIntegrator:
         start, length = ca.SX.sym("start"), ca.SX.sym("length")
         parameters, y, share = ca.SX.sym("parameters", count), ca.SX.sym("y", size), ca.SX.sym("share")
         sizes = ca.DM(np.asarray(scales, dtype=float))
-        found = rates(start + share * length, y * sizes, parameters)
+        found: Any = rates(start + share * length, y * sizes, parameters)
         field, *more = found if isinstance(found, tuple | list) else (found,)
         problem = {"x": y, "t": share, "p": ca.vertcat(start, length, parameters), "ode": length * field / sizes}
         if quadratures:
@@ -182,7 +186,7 @@ class AdaptiveIntegrator:
 class Flow:
     """Solution over intervals of one subdivision."""
 
-    solver: Any  # casadi.Function
+    solver: ca.Function  # casadi.Function
     scales: "np.ndarray"
 
     def follow(
@@ -292,6 +296,7 @@ def amplification(poles: Iterable[complex], step: float, method: str = "dormand-
     advance = integrator(method).advance
 
     def growth(pole: complex) -> float:
-        return float(abs(advance(lambda _, x: pole * x, 1.0 + 0.0j, step)))
+        end: complex = advance(lambda _, x: pole * x, 1.0 + 0.0j, step)
+        return float(abs(end))
 
     return max(map(growth, poles))

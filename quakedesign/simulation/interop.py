@@ -74,11 +74,7 @@ def to_casadi(fault: Fault, controller: Controller | None = None, *, parameters:
     rates = ca.vertcat(loop.plant(time, state[:2], pressure), integral_rates)
     h, _ = loop.perturbation(time, state[:2], reference)
     return ca.Function(
-        "closed_loop",
-        [time, state],
-        [rates, pressure, h, reference],
-        ["t", "x"],
-        ["dx", "p", "h", "reference"],
+        "closed_loop", [time, state], [rates, pressure, h, reference], ["t", "x"], ["dx", "p", "h", "reference"]
     )
 
 
@@ -135,9 +131,9 @@ def to_iosystem(subject: Fault | Controller) -> Any:
 def _fault_system(fault: Fault) -> Any:
     import control
 
-    field = ClosedLoop(fault).plant
+    field: Any = ClosedLoop(fault).plant
     inputs = [ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")]
-    slopes = ca.Function("slopes", inputs, [ca.jacobian(field(*inputs), v) for v in inputs[1:]])
+    slopes: Any = ca.Function("slopes", inputs, [ca.jacobian(field(*inputs), v) for v in inputs[1:]])
 
     class FaultSystem(control.NonlinearIOSystem):  # type: ignore[misc]
         def linearize(self, x0: Any, u0: Any = None, t: float = 0, *arguments: Any, **options: Any) -> Any:
@@ -372,7 +368,8 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actu
 
     law = _linear(to_iosystem(controller.while_moving), ("slip", "slip_rate"))
     late, flowing = _between(controller, actuator)
-    plant = _series(to_statespace(fault, at), _linear(_flow_system(flowing), ("p",)))
+    plant, before = to_statespace(fault, at), _linear(_flow_system(flowing), ("p",))
+    plant = plant * before if before.nstates else plant  # else everything passes at once
     if controller.sampling is not None:
         plant = _held(plant, controller.sampling.step, late)
     return control.ss(-law * plant, name=f"{controller.name} around {fault.name}", inputs=["p"], outputs=["answer"])
@@ -516,7 +513,7 @@ def _flow_system(actuator: Actuator) -> Any:
     """Flowing stages from the pressure that is held, ``p``, to that in the fault."""
     import control
 
-    numbers = [value for stage in actuator.flowing for value in stage.numbers]
+    numbers: list[Any] = [value for stage in actuator.flowing for value in stage.numbers]
 
     def flow(x: Any, u: Any) -> Any:
         return actuator.flow(numbers, list(x), u[0])
@@ -530,11 +527,6 @@ def _flow_system(actuator: Actuator) -> Any:
         outputs=["fault"],
         states=len(actuator.flow_start),
     )
-
-
-def _series(plant: Any, before: Any) -> Any:
-    """A plant behind another, or alone behind one that lets everything pass at once."""
-    return plant * before if before.nstates else plant
 
 
 def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:

@@ -7,11 +7,12 @@ from functools import cached_property
 from typing import Any, cast
 
 import casadi as ca
+import numpy as np
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.loop import Scheme
 from quakedesign.loop.schemes.base import Stepped
-from quakedesign.simulation.closed_loop import WORKS, ClosedLoop, EnergyBudget, Meter
+from quakedesign.simulation.closed_loop import WORKS, ClosedLoop, EnergyBudget, Meter, Number
 from quakedesign.simulation.integrators import Integrator
 
 # ----------------------------------------------------------------------
@@ -49,13 +50,13 @@ START = {
 class Parts:
     """What the vector of a run holds."""
 
-    counter: Any  # SX or float: Number of the step
-    settled_from: Any  # SX or float: Time from which errors count [s]
+    counter: Any  # SX or ndarray: Number of the step
+    settled_from: Number  # Time from which errors count [s]
     state: Any  # SX or ndarray: x1 [m], x2 [m/s], ξ, memory of the scheme
     watched: dict[str, Any]
-    factors: tuple[Any, ...]  # tuple of SX or float: Numbers of the plant that a run carries along unchanged
+    factors: tuple[Number, ...]  # Numbers of the plant that a run carries along unchanged
 
-    def joined(self) -> Any:
+    def joined(self) -> ca.SX:
         """The vector (SX)."""
         return ca.vertcat(self.counter, self.settled_from, self.state, *self.watched.values(), *self.factors)
 
@@ -97,26 +98,26 @@ class Recorder:
         extremes = (("max", -math.inf), ("min", math.inf))
         return START | {f"{side}_{signal}": start for signal in self.scheme.described for side, start in extremes}
 
-    def loop_of(self, vector: Any) -> ClosedLoop:
+    def loop_of(self, vector: ca.SX) -> ClosedLoop:
         """Loop whose plant has the factors that the vector carries."""
         return self.loop.with_factors(self.parts(vector).factors)
 
     def start(self, settled_from: float) -> list[float]:
         """Vector at time zero; `settled_from` is a time [s]."""
         state = [*self.initial, *[0.0] * len(self.loop.integrals), *self.memory.values()]
-        return [0.0, settled_from, *state, *self.watching.values(), *self.loop.factors]
+        return [0.0, settled_from, *state, *self.watching.values(), *map(float, self.loop.factors)]
 
-    def watched(self, vector: Any) -> dict[str, float]:
+    def watched(self, vector: ca.SX | np.ndarray) -> dict[str, float]:
         """Accumulated values by name."""
         return {name: float(value) for name, value in self.parts(vector).watched.items()}
 
-    def observe(self, vector: Any) -> Any:
+    def observe(self, vector: ca.SX) -> ca.SX:
         """Vector (SX) after its own instant has been watched."""
         now = self.parts(vector)
         after = self._after(now.watched, vector)
         return replace(now, watched={name: after[name] for name in self.watching}).joined()
 
-    def energy(self, end: Any) -> EnergyBudget:
+    def energy(self, end: ca.SX | np.ndarray) -> EnergyBudget:
         """Energy budget of a run from its last vector: that from rest, less what it took to get to the start."""
         last = self.parts(end)
         slip, rate = (float(v) for v in last.state[:2])
@@ -124,14 +125,14 @@ class Recorder:
         now, before = whole.to_dict(), self.loop.budget(dict.fromkeys(WORKS, 0.0), 0.0, *self.initial).to_dict()
         return EnergyBudget(**{name: now[name] - before[name] for name in now if name != "residual"})
 
-    def advance(self, vector: Any, method: type[Integrator]) -> Any:
+    def advance(self, vector: ca.SX, method: type[Integrator]) -> ca.SX:
         """Vector (SX) after its own instant has been watched and one step has been taken."""
         now, first = self.parts(vector), self.index(WORKS[0])
         meter = Meter(self.loop_of(vector), vector[first : first + len(WORKS)])
         moved = self.scheme.advance(cast(Stepped, meter), method, now.counter, now.state, self.step)
         return ca.cse([self.moved(vector, moved, meter.works)])[0]
 
-    def moved(self, vector: Any, state: Any, done: Any) -> Any:
+    def moved(self, vector: ca.SX, state: ca.SX, done: ca.SX) -> ca.SX:
         """Vector (SX) after its own instant has been watched, with the state and works of the next instant."""
         now = self.parts(self.observe(vector))
         watched = now.watched | dict(zip(WORKS, (done[i] for i in range(len(WORKS))), strict=True))
@@ -141,7 +142,7 @@ class Recorder:
         """Place of a watched value in the vector."""
         return 2 + self.state_size + list(self.watching).index(name)
 
-    def signals(self, vector: Any) -> dict[str, Any]:
+    def signals(self, vector: ca.SX) -> dict[str, ca.SX]:
         """Every signal of the loop (SX) at the instant of the vector."""
         loop = self.loop_of(vector)
         parts = self.parts(vector)
@@ -162,11 +163,11 @@ class Recorder:
             "shear_stress": loop.shear_stress(time, state, pressure, mu),
         }
 
-    def _after(self, before: dict[str, Any], vector: Any) -> dict[str, Any]:
+    def _after(self, before: dict[str, Number], vector: ca.SX) -> dict[str, Number]:
         now, parts, described = self.signals(vector), self.parts(vector), self.scheme.described
         settled, later = now["time"] > parts.settled_from, parts.counter > 0
         # The plant without stick is at rest only in passing.
-        rests: Any = now["slip_rate"] == 0 if self.loop.sticks else 0
+        rests: ca.SX | float = now["slip_rate"] == 0 if self.loop.sticks else 0
         slip_error = ca.if_else(settled, now["slip"] - now["reference"], 0)
         rate_error = ca.if_else(settled, now["slip_rate"] - now["reference_rate"], 0)
         pressure, h = now["pressure"], now["matched_perturbation"]

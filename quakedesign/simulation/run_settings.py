@@ -10,10 +10,12 @@ from time import perf_counter
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
-from quakedesign.errors import ParameterError, SimulationError, require_known
+from quakedesign.errors import ParameterError, SimulationError, require_known, require_whole
 from quakedesign.exact import rational
 from quakedesign.fault import Fault, fault_toml
+from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.loop import Actuator, Scheme, simulation_scheme
 from quakedesign.loop.schemes.base import MOST_SUBSTEPS, NoClock
@@ -46,12 +48,7 @@ class RunSetting:
 
     @classmethod
     def of(
-        cls,
-        fault: Fault,
-        step: float | None,
-        duration: float | None,
-        samples: int,
-        settled_from: float | None,
+        cls, fault: Fault, step: float | None, duration: float | None, samples: int, settled_from: float | None
     ) -> "RunSetting":
         """Setting from what `simulate` was given; None stands for its defaults."""
         task = fault.reference.operation_time
@@ -60,8 +57,7 @@ class RunSetting:
         steps = int(rational(length) / rational(pace) + _ALMOST_A_STEP)
         if not 1 <= steps <= MOST_STEPS:
             raise ParameterError(f"duration must hold 1 to {MOST_STEPS:.0e} steps. Received {steps}. Change the step.")
-        if isinstance(samples, bool) or not isinstance(samples, int) or samples < 1:
-            raise ParameterError(f"samples must be a whole number of at least 1. Received {samples!r}.")
+        require_whole(1, samples=samples)
         start = min(task, length) / 4 if settled_from is None else settled_from
         if not 0 <= start < length:
             raise ParameterError(
@@ -83,9 +79,9 @@ def _positive(name: str, value: float) -> float:
 def trajectory(
     recorder: Recorder,
     setting: RunSetting,
-    kept: Any,
+    kept: np.ndarray,
     criterion: OutcomeCriterion,
-    provenance: dict[str, Any],
+    provenance: Json,
     began: tuple[float, float],
 ) -> LoopTrajectory:
     """Trajectory from the kept vectors, of which those before a divergence are shown.
@@ -274,16 +270,16 @@ def run_adaptive(
     return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | entries, (began, began))
 
 
-def _step(recorder: Recorder, method: type[Integrator]) -> Any:
+def _step(recorder: Recorder, method: type[Integrator]) -> ca.Function:
     """CasADi Function of the vector: one step."""
     before = ca.SX.sym("z", recorder.size)
     return ca.Function(STEP, [before], [recorder.advance(before, method)])
 
 
-def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveIntegrator]) -> dict[str, Any]:
+def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveIntegrator]) -> Json:
     controller, load = recorder.loop.controller, recorder.loop.load
     varied = {f"variation_{name}": value for name, value in zip(names(), recorder.loop.factors, strict=False)}
-    pushed: dict[str, Any] = {"drift": load.drift} if load.drift else {}
+    pushed: Json = {"drift": load.drift} if load.drift else {}
     pushed |= {} if load.perturbation is None else {"perturbation": str(load.perturbation)}
     clock = getattr(recorder.scheme, "clock", None)
     if clock:

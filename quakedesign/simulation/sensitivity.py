@@ -3,13 +3,14 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, SimulationError, require_known
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.closed_loop import Variation
@@ -17,6 +18,10 @@ from quakedesign.simulation.run_settings import PRINTED
 from quakedesign.simulation.simulate import simulate
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from quakedesign.simulation.trajectory import Trajectory
 
 
@@ -51,7 +56,7 @@ class Study:
     levels: tuple[float, ...]
     errors: Mapping[str, Mapping[str, tuple[float, ...]]]
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Json]:
         """One row a scheme and level."""
         return [
             {"scheme": scheme, self.label: level} | {name: values[i] for name, values in found.items()}
@@ -59,7 +64,7 @@ class Study:
             for i, level in enumerate(self.levels)
         ]
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> "pd.DataFrame":
         """Return the rows as a pandas DataFrame."""
         import pandas as pd
 
@@ -75,7 +80,7 @@ class Study:
             for scheme, found in self.errors.items()
         }
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """JSON-able facts; null stands for a run that diverged."""
         errors = {
             scheme: {name: [v if math.isfinite(v) else None for v in values] for name, values in found.items()}
@@ -83,7 +88,7 @@ class Study:
         }
         return {k: getattr(self, k) for k in ("title", "label", "unit")} | {"levels": [*self.levels], "errors": errors}
 
-    def figure(self) -> Any:
+    def figure(self) -> "Figure":
         """Return a matplotlib Figure with one panel a quantity, one line a scheme."""
         from matplotlib.figure import Figure
 
@@ -97,7 +102,7 @@ class Study:
         drawing.suptitle(self.title)
         return drawing
 
-    def _panel(self, axis: Any, name: str) -> None:
+    def _panel(self, axis: "Axes", name: str) -> None:
         label, unit = QUANTITIES[name]
         for scheme, found in self.errors.items():
             axis.plot(self.levels, found[name], "o-", ms=3, lw=1.2, color=_COLOURS.get(scheme, "#555555"), label=scheme)

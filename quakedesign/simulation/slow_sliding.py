@@ -236,7 +236,7 @@ class _Loop:
             layered = layered + share * (held + (modes[i] - held) * exp(-rate * since))
         return self.planned(time) + direct + layered
 
-    def rates(self) -> Any:
+    def rates(self) -> ca.Function:
         """CasADi Function (t, y, (held pressure, its time, modes)) → dy/dt."""
         time, y, told = ca.SX.sym("t"), ca.SX.sym("y", 4), ca.SX.sym("told", 2 + len(self.decay))
         pressure = self.pressure(time, told[0], time - told[1], told[2:], ca.exp)
@@ -247,12 +247,7 @@ class _Loop:
 
 
 def _followed(
-    loop: _Loop,
-    law: LinearLaw,
-    around: Instruments,
-    length: float,
-    method: str,
-    progress: Callable[[float], None],
+    loop: _Loop, law: LinearLaw, around: Instruments, length: float, method: str, progress: Callable[[float], None]
 ) -> tuple["np.ndarray", dict[str, float]]:
     """Rows of (time, y, asked, pressure), and what ends them: when the fault opens, or nothing can go on."""
     sizes = [float(loop.slider.law.critical_slip)] * 2 + [1.0, 1.0]  # type: ignore[attr-defined]

@@ -4,6 +4,7 @@ Output intervals are so short that the solution is nearly linear in each, so tha
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -43,15 +44,15 @@ class Resolved(OdeSolver):  # type: ignore[misc]
     """
 
     t: float
-    y: Any
+    y: np.ndarray
 
     def __init__(
-        self, fun: Any, t0: float, y0: Any, t_bound: float, vectorized: bool, *,
+        self, fun: Callable[..., np.ndarray], t0: float, y0: np.ndarray, t_bound: float, vectorized: bool, *,
         pieces: Flow, whole: Flow, parameters: list[float], **_tolerances: Any,
     ) -> None:  # fmt: skip
         super().__init__(fun, t0, y0, t_bound, vectorized)
         self._pieces, self._whole, self._parameters = pieces, whole, parameters
-        self._length, self._ahead = t_bound - t0, deque[tuple[float, Any]]()
+        self._length, self._ahead = t_bound - t0, deque[tuple[float, np.ndarray]]()
 
     def _step_impl(self) -> tuple[bool, str | None]:
         try:
@@ -90,7 +91,7 @@ class Resolved(OdeSolver):  # type: ignore[misc]
     def _dense_output_impl(self) -> "_Between":
         return _Between(self, {self.t_old: self._before, self.t: self.y})
 
-    def follow(self, start: float, y: Any, time: float) -> Any:
+    def follow(self, start: float, y: np.ndarray, time: float) -> np.ndarray:
         """Value at a time [s] from that at another."""
         return self._whole.follow(start, time - start, y, self._parameters)[0][:, -1]
 
@@ -98,14 +99,14 @@ class Resolved(OdeSolver):  # type: ignore[misc]
 class _Between(DenseOutput):  # type: ignore[misc]
     """Values within a step, of the solver itself; its ends are as they are known."""
 
-    def __init__(self, solver: Resolved, known: dict[float, Any]) -> None:
+    def __init__(self, solver: Resolved, known: dict[float, np.ndarray]) -> None:
         super().__init__(solver.t_old, solver.t)
         self._solver, self._known = solver, known
 
-    def _call_impl(self, t: Any) -> Any:
+    def _call_impl(self, t: np.ndarray) -> np.ndarray:
         return np.array([self._at(float(time)) for time in t]).T if t.ndim else self._at(float(t))
 
-    def _at(self, time: float) -> Any:
+    def _at(self, time: float) -> np.ndarray:
         return (
             self._known[time] if time in self._known else self._solver.follow(self.t_old, self._known[self.t_old], time)
         )
@@ -115,6 +116,7 @@ class _Between(DenseOutput):  # type: ignore[misc]
 # Integration of smooth differential equations to a tolerance, with crossings of one level found on the way.
 
 _FRESH = 1.0  # s; what a clock reads at most that a new one would not help, for it tells 1e-16 s apart
+Field = Callable[[float, np.ndarray], np.ndarray]
 METHODS = {"dop853": "DOP853", "radau": "Radau"}
 
 
@@ -145,7 +147,7 @@ class SmoothSolution:
 class SmoothProblem:
     """y' = f(y, load(t)) in the variables of a CasADi Function (y, load) → f, ∂f/∂y."""
 
-    rates: Any  # casadi.Function
+    rates: ca.Function
     scales: "np.ndarray"  # Size of each variable below which its error counts absolutely
     # Index of the variable whose upward crossings of `level` are found, or of those of which the largest is watched
     watched: int | slice
@@ -225,7 +227,7 @@ class SmoothProblem:
         values = np.concatenate([v for _, v in pieces], axis=1)
         return SmoothSolution(np.concatenate([t for t, _ in pieces]), values, np.concatenate(crossed), evaluations)
 
-    def _solver(self, method: str, load: Ramp, rtol: float) -> tuple[Any, dict[str, Any]]:
+    def _solver(self, method: str, load: Ramp, rtol: float) -> tuple[Field, dict[str, Any]]:
         """Field, solver of SciPy, and what it takes beside instants and tolerances."""
         field = _Bound.of(self.rates, 0, load, np.empty(self.rates.size1_in(0))).at
         if method not in adaptive_integrators():
@@ -241,12 +243,12 @@ class SmoothProblem:
         lines = [*load.value, *load.slope, load.start]
         return field, {"method": Resolved, "pieces": pieces, "whole": whole, "parameters": lines}
 
-    def _jacobian(self, load: Ramp) -> Any:
+    def _jacobian(self, load: Ramp) -> Field:
         """Jacobian as a function of (t, y)."""
         jacobian = _Bound.of(self.rates, 1, load, np.empty((self.rates.size1_in(0),) * 2))
         return lambda time, y: jacobian.at(time, y).T
 
-    def _crossing(self) -> Any:
+    def _crossing(self) -> Callable[[float, np.ndarray], float]:
         def crossing(_: float, y: "np.ndarray") -> float:
             return float(np.max(y[self.watched])) - self.level
 
@@ -262,11 +264,11 @@ class _Bound:
     state: "np.ndarray"
     given: "np.ndarray"
     result: "np.ndarray"
-    evaluate: Any
+    evaluate: Callable[[], None]
     owners: tuple[Any, ...]
 
     @classmethod
-    def of(cls, function: Any, index: int, load: Ramp, result: "np.ndarray") -> "_Bound":
+    def of(cls, function: ca.Function, index: int, load: Ramp, result: "np.ndarray") -> "_Bound":
         kind: Any = ca.SX if function.is_a("SXFunction") else ca.MX
         inputs = [kind.sym("y", function.size1_in(0)), kind.sym("load", len(load.value))]
         dense: Any = ca.Function("dense", inputs, [ca.densify(function.call(inputs)[index])])

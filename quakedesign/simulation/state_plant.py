@@ -5,7 +5,7 @@ from the nominal ones, pressure path, and instruments with their memory.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -124,7 +124,7 @@ class SpringSlider:
         return (*moving, acceleration, *state_rates)
 
     @cached_property
-    def rates(self) -> Any:
+    def rates(self) -> ca.Function:
         """CasADi Function (y as in `names`, (loading rate [m/s], p [Pa], dp/dt [Pa/s])) → dy/dt, Jacobian."""
         y, load, values = self._variables()
         known = values | {loading_rate: load[0], plant.p: load[1], pressure_rate: load[2]}
@@ -134,7 +134,7 @@ class SpringSlider:
         return ca.Function("rates", [y, load], [field, ca.jacobian(field, y)])
 
     @cached_property
-    def readings(self) -> Any:
+    def readings(self) -> ca.Function:
         """CasADi Function (y, p [Pa]) → friction coefficient [-], driving less resisting stress [Pa]."""
         y, load, values = self._variables()
         law, states = self.law.exact(), state_symbols(self.law.state_names)
@@ -198,14 +198,14 @@ class SpringSlider:
                 )
         return float(brentq(excess, *sorted((y[2], y[2] + width)), xtol=1e-14, rtol=1e-15))
 
-    def _variables(self) -> tuple[Any, Any, dict[sp.Symbol, Any]]:
+    def _variables(self) -> tuple[ca.SX, ca.SX, dict[sp.Symbol, ca.SX]]:
         states = state_symbols(self.law.state_names)
         y, load = ca.SX.sym("y", 3 + len(states)), ca.SX.sym("load", 3)
         logged = {x: ca.exp(y[2 + i]) for i, x in enumerate((rate, *states))}
         return y, load, {slip: y[0], stretch: y[1]} | logged
 
 
-def rational_number(value: Any) -> sp.Rational:
+def rational_number(value: float | Fraction) -> sp.Rational:
     """Exact SymPy number of a float."""
     return sp.Rational(str(rational(float(value))))
 
@@ -249,7 +249,7 @@ class Tide:
         require_nonnegative(stress=self.amplitude, stress_phase=self.phase)
         require_positive(stress_period=self.period)
 
-    def at(self, time: Any) -> Any:
+    def at(self, time: "float | np.ndarray") -> Any:
         """Stress [Pa] at a time [s]."""
         return self.amplitude * np.sin(2 * math.pi / self.period * time + self.phase)
 
@@ -347,9 +347,9 @@ class Instruments:
         Share of it after which the pressure that is held changes.
     """
 
-    def __init__(self, step: float, part: float, reading: Any, late: Any, pumped: Any) -> None:
+    def __init__(self, step: float, part: float, *elements: Callable[[float], Any]) -> None:
         self.step, self.part = step, part
-        self._reading, self._late, self._pumped = reading, late, pumped
+        self._reading, self._late, self._pumped = elements
 
     @classmethod
     def of(cls, path: PressurePath, transducer: Transducer | None, step: float) -> "Instruments":
@@ -373,7 +373,7 @@ class Instruments:
         return [(now, late, before)] * (late > 0) + [(now + late, self.step - late, after)]
 
 
-def _read(transducer: Transducer | None, step: float) -> Any:
+def _read(transducer: Transducer | None, step: float) -> "tuple[ca.Function, tuple[float, ...]] | None":
     """CasADi Function (memory, slip) → reading, memory, and the memory at first; None without a transducer."""
     if transducer is None:
         return None
@@ -382,7 +382,7 @@ def _read(transducer: Transducer | None, step: float) -> Any:
     return ca.Function("reading", [memory, slip], [seen, ca.vertcat(*after)]), transducer.start
 
 
-def _held(stages: Sequence[SampledStage], step: float) -> Any:
+def _held(stages: Sequence[SampledStage], step: float) -> "tuple[ca.Function, tuple[float, ...]] | None":
     """The same of a pressure and what is held of it; None without stages."""
     if not stages:
         return None
@@ -393,7 +393,7 @@ def _held(stages: Sequence[SampledStage], step: float) -> Any:
     return ca.Function("held", [memory, asked], [held, ca.vertcat(*after)]), start
 
 
-def _remembering(element: Any) -> Any:
+def _remembering(element: tuple[ca.Function, tuple[float, ...]] | None) -> Callable[[float], Any]:
     """Number → number of such a Function, which keeps its memory; as it is without one."""
     if element is None:
         return float

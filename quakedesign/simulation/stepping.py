@@ -11,7 +11,7 @@ from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -20,6 +20,9 @@ from quakedesign import cache
 from quakedesign.errors import OutputError, SimulationError
 from quakedesign.files import sweep, write_whole
 from quakedesign.simulation.compiled import LEVELS, RADIX, Backend, MachineCode, compilation
+
+if TYPE_CHECKING:
+    import casadi as ca
 
 # ----------------------------------------------------------------------
 # Long runs that can be interrupted at any moment and go on later with the same digits.
@@ -36,7 +39,7 @@ class Checkpoint:
     _written: list[float] = field(default_factory=lambda: [monotonic()], repr=False)
 
     @classmethod
-    def of(cls, path: str | Path, step: Any, start: Sequence[float], kept: Sequence[int]) -> "Checkpoint":
+    def of(cls, path: str | Path, step: "ca.Function", start: Sequence[float], kept: Sequence[int]) -> "Checkpoint":
         """Checkpoint of a run.
 
         Parameters
@@ -113,7 +116,7 @@ class Advancer:
 
     vector: "np.ndarray"
     calls: tuple[Callable[[], None], ...] = ()  # Advance the vector by 1, 64 and 4096 steps; none beside machine code
-    owners: tuple[Any, ...] = ()  # tuple: CasADi's buffers, which must live as long as the calls
+    owners: tuple[object, ...] = ()  # tuple: CasADi's buffers, which must live as long as the calls
     machine_code: MachineCode | None = None  # See `Backend`
 
     @classmethod
@@ -141,7 +144,7 @@ class Advancer:
                 raise SimulationError("the compiled step failed. Use compiled=False.")
 
 
-def _bound(function: Any, vector: "np.ndarray") -> tuple[Callable[[], None], Any]:
+def _bound(function: Any, vector: "np.ndarray") -> tuple[Callable[[], None], object]:
     result = np.empty_like(vector)
     buffer, evaluate = function.buffer()
     buffer.set_arg(0, vector.data)
@@ -207,7 +210,7 @@ LONG = 100_000_000
 
 
 def run_question(
-    step: Any, start: Sequence[float], instants: Sequence[int], compiled: bool | None, steps: int
+    step: "ca.Function", start: Sequence[float], instants: Sequence[int], compiled: bool | None, steps: int
 ) -> tuple[bytes, ...]:
     """Everything that determines the digits of so many steps of a casadi.Function; empty for a run that is not kept."""
     if not cache.in_use() or compiled is False or steps * step.n_instructions() < LONG:

@@ -1,11 +1,12 @@
 """The stick–slip plant: friction holds the fault at rest, and it never slips backward (ERRATA 14)."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 
-from quakedesign.simulation.closed_loop import ClosedLoop, Motion
+from quakedesign.loop.schemes.base import Motion
+from quakedesign.simulation.closed_loop import ClosedLoop, Number
 from quakedesign.simulation.integrators import Integrator
 
 _BISECTIONS = 4  # of the step, which leave a sixteenth of it, from where Newton's method converges quadratically
@@ -34,18 +35,19 @@ class StickSlipLoop(ClosedLoop):
     sticks: ClassVar[bool] = True
 
     @property
-    def plant(self) -> Any:
+    def plant(self) -> Motion:
         """Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²] while it slips; without friction where it is opened."""
         _, normal, _, stress = self.hats()
 
-        def rates(time: Any, x: Any, pressure: Any) -> Any:
+        def rates(time: ca.SX, x: ca.SX, pressure: ca.SX) -> ca.SX:
             pulling = normal * self.friction(x) * ca.fmin(stress - pressure, 0)  # of the printed plant beyond p = σ'
-            return self.printed(time, x, pressure) + ca.vertcat(0, pulling)
+            rate = self.printed(time, x, pressure)
+            return rate + ca.vertcat(0, pulling)
 
         return rates
 
     @property
-    def held(self) -> Any:
+    def held(self) -> Motion:
         """As `plant`, out of rest: with the friction that holds the fault there."""
         plant, excess = self.plant, self.fault.friction.rest_excess
         _, normal, _, stress = self.hats()
@@ -53,25 +55,25 @@ class StickSlipLoop(ClosedLoop):
             return plant
         return lambda time, x, p: plant(time, x, p) - ca.vertcat(0, normal * excess * ca.fmax(stress - p, 0))
 
-    def resting_load(self, time: Any, slip: Any, pressure: Any) -> tuple[Any, Any]:
+    def resting_load(self, time: ca.SX, slip: ca.SX, pressure: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Load less friction, and load plus friction [m/s²], of a fault at rest (SX): it rests from ≤ 0 to ≥ 0."""
         forward = self.held(time, ca.vertcat(slip, 0), pressure)[1]
         _, normal, _, stress = self.hats()
         friction = self.friction(ca.vertcat(slip, 0)) + self.fault.friction.rest_excess
         return forward, forward + 2 * normal * friction * ca.fmax(stress - pressure, 0)
 
-    def reversing(self, time: Any, state: Any, pressure: Any) -> Any:
+    def reversing(self, time: ca.SX, state: ca.SX, pressure: ca.SX) -> ca.SX:
         """Whether the load on a fault at rest exceeds friction backward (SX)."""
         return ca.logic_and(state[1] == 0, self.resting_load(time, state[0], pressure)[1] < 0)
 
-    def shear_stress(self, time: Any, state: Any, pressure: Any, friction: Any) -> Any:
+    def shear_stress(self, time: ca.SX, state: ca.SX, pressure: ca.SX, friction: ca.SX) -> ca.SX:
         """Shear stress [Pa]: μ max(σ' − p, 0) against slip, or what carries the load at rest (SX)."""
         closed = ca.fmax(self.fault.effective_normal_stress - pressure, 0)
         strength, held = friction * closed, (friction + self.fault.friction.rest_excess) * closed
         carried = self.resting_load(time, state[0], pressure)[0] / self.hats()[1] + held
         return ca.if_else(state[1] == 0, ca.fmin(carried, held), strength)
 
-    def advance(self, method: type[Integrator], motion: Motion, state: Any, step: float, works: int = 0) -> Any:
+    def advance(self, method: type[Integrator], motion: Motion, state: ca.SX, step: float, works: int = 0) -> ca.SX:
         """State after one step, with at most one release and one stop; the last entries of the state are works."""
         moved = _SplitStep(self.plant, self.held, method, motion, step, works)
         rests, push = state[1] == 0, moved.push(0.0, state)
@@ -87,40 +89,40 @@ class StickSlipLoop(ClosedLoop):
 class _SplitStep:
     """The motion within one step, cut at shares [-] of its length."""
 
-    plant: Any
-    held: Any
+    plant: Motion
+    held: Motion
     method: type[Integrator]
     motion: Motion
     step: float
     works: int
 
-    def rates(self, passed: Any, state: Any) -> Any:
+    def rates(self, passed: Number, state: ca.SX) -> ca.SX:
         """Time derivative of the state while the fault slips."""
         return self.motion(self.plant, passed, state)
 
-    def push(self, passed: Any, state: Any) -> Any:
+    def push(self, passed: Number, state: ca.SX) -> ca.SX:
         """Acceleration [m/s²] out of rest; positive where friction cannot hold the fault."""
-        return self.motion(self.held, passed, _at_rest(state))[1]
+        return self.motion(self.held, passed, ca.vertcat(state[0], 0, state[2:]))[1]
 
-    def slid(self, passed: Any, share: Any, state: Any) -> Any:
+    def slid(self, passed: Number, share: Number, state: ca.SX) -> ca.SX:
         """State after a share of the step of the sliding fault."""
         return self.method.advance(lambda part, now: self.rates(passed + share * part, now), state, share * self.step)
 
-    def rested(self, passed: Any, share: Any, state: Any) -> Any:
+    def rested(self, passed: Number, share: Number, state: ca.SX) -> ca.SX:
         """State after a share of the step at rest: slip and slip rate stay, the rest of the state goes on."""
 
-        def field(part: Any, now: Any) -> Any:
+        def field(part: Number, now: ca.SX) -> ca.SX:
             return self.motion(lambda *_: ca.SX.zeros(2), passed + share * part, ca.vertcat(state[0], 0, now[2:]))
 
         if self._further(state):
             return self.method.advance(field, state, share * self.step)
         return state + share * self.step * field(0.0, state)
 
-    def _further(self, state: Any) -> bool:
+    def _further(self, state: ca.SX) -> bool:
         """Whether there is more than slip, slip rate and works: states of the law, or pressures on their way."""
         return bool(state.shape[0] - 2 - self.works)
 
-    def stop(self, begin: Any, start: Any, ahead: Any) -> tuple[Any, Any]:
+    def stop(self, begin: Number, start: ca.SX, ahead: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Share of the step at which the slip rate has fallen to zero, and the state there.
 
         The slip rate is the quartic in time with the values and slopes of both ends and the slip between them. States
@@ -140,11 +142,7 @@ class _SplitStep:
         return stop, ca.vertcat(start[0] + length * rate.integral(share), 0, stopped[2:])
 
 
-def _at_rest(state: Any) -> Any:
-    return ca.vertcat(state[0], 0, state[2:])
-
-
-def _crossing(before: Any, after: Any) -> Any:
+def _crossing(before: ca.SX, after: ca.SX) -> ca.SX:
     """Share of a step at which a quantity that ends positive has left zero, by its secant; 1 where it stays below."""
     crosses = ca.logic_and(before <= 0, after > 0)
     return ca.if_else(crosses, before / ca.if_else(crosses, before - after, 1), 1)
@@ -154,34 +152,34 @@ def _crossing(before: Any, after: Any) -> Any:
 class _Quartic:
     """Polynomial of degree four on [0, 1], by its coefficients."""
 
-    coefficients: tuple[Any, Any, Any, Any, Any]
+    coefficients: tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]
 
     @classmethod
-    def of(cls, start: Any, end: Any, start_slope: Any, end_slope: Any, mean: Any) -> "_Quartic":
+    def of(cls, start: ca.SX, end: ca.SX, start_slope: ca.SX, end_slope: ca.SX, mean: ca.SX) -> "_Quartic":
         """Quartic with these values and slopes at 0 and 1, and this mean."""
         cubic = 2 * (start - end) + start_slope + end_slope
         square = 3 * (end - start) - 2 * start_slope - end_slope
         bulge = 30 * (mean - (start + start_slope / 2 + square / 3 + cubic / 4))  # of s²(1 − s)²
         return cls((start, start_slope, square + bulge, cubic - 2 * bulge, bulge))
 
-    def at(self, share: Any) -> Any:
+    def at(self, share: Number) -> ca.SX:
         """Value at a share."""
         a, b, c, d, e = self.coefficients
         return a + share * (b + share * (c + share * (d + share * e)))
 
-    def integral(self, share: Any) -> Any:
+    def integral(self, share: Number) -> ca.SX:
         """Integral from 0 to a share."""
         a, b, c, d, e = self.coefficients
         return share * (a + share * (b / 2 + share * (c / 3 + share * (d / 4 + share * e / 5))))
 
-    def slope(self, share: Any) -> Any:
+    def slope(self, share: Number) -> ca.SX:
         """Derivative at a share."""
         _, b, c, d, e = self.coefficients
         return b + share * (2 * c + share * (3 * d + share * 4 * e))
 
-    def root(self) -> Any:
+    def root(self) -> ca.SX:
         """A share at which it falls through zero, where it is ≥ 0 at 0 and < 0 at 1."""
-        low, high = 0.0, 1.0
+        low, high = ca.SX(0), ca.SX(1)
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2
             positive = self.at(middle) > 0

@@ -10,16 +10,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, field, fields
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
-from quakedesign.files import write_whole
+from quakedesign.files import Json, write_whole
 from quakedesign.simulation.closed_loop import EnergyBudget
 from quakedesign.simulation.recorder import Metrics
+
+if TYPE_CHECKING:
+    import control
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # ----------------------------------------------------------------------
 # Export of every run: xarray, pandas, NetCDF.
@@ -108,7 +115,7 @@ class Trajectory(ABC):
         """Texts and numbers about the run as a whole."""
         return self.provenance
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> "xr.Dataset":
         """Return an xarray Dataset over ``time``, with the attributes of the CF conventions.
 
         The time [s] is that since the start of the run. It is not marked as CF's axis T, which is for dates: its unit
@@ -128,7 +135,7 @@ class Trajectory(ABC):
             variable.encoding["_FillValue"] = None
         return found
 
-    def resample(self, dt: float) -> Any:
+    def resample(self, dt: float) -> "xr.Dataset":
         """Return an xarray Dataset at uniform instants, as filters and spectra need them, interpolated linearly.
 
         Parameters
@@ -150,7 +157,7 @@ class Trajectory(ABC):
         count = int(duration / dt * (1 + 1e-12)) + 1
         return self.to_xarray().interp(time=self.time[0] + dt * np.arange(count))
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> "pd.DataFrame":
         """Return a pandas DataFrame over the time [s]; the columns carry their units."""
         import pandas as pd
 
@@ -207,7 +214,7 @@ class Outcome:
         """Whether the run neither is an earthquake nor diverges nor opens the fault."""
         return self.kind in HARMLESS
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Keys of DESIGN.md."""
         return asdict(self)
 
@@ -293,7 +300,8 @@ class OutcomeCriterion:
 # ----------------------------------------------------------------------
 # The figure of one run.
 
-Panel = tuple[str, str, Any, tuple[str, Any]]
+Array = np.ndarray
+Panel = tuple[str, str, Array, tuple[str, Array | None]]
 """Name, SI unit and values of a signal, and name and values of one that is drawn beside it."""
 Signal = tuple["np.ndarray", str, str]
 NOTHING = ("", None)
@@ -301,7 +309,7 @@ _TIMES = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"), (2 * 60.0, 60.
 _PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
-def figure(title: str, time: Any, panels: Sequence[Panel]) -> Any:
+def figure(title: str, time: np.ndarray, panels: Sequence[Panel]) -> "Figure":
     """Return a Figure of signals over time [s], one panel each."""
     from matplotlib.figure import Figure
 
@@ -315,7 +323,7 @@ def figure(title: str, time: Any, panels: Sequence[Panel]) -> Any:
     return drawing
 
 
-def stress_figure(title: str, time: Any, slip: Any, shear_stress: Any, moment_rate: Any) -> Any:
+def stress_figure(title: str, time: Array, slip: Array, shear_stress: Array, moment_rate: Array) -> "Figure":
     """Return a Figure of shear stress against slip (the area under it is the work per area), and of the moment rate."""
     from matplotlib.figure import Figure
 
@@ -333,7 +341,7 @@ def stress_figure(title: str, time: Any, slip: Any, shear_stress: Any, moment_ra
     return drawing
 
 
-def _panel(axis: Any, time: Any, title: str, unit: str, values: Any, beside: tuple[str, Any]) -> None:
+def _panel(axis: "Axes", time: Array, title: str, unit: str, values: Array, beside: tuple[str, Array | None]) -> None:
     name, others = beside
     largest = max(float(abs(curve).max()) for curve in (values, others) if curve is not None)
     # No prefix where the unit is a power, which would belong to what is inside of it.
@@ -349,8 +357,7 @@ def _panel(axis: Any, time: Any, title: str, unit: str, values: Any, beside: tup
 
 def _prefix(largest: float) -> tuple[float, str]:
     return next(
-        ((size, prefix) for size, prefix in _PREFIXES if largest >= size),
-        _PREFIXES[-1] if largest else (1.0, ""),
+        ((size, prefix) for size, prefix in _PREFIXES if largest >= size), _PREFIXES[-1] if largest else (1.0, "")
     )
 
 
@@ -415,7 +422,7 @@ class LoopTrajectory(Trajectory):
             found[f"xi_{number}"] = (values, f"integral state xi{number}", unit)
         return found | dict(self.actuation)
 
-    def attributes(self) -> dict[str, Any]:
+    def attributes(self) -> Json:
         """Provenance, and outcome, metrics, events and energy as JSON text."""
         entries = {
             "outcome": self.outcome.to_dict(),
@@ -426,7 +433,7 @@ class LoopTrajectory(Trajectory):
         return {**self.provenance} | {name: json.dumps(value, allow_nan=False) for name, value in entries.items()}
 
     @property
-    def response(self) -> Any:
+    def response(self) -> "control.TimeResponseData":
         """The run as python-control's TimeResponseData: outputs slip [m] and slip_rate [m/s], input p [Pa]."""
         import control
 
@@ -461,14 +468,14 @@ class LoopTrajectory(Trajectory):
             ("pressure", "Pa", self.pressure, ("at the well", well)),
         ]
         if self.slip_error is not None:
-            errors = (("slip error", "m", self.slip_error), ("slip-rate error", "m/s", self.slip_rate_error))
+            errors: Any = ("slip error", "m", self.slip_error), ("slip-rate error", "m/s", self.slip_rate_error)
             found += ((*error, NOTHING) for error in errors)
         return [*found, *((title, unit, values, NOTHING) for values, title, unit in further.values())]
 
-    def plot(self) -> Any:
+    def plot(self) -> "Figure":
         """Return a matplotlib Figure of slip, slip rate, pressure, errors, and what an actuator adds."""
         return figure(self.heading, self.time, self.panels())
 
-    def plot_stress(self) -> Any:
+    def plot_stress(self) -> "Figure":
         """Return a matplotlib Figure of the shear stress against slip, and of the moment rate over time."""
         return stress_figure(self.heading, self.time, self.slip, self.shear_stress, self.moment_rate)

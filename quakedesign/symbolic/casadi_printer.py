@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, reduce
 from operator import add, mul
+from types import ModuleType
 from typing import Any
 
 import casadi as ca
@@ -13,10 +14,12 @@ from sympy.codegen.cfunctions import expm1
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
-Operations = Mapping[Any, Any]
+Value = ca.SX | np.ndarray | float  # of an expression, by the symbols in it
+Values = Mapping[sp.Symbol, Value]
+Operations = Mapping[type[sp.Basic], Callable[..., Value]]
 
 
-def to_casadi(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], motion: Sequence[Any] = ()) -> list[Any]:
+def to_casadi(expressions: Sequence[sp.Expr], values: Values, motion: Sequence[ca.SX] = ()) -> list[ca.SX]:
     """Expressions as CasADi SX; subexpressions that SymPy shares are shared there too.
 
     Parameters
@@ -44,7 +47,7 @@ def to_casadi(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], m
     return [ca.SX(item) for item in _translate(expressions, values, table)]
 
 
-def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -> list[Any]:
+def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Value]) -> list[Value]:
     """Values of expressions at floats or NumPy arrays of one shape, with the operations of `to_casadi`.
 
     Raises
@@ -55,10 +58,10 @@ def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) ->
     return _translate(expressions, values, _numpy_operations())
 
 
-def _translate(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], table: Operations) -> list[Any]:
-    translated: dict[sp.Basic, Any] = dict(values)
+def _translate(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Value], table: Operations) -> list[Value]:
+    translated: dict[sp.Basic, Value] = dict(values)
 
-    def walk(node: sp.Basic) -> Any:
+    def walk(node: sp.Basic) -> Value:
         if node not in translated:
             translated[node] = _number(node) if node.is_number else _operate(node, table, walk)
         return translated[node]
@@ -66,12 +69,12 @@ def _translate(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], 
     return [walk(sp.sympify(expression)) for expression in expressions]
 
 
-def _number(node: Any) -> float:
+def _number(node: sp.Basic) -> float:
     exact = node.p / node.q if node.is_Rational else None
     return float(node.evalf(30)) if exact is None else exact
 
 
-def _operate(node: Any, table: Operations, walk: Callable[[Any], Any]) -> Any:
+def _operate(node: sp.Basic, table: Operations, walk: Callable[[sp.Basic], Value]) -> Value:
     if node.is_Add or node.is_Mul:
         # Sum or product, with its numbers joined exactly before they are rounded.
         numbers = [arg for arg in node.args if arg.is_number]
@@ -95,31 +98,33 @@ def _operate(node: Any, table: Operations, walk: Callable[[Any], Any]) -> Any:
     return table[node.func](*(walk(arg) for arg in node.args))
 
 
-def _power(library: Any, base: Any, exponent: sp.Expr) -> Any:
+def _power(library: ModuleType, base: Value, exponent: sp.Expr) -> Value:
     """Power with square roots as such, since they are cheaper and correctly rounded."""
     if exponent in (1, -1):
         return base if exponent == 1 else 1 / base
     if exponent in (2, 3):
         return base * base if exponent == 2 else base * base * base
     if exponent in (sp.Rational(1, 2), sp.Rational(3, 2)):
-        root = library.sqrt(base)
+        root: Value = library.sqrt(base)
         return root if exponent < 1 else base * root
     if exponent in (sp.Rational(-1, 2), sp.Rational(-3, 2)):
         return 1 / _power(library, base, -exponent)
     return base ** _number(exponent)
 
 
-def _powers(library: Any) -> dict[Any, Any]:
-    def signed(x: Any, a: sp.Expr) -> Any:
-        return library.sign(x) if a == 0 else library.sign(x) * _power(library, library.fabs(x), a)
+def _powers(library: ModuleType) -> dict[type[sp.Basic], Callable[..., Value]]:
+    def signed(x: Value, a: sp.Expr) -> Value:
+        way: Value = library.sign(x)
+        return way if a == 0 else way * _power(library, library.fabs(x), a)
 
-    def absolute(x: Any, a: sp.Expr) -> Any:
+    def absolute(x: Value, a: sp.Expr) -> Value:
         return _power(library, library.fabs(x), a)
 
-    def larger(first: Any, *others: Any) -> Any:
+    def larger(first: Value, *others: Value) -> Value:
         """The positive part, a maximum with 0, without a branch: x/2 + |x|/2 is exactly x or 0."""
-        rest = reduce(library.fmax, others)
-        return (rest + library.fabs(rest)) / 2 if isinstance(first, float) and first == 0 else library.fmax(first, rest)
+        rest: Value = reduce(library.fmax, others)
+        greater: Value = library.fmax(first, rest)
+        return (rest + library.fabs(rest)) / 2 if isinstance(first, float) and first == 0 else greater
 
     elementary = {getattr(sp, name): getattr(library, name) for name in ("exp", "log", "sin", "cos", "tan", "tanh")}
     return {
@@ -138,20 +143,20 @@ def _powers(library: Any) -> dict[Any, Any]:
     }
 
 
-def _kinks(motion: Any) -> dict[Any, Any]:
+def _kinks(motion: ca.SX) -> dict[type[sp.Basic], Callable[..., Value]]:
     """Max, Min and Abs with the values of CasADi's, and the derivatives of the branch that a motion enters."""
 
-    def not_less(a: Any, b: Any) -> Any:
-        ahead: Any = True
+    def not_less(a: Value, b: Value) -> Value:
+        ahead: ca.SX | bool = True
         slopes = ca.jacobian(ca.SX(a) - b, motion)
         for slope in reversed(ca.vertsplit(slopes.T)):
             ahead = ca.logic_or(slope > 0, ca.logic_and(slope == 0, ahead))
         return ca.logic_or(a > b, ca.logic_and(a == b, ahead))
 
-    def larger(a: Any, b: Any) -> Any:
+    def larger(a: Value, b: Value) -> Value:
         return ca.if_else(not_less(a, b), a, b)
 
-    def smaller(a: Any, b: Any) -> Any:
+    def smaller(a: Value, b: Value) -> Value:
         return ca.if_else(not_less(a, b), b, a)
 
     return {
@@ -171,7 +176,8 @@ def _numpy_operations() -> Operations:
     return _operations(np, np.arcsinh, np.arctan, np.where, np.logical_and, np.logical_or)
 
 
-def _operations(library: Any, asinh: Any, atan: Any, choose: Any, both: Any, either: Any) -> Operations:
+def _operations(library: ModuleType, *others: Callable[..., Value]) -> Operations:
+    asinh, atan, choose, both, either = others
     other = {expm1: library.expm1, sp.asinh: asinh, sp.sinh: library.sinh, sp.cosh: library.cosh, sp.atan: atan}
     logic = {sp.Piecewise: choose, sp.And: lambda *c: reduce(both, c), sp.Or: lambda *c: reduce(either, c)}
     return _powers(library) | other | logic
@@ -181,7 +187,7 @@ def _operations(library: Any, asinh: Any, atan: Any, choose: Any, both: Any, eit
 # Functions of CasADi at many points at once.
 
 
-def vectorised(function: Any) -> Callable[..., "np.ndarray"]:
+def vectorised(function: ca.Function) -> Callable[..., "np.ndarray"]:
     """A Function of SX at many points at once, in NumPy: some times as fast as `Function.map`.
 
     Parameters
@@ -195,7 +201,7 @@ def vectorised(function: Any) -> Callable[..., "np.ndarray"]:
         Of arrays of shape (numbers of an input, points), or (numbers, 1) for what all points share; gives the numbers
         of the output, column by column, in shape (numbers, points).
     """
-    steps = []
+    steps: list[tuple[int, list[int], Any]] = []  # operation, places of the results, and of the arguments or a constant
     for k in range(function.n_instructions()):
         code, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if code not in (ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT) and code not in _INSTRUCTIONS:
@@ -203,7 +209,7 @@ def vectorised(function: Any) -> Callable[..., "np.ndarray"]:
         steps.append((code, out, function.instruction_constant(k) if code == ca.OP_CONST else into))
 
     def evaluated(*inputs: "np.ndarray") -> "np.ndarray":
-        work: list[Any] = [0.0] * function.sz_w()
+        work: list[Value] = [0.0] * function.sz_w()
         result = np.empty((function.nnz_out(0), max(each.shape[1] for each in inputs)))
         with np.errstate(all="ignore"):
             for code, out, into in steps:
@@ -226,7 +232,7 @@ _NAMED |= {"ASINH": "arcsinh", "ATAN": "arctan", "LT": "less", "LE": "less_equal
 _NAMED |= {
     n: n.lower() for n in "EXP LOG SQRT FABS FMAX FMIN SIGN SIN COS TAN TANH SINH COSH LOG1P EXPM1 HYPOT".split()
 }
-_INSTRUCTIONS: dict[int, Callable[..., Any]] = {
+_INSTRUCTIONS: dict[int, Callable[..., Value]] = {
     **{getattr(ca, f"OP_{name}"): getattr(np, ours) for name, ours in _NAMED.items()},
     ca.OP_ASSIGN: lambda x: x,
     ca.OP_TWICE: lambda x: x + x,

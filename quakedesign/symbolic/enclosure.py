@@ -12,7 +12,7 @@ from fractions import Fraction
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import count
 from math import inf
-from operator import methodcaller, mul
+from operator import mul
 from typing import Any, NoReturn
 
 import flint
@@ -39,7 +39,8 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 _BITS = 256
 _LONGEST = 3 * _BITS  # bits of a numerator or denominator beyond which an end is rounded
 _LARGEST = 16 * _BITS  # bits of size beyond which an end is rounded to infinity or zero, or away from them
-_RISING: dict[Any, Interval] = {  # with their limits at −inf and inf
+_POWERS = sp.Pow, SignedPower, AbsolutePower
+_RISING: dict[type[sp.Basic], Interval] = {  # with their limits at −inf and inf
     sp.exp: (_ZERO, inf),
     sp.log: EVERYTHING,
     sp.asinh: EVERYTHING,
@@ -78,17 +79,16 @@ def regular(expression: sp.Expr, box: Box) -> bool:
     return all(low > 0 or high < 0 for low, high in ends)
 
 
-def _singular_at_zero(node: Any) -> bool:
-    if isinstance(node, sp.Pow | SignedPower | AbsolutePower):
-        return not (node.args[1].is_Integer and node.args[1] > 0)
-    return isinstance(node, sp.log)
+def _singular_at_zero(node: sp.Basic) -> bool:
+    whole = node.func in _POWERS and node.args[1].is_Integer and node.args[1] > 0
+    return node.func is sp.log or (node.func in _POWERS and not whole)
 
 
 def _intervals(expression: sp.Expr, box: Box) -> dict[sp.Basic, Interval]:
     """Intervals of an expression and of every part of it."""
     bounds: dict[sp.Basic, Interval] = dict(box)
 
-    def walk(node: Any) -> Interval:
+    def walk(node: sp.Basic) -> Interval:
         if node not in bounds:
             bounds[node] = _rounded(_number(node) if node.is_Number or node.is_NumberSymbol else _operate(node, walk))
         return bounds[node]
@@ -97,7 +97,7 @@ def _intervals(expression: sp.Expr, box: Box) -> dict[sp.Basic, Interval]:
     return bounds
 
 
-def _number(node: Any) -> Interval:
+def _number(node: sp.Basic) -> Interval:
     if node.is_finite is not True:
         return EVERYTHING
     if node.is_NumberSymbol:
@@ -107,11 +107,11 @@ def _number(node: Any) -> Interval:
     return exact, exact
 
 
-def _operate(node: Any, walk: Callable[[Any], Interval]) -> Interval:
+def _operate(node: sp.Basic, walk: Callable[[sp.Basic], Interval]) -> Interval:
     if node.is_Pow:
         return _power(walk(node.base), node.exp)
-    if isinstance(node, SignedPower | AbsolutePower):
-        return _signed_power(walk(node.args[0]), node.args[1], signed=isinstance(node, SignedPower))
+    if node.func in (SignedPower, AbsolutePower):
+        return _signed_power(walk(node.args[0]), node.args[1], signed=node.func is SignedPower)
     if node.func in _OPERATIONS:
         return _OPERATIONS[node.func]([walk(argument) for argument in node.args])
     if node.func in _RISING:
@@ -191,26 +191,26 @@ def _signed_power(x: Interval, exponent: sp.Expr, *, signed: bool) -> Interval:
     return negative(_power((_ZERO, -x[0]), exponent))[0], _power((_ZERO, x[1]), exponent)[1]
 
 
-def _rising(function: Any, x: Interval) -> Interval:
+def _rising(function: type[sp.Basic], x: Interval) -> Interval:
     """Enclosure by a function that rises."""
     if function is sp.log and x[0] < 0:
         return EVERYTHING
     return _rise(function, x[0], up=False), _rise(function, x[1], up=True)
 
 
-def _rise(function: Any, x: End, *, up: bool) -> End:
+def _rise(function: type[sp.Basic], x: End, *, up: bool) -> End:
     if isinstance(x, float):
         return _RISING[function][x == inf]
     return _end(lambda: getattr(arb(fmpq(x.numerator, x.denominator)), function.__name__)(), up=up)
 
 
-def _end(evaluate: Callable[[], Any], *, up: bool) -> End:
+def _end(evaluate: Callable[[], arb], *, up: bool) -> End:
     """Upper or lower end of a ball that is evaluated with `_BITS` bits."""
     with flint.ctx.workprec(_BITS):
         return upper_end(evaluate()) if up else -upper_end(-evaluate())
 
 
-def upper_end(ball: Any) -> End:
+def upper_end(ball: arb) -> End:
     """Rational at or above a ball of python-flint, of a size between 2 to ± `_LARGEST`; zero, or infinite.
 
     Numbers of any size have balls, but as rationals the largest and the smallest would fill the memory.
@@ -231,9 +231,10 @@ def _wave(name: str) -> Callable[[list[Interval]], Interval]:
         if isinstance(low, float) or isinstance(high, float):
             return -_ONE, _ONE
 
-        def over() -> Any:
+        def over() -> arb:
             ends = [arb(fmpq(x.numerator, x.denominator)) for x in (low, high)]
-            return getattr(ends[0].union(ends[1]), name)()
+            wave: arb = getattr(ends[0].union(ends[1]), name)()
+            return wave
 
         return max(-_ONE, _end(over, up=False)), min(_ONE, _end(over, up=True))
 
@@ -265,7 +266,7 @@ def _extreme(choose: Callable[[Iterable[End]], End]) -> Callable[[list[Interval]
     return operation
 
 
-_OPERATIONS: dict[Any, Callable[[list[Interval]], Interval]] = {
+_OPERATIONS: dict[type[sp.Basic], Callable[[list[Interval]], Interval]] = {
     sp.Add: lambda arguments: reduce(add, arguments),
     sp.Mul: lambda arguments: reduce(times, arguments),
     sp.Max: _extreme(max),
@@ -295,17 +296,17 @@ def _rounded(a: Interval) -> Interval:
 # Rigorous enclosures of SymPy expressions over boxes, in ball arithmetic (python-flint).
 
 BallBox = Mapping[sp.Symbol, tuple[Fraction, Fraction]]
-Operation = Callable[[list[Any]], Any]
+Operation = Callable[[list[arb]], Any]
 Work = list[tuple[int, Operation, list[int]]]
 
 
-def ball(low: Fraction, high: Fraction) -> Any:
+def ball(low: Fraction, high: Fraction) -> arb:
     """Ball that contains the interval [low, high]."""
     ends = [arb(fmpq(v.numerator, v.denominator)) for v in (low, high)]
     return ends[0].union(ends[1])
 
 
-def enclose(expression: sp.Expr, box: BallBox) -> Any:
+def enclose(expression: sp.Expr, box: BallBox) -> arb:
     """Ball that contains every value of an expression over a box.
 
     Parameters
@@ -332,7 +333,7 @@ class _Operations:
     def __init__(self, expression: sp.Expr) -> None:
         places: dict[sp.Expr, int] = {}
         self._places: dict[sp.Symbol, int] = {}
-        self._start: list[Any] = []
+        self._start: list[Any] = []  # arb, or None before the symbols are known
         work: Work = []
 
         def place(e: sp.Expr) -> int:
@@ -350,18 +351,18 @@ class _Operations:
         self._work = work
         self._after = {symbol: _depending(work, index) for symbol, index in self._places.items()}
 
-    def value(self, balls: Mapping[sp.Symbol, Any]) -> Any:
+    def value(self, balls: Mapping[sp.Symbol, arb]) -> arb:
         """Ball of the expression for balls of its symbols."""
         return self.values(balls)[-1]
 
-    def values(self, balls: Mapping[sp.Symbol, Any]) -> list[Any]:
+    def values(self, balls: Mapping[sp.Symbol, arb]) -> list[arb]:
         """Balls of all subexpressions, the expression's own last."""
         results = self._start.copy()
         for symbol, index in self._places.items():
             results[index] = balls[symbol]
         return _worked(results, self._work)
 
-    def moved(self, results: list[Any], symbol: sp.Symbol, changed: Any) -> list[Any]:
+    def moved(self, results: list[arb], symbol: sp.Symbol, changed: arb) -> list[arb]:
         """The same for another ball of one symbol: what depends on it is computed again."""
         results = results.copy()
         results[self._places[symbol]] = changed
@@ -371,7 +372,7 @@ class _Operations:
 _compiled = lru_cache(maxsize=64)(_Operations)
 
 
-def _worked(results: list[Any], work: Work) -> list[Any]:
+def _worked(results: list[arb], work: Work) -> list[arb]:
     for i, operation, arguments in work:
         results[i] = operation([results[j] for j in arguments])
     return results
@@ -386,7 +387,7 @@ def _depending(work: Work, index: int) -> Work:
     return depending
 
 
-def _ball_number(e: sp.Expr) -> Any:
+def _ball_number(e: sp.Expr) -> arb:
     if e.is_Rational:
         return arb(fmpq(int(e.p), int(e.q)))
     if e.is_Float:
@@ -396,43 +397,31 @@ def _ball_number(e: sp.Expr) -> Any:
         return arb.pi()
     if e is sp.E:
         return arb(1).exp()
-    return _operation(e)([_ball_number(a) for a in e.args])
+    value: arb = _operation(e)([_ball_number(a) for a in e.args])
+    return value
 
 
 def _operation(e: sp.Expr) -> Operation:
     """What a node does with the balls of its arguments; everything about its exponent is settled here."""
     if e.is_Add:
         return sum
-    if e.is_Mul or isinstance(e, sp.Max | sp.Min):
-        return partial(reduce, {sp.Max: _larger, sp.Min: _smaller}.get(type(e), mul))
+    if e.func in (folded := {sp.Mul: mul, sp.Max: arb.max, sp.Min: arb.min}):
+        return partial(reduce, folded[e.func])
     if e.is_Pow:
         return _ball_power(e.exp)
-    if isinstance(e, AbsolutePower | SignedPower):
-        return _monotone(e.args[1], signed=isinstance(e, SignedPower))
+    if e.func in (AbsolutePower, SignedPower):
+        return _monotone(e.args[1], signed=e.func is SignedPower)
     methods = {sp.exp: "exp", sp.sin: "sin", sp.cos: "cos", sp.log: "log", sp.asinh: "asinh", sp.Abs: "__abs__"}
-    for function, method in methods.items():
-        if isinstance(e, function):
-            return partial(_of_one, methodcaller(method))
-    return _without_ball(type(e).__name__)
-
-
-def _of_one(function: Callable[[Any], Any], values: list[Any]) -> Any:
-    return function(values[0])
+    if (method := methods.get(type(e))) is None:
+        return _without_ball(type(e).__name__)
+    return lambda values: getattr(values[0], method)()
 
 
 def _without_ball(what: str) -> Operation:
-    def refuse(values: list[Any]) -> Any:
+    def refuse(values: list[arb]) -> arb:
         raise UnsupportedError(f"no enclosure for {what}. Write it with powers, exp, log, sin, cos, asinh, Min or Max.")
 
     return refuse
-
-
-def _larger(a: Any, b: Any) -> Any:
-    return a.max(b)
-
-
-def _smaller(a: Any, b: Any) -> Any:
-    return a.min(b)
 
 
 def _ball_power(exponent: sp.Expr) -> Operation:
@@ -447,12 +436,12 @@ def _ball_power(exponent: sp.Expr) -> Operation:
     return _without_ball(f"the exponent {exponent}")
 
 
-def _integer_power(base: Any, n: int) -> Any:
+def _integer_power(base: arb, n: int) -> arb:
     """Tight enclosure of base^n, n ≥ 1, from its ends; arb's own power is not finite about a zero midpoint."""
     if n == 1:
         return base
 
-    def at(end: Any) -> Any:
+    def at(end: arb) -> arb:
         return reduce(mul, [end] * n)
 
     if n % 2:
@@ -466,11 +455,11 @@ def _monotone(exponent: sp.Expr, *, signed: bool) -> Operation:
     power = arb(fmpq(int(exponent.p), int(exponent.q)))
     negative, jumps = bool(exponent < 0), signed and bool(exponent == 0)
 
-    def at(end: Any) -> Any:
+    def at(end: arb) -> arb:
         value = abs(end) ** power
         return value * end.sgn() if signed else value
 
-    def operation(values: list[Any]) -> Any:
+    def operation(values: list[arb]) -> arb:
         x = values[0]
         low, high = x.lower(), x.upper()
         straddles = not (low > 0 or high < 0)
@@ -513,12 +502,12 @@ def upper_bound(
     free = expression.free_symbols
     start = {symbol: ends for symbol, ends in box.items() if symbol in free}
     values = operations.values(_balls(start))
-    attained = Fraction(0)
+    attained: End = Fraction(0)
     heap = [(-_upper(values[-1]), next(order), start, values)]
     for _ in range(pieces):
         bound, _, worst, values = heap[0]
         middle = {s: ((a + b) / 2,) * 2 for s, (a, b) in worst.items()}
-        attained = max(attained, _lower(operations.value(_balls(middle))))
+        attained = max(attained, -upper_end(-abs(operations.value(_balls(middle)))))
         if -bound <= attained * (1 + tolerance):
             break
         if limit is not None and (-bound < limit or limit <= attained < -bound < float("inf")):
@@ -535,14 +524,16 @@ def upper_bound(
     return Fraction(result)
 
 
-def _balls(box: BallBox) -> dict[sp.Symbol, Any]:
+def _balls(box: BallBox) -> dict[sp.Symbol, arb]:
     return {symbol: ball(*ends) for symbol, ends in box.items()}
 
 
-def _halves(operations: _Operations, box: dict[Any, Any], values: list[Any]) -> list[tuple[dict[Any, Any], list[Any]]]:
+def _halves(
+    operations: _Operations, box: dict[sp.Symbol, tuple[Fraction, Fraction]], values: list[arb]
+) -> list[tuple[dict[sp.Symbol, tuple[Fraction, Fraction]], list[arb]]]:
     """Halve the box where that lowers the bound most: parts with the balls of all subexpressions."""
-    best: list[tuple[dict[Any, Any], list[Any]]] = []
-    least: Any = None
+    best: list[tuple[dict[sp.Symbol, tuple[Fraction, Fraction]], list[arb]]] = []
+    least: End | None = None
     for symbol, (low, high) in box.items():
         if low == high:
             continue
@@ -560,12 +551,8 @@ def _halves(operations: _Operations, box: dict[Any, Any], values: list[Any]) -> 
     return best or [(box, values)]
 
 
-def _upper(enclosure: Any) -> Any:
+def _upper(enclosure: arb) -> End:
     return upper_end(abs(enclosure))
-
-
-def _lower(enclosure: Any) -> Any:
-    return max(Fraction(0), -upper_end(-abs(enclosure)))
 
 
 # ----------------------------------------------------------------------

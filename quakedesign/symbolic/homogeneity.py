@@ -309,17 +309,19 @@ def size_of(e: sp.Expr, sizes: Mapping[sp.Symbol, sp.Expr], equations: list[sp.E
     if e in sizes or not e.has(*sizes):
         return sizes.get(e, sp.Integer(0))
     parts = [size_of(part, sizes, equations) for part in e.args]
-    if e.is_Mul:
-        return sum(parts, start=sp.Integer(0))
-    if e.is_Pow or isinstance(e, SignedPower | AbsolutePower):
-        if not e.args[1].is_Rational:
-            raise ParameterError(f"an exponent must be rational. Received {e.args[1]} in {e}.")
-        return parts[0] * e.args[1]
-    if isinstance(e, sp.Add | sp.Max | sp.Min | sp.Abs):
-        equations += [parts[0] - other for other in parts[1:]]
-        return parts[0]
-    if not isinstance(e, sp.sign):
-        equations += parts
+    match e:
+        case sp.Mul():
+            return sum(parts, start=sp.Integer(0))
+        case sp.Pow() | SignedPower() | AbsolutePower():
+            if not e.args[1].is_Rational:
+                raise ParameterError(f"an exponent must be rational. Received {e.args[1]} in {e}.")
+            return parts[0] * e.args[1]
+        case sp.Add() | sp.Max() | sp.Min() | sp.Abs():
+            equations += [parts[0] - other for other in parts[1:]]
+            return parts[0]
+        case sp.sign():
+            return sp.Integer(0)
+    equations += parts
     return sp.Integer(0)
 
 

@@ -22,6 +22,12 @@ from quakedesign.cache import shipped
 from quakedesign.exact import rational
 from quakedesign.fault import Fault, FrictionLaw
 
+
+def _read(text: str) -> sp.Basic:
+    """Expression of its ``srepr``, which leaves out that the functions of the plant are real."""
+    return eval(text, vars(sp) | {"Function": lambda name: sp.Function(name, real=True)})
+
+
 # ----------------------------------------------------------------------
 # Derivations that are the same for every fault, kept beside the code that derives them.
 #
@@ -61,11 +67,6 @@ def derived_again() -> str:
     finally:
         shipped_texts.update(before)
     return json.dumps(derived, indent=1) + "\n"
-
-
-def _read(text: str) -> Any:
-    """Expression of its ``srepr``, which leaves out that the functions of the plant are real."""
-    return eval(text, vars(sp) | {"Function": lambda name: sp.Function(name, real=True)})
 
 
 # ----------------------------------------------------------------------

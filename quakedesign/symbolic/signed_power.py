@@ -171,12 +171,13 @@ def _flat(e: sp.Expr) -> sp.Expr:
     """Flatten nested powers, from the inside out."""
     if e.is_Atom:
         return e
-    if isinstance(e, SignedPower | AbsolutePower):
-        return _spread(type(e), normal_form(e.args[0]), e.args[1])
-    if isinstance(e, sp.Abs):
-        return _spread(AbsolutePower, normal_form(e.args[0]), sp.Integer(1))
-    if isinstance(e, sp.sign):
-        return _spread(SignedPower, normal_form(e.args[0]), sp.Integer(0))
+    match e:
+        case SignedPower() | AbsolutePower():
+            return _spread(type(e), normal_form(e.args[0]), e.args[1])
+        case sp.Abs():
+            return _spread(AbsolutePower, normal_form(e.args[0]), sp.Integer(1))
+        case sp.sign():
+            return _spread(SignedPower, normal_form(e.args[0]), sp.Integer(0))
     arguments = [_flat(argument) for argument in e.args]
     if e.is_Pow and isinstance(arguments[0], AbsolutePower):
         x, a = arguments[0].args
@@ -201,10 +202,11 @@ def _spread_factor(kind: type, factor: sp.Expr, a: sp.Expr) -> sp.Expr:
     if not (n.is_Integer and n > 0):
         return kind(factor, a)
     odd = kind is SignedPower and n % 2 == 1
-    if isinstance(base, AbsolutePower):
-        return AbsolutePower(base.args[0], base.args[1] * n * a)
-    if isinstance(base, SignedPower):
-        return (SignedPower if odd else AbsolutePower)(base.args[0], base.args[1] * n * a)
+    match base:
+        case AbsolutePower():
+            return AbsolutePower(base.args[0], base.args[1] * n * a)
+        case SignedPower():
+            return (SignedPower if odd else AbsolutePower)(base.args[0], base.args[1] * n * a)
     return (SignedPower if odd else AbsolutePower)(base, n * a)
 
 

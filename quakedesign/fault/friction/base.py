@@ -92,20 +92,20 @@ class FrictionLaw(ABC):
     def rate_slope(self) -> float:
         """Largest chord slope |Δμ/Δrate| [s/m] at a fixed state."""
 
-    def require(self, **given: Any) -> None:
+    def require(self, **given: object) -> None:
         """Reject what is given, not None, and does not apply to the equilibrium of a fault with this friction."""
         for name in self.equilibrium.refused.keys() & {name for name, value in given.items() if value is not None}:
             told = {"value": given[name], "law": self.name, "states": ", ".join(self.state_names)}
             raise ParameterError(self.equilibrium.refused[name].format(**told))
 
-    def _holding(self, values: Mapping[str, Any]) -> Self:
+    def _holding(self, values: "Mapping[str, sp.Expr]") -> Self:
         law = object.__new__(type(self))
         for name, value in values.items():
             object.__setattr__(law, name, value)
         return law
 
     @classmethod
-    def quantities(cls) -> "dict[str, Field[Any]]":
+    def quantities(cls) -> "dict[str, Field[float]]":
         """Every field that is a quantity with unit and symbol, by name."""
         return {f.name: f for f in fields(cls) if "symbol" in f.metadata}  # type: ignore[arg-type]
 

@@ -8,7 +8,7 @@ rate.
 from abc import abstractmethod
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import float_above, float_below, fraction_of, rational
@@ -105,7 +105,7 @@ class RateAndState(FrictionLaw):
         """Friction coefficient [-] with rate and state held at the ends of the working range beyond it."""
         import sympy as sp
 
-        def clip(value: Any, low: Any, high: Any) -> "sp.Expr":
+        def clip(value: "sp.Expr", low: "sp.Expr", high: "sp.Expr") -> "sp.Expr":
             return sp.Min(sp.Max(value, low), high)
 
         theta = clip(self._theta(state), self.critical_slip / self.fastest_rate, self.critical_slip / self.slowest_rate)
@@ -163,7 +163,7 @@ class RateAndState(FrictionLaw):
         return outward(law.direct_effect / law.slowest_rate, up=True)
 
 
-def outward(value: Any, *, up: bool) -> float:
+def outward(value: "sp.Expr", *, up: bool) -> float:
     """Float that is not below (`up`) or not above an exact SymPy number."""
     import sympy as sp
 
@@ -175,12 +175,12 @@ def outward(value: Any, *, up: bool) -> float:
     return float_above(exact) if up else float_below(exact)
 
 
-def aging_rate(rate: Any, theta: Any, critical_slip: Any) -> Any:
+def aging_rate(rate: "sp.Expr", theta: "sp.Expr", critical_slip: "sp.Expr") -> "sp.Expr":
     """θ' = 1 − vθ/d_c [-] (Dieterich 1979; Ruina 1983): contacts age at rest too."""
     return 1 - rate * theta / critical_slip
 
 
-def slip_rate(rate: Any, theta: Any, critical_slip: Any) -> Any:
+def slip_rate(rate: "sp.Expr", theta: "sp.Expr", critical_slip: "sp.Expr") -> "sp.Expr":
     """θ' = −(vθ/d_c) log(vθ/d_c) [-] (Ruina 1983): the state changes only with slip."""
     import sympy as sp
 
@@ -188,19 +188,19 @@ def slip_rate(rate: Any, theta: Any, critical_slip: Any) -> Any:
     return -share * sp.log(share)
 
 
-def aging_slope(slowest: Any, fastest: Any) -> Any:
+def aging_slope(slowest: "sp.Expr", fastest: "sp.Expr") -> "sp.Expr":
     """Largest |1/u − 1| [-] for u = vθ/d_c between v_s/v_f and v_f/v_s: v_f/v_s − 1."""
     return fastest / slowest - 1
 
 
-def slip_law_slope(slowest: Any, fastest: Any) -> Any:
+def slip_law_slope(slowest: "sp.Expr", fastest: "sp.Expr") -> "sp.Expr":
     """Largest |log u| [-] for u = vθ/d_c between v_s/v_f and v_f/v_s: log(v_f/v_s)."""
     import sympy as sp
 
     return sp.log(fastest / slowest)
 
 
-def logarithmic(law: Any, rate: Any, theta: Any) -> Any:
+def logarithmic(law: "RateAndState", rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
     """μ_0 + a log(v/v_0) + b log(v_0 θ/d_c) [-] (Dieterich 1979; Ruina 1983)."""
     import sympy as sp
 

@@ -4,6 +4,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
+from quakedesign.loop.sensing.measurement import Entries
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Option:
@@ -78,7 +80,7 @@ class SampledStage(Stage):
     part: float = 0.0
 
     @abstractmethod
-    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+    def apply(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Entries]:
         """Pressure [Pa] that leaves the stage over one sample of length `step` [s], and the memory afterwards."""
 
 
@@ -91,11 +93,11 @@ class FlowStage(Stage):
         """Largest rate of decay [1/s]; it limits the length of a substep."""
 
     @abstractmethod
-    def rates(self, numbers: Any, memory: list[Any], pressure: Any) -> list[Any]:
+    def rates(self, numbers: Entries, memory: Entries, pressure: Any) -> Entries:
         """Time derivative of the memory under a pressure [Pa] at the inlet."""
 
     @abstractmethod
-    def output(self, numbers: Any, memory: list[Any], pressure: Any) -> Any:
+    def output(self, numbers: Entries, memory: Entries, pressure: Any) -> Any:
         """Pressure [Pa] at the outlet."""
 
     @property
@@ -103,12 +105,9 @@ class FlowStage(Stage):
         """Whether `flows` contains volume and flow rate."""
         return type(self).flows is not FlowStage.flows
 
-    def flows(self, numbers: Any, memory: list[Any], pressure: Any) -> dict[str, Any]:
+    def flows(self, numbers: Entries, memory: Entries, pressure: Any) -> dict[str, Any]:
         """Further signals by the names of `FLOWS`; none unless the stage stores fluid."""
         return {}
 
 
-FLOWS = {
-    "injected_volume": ("injected volume", "m^3"),
-    "flow_rate": ("injected flow rate", "m^3/s"),
-}
+FLOWS = {"injected_volume": ("injected volume", "m^3"), "flow_rate": ("injected flow rate", "m^3/s")}

@@ -9,6 +9,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
 from quakedesign.loop.actuators.flow_stages import Diffusion, Lag
 from quakedesign.loop.actuators.sampled_stages import Delay
+from quakedesign.loop.sensing.measurement import Entries
 
 if TYPE_CHECKING:
     from quakedesign.laws import Sampling
@@ -112,9 +113,9 @@ class Actuator:
                     f"Received {substep:.3g} s. Take {math.ceil(times)} times as many substeps, or leave the stage out."
                 )
 
-    def hold(self, numbers: list[Any], memory: list[Any], pressure: Any, step: float) -> tuple[Any, Any, list[Any]]:
+    def hold(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Any, Entries]:
         """Held pressure [Pa], excess of the commanded pressure [Pa], and the memory afterwards."""
-        memories: list[Any] = []
+        memories: Entries = []
         excess: Any = 0.0
         for stage, own, past in zip(self.sampled, *_split(self.sampled, numbers, memory), strict=True):
             before = pressure
@@ -123,9 +124,9 @@ class Actuator:
             memories += past
         return pressure, excess, memories
 
-    def flow(self, numbers: list[Any], memory: list[Any], applied: Any) -> tuple[list[Any], Any, dict[str, Any]]:
+    def flow(self, numbers: Entries, memory: Entries, applied: Any) -> tuple[Entries, Any, dict[str, Any]]:
         """Rates of the flowing stages, pressure [Pa] in the fault, and signals of `FLOWS`, under a pressure held."""
-        rates: list[Any] = []
+        rates: Entries = []
         signals: dict[str, Any] = {}
         for stage, own, past in zip(self.flowing, *_split(self.flowing, numbers, memory), strict=True):
             rates += stage.rates(own, past, applied)
@@ -137,7 +138,7 @@ class Actuator:
 DIRECT = Actuator()
 
 
-def _split(stages: tuple[Stage, ...], numbers: list[Any], memory: list[Any]) -> tuple[list[list[Any]], list[list[Any]]]:
+def _split(stages: tuple[Stage, ...], numbers: Entries, memory: Entries) -> tuple[list[Entries], list[Entries]]:
     """Entries of every stage."""
     own, past = iter(numbers), iter(memory)
     return [[next(own) for _ in s.numbers] for s in stages], [[next(past) for _ in s.start] for s in stages]

@@ -5,9 +5,10 @@ from itertools import pairwise
 from typing import Any, ClassVar, Self
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, is_whole
 from quakedesign.fault.model import require_positive
 from quakedesign.loop.actuators.base import FlowStage, Option
+from quakedesign.loop.sensing.measurement import Entries
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -51,11 +52,11 @@ class Lag(FlowStage):
         """1/τ [1/s]."""
         return 1 / self.time_constant
 
-    def rates(self, numbers: Any, memory: list[Any], pressure: Any) -> list[Any]:
+    def rates(self, numbers: Entries, memory: Entries, pressure: Any) -> Entries:
         """See `FlowStage.rates`."""
         return [numbers[0] * (pressure - memory[0])]
 
-    def output(self, numbers: Any, memory: list[Any], pressure: Any) -> Any:
+    def output(self, numbers: Entries, memory: Entries, pressure: Any) -> Any:
         """See `FlowStage.output`."""
         return memory[0]
 
@@ -120,8 +121,7 @@ class Diffusion(FlowStage):
         require_positive(length=self.length, diffusivity=self.diffusivity)
         if self.storage is not None:
             require_positive(storage=self.storage)
-        whole = isinstance(self.cells, int) and not isinstance(self.cells, bool)
-        if not (whole and 1 <= self.cells <= MOST_CELLS):
+        if not is_whole(self.cells, 1, MOST_CELLS):
             raise ParameterError(f"cells must be a whole number, 1 to {MOST_CELLS}. Received {self.cells!r}.")
 
     @classmethod
@@ -161,17 +161,17 @@ class Diffusion(FlowStage):
         """Largest eigenvalue of the cells, (4N²/τ)cos²(π/(4N)) [1/s]."""
         return 4 * self.numbers[0] * math.cos(math.pi / (4 * self.cells)) ** 2
 
-    def rates(self, numbers: Any, memory: list[Any], pressure: Any) -> list[Any]:
+    def rates(self, numbers: Entries, memory: Entries, pressure: Any) -> Entries:
         """Inflow minus outflow of every cell; see `FlowStage.rates`."""
         inflow = [2 * (pressure - memory[0]), *(a - b for a, b in pairwise(memory))]
         outflow = [*inflow[1:], 0.0]
         return [numbers[0] * (a - b) for a, b in zip(inflow, outflow, strict=True)]
 
-    def output(self, numbers: Any, memory: list[Any], pressure: Any) -> Any:
+    def output(self, numbers: Entries, memory: Entries, pressure: Any) -> Any:
         """Pressure in the last cell, which has no outflow; see `FlowStage.output`."""
         return memory[-1]
 
-    def flows(self, numbers: Any, memory: list[Any], pressure: Any) -> dict[str, Any]:
+    def flows(self, numbers: Entries, memory: Entries, pressure: Any) -> dict[str, Any]:
         """Injected volume [m³] and flow rate [m³/s] at the well, where the storage is known."""
         if not self.stores:
             return {}

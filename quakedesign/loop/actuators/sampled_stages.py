@@ -4,10 +4,10 @@ import math
 from typing import Any, ClassVar, Self
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, is_whole
 from quakedesign.fault.model import require_positive
 from quakedesign.loop.actuators.base import Option, SampledStage
-from quakedesign.loop.sensing.measurement import Measurement, generator, uniform
+from quakedesign.loop.sensing.measurement import Entries, Measurement, generator, uniform
 
 # ----------------------------------------------------------------------
 # Time that the computation takes.
@@ -36,12 +36,7 @@ class Delay(SampledStage):
     name: ClassVar[str] = "delay"
     place: ClassVar[int] = 1
     options: ClassVar[tuple[Option, ...]] = (
-        Option(
-            name="delay",
-            unit="s",
-            help="Delay of the computation, such as '2 ms'.",
-            default=0.0,
-        ),
+        Option(name="delay", unit="s", help="Delay of the computation, such as '2 ms'.", default=0.0),
         Option(
             name="jitter",
             unit="",
@@ -57,7 +52,7 @@ class Delay(SampledStage):
 
     def __post_init__(self) -> None:
         for name, value in (("samples of a delay", self.samples), ("jitter", self.jitter)):
-            if not isinstance(value, int) or not 0 <= value <= MOST_SAMPLES:
+            if not is_whole(value, 0, MOST_SAMPLES):
                 raise ParameterError(f"{name} must be a whole number, 0 to {MOST_SAMPLES}. Received {value!r}.")
         if not 0 <= self.part < 1:
             raise ParameterError(f"part of a delay must be at least 0 and below 1. Received {self.part!r}.")
@@ -80,7 +75,7 @@ class Delay(SampledStage):
         queue = (0.0,) * (self.samples + self.jitter)
         return (*queue, float(self.samples), *generator(self.seed)) if self.jitter else queue
 
-    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+    def apply(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Entries]:
         """Pressure of the queue whose age is the delay; see `SampledStage.apply`."""
         import casadi as ca
 
@@ -123,7 +118,7 @@ class Quantisation(SampledStage):
         """The quantum [Pa]."""
         return (float(self.quantum),)
 
-    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+    def apply(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Entries]:
         """Nearest multiple; see `SampledStage.apply`."""
         import casadi as ca
 
@@ -168,7 +163,7 @@ class RateLimit(SampledStage):
         """Initial pressure [Pa]."""
         return (0.0,)
 
-    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+    def apply(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Entries]:
         """Rate-limited pressure; see `SampledStage.apply`."""
         import casadi as ca
 
@@ -220,7 +215,7 @@ class Saturation(SampledStage):
         """The bounds [Pa]."""
         return float(self.lowest), float(self.highest)
 
-    def apply(self, numbers: Any, memory: list[Any], pressure: Any, step: float) -> tuple[Any, list[Any]]:
+    def apply(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Entries]:
         """Pressure within the bounds; see `SampledStage.apply`."""
         import casadi as ca
 

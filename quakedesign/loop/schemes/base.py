@@ -6,6 +6,7 @@ zero-order hold; with aperiodic sampling, the interval is a random whole number 
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -14,8 +15,9 @@ from typing import Any, ClassVar, Self
 import casadi as ca
 import sympy as sp
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, is_whole
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.loop import discrete_law
 from quakedesign.loop.actuators.base import FLOWS
@@ -25,6 +27,8 @@ from quakedesign.loop.sensing.measurement import EXACT, Measurement, Sensor, gen
 
 # ----------------------------------------------------------------------
 # What every scheme offers.
+
+Motion = Callable[..., ca.SX]  # from numbers or symbols to rates of a state, or to another column
 
 
 class Stepped(ABC):
@@ -53,25 +57,25 @@ class Stepped(ABC):
 
     @property
     @abstractmethod
-    def plant(self) -> Any:
+    def plant(self) -> Motion:
         """Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²]."""
 
     @property
     @abstractmethod
-    def reference(self) -> Any:
+    def reference(self) -> ca.Function:
         """Function t [s] → reference [m, m/s, m/s²]."""
 
     @property
     @abstractmethod
-    def law(self) -> Any:
+    def law(self) -> ca.Function:
         """Function (x, xi, reference) → p [Pa], dxi."""
 
     @abstractmethod
-    def advance(self, method: Any, motion: Any, state: Any, step: float) -> Any:
+    def advance(self, method: Any, motion: Motion, state: ca.SX, step: float) -> ca.SX:
         """State after one step of an integrator on a motion, given the plant, how much has passed [-] and the state."""
 
     @abstractmethod
-    def advance_often(self, method: Any, motion: Any, given: Any, state: Any, step: float, times: int) -> Any:
+    def advance_often(self, method: Any, motion: Motion, given: ca.SX, state: ca.SX, step: float, times: int) -> ca.SX:
         """State after a number of steps; the motion is given numbers too, and `passed` counts steps."""
 
 
@@ -89,18 +93,18 @@ class Scheme(ABC):
         return {}
 
     @abstractmethod
-    def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+    def pressure(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
         """Pressure [Pa] in the fault at the start of step number `counter`."""
 
     @abstractmethod
-    def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
+    def advance(self, loop: Stepped, method: Any, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
         """State at the end of step number `counter`, which starts at counter·step [s]."""
 
-    def rates(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+    def rates(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX | None:
         """Time derivative of the state at the start of a step; None where the scheme has none."""
         return None
 
-    def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:
+    def outputs(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> dict[str, ca.SX]:
         """Further signals (SX) at the start of a step, by the names of `described`; none by default."""
         return {}
 
@@ -110,7 +114,7 @@ class Scheme(ABC):
         return {}
 
     @property
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> Json:
         """Numbers and texts that say how the scheme was set, for the provenance of a run."""
         return {}
 
@@ -146,9 +150,9 @@ class Decision:
         Memory of the scheme itself at the next sample.
     """
 
-    pressure: Any
-    integrals: list[Any]
-    own: list[Any]
+    pressure: ca.SX
+    integrals: list[ca.SX]
+    own: list[ca.SX]
 
 
 class Decided(ABC):
@@ -169,7 +173,7 @@ class Decided(ABC):
 
     @classmethod
     @abstractmethod
-    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[ca.SX]) -> Decision:
         """What the controller does, given the expressions, the values of their symbols, and its own memory."""
 
 
@@ -186,7 +190,7 @@ class ControlStep:
         Of this law; another law of the same kind has the same function.
     """
 
-    function: Any
+    function: ca.Function
     numbers: tuple[float, ...]
 
 
@@ -216,7 +220,7 @@ def slope_of(pressure: sp.Expr, integral: sp.Symbol) -> sp.Expr:
     return sp.Integer(0) if limited else sp.diff(pressure, integral)
 
 
-def _column(entries: list[Any]) -> Any:
+def _column(entries: list[ca.SX]) -> ca.SX:
     return ca.vertcat(*entries) if entries else ca.SX(0, 1)
 
 
@@ -244,8 +248,7 @@ class NoClock:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        whole = all(isinstance(v, int) and not isinstance(v, bool) for v in (self.shortest, self.longest))
-        if not (whole and 1 <= self.shortest <= self.longest <= MOST_STEPS):
+        if not (is_whole(self.shortest, 1) and is_whole(self.longest, self.shortest, MOST_STEPS)):
             raise ParameterError(
                 f"shortest and longest interval of aperiodic sampling must be whole numbers of steps, 1 to "
                 f"{MOST_STEPS}, with shortest <= longest. Received {self.shortest!r} and {self.longest!r}. "
@@ -265,7 +268,7 @@ class NoClock:
         """Steps until the first sample, which are none, and the generator."""
         return (0.0, *generator(self.seed))
 
-    def after(self, memory: list[Any]) -> tuple[Any, list[Any]]:
+    def after(self, memory: list[ca.SX]) -> tuple[ca.SX, list[ca.SX]]:
         """Whether there is a sample now, and the memory one step later."""
         wait, *state = memory
         now = wait < 1
@@ -285,16 +288,16 @@ MOST_SUBSTEPS = 100
 class ControlSample:
     """Everything known at one sample (SX): the pressures held before and from it, and the memory afterwards."""
 
-    before: Any
-    applied: Any
-    integrals: list[Any]
-    numbers: list[Any]
-    own: list[Any]
-    memories: list[Any]
-    noise: list[Any]
-    clock: list[Any]
-    flow: list[Any]
-    push: Any
+    before: ca.SX
+    applied: ca.SX
+    integrals: list[ca.SX]
+    numbers: list[ca.SX]
+    own: list[ca.SX]
+    memories: list[ca.SX]
+    noise: list[ca.SX]
+    clock: list[ca.SX]
+    flow: list[ca.SX]
+    push: ca.SX
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -323,8 +326,7 @@ class Sampled(Scheme, Decided):
     clock: NoClock | None = None
 
     def __post_init__(self) -> None:
-        whole = isinstance(self.substeps, int) and not isinstance(self.substeps, bool)
-        if not (whole and 1 <= self.substeps <= MOST_SUBSTEPS):
+        if not is_whole(self.substeps, 1, MOST_SUBSTEPS):
             raise ParameterError(f"substeps must be a whole number, 1 to {MOST_SUBSTEPS}. Received {self.substeps!r}.")
         if self.authority is not None and not 0 < self.authority < float("inf"):
             raise ParameterError(f"authority must be positive and finite. Received {self.authority!r} m²/kg.")
@@ -350,16 +352,17 @@ class Sampled(Scheme, Decided):
         parts = self._parts(loop)
         return {f"{name}_{i}": float(v) for name, values in parts.items() for i, v in enumerate(values)}
 
-    def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+    def pressure(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
         """See `Scheme.pressure`."""
         sample = self._sample(loop, counter, state, step)
-        return self.actuator.flow(sample.numbers, sample.flow, self._sections(sample)[0][0])[1]
+        pressure: ca.SX = self.actuator.flow(sample.numbers, sample.flow, self._sections(sample)[0][0])[1]
+        return pressure
 
-    def push(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+    def push(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
         """Which way ξ moves the pressure at a sample (SX): ξ stays where a limit keeps the pressure from that."""
         return self._sample(loop, counter, state, step).push
 
-    def outputs(self, loop: Stepped, counter: Any, state: Any, step: float) -> dict[str, Any]:
+    def outputs(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> dict[str, ca.SX]:
         """See `Scheme.outputs`."""
         if not self.actuator.stages:
             return {}
@@ -374,15 +377,15 @@ class Sampled(Scheme, Decided):
         return (well | (FLOWS if self.actuator.stores else {})) if self.actuator.stages else {}
 
     @property
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> Json:
         """See `Scheme.settings`."""
-        entries: dict[str, Any] = {"substeps": self.substeps}
+        entries: Json = {"substeps": self.substeps}
         entries |= {"actuator": ", ".join(map(repr, self.actuator.stages))} if self.actuator.stages else {}
         entries |= {"authority": self.authority} if self.authority else {}
         entries |= {"clock": repr(self.clock)} if self.clock else {}
         return entries | ({"measurement": repr(self.measurement)} if self.measurement.noisy else {})
 
-    def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
+    def advance(self, loop: Stepped, method: Any, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
         """See `Scheme.advance`."""
         sample = self._sample(loop, counter, state, step)
         moving = ca.vertcat(state[:2], *sample.flow)
@@ -398,15 +401,15 @@ class Sampled(Scheme, Decided):
         constants = state[first : first + count]
         return ca.vertcat(moving[:2], *sample.integrals, constants, rest, moving[2:])
 
-    def _sections(self, sample: ControlSample) -> tuple[tuple[Any, float, float], ...]:
+    def _sections(self, sample: ControlSample) -> tuple[tuple[ca.SX, float, float], ...]:
         """Pressures that are held between two samples, from which share of the period, and for which."""
         late = self.actuator.part
         return ((sample.before, 0, late), (sample.applied, late, 1 - late)) if late else ((sample.applied, 0, 1),)
 
-    def _motion(self, step: float, begin: float, share: float, times: int) -> Any:
+    def _motion(self, step: float, begin: float, share: float, times: int) -> Motion:
         """Rates of plant and actuator under a pressure held, as `Stepped.advance_often` takes them."""
 
-        def motion(plant: Any, passed: Any, now: Any, given: Any) -> Any:
+        def motion(plant: Motion, passed: ca.SX, now: ca.SX, given: ca.SX) -> ca.SX:
             counter, applied, *numbers = ca.vertsplit(given)
             time = (counter + (begin + passed * share / times)) * step
             rates, pressure, _ = self.actuator.flow(numbers, ca.vertsplit(now[2:]), applied)
@@ -435,7 +438,7 @@ class Sampled(Scheme, Decided):
         """What the controller of a loop computes at one sample."""
         return control_step(type(self), DiscreteLaw.of(loop.controller, loop.constant_pressure))
 
-    def _sample(self, loop: Stepped, counter: Any, state: Any, step: float) -> ControlSample:
+    def _sample(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ControlSample:
         """Measure, decide, and pass the decision on to the actuator; ξ does not wind up where a stage limits."""
         count = len(loop.integrals)
         entries = iter(ca.vertsplit(state[2 + count :]))
@@ -457,11 +460,11 @@ class Sampled(Scheme, Decided):
         )
         return self._if_now(sample, ca.vertsplit(before) if count else [], part) if self.clock else sample
 
-    def _if_now(self, sample: ControlSample, integrals: list[Any], part: dict[str, list[Any]]) -> ControlSample:
+    def _if_now(self, sample: ControlSample, integrals: list[ca.SX], part: dict[str, list[ca.SX]]) -> ControlSample:
         """The sample, or what there was before where none is taken now."""
         now, clock = self.clock.after(part["clock"]) if self.clock else (True, [])
 
-        def chosen(new: list[Any], old: list[Any]) -> list[Any]:
+        def chosen(new: list[ca.SX], old: list[ca.SX]) -> list[ca.SX]:
             return [ca.if_else(now, a, b) for a, b in zip(new, old, strict=True)]
 
         return replace(
@@ -475,7 +478,7 @@ class Sampled(Scheme, Decided):
         )
 
     @staticmethod
-    def _inputs(loop: Stepped, counter: Any, step: float, seen: Any, ahead: int) -> Values:
+    def _inputs(loop: Stepped, counter: ca.SX, step: float, seen: ca.SX, ahead: int) -> Values:
         """Values of the signals of one sample, the next expected so many steps ahead."""
         now, later = loop.reference(counter * step), loop.reference((counter + ahead) * step)
         return {

@@ -3,12 +3,13 @@
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import sympy as sp
 
 from quakedesign.errors import ParameterError
+from quakedesign.files import Json
 from quakedesign.laws.sampled_controller import compensation_answered, cut_off, followed
 from quakedesign.laws.sampled_law import RestLimit
 from quakedesign.loop import discrete_law
@@ -90,13 +91,13 @@ class Compensated(Sampled):
         return math.sqrt(math.prod(loop.fault.authority_range))
 
     @property
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> Json:
         """See `Scheme.settings`."""
         names = [name for name in _NUMBERS if getattr(self, name) is not None] if self.rest_width else []
         return super().settings | {"weight": self.weight} | {name: getattr(self, name) for name in names}
 
     @classmethod
-    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[ca.SX]) -> Decision:
         """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
         begun, before, ahead_before, estimate, weight, *limit = own
         pull, feed_forward, slope = expressions

@@ -8,7 +8,7 @@ import sympy as sp
 
 from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw, Values
-from quakedesign.loop.schemes.base import Decision, Sampled, Scheme, Stepped
+from quakedesign.loop.schemes.base import Decision, Motion, Sampled, Scheme, Stepped
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +26,7 @@ class Explicit(Sampled):
         return law.pressure, *law.rates
 
     @classmethod
-    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[ca.SX]) -> Decision:
         """See `Decided.decide`."""
         pressure, *rates = discrete_law.values(expressions, values)
         after = [values[s] + values[discrete_law.step] * rate for s, rate in zip(law.integrals, rates, strict=True)]
@@ -41,23 +41,23 @@ class Continuous(Scheme):
 
     name: ClassVar[str] = "continuous"
 
-    def pressure(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+    def pressure(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
         """Pressure [Pa] that the law asks for now."""
         return loop.law(state[:2], state[2:], loop.reference(counter * step))[0]
 
-    def advance(self, loop: Stepped, method: Any, counter: Any, state: Any, step: float) -> Any:
+    def advance(self, loop: Stepped, method: Any, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
         """State after one step of the integrator on plant and law together."""
 
-        def motion(plant: Any, passed: Any, now: Any) -> Any:
+        def motion(plant: Motion, passed: ca.SX, now: ca.SX) -> ca.SX:
             return self._motion(loop, plant, (counter + passed) * step, now)
 
         return loop.advance(method, motion, state, step)
 
-    def rates(self, loop: Stepped, counter: Any, state: Any, step: float) -> Any:
+    def rates(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX | None:
         """Time derivative of the state; None where friction is set-valued."""
         return None if loop.sticks else self._motion(loop, loop.plant, counter * step, state)
 
     @staticmethod
-    def _motion(loop: Stepped, plant: Any, time: Any, now: Any) -> Any:
+    def _motion(loop: Stepped, plant: Motion, time: ca.SX, now: ca.SX) -> ca.SX:
         pressure, integral_rates = loop.law(now[:2], now[2:], loop.reference(time))
         return ca.vertcat(plant(time, now[:2], pressure), integral_rates)

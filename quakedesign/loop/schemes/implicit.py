@@ -8,7 +8,7 @@ tolerance. The semi-implicit scheme takes magnitudes at the start of the step an
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import sympy as sp
@@ -44,7 +44,7 @@ ROUNDS = 27
 AT_ONCE = 3  # rounds in the body of a loop in C: all of them would take half a second to compile
 end_slip, end_rate = sp.symbols("end_slip end_rate", real=True)
 
-InclusionValues = dict[sp.Symbol, Any]
+InclusionValues = dict[sp.Symbol, ca.SX]
 
 
 def direction(expression: sp.Expr) -> int | None:
@@ -165,7 +165,7 @@ class Inclusion:
             )
         return slope
 
-    def _signs(self, jumps: list[InclusionValues], number: int, own: Any) -> InclusionValues:
+    def _signs(self, jumps: list[InclusionValues], number: int, own: ca.SX | float) -> InclusionValues:
         """Selections at a jump; those whose jumps coincide with it go along."""
         here = jumps[number][end_rate]
         ways = [ca.sign(here - point[end_rate]) for point in jumps]
@@ -174,25 +174,26 @@ class Inclusion:
 
     def _beside(
         self, excess: sp.Expr, inputs: InclusionValues, jumps: list[InclusionValues], number: int, side: float
-    ) -> Any:
+    ) -> ca.SX:
         """F on one side of a jump."""
         return to_casadi([excess], inputs | jumps[number] | self._signs(jumps, number, side))[0]
 
-    def _smooth(self, inputs: InclusionValues, needed: Any) -> InclusionValues:
+    def _smooth(self, inputs: InclusionValues, needed: ca.SX) -> InclusionValues:
         """Solution with all signs fixed; where it is not needed, any number."""
         target = self.free + self.selected(self.pull)
-        straight = sp.Poly(_straight(target, self.slip_error, self.step), end_rate) if _is_straight(target) else None
+        moved = (end_slip, self.slip_error + self.step * end_rate)
+        straight = sp.Poly(sp.expand(target.subs(*moved)), end_rate) if _is_straight(target) else None
         if straight is None:
             end = _where(needed, self._used(target, inputs), partial(self._free_end, target))
         else:
             end = to_casadi([straight.coeff_monomial(1) / (1 - straight.coeff_monomial(end_rate))], inputs)[0]
         return {sign: inputs[sign] for sign in self.signs} | self._ends(inputs, end)
 
-    def _free_end(self, target: sp.Expr, inputs: InclusionValues) -> Any:
+    def _free_end(self, target: sp.Expr, inputs: InclusionValues) -> ca.SX:
         """Zero of target − w."""
         return self._quarter(target - end_rate, inputs, self._value(target, inputs, 0.0))
 
-    def _quarter(self, falling: sp.Expr, inputs: InclusionValues, width: Any) -> Any:
+    def _quarter(self, falling: sp.Expr, inputs: InclusionValues, width: ca.SX) -> ca.SX:
         """Zero of a falling function of the end of the step, between 0 and `width`."""
         test, inputs = _sign_only(falling), self._used(falling, inputs)
         before = ca.SX.sym("before", 2 + len(inputs))
@@ -211,25 +212,25 @@ class Inclusion:
         names = expression.free_symbols | {self.slip_error, self.step}
         return {symbol: value for symbol, value in inputs.items() if symbol in names}
 
-    def _value(self, expression: sp.Expr, inputs: InclusionValues, end: Any) -> Any:
+    def _value(self, expression: sp.Expr, inputs: InclusionValues, end: ca.SX | float) -> ca.SX:
         return to_casadi([expression], inputs | self._ends(inputs, end))[0]
 
-    def _ends(self, inputs: InclusionValues, end: Any) -> InclusionValues:
+    def _ends(self, inputs: InclusionValues, end: ca.SX | float) -> InclusionValues:
         return {end_rate: ca.SX(end), end_slip: inputs[self.slip_error] + inputs[self.step] * end}
 
 
-def _choose(at: Any, case: InclusionValues, other: InclusionValues) -> InclusionValues:
+def _choose(at: ca.SX, case: InclusionValues, other: InclusionValues) -> InclusionValues:
     return {symbol: ca.if_else(at, case[symbol], other[symbol]) for symbol in other}
 
 
-def _where(needed: Any, inputs: InclusionValues, solution: Callable[[InclusionValues], Any]) -> Any:
+def _where(needed: ca.SX, inputs: InclusionValues, solution: Callable[[InclusionValues], ca.SX]) -> ca.SX:
     """Solution (SX) where it is needed, 0 elsewhere."""
     given = ca.SX.sym("given", len(inputs))
     solved = solution(dict(zip(inputs, ca.vertsplit(given), strict=True)))
     return where_needed(ca.Function("solved", [given], [solved]))(needed, ca.vertcat(*inputs.values()))
 
 
-def where_needed(function: Any) -> Any:
+def where_needed(function: ca.Function) -> ca.Function:
     """CasADi Function (needed, vector) → value of another where it is needed, else 0: a call runs one of two branches.
 
     Parameters
@@ -261,10 +262,6 @@ def _is_straight(expression: sp.Expr) -> bool:
     return all(
         not atom.free_symbols & {end_slip, end_rate} for atom in expression.atoms(SignedPower, AbsolutePower)
     ) and bool(expression.is_polynomial(end_slip, end_rate))
-
-
-def _straight(expression: sp.Expr, slip: sp.Expr, step: sp.Expr) -> sp.Expr:
-    return sp.expand(expression.subs(end_slip, slip + step * end_rate))
 
 
 def _sign_only(expression: sp.Expr) -> sp.Expr:
@@ -334,7 +331,7 @@ class Implicit(Sampled):
         return backward_euler(law)
 
     @classmethod
-    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[ca.SX]) -> Decision:
         """See `Decided.decide`."""
         pull, feed_forward, *ends = expressions
         problem = inclusion(pull)

@@ -1,12 +1,13 @@
 """The implicit step with the disturbance estimate of `StickSlipLaw`, which does not wind up at rest."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import sympy as sp
 
 from quakedesign.errors import ParameterError
+from quakedesign.files import Json
 from quakedesign.laws.sampled_controller import compensation_answered
 from quakedesign.laws.stick_slip_controller import level_after
 from quakedesign.loop import discrete_law
@@ -73,13 +74,13 @@ class StickSlip(Sampled):
         return loop.fault.authority_range[1]
 
     @property
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> Json:
         """See `Scheme.settings`."""
         own = {"weight": self.weight, "slip_weight": self.slip_weight, "rest_slip": self.rest_slip}
         return super().settings | own
 
     @classmethod
-    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[Any]) -> Decision:
+    def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[ca.SX]) -> Decision:
         """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
         weight, slip_weight, rest_slip, *states = own
         pull, feed_forward, slope = expressions

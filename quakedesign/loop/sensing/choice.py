@@ -8,7 +8,6 @@ law.
 import math
 from dataclasses import asdict, replace
 from functools import lru_cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -17,6 +16,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_nonnegative
+from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.laws.sampled_controller import integral_symbols, law_expressions, r, r_acceleration, r_rate
 from quakedesign.loop.sensing.differentiator import Differentiator
@@ -96,7 +96,7 @@ def _kinds(unit: Differentiator) -> int:
     return len(HALF_PERIODS) + 2 * (unit.order + 1) + 1
 
 
-def _signs(sample: int, errors: "np.ndarray", random: Any) -> "np.ndarray":
+def _signs(sample: int, errors: "np.ndarray", random: np.random.Generator) -> "np.ndarray":
     """One row an adversary: square waves, for and against every error, and chance; one column a run."""
     columns = errors.shape[1]
     waves = [np.full(columns, 1.0 if sample // half % 2 else -1.0) for half in HALF_PERIODS]
@@ -116,7 +116,7 @@ def _moved(derivatives: "np.ndarray", highest: "np.ndarray") -> "np.ndarray":
     return np.array(after)
 
 
-def _function(unit: Differentiator) -> Any:
+def _function(unit: Differentiator) -> ca.Function:
     """CasADi Function (memory, slip) → memory, estimates."""
     memory, slip = ca.SX.sym("memory", unit.size), ca.SX.sym("slip")
     estimates, after = unit.estimate([*map(ca.SX, unit.numbers)], ca.vertsplit(memory), slip)
@@ -171,7 +171,7 @@ class JointCondition:
     slip_error: float
     rate_error: float
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """JSON-able facts; null stands for infinite."""
         return {k: None if v == math.inf else v for k, v in asdict(self).items()}
 

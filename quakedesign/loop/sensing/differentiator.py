@@ -13,15 +13,14 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from math import comb
-from typing import Any
 
 import casadi as ca
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError, require_known
+from quakedesign.errors import ParameterError, require_known, require_whole
 from quakedesign.fault.model import require_positive
 from quakedesign.laws.sampled_law import LinearLaw
-from quakedesign.loop.sensing.measurement import Sensor, SlipStage
+from quakedesign.loop.sensing.measurement import Entries, Sensor, SlipStage
 
 # ----------------------------------------------------------------------
 # One sample of the filtering differentiator, discretised in three ways.
@@ -56,9 +55,7 @@ from quakedesign.loop.sensing.measurement import Sensor, SlipStage
 NEWTON_STEPS = 8
 
 
-def explicit_step(
-    gains: Sequence[Any], step: Any, state: Sequence[Any], slip: Any, filters: int, taylor: bool
-) -> list[Any]:
+def explicit_step(gains: Entries, step: ca.SX, state: Entries, slip: ca.SX, filters: int, taylor: bool) -> Entries:
     """y after one sample (SX); the gains are T·λ̃_(N−j)·λ_d^(j/N), j = 1 … N."""
     size = len(state)
     distance = state[0] if filters else state[0] - slip
@@ -73,8 +70,8 @@ def explicit_step(
 
 
 def implicit_step(
-    gains: Sequence[Any], scale: Any, table: Sequence[float], step: Any, state: Sequence[Any], slip: Any, filters: int
-) -> list[Any]:
+    gains: Entries, scale: ca.SX, table: Sequence[float], step: ca.SX, state: Entries, slip: ca.SX, filters: int
+) -> Entries:
     """y after one sample (SX); the gains are λ̃_(N−j)·λ_d·T^(N−j+1), j = 1 … N, and the scale is λ_d·T^N."""
     size = len(state)
     ahead = state[-1]
@@ -83,7 +80,7 @@ def implicit_step(
     ahead = (ahead - _whole_power(step, filters) * slip) / scale
     root, share = _solve(ca.fabs(ahead), table)
     push = [_whole_power(root, size - j) for j in range(1, size)] + [share]
-    after: list[Any] = []
+    after: Entries = []
     following = ca.SX(0)
     for j in range(size, 0, -1):
         drift = following - slip if j == filters else following
@@ -101,7 +98,7 @@ def lag_free(order: int) -> tuple[tuple[Fraction, ...], ...]:
     return tuple(rows)
 
 
-def _solve(target: Any, table: Sequence[float]) -> tuple[Any, Any]:
+def _solve(target: ca.SX, table: Sequence[float]) -> tuple[ca.SX, ca.SX]:
     """q of the polynomial, and the selection of |⌈s⁺⌋⁰| from [0, 1]."""
     size, (jump, *rest) = len(table), table
     excess = ca.fmax(target - jump, 0)
@@ -119,21 +116,21 @@ def _solve(target: Any, table: Sequence[float]) -> tuple[Any, Any]:
     return root, ca.fmin(target / jump, 1)
 
 
-def _root(value: Any, degree: int) -> Any:
+def _root(value: ca.SX, degree: int) -> ca.SX:
     """Root of a number that is not negative; square roots are correctly rounded."""
     return value if degree == 1 else ca.sqrt(value) if degree == 2 else value ** (1.0 / degree)
 
 
-def _whole_power(value: Any, exponent: int) -> Any:
-    product: Any = 1.0
+def _whole_power(value: ca.SX, exponent: int) -> ca.SX:
+    product = ca.SX(1)
     for _ in range(exponent):
         product = product * value
     return product
 
 
-def _taylor(step: Any, later: Sequence[Any]) -> Any:
+def _taylor(step: ca.SX, later: Entries) -> ca.SX:
     """T²/2·z_(i+2) + T³/6·z_(i+3) + …."""
-    total: Any = 0.0
+    total = ca.SX(0)
     for degree in range(len(later) + 1, 1, -1):
         total = (total + later[degree - 2]) * step / degree
     return total * step
@@ -215,9 +212,7 @@ class Differentiator:
     def __post_init__(self) -> None:
         require_positive(bound=self.bound, step=self.step)
         for name, least in (("order", 1), ("filter_order", 0), ("inner_steps", 1)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                raise ParameterError(f"{name} must be a whole number of at least {least}. Received {value!r}.")
+            require_whole(least, **{name: getattr(self, name)})
         if self.order + self.filter_order > LONGEST:
             raise ParameterError(
                 f"order + filter_order must be at most {LONGEST}, the end of the published table. "
@@ -256,7 +251,7 @@ class Differentiator:
             return (step, *gains, bound * step**size)
         return (step, *(step * self.table[size - j] * bound ** (j / size) for j in places))
 
-    def estimate(self, numbers: list[Any], memory: list[Any], slip: Any) -> tuple[list[Any], list[Any]]:
+    def estimate(self, numbers: Entries, memory: Entries, slip: ca.SX) -> tuple[Entries, Entries]:
         """Estimates (SX) of slip and its derivatives at the time of a reading, and the states afterwards.
 
         Parameters
@@ -282,10 +277,10 @@ class Differentiator:
         return memory[self.filter_order :], after
 
 
-def _without_lag(derivatives: list[Any], step: Any) -> list[Any]:
+def _without_lag(derivatives: Entries, step: ca.SX) -> Entries:
     totals = []
     for i, shares in enumerate(lag_free(len(derivatives) - 1)):
-        total: Any = 0.0
+        total = ca.SX(0)
         for share, value in reversed(list(zip(shares, derivatives[i:], strict=True))):
             total = total * step + float(share) * value
         totals.append(total)
@@ -351,7 +346,7 @@ class OutputFeedback(Sensor):
         """See `Sensor.software`."""
         return replace(self, stages=tuple(stage for stage in self.stages if not stage.hardware))
 
-    def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
+    def measure(self, numbers: Entries, memory: Entries, x: ca.SX) -> tuple[ca.SX, Entries]:
         """See `Sensor.measure`."""
         own, past = iter(numbers), iter(memory)
         slip, memories = x[0], []
@@ -362,7 +357,7 @@ class OutputFeedback(Sensor):
         return ca.vertcat(estimates[0], estimates[1]), [*memories, *after]
 
 
-def _next(entries: Iterator[Any], count: int) -> list[Any]:
+def _next(entries: Iterator[ca.SX], count: int) -> Entries:
     return [next(entries) for _ in range(count)]
 
 

@@ -2,11 +2,17 @@
 
 import math
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, is_whole, require_whole
 from quakedesign.fault.model import require_nonnegative
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+Entries = list["ca.SX"]
+"""Numbers or memory of an element of the loop, in the vector that the compiled loop carries along."""
 
 # ----------------------------------------------------------------------
 # What every sensor, and every element of one, offers.
@@ -49,7 +55,7 @@ class Sensor(ABC):
         """Memory before the first sample, for a fault at rest at slip 0."""
 
     @abstractmethod
-    def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
+    def measure(self, numbers: Entries, memory: Entries, x: "ca.SX") -> tuple["ca.SX", Entries]:
         """Slip [m] and slip rate [m/s] that the law is told, and the memory afterwards, at the true state x."""
 
     @property
@@ -70,7 +76,7 @@ class Sensor(ABC):
                 "Make the sensor for the period of the loop."
             )
 
-    def function(self) -> Any:
+    def function(self) -> "ca.Function":
         """CasADi Function (memory, slip [m]) → memory, slip estimate [m], slip-rate estimate [m/s]."""
         import casadi as ca
 
@@ -102,7 +108,7 @@ class SlipStage(ABC):
         """Parameters for a sampling period [s], as `pass_on` expects them."""
 
     @abstractmethod
-    def pass_on(self, numbers: list[Any], memory: list[Any], slip: Any) -> tuple[Any, list[Any]]:
+    def pass_on(self, numbers: Entries, memory: Entries, slip: "ca.SX") -> tuple["ca.SX", Entries]:
         """Slip [m] (SX) that leaves the element, and the memory afterwards."""
 
 
@@ -138,8 +144,7 @@ class Measurement(Sensor):
 
     def __post_init__(self) -> None:
         require_nonnegative(slip_noise=self.slip_noise, rate_noise=self.rate_noise)
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
-            raise ParameterError(f"seed must be a whole number of at least 0. Received {self.seed!r}.")
+        require_whole(0, seed=self.seed)
 
     @property
     def noisy(self) -> bool:
@@ -165,7 +170,7 @@ class Measurement(Sensor):
         """State of the generator, from the seed; none without noise."""
         return generator(self.seed) if self.noisy else ()
 
-    def measure(self, numbers: list[Any], memory: list[Any], x: Any) -> tuple[Any, list[Any]]:
+    def measure(self, numbers: Entries, memory: Entries, x: "ca.SX") -> tuple["ca.SX", Entries]:
         """Measured x1 [m] and x2 [m/s] (SX), and the generator afterwards."""
         import casadi as ca
 
@@ -189,7 +194,7 @@ def generator(seed: int) -> tuple[float, ...]:
     return tuple(float(int(word) % (m - 1) + 1) for word, m in zip(words, _MODULI, strict=True))
 
 
-def _normal(memory: list[Any]) -> tuple[list[Any], Any]:
+def _normal(memory: Entries) -> tuple[Entries, "ca.SX"]:
     """State of the generator after two steps, and a number of the standard normal distribution."""
     import casadi as ca
 
@@ -198,7 +203,7 @@ def _normal(memory: list[Any]) -> tuple[list[Any], Any]:
     return memory, ca.sqrt(-2 * ca.log(radius)) * ca.cos(2 * ca.pi * angle)
 
 
-def uniform(memory: list[Any]) -> tuple[list[Any], Any]:
+def uniform(memory: Entries) -> tuple[Entries, "ca.SX"]:
     """Next state of the generator, and a number strictly between 0 and 1."""
     import casadi as ca
 
@@ -249,7 +254,7 @@ class Transducer(SlipStage):
         share = (-math.expm1(-2 * math.pi * self.bandwidth * step),) if self._filtered else ()
         return (*share, *self._noise.numbers, *((float(self.quantum),) if self.quantum else ()))
 
-    def pass_on(self, numbers: list[Any], memory: list[Any], slip: Any) -> tuple[Any, list[Any]]:
+    def pass_on(self, numbers: Entries, memory: Entries, slip: "ca.SX") -> tuple["ca.SX", Entries]:
         """See `SlipStage.pass_on`."""
         import casadi as ca
 
@@ -293,8 +298,7 @@ class Averaging(SlipStage):
     samples: int
 
     def __post_init__(self) -> None:
-        whole = isinstance(self.samples, int) and not isinstance(self.samples, bool)
-        if not (whole and 1 <= self.samples <= MOST_SAMPLES):
+        if not is_whole(self.samples, 1, MOST_SAMPLES):
             raise ParameterError(
                 f"samples of a mean must be a whole number, 1 to {MOST_SAMPLES}. Received {self.samples!r}."
             )
@@ -308,7 +312,7 @@ class Averaging(SlipStage):
         """None."""
         return ()
 
-    def pass_on(self, numbers: list[Any], memory: list[Any], slip: Any) -> tuple[Any, list[Any]]:
+    def pass_on(self, numbers: Entries, memory: Entries, slip: "ca.SX") -> tuple["ca.SX", Entries]:
         """See `SlipStage.pass_on`. A running sum would be cheaper, and would gather rounding errors for hours."""
         readings = [*memory, slip]
         return sum(readings[1:], start=readings[0]) / self.samples, readings[1:]

@@ -8,7 +8,7 @@ from functools import lru_cache
 from hashlib import sha256
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.laws.known_fields import field_of, is_law
@@ -141,7 +141,7 @@ def _check_equilibrium(loop: Loop, equilibrium: Equilibrium) -> None:
         require(mean == 0, f"the field does not vanish in {state} at the counterexample.")
 
 
-def touching_cells(loop: Loop, point: Any) -> dict[str, dict[str, int]]:
+def touching_cells(loop: Loop, point: Mapping[str, Fraction]) -> dict[str, dict[str, int]]:
     """Sign cells whose closure holds a point, by name."""
     choices = [(1, -1) if point[s] == 0 else ((1,) if point[s] > 0 else (-1,)) for s in loop.states]
     return {
@@ -150,7 +150,13 @@ def touching_cells(loop: Loop, point: Any) -> dict[str, dict[str, int]]:
     }
 
 
-def limit(terms: Any, loop: Loop, point: Any, signs: Any, parameters: Any) -> Fraction:
+def limit(
+    terms: Iterable[Term],
+    loop: Loop,
+    point: Mapping[str, Fraction],
+    signs: Mapping[str, int],
+    parameters: Mapping[str, Fraction],
+) -> Fraction:
     """Limit of a sum of terms at a point from one cell."""
     total = Fraction(0)
     for term in terms:

@@ -4,7 +4,7 @@ The last chapter reads the kind of claim of a file without loading the code that
 """
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
@@ -16,7 +16,7 @@ from msgspec import Meta
 
 from quakedesign.errors import CertificateError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.files import read_text
+from quakedesign.files import Json, read_text
 from quakedesign.lyapunov.exact.claim import Equilibrium, Evidence, Loop, Witness
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.exact.strict import (
@@ -207,7 +207,7 @@ def read_json(path: str | Path) -> Any:
     return parse(text)
 
 
-def evidence_of(raw: Any) -> Evidence:
+def evidence_of(raw: object) -> Evidence:
     """Evidence from a parsed file; reading verifies nothing.
 
     Raises
@@ -240,7 +240,7 @@ def evidence_of(raw: Any) -> Evidence:
 def certificate_text(certificate: Evidence) -> str:
     """Text of the file, the same for the same certificate."""
     loop, refutation = certificate.loop, certificate.refutation
-    parts: dict[str, Any] = {
+    parts: Json = {
         "roots": {name: (of, *ends) for name, (of, ends) in loop.roots.items()},
         "lifts": {lift: term_entries(terms) for lift, terms in loop.lifts.items()},
         "field": {state: term_entries(terms) for state, terms in loop.field.items()},
@@ -292,7 +292,7 @@ _KINDS = GUARANTEE, SLOW_SLIDING, STICK_SLIP, ATTRACTION, UNCERTAIN_PLANT
 POLYNOMIAL, LOOP = "polynomial", "loop"
 
 
-def kind_of(raw: Any) -> str:
+def kind_of(raw: object) -> str:
     """What a parsed file says that it is, else what its keys say: about a polynomial, or a closed loop."""
     if not isinstance(raw, dict):
         return LOOP
@@ -310,7 +310,7 @@ _MOST_CHARACTERS = 24
 _DIGITS = 6
 
 
-def entry_lines(document: Mapping[str, Any]) -> list[str]:
+def entry_lines(document: Json) -> list[str]:
     """Every entry of a file of `guarantee_text` but names: a line for each of its parts, its claims and its SHA-256.
 
     Parameters
@@ -330,17 +330,17 @@ def entry_lines(document: Mapping[str, Any]) -> list[str]:
     return [*lines, f"SHA-256 of the entries without claims: {sha256(exact).hexdigest()}"]
 
 
-def _without_names(part: Any) -> Any:
+def _without_names(part: object) -> object:
     if not isinstance(part, dict):
         return part
     return {key: _without_names(entry) for key, entry in part.items() if key not in _NAMED}
 
 
-def _part(part: Any) -> str:
+def _part(part: object) -> str:
     return "; ".join(_phrases(part, ())) if isinstance(part, dict) else _entry(part)
 
 
-def _phrases(part: dict[str, Any], path: tuple[str, ...]) -> list[str]:
+def _phrases(part: Json, path: tuple[str, ...]) -> list[str]:
     """Entries that are no objects behind the path to them, then those of every object."""
     inner = {key: entry for key, entry in sorted(part.items()) if isinstance(entry, dict)}
     own = ", ".join(f"{key} {_entry(entry)}" for key, entry in sorted(part.items()) if key not in inner)
@@ -348,20 +348,26 @@ def _phrases(part: dict[str, Any], path: tuple[str, ...]) -> list[str]:
     return phrases + [phrase for key, entry in inner.items() for phrase in _phrases(entry, (*path, key))]
 
 
-def _entry(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{" + _part(value) + "}"
-    if isinstance(value, list):
-        count = _leaves(value)
-        return f"({count} entries)" if count > _MOST_LISTED else f"[{', '.join(map(_entry, value))}]"
-    return _number(value) if isinstance(value, str) and value.lstrip("-")[:1].isdigit() else str(value)
+def _entry(value: object) -> str:
+    match value:
+        case dict():
+            return "{" + _part(value) + "}"
+        case list():
+            count = _leaves(value)
+            return f"({count} entries)" if count > _MOST_LISTED else f"[{', '.join(map(_entry, value))}]"
+        case str() if value.lstrip("-")[:1].isdigit():
+            return _number(value)
+    return str(value)
 
 
-def _leaves(value: Any) -> int:
+def _leaves(value: object) -> int:
     """Entries of nested lists; an empty one counts as one."""
-    if isinstance(value, dict):
-        return sum(map(_leaves, value.values()))
-    return sum(map(_leaves, value)) or 1 if isinstance(value, list) else 1
+    match value:
+        case dict():
+            return sum(map(_leaves, value.values()))
+        case list():
+            return sum(map(_leaves, value)) or 1
+    return 1
 
 
 def _number(text: str) -> str:

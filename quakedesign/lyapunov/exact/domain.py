@@ -17,6 +17,7 @@ import sympy as sp
 
 from quakedesign.exact import LowerBound, UpperBound, end_of
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.laws import SlidingMode
 from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.fault_bounds import (
@@ -58,7 +59,7 @@ class Domain:
     limited_by: str
     feedforward: str  # Name of the feed-forward of the law
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI."""
         return {name: float(v) if isinstance(v, Fraction) else v for name, v in asdict(self).items()}
 
@@ -112,7 +113,7 @@ class DomainProblem:
         }
 
     @property
-    def _added(self) -> dict[str, Any]:
+    def _added(self) -> Json:
         return {"feedforward": self.controller.feedforward}
 
     def _rate(self, errors: Errors, **options: Any) -> Fraction:

@@ -165,7 +165,8 @@ def largest_ratio(
 def _largest(problems: tuple[Problem, ...], tolerance: Fraction, pieces: int) -> Fraction | None:
     order, heap, attained = count(), [], 0.0
     for forms, exponents in problems:
-        corners, powers = _identity(forms[0].variables), tuple(map(_FormPower.of, exponents))
+        size, powers = range(forms[0].variables), tuple(map(_FormPower.of, exponents))
+        corners = tuple(tuple(float(i == j) for j in size) for i in size)
         heap.append((-_bound(forms, powers), next(order), forms, powers, corners))
     heapq.heapify(heap)
     for _ in range(pieces):
@@ -213,10 +214,6 @@ def _bound(forms: Sequence[Form], powers: Sequence[_FormPower]) -> float:
     upper = total.upper()
     near = float(upper)  # has the digits of a float, unless it is out of range
     return near if upper <= near else float_above(end_of(upper))
-
-
-def _identity(size: int) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(float(i == j) for j in range(size)) for i in range(size))
 
 
 def _longest(corners: Sequence[Sequence[float]]) -> Edge:

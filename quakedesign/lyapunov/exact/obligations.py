@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
 from itertools import combinations, product
-from typing import Any
 
 from quakedesign.lyapunov.exact.claim import Loop, Witness, require
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination, constant, degree
@@ -42,7 +41,7 @@ class Obligation:
     inequalities: tuple[Polynomial, ...] = ()
 
     @property
-    def key(self) -> tuple[Any, ...]:
+    def key(self) -> tuple[object, ...]:
         """What two obligations share when one witness serves both."""
         parts = ((self.polynomial,), self.equalities, self.inequalities)
         return tuple(
@@ -262,7 +261,7 @@ def _word(signs: Mapping[str, int]) -> str:
 
 def different(obligations: Iterable[Obligation]) -> Iterator[Obligation]:
     """Obligations of which no witness serves two: the first of each kind."""
-    seen = set[tuple[Any, ...]]()
+    seen = set[tuple[object, ...]]()
     for one in obligations:
         key = one.key
         if key not in seen:
@@ -354,7 +353,7 @@ def statement_of(one: Obligation, domain: str, multiplier: Polynomial | None = N
     size = width(one)
     factor = constant(size) if multiplier is None else multiplier
     plain = domain == "cells"
-    variables = tuple({_unit(size, i): Fraction(1)} for i in range(size)) if plain else ()
+    variables = tuple({tuple(int(i == j) for j in range(size)): Fraction(1)} for i in range(size)) if plain else ()
     return Statement(
         variables=tuple(f"u{i}" for i in range(size)),
         polynomial=one.polynomial,
@@ -379,10 +378,6 @@ def _products(variables: int, conditions: int) -> tuple[tuple[int, ...], ...]:
     subsets = [s for size in range(variables + 1) for s in combinations(range(variables), size)]
     with_condition = [(*s, variables + k) for k in range(conditions) for s in subsets]
     return (*subsets, *with_condition)
-
-
-def _unit(size: int, index: int) -> tuple[int, ...]:
-    return tuple(int(i == index) for i in range(size))
 
 
 def proves(one: Obligation, witness: Witness, domain: str) -> bool:

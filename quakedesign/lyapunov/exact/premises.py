@@ -10,13 +10,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from typing import Any
 
 import sympy as sp
 
 from quakedesign.errors import CertificateError
 from quakedesign.exact import Enclosure, LowerBound, UpperBound, float_above, rational
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.laws import Controller, SlidingMode
 from quakedesign.laws.feed_forward import FEED_FORWARDS, FeedForward, feed_forward
 from quakedesign.lyapunov.exact.certificate import Certificate
@@ -86,7 +86,7 @@ class Premise:
                 return f"{required}{unit}", f"{certified}{unit}"
         return f"{self.required:.4g}{unit}", "no less"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Keys of DESIGN.md and the unit; None for what is infinite."""
         return {
             "name": self.name,
@@ -140,7 +140,7 @@ class Variant:
     premises: tuple[Premise, ...]
     domain: Domain | None  # None where the certificate has no bounds of its states, or there is none
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI; exact coefficients as texts."""
         return {
             "feedforward": self.feedforward.name,

@@ -127,7 +127,7 @@ def robustness(certificate: Certificate, model: LoopField | None = None) -> Robu
         ratios = [largest_ratio(_against_decrease(cells, slope, index)) for index in (0, _PUSHED)]
         source = "bisection of the cells"
     except (CertificateError, KinkError):
-        kappa = _claimed(certificate)
+        kappa = certificate.claims.get("decay")
         if kappa is None:
             return None
         largest = [largest_ratio(_against_function(cells, slope, index)) for index in (0, _PUSHED)]
@@ -157,10 +157,6 @@ def _against_function(cells: _Cells, slope: tuple[Term, ...], index: int) -> lis
         for signs, function in cells.functions()
         for push in (cells.push(slope, index, signs, beta),)
     ]
-
-
-def _claimed(certificate: Certificate) -> Fraction | None:
-    return certificate.claims.get("decay")
 
 
 # ----------------------------------------------------------------------

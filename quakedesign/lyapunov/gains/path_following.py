@@ -8,7 +8,7 @@ nothing is proved here.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -35,7 +35,7 @@ from quakedesign.lyapunov.search.lyapunov_search import (
     sum_of,
 )
 from quakedesign.lyapunov.search.parametric_forms import FormRow, Kin, float_rows, values_of
-from quakedesign.sos import Polynomial
+from quakedesign.sos import Polynomial, Statement
 from quakedesign.sos.solve.joint import DecisionBounds, Demand, JointProgram, joint_program
 from quakedesign.symbolic.term_expressions import signed_monomials
 from quakedesign.symbolic.terms import Term
@@ -47,6 +47,7 @@ from quakedesign.symbolic.terms import Term
 
 Form = dict[tuple[int, ...], Any]
 """Polynomial with floats."""
+Template = tuple[FormRow, Statement, tuple[Fraction, ...]]
 _GRID = 1 << 40
 
 
@@ -125,7 +126,7 @@ def neighbourhood(
     return Neighbourhood(monomials=monomials, sizes=sizes, program=program, demands=tuple(demands), fixed=tuple(fixed))
 
 
-def _power(base: Sequence[Any], exponents: Sequence[int]) -> Any:
+def _power(base: Sequence[Fraction], exponents: Sequence[int]) -> Fraction | int:
     return math.prod(b**e for b, e in zip(base, exponents, strict=True) if e)
 
 
@@ -143,7 +144,12 @@ def _columns(
 
 
 def _faster(
-    row: FormRow, j: int | None, values: Mapping[str, float], pace: Pace | None, factor: float, weights: Any = ()
+    row: FormRow,
+    j: int | None,
+    values: Mapping[str, float],
+    pace: Pace | None,
+    factor: float,
+    weights: Sequence[float] = (),
 ) -> Form:
     """Part of a row that V decides: V, −V̇, or −w^{m−n}V̇ − κ(n/m)V."""
     function, fall = _columns(row, j, values, weights)
@@ -162,7 +168,9 @@ def _faster(
     return {e: c * factor for e, c in form.items()}
 
 
-def _moved(row: FormRow, present: Sequence[float], values: Any, other: Any, pace: Pace | None) -> Form:
+def _moved(
+    row: FormRow, present: Sequence[float], values: Mapping[str, float], other: Mapping[str, float], pace: Pace | None
+) -> Form:
     """What changed numbers add to a row for V as it is."""
     before = _faster(row, None, values, pace, 1.0, present)
     after = _faster(row, None, other, pace, 1.0, present)
@@ -195,7 +203,7 @@ def _times(left: Form, right: Form) -> Form:
 
 
 @lru_cache(maxsize=32)
-def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> Any:
+def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> tuple[Template, ...]:
     """Every row with its set and monomials in scaled variables, and the scale of all of these."""
     templates = []
     loop = kin.loop
@@ -221,7 +229,7 @@ def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> Any:
     return tuple(templates)
 
 
-def _raised(support: Any, unit: Form, times: int) -> Any:
+def _raised(support: Iterable[tuple[int, ...]], unit: Form, times: int) -> Form:
     """Monomials of a product with a linear form to a power."""
     form = dict.fromkeys(support, 1.0)
     for _ in range(times):
@@ -336,7 +344,7 @@ def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
     return min(least)
 
 
-def _lifted(points: Any, one: Obligation) -> Any:
+def _lifted(points: np.ndarray, one: Obligation) -> tuple[np.ndarray, np.ndarray]:
     """Points with the variables of nested powers, and which of them are in the cell."""
     inside = np.full(len(points), True)
     for equality in one.equalities:
@@ -362,19 +370,19 @@ def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
     return {tuple(int(i == j) for j in range(size)): max(float(c), least) for i, c in enumerate(coefficients)}
 
 
-def _points(potential: Polynomial, m: int) -> Any:
+def _points(potential: Polynomial, m: int) -> np.ndarray:
     """Directions spread over a cell (k × n), every variable in the unit in which V is one on its axis."""
     size = len(next(iter(potential)))
     corners = [abs(float(potential.get(tuple(m * (i == j) for j in range(size)), 0))) for i in range(size)]
     units = np.array([c ** (-1 / m) if c > 0 else 1.0 for c in corners])
     rng = np.random.default_rng(_SEED)
-    return rng.dirichlet(np.full(size, 0.5), _POINTS) * units
+    return np.asarray(rng.dirichlet(np.full(size, 0.5), _POINTS) * units)
 
 
-def _values(polynomial: Polynomial, points: Any) -> Any:
+def _values(polynomial: Polynomial, points: np.ndarray) -> np.ndarray:
     exponents = np.array(list(polynomial), dtype=float)
     coefficients = np.array([float(c) for c in polynomial.values()])
-    return np.prod(points[:, None, :] ** exponents[None, :, :], axis=2) @ coefficients
+    return np.asarray(np.prod(points[:, None, :] ** exponents[None, :, :], axis=2) @ coefficients)
 
 
 # ----------------------------------------------------------------------
@@ -585,7 +593,7 @@ def _digits(number: float) -> Fraction:
     return Fraction(f"{number:.4g}")
 
 
-def climb(setting: PathSetting, state: State, *, free: bool = True, until: float | None = None) -> Any:
+def climb(setting: PathSetting, state: State, *, free: bool = True, until: float | None = None) -> list[State]:
     """States in the order in which they were found, each better than the one before; the given one first.
 
     Parameters

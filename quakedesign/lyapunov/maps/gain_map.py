@@ -158,7 +158,7 @@ class Screeners:
     def __init__(self, sheet: Sheet, crew: Crew) -> None:
         self._sheet, self._crew = sheet, crew
 
-    def answers(self, question: str, arguments: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
+    def answers(self, question: str, arguments: Iterable[tuple[object, ...]]) -> Iterator[Any]:
         """Answers of one method of `Screener` to many arguments, in any order.
 
         Raises
@@ -179,7 +179,7 @@ class _Cached(threading.local):
 _cached = _Cached()
 
 
-def _answer(sheet: Sheet, question: str, arguments: tuple[Any, ...]) -> Any:
+def _answer(sheet: Sheet, question: str, arguments: tuple[object, ...]) -> Any:
     if _cached.screener is None or _cached.screener.sheet != sheet:
         _cached.screener = Screener(sheet)
     return getattr(_cached.screener, question)(*arguments)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import groupby
 from math import factorial, prod
-from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -73,13 +72,15 @@ class Cones:
         constraints = [self._unit, self._link, *in_cones(shapes, self._moments)]
         self.compiled = Compiled(cp.Problem(cp.Minimize(level), constraints))
 
-    def table(self, parts: Any) -> Any:
+    def table(self, parts: np.ndarray) -> np.ndarray:
         """What every moment (row) is multiplied by in ΣL(N) and in every ΣL(P_j) (columns)."""
         count = len(self.means)
         values = np.bincount(self.columns * count + self.parts, parts, minlength=len(self.margin) * count)
         return np.column_stack([self.margin, values.reshape(-1, count)])
 
-    def solve(self, parts: Any, accuracy: float, *, anew: bool = False) -> tuple[float, Any, Any] | None:
+    def solve(
+        self, parts: np.ndarray, accuracy: float, *, anew: bool = False
+    ) -> tuple[float, np.ndarray, np.ndarray] | None:
         """Margin, a_j and L for the values of all parts, in the order of the rows; None if the solver fails twice."""
         self._numbers.value = np.bincount(self.slots, parts)
         if not self.compiled.solve(accuracy, anew=anew) and not self.compiled.solve(accuracy):
@@ -243,11 +244,11 @@ class Sweep:
         """The programme in the units of a frame."""
         return self._in_units(frame.scale).cones
 
-    def parts_at(self, loop: Loop, frame: Frame) -> Any:
+    def parts_at(self, loop: Loop, frame: Frame) -> np.ndarray:
         """Values of all parts at a point, as `Cones` takes them."""
         features = self._features(values_of(loop))
         numbers = self._in_units(frame.scale)
-        return numbers.weights(frame.pace) * features[numbers.products]
+        return np.asarray(numbers.weights(frame.pace) * features[numbers.products])
 
     def _in_units(self, scale: tuple[Fraction, ...]) -> "_Numbers":
         if scale not in self._numbers:
@@ -261,11 +262,11 @@ class Sweep:
                 raise CertificateError(_TOO_FAR) from None
         return self._numbers[scale]
 
-    def _features(self, values: Mapping[str, float]) -> Any:
+    def _features(self, values: Mapping[str, float]) -> np.ndarray:
         """Value of every product of names."""
         return np.array([_product(values, names) for names in self.products])
 
-    def _slopes(self, values: Mapping[str, float], per_product: Any) -> dict[str, float]:
+    def _slopes(self, values: Mapping[str, float], per_product: np.ndarray) -> dict[str, float]:
         """Derivative of the margin in every name, from that in every product."""
         slopes = {name: 0.0 for names in self.products for name in names}
         for names, slope in zip(self.products, per_product.tolist(), strict=True):
@@ -297,7 +298,7 @@ class _Numbers:
         if not np.isfinite(self.coefficients).all():
             raise OverflowError
 
-    def pace(self, features: Any) -> float:
+    def pace(self, features: np.ndarray) -> float:
         """Largest coefficient of all −V̇_j."""
         with np.errstate(over="ignore", invalid="ignore"):
             merged = np.bincount(self.cones.slots[self.rate], (self.coefficients * features[self.products])[self.rate])
@@ -305,13 +306,13 @@ class _Numbers:
             raise CertificateError(_TOO_FAR)
         return float(np.abs(merged).max(initial=0.0)) or 1.0
 
-    def weights(self, pace: float) -> Any:
+    def weights(self, pace: float) -> np.ndarray:
         """What the products are multiplied by in every part."""
-        return np.where(self.rate, self.coefficients / pace, self.coefficients)
+        return np.asarray(np.where(self.rate, self.coefficients / pace, self.coefficients))
 
     def solve(
-        self, features: Any, pace: float, accuracy: float, *, anew: bool
-    ) -> tuple[float, list[float], Any, float] | None:
+        self, features: np.ndarray, pace: float, accuracy: float, *, anew: bool
+    ) -> tuple[float, list[float], np.ndarray, float] | None:
         """Margin, decision, derivative of the margin in every product, and seconds; None if the solver fails."""
         weights = self.weights(pace)
         solution = self.cones.solve(weights * features[self.products], accuracy, anew=anew)
@@ -323,7 +324,7 @@ class _Numbers:
         return margin, decision.tolist(), per_product, self.cones.compiled.solver_seconds
 
 
-def _exponents(values: Sequence[Fraction]) -> Any:
+def _exponents(values: Sequence[Fraction]) -> np.ndarray:
     """n of 2^n within a factor of two, exact where the values are powers of two: numbers of any size have one."""
     return np.array([v.numerator.bit_length() - v.denominator.bit_length() for v in values])
 
@@ -371,7 +372,7 @@ class _Place:
     """Functionals of all kinds of rows, about the centre of one τ."""
 
     tau: float
-    functionals: Sequence[Any]
+    functionals: Sequence[np.ndarray]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -380,8 +381,8 @@ class _Step:
 
     tau: float
     # moves, multipliers, bound: ΔL, those of the equations over τ, and μ
-    moves: Sequence[Any]
-    multipliers: Any
+    moves: Sequence[np.ndarray]
+    multipliers: np.ndarray
     bound: float
     # least, most: Eigenvalues of ΔS beside S
     least: float
@@ -477,7 +478,9 @@ class _Newton:
         Where a functional is not inside its cone.
     """
 
-    def __init__(self, kinds: "Sequence[_Rows]", tables: Sequence[Any], means: Any, place: _Place) -> None:
+    def __init__(
+        self, kinds: "Sequence[_Rows]", tables: Sequence[np.ndarray], means: np.ndarray, place: _Place
+    ) -> None:
         self._kinds, self._tables, self._means, self._place = kinds, tables, means, place
         self._forms = [kind.beside(f) for kind, f in zip(kinds, place.functionals, strict=True)]
         self._squares = [one @ one.transpose(0, 2, 1) for one in self._forms]
@@ -489,18 +492,20 @@ class _Newton:
         self._system[:-1, :-1] = sum(map(_sum, tables, self._solved))
         self._system[:-1, -1] = self._system[-1, :-1] = means
 
-    def _solve(self, free: Sequence[Any], rest: Any, slope: float) -> tuple[list[Any], Any, float]:
+    def _solve(
+        self, free: Sequence[np.ndarray], rest: np.ndarray, slope: float
+    ) -> tuple[list[np.ndarray], np.ndarray, float]:
         """ΔL, λ and Δμ, from H⁻¹a."""
         side = np.append(sum(map(_sum, self._tables, free)) - rest, slope)
         answer = np.linalg.solve(self._system, side)
         moves = [one - solved @ answer[:-1] for one, solved in zip(free, self._solved, strict=True)]
         return moves, answer[:-1], float(answer[-1])
 
-    def _changes(self, moves: Sequence[Any]) -> list[Any]:
+    def _changes(self, moves: Sequence[np.ndarray]) -> list[np.ndarray]:
         """ΔS beside S."""
         return [(move[:, None] @ one)[:, 0] for move, one in zip(moves, self._forms, strict=True)]
 
-    def _ends(self, changes: Sequence[Any]) -> tuple[float, float]:
+    def _ends(self, changes: Sequence[np.ndarray]) -> tuple[float, float]:
         ends = [end for kind, change in zip(self._kinds, changes, strict=True) for end in kind.ends(change)]
         return min(ends), max(ends)
 
@@ -520,13 +525,13 @@ class _Newton:
             step.bound + more * bound,
         )
 
-    def _rest(self, functionals: Sequence[Any], bound: float) -> Any:
+    def _rest(self, functionals: Sequence[np.ndarray], bound: float) -> np.ndarray:
         """By how much the equations of the functionals are missed."""
         rest = bound * self._means - sum(map(_sum, self._tables, functionals))
         rest[0] += 1.0
         return rest
 
-    def _refined(self, tau: float, moves: Sequence[Any], multipliers: Any, bound: float) -> _Step:
+    def _refined(self, tau: float, moves: Sequence[np.ndarray], multipliers: np.ndarray, bound: float) -> _Step:
         """Step whose equations hold as well as its bounds need."""
         for _ in range(_ROUNDS):
             changes = self._changes(moves)
@@ -548,11 +553,11 @@ class _Newton:
         )
 
 
-def _kind(shape: MomentProgram) -> tuple[Any, ...]:
+def _kind(shape: MomentProgram) -> tuple[int | tuple[int, ...], ...]:
     return len(shape.keys), shape.relation_count, tuple(block.size for block in shape.blocks)
 
 
-def _sum(tables: Any, vectors: Any) -> Any:
+def _sum(tables: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Σ over rows and unknowns."""
     return np.tensordot(tables, vectors, axes=((0, 1), (0, 1)))
 
@@ -591,19 +596,19 @@ class _Rows:
         self.unit = np.concatenate(units)
         self.firsts = np.cumsum([0, *map(len, units[:-1])])
 
-    def of(self, table: Any) -> Any:
+    def of(self, table: np.ndarray) -> np.ndarray:
         """What all moments are multiplied by in the equations, in the coordinates of every row."""
-        return self._bases.transpose(0, 2, 1) @ table[self._places]
+        return np.asarray(self._bases.transpose(0, 2, 1) @ table[self._places])
 
-    def interior(self, margin: Any) -> Any:
+    def interior(self, margin: np.ndarray) -> np.ndarray:
         """Functional of every row inside its cone, with L(N) = 1."""
         centres = (one.alone().solve({}) for one in self._shapes)
         nothing = np.full(self._places.shape[1], np.nan)  # outside of every cone
         values = np.array([nothing if c is None else list(c.functional.values()) for c in centres])
         sized = values / (values * margin[self._places]).sum(axis=1)[:, None]
-        return (self._bases.transpose(0, 2, 1) @ sized[..., None])[..., 0]
+        return np.asarray((self._bases.transpose(0, 2, 1) @ sized[..., None])[..., 0])
 
-    def beside(self, functional: Any) -> Any:
+    def beside(self, functional: np.ndarray) -> np.ndarray:
         """F⁻¹ S_i F⁻ᵀ of all unknowns i, with F Fᵀ = S = Σ_i L_i S_i: scaled triangles (rows × unknowns × ·)."""
         blocks = []
         for block, (upper, lower, factors) in zip(self._blocks, self._corners, strict=True):
@@ -616,7 +621,7 @@ class _Rows:
             blocks.append(triangles.reshape(rows, unknowns, -1))
         return np.concatenate(blocks, axis=2)
 
-    def ends(self, triangles: Any) -> tuple[float, float]:
+    def ends(self, triangles: np.ndarray) -> tuple[float, float]:
         """Smallest and largest eigenvalue of all matrices."""
         eigenvalues, start = [], 0
         for block, (upper, lower, factors) in zip(self._blocks, self._corners, strict=True):
@@ -629,18 +634,18 @@ class _Rows:
         return min(float(np.min(e)) for e in eigenvalues), max(float(np.max(e)) for e in eigenvalues)
 
 
-def _longest(kind: _Rows, triangles: Any) -> float:
+def _longest(kind: _Rows, triangles: np.ndarray) -> float:
     """Largest norm of a matrix, at least its largest eigenvalue."""
     return float(np.sqrt(np.add.reduceat(triangles**2, kind.firsts, axis=1).max()))
 
 
-def _corners(size: int) -> tuple[Any, Any, Any]:
+def _corners(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows and columns of an upper triangle, and what makes its length that of the matrix."""
     rows, columns = pairs(size)
     return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
 
 
-def _matrices(triangle: Any, size: int) -> Any:
+def _matrices(triangle: np.ndarray, size: int) -> np.ndarray:
     """Matrices (size × unknowns × size) with an upper triangle, column by column."""
     rows, columns = pairs(size)
     full = np.zeros((size, triangle.shape[1], size))

@@ -29,11 +29,7 @@ Number = str | float | Fraction
 
 
 def certify(
-    subject: Subject,
-    gains: tuple[Number, ...],
-    *,
-    lipschitz: Number,
-    gain_range: tuple[Number, Number] = (1, 1),
+    subject: Subject, gains: tuple[Number, ...], *, lipschitz: Number, gain_range: tuple[Number, Number] = (1, 1)
 ) -> tuple[Verdict, Certificate | None]:
     """Decide whether gains make the origin stable for |d| ≤ lipschitz and all β of a range.
 
@@ -280,7 +276,8 @@ def last_success(
         enough = most is not None and bracket.low is not None and bracket.low >= most
         if bracket.closed(limit) or enough or bracket.high == floor or (only_above and bracket.low is None):
             break
-        x = max(floor, _short(_next(bracket, x, _root(x, answer, slope), floor, limit)))
+        step = _next(bracket, x, _root(x, answer, slope), floor, limit)
+        x = max(floor, Fraction(f"{float(step):.7e}"))  # eight digits are enough
     return bracket
 
 
@@ -323,11 +320,6 @@ def _middle(
 def first_below(limit: Fraction) -> Fraction:
     """Number so near to a limit that the search need not go on if it succeeds there."""
     return limit * (1 - _BELOW - _ABOVE)
-
-
-def _short(x: Fraction) -> Fraction:
-    """Nearest decimal of eight digits."""
-    return Fraction(f"{float(x):.7e}")
 
 
 # ----------------------------------------------------------------------

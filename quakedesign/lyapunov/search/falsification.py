@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import Any
 
 import numpy as np
 
@@ -79,7 +78,7 @@ class _FloatField:
         self.loop, self.states = loop, list(loop.states)
         self.weights = np.array(list(loop.states.values()), dtype=float)[:, None]
 
-    def rates(self, x: Any, parameters: Mapping[str, Any]) -> Any:
+    def rates(self, x: np.ndarray, parameters: Mapping[str, np.ndarray | float]) -> np.ndarray:
         """x' for states of shape (n, columns)."""
         values = dict(zip(self.states, x, strict=True))
         for lift, terms in self.loop.lifts.items():
@@ -87,10 +86,15 @@ class _FloatField:
         columns = [self._sum(terms, values, parameters) + np.zeros(x.shape[1]) for terms in self.loop.field.values()]
         return np.array(columns)
 
-    def _sum(self, terms: Sequence[Term], values: Mapping[str, Any], parameters: Mapping[str, Any]) -> Any:
-        total: Any = 0.0
+    def _sum(
+        self,
+        terms: Sequence[Term],
+        values: Mapping[str, np.ndarray | float],
+        parameters: Mapping[str, np.ndarray | float],
+    ) -> np.ndarray | float:
+        total: np.ndarray | float = 0.0
         for term in terms:
-            part: Any = float(term.coefficient)
+            part: np.ndarray | float = float(term.coefficient)
             for name in term.parameters:
                 part = part * parameters[name]
             for state, exponent, kind in term.factors:
@@ -99,7 +103,7 @@ class _FloatField:
             total = total + part
         return total
 
-    def growths(self, plays: Sequence[tuple[_Play, ...]], steps: int, pace: float) -> Any:
+    def growths(self, plays: Sequence[tuple[_Play, ...]], steps: int, pace: float) -> np.ndarray:
         """Largest growth in e-foldings of every play over all starts, the beginning of the run left out."""
         x = np.tile(np.random.default_rng(0).normal(size=(len(self.states), _STARTS)), len(plays))
         middle, ends = self._parameters()
@@ -111,21 +115,21 @@ class _FloatField:
             x = x / size**self.weights
             growth += np.log(size) if step > steps * _UNCOUNTED else 0.0
             signs = np.sign(np.concatenate([x, self.rates(x, middle), np.ones((1, x.shape[1]))]))
-            chosen = dict(middle)
+            chosen: dict[str, np.ndarray | float] = dict(middle)
             for name, (low, high) in ends.items():
                 first, second, sign = followed[name]
                 chosen[name] = np.where(signs[first, columns] * signs[second, columns] * sign > 0, high, low)
             speed = self.rates(x, chosen)
             x = x + pace * speed / np.abs(speed).max(axis=0)
-        return growth.reshape(len(plays), _STARTS).max(axis=1)
+        return np.asarray(growth.reshape(len(plays), _STARTS).max(axis=1))
 
-    def _followed(self, plays: Sequence[_Play]) -> tuple[Any, Any, Any]:
+    def _followed(self, plays: Sequence[_Play]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows of the two signs that every column multiplies, in states, rates and a one; and the sign before them."""
         rows = {name: i for i, name in enumerate((*self.states, *(f"{s}'" for s in self.states), ""))}
         pairs = np.array([[rows[name] for name in (*play.names, "")[:2]] for play in plays])
         return (*np.repeat(pairs, _STARTS, axis=0).T, np.repeat([play.sign for play in plays], _STARTS))
 
-    def _parameters(self) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
+    def _parameters(self) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
         """All numbers with ranges at their middle, and the ends of the ranges."""
         ends = {name: (float(low), float(high)) for name, (low, high) in self.loop.uncertain.items()}
         middle = {name: float(v) for name, v in self.loop.parameters.items()}

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -159,10 +158,10 @@ class _PointSearch:
 
     def near(self, point: Sequence[Fraction]) -> tuple[Fraction, ...]:
         """Point next to another one, on the same faces."""
-        parts = [float(p / s) for p, s in zip(point, self.scale, strict=True)]
+        parts = np.array([float(p / s) for p, s in zip(point, self.scale, strict=True)])
         return self.rounded(parts * 2.0 ** self.random.normal(scale=0.2, size=len(parts)))
 
-    def rounded(self, parts: Any) -> tuple[Fraction, ...]:
+    def rounded(self, parts: np.ndarray) -> tuple[Fraction, ...]:
         whole = [round(_GRID * float(p / parts.max())) for p in parts]
         return tuple(s * Fraction(n, _GRID) for s, n in zip(self.scale, whole, strict=True))
 
@@ -172,7 +171,7 @@ class _PointSearch:
         largest = max(map(abs, values)) or Fraction(1)
         return [float(v / largest) for v in values]
 
-    def best(self) -> tuple[float, Any]:
+    def best(self) -> tuple[float, np.ndarray]:
         """Largest margin t with line·a ≥ t on all lines and |a_j| ≤ 1, and a."""
         A = np.hstack([-np.array(self.lines), np.ones((len(self.lines), 1))])
         count = A.shape[1] - 1
@@ -180,7 +179,7 @@ class _PointSearch:
         solution = linprog(cost, A_ub=A, b_ub=np.zeros(len(A)), bounds=[(-1, 1)] * count + [(0, 1)], method="highs")
         return (float(solution.x[-1]), solution.x[:-1]) if solution.status == 0 else (1.0, np.zeros(count))
 
-    def refine(self, decision: Any) -> bool:
+    def refine(self, decision: np.ndarray) -> bool:
         """Add the worst of many new points; False where none is worse than those at hand."""
         count = len(self.lines)
         tight = np.argsort(np.array(self.lines) @ decision)[: 2 * len(decision)]

@@ -55,10 +55,7 @@ DECAY_LEVEL = 2
 
 
 def finish(
-    loop: Loop,
-    lyapunov: tuple[Term, ...],
-    claims: Mapping[str, Fraction],
-    subject: Subject | None = None,
+    loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fraction], subject: Subject | None = None
 ) -> Certificate | None:
     """Find exact witnesses for every obligation of a given V; None when one is missing."""
     witnesses: dict[str, Witness] = {}
@@ -211,12 +208,12 @@ def quadratic_terms(states: Sequence[str], coefficient: Callable[[int, int], Fra
     )
 
 
-def quadratic_matrix(loop: Loop, lyapunov: tuple[Term, ...]) -> Any:
+def quadratic_matrix(loop: Loop, lyapunov: tuple[Term, ...]) -> np.ndarray:
     """Matrix of a quadratic V, as floats (n × n)."""
     return _matrix(next(iter(Obligations(loop, lyapunov).function()))[1], len(loop.states))
 
 
-def _matrix(polynomial: Polynomial, size: int) -> Any:
+def _matrix(polynomial: Polynomial, size: int) -> np.ndarray:
     full = np.zeros((size, size))
     for exponents, c in polynomial.items():
         i, *rest = [k for k, e in enumerate(exponents) for _ in range(e)]
@@ -299,13 +296,7 @@ def with_largest_decay(
     return finish(loop, lyapunov, {**certificate.claims, "decay": kappa}, subject)
 
 
-def _largest(
-    one: Obligation,
-    direction: Mapping[Any, Any],
-    domain: str,
-    scale: Sequence[Fraction],
-    level: int,
-) -> float:
+def _largest(one: Obligation, direction: Polynomial, domain: str, scale: Sequence[Fraction], level: int) -> float:
     """Largest g for which the solver finds P − g·direction in the cone, 0 if it finds none; proves nothing."""
     whole = lifted_scale(one.equalities, scale)
     size = max(abs(c) for c in scaled(one.polynomial, whole).values())

@@ -83,7 +83,7 @@ def rows_of(loop: Loop, monomials: Sequence[Term], *, beside: bool = False) -> t
         When the law has nested powers that certificates do not know.
     """
     columns = [Obligations(loop, (term,)) for term in monomials]
-    rows: dict[tuple[Any, ...], FormRow] = {}
+    rows: dict[tuple[object, ...], FormRow] = {}
     for row in (*_functions(columns), *_falls(loop, columns)):
         conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
         rows.setdefault((row.rate, row.parts, row.function if beside else (), conditions), row)
@@ -137,7 +137,7 @@ def _single(term: Term, weights: Mapping[str, int], signs: Mapping[str, int]) ->
 class Structure:
     """All of a loop that the rows depend on, to tell whether they can be used again."""
 
-    loop: tuple[Any, ...]
+    loop: tuple[object, ...]
     inside: tuple[tuple[str, Fraction], ...]
     points: tuple[tuple[str, bool, bool], ...]
     degree: int

@@ -7,17 +7,21 @@ from dataclasses import field
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
-from quakedesign.files import write_whole
+from quakedesign.files import Json, write_whole
 from quakedesign.simulation.campaign.problem import CampaignProblem, SampleResult
 from quakedesign.simulation.campaign.space import UNITS, Worst
 from quakedesign.simulation.recorder import EVENTS, Metrics
 from quakedesign.simulation.trajectory import KINDS, Outcome, Trajectory
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 # ----------------------------------------------------------------------
 # The figure of a campaign.
@@ -25,7 +29,7 @@ from quakedesign.simulation.trajectory import KINDS, Outcome, Trajectory
 _DECADES = 30.0
 
 
-def figure(title: str, caption: str, shown: Mapping[str, tuple[Any, Mapping[float, float | None]]]) -> Any:
+def figure(title: str, caption: str, shown: Mapping[str, tuple[np.ndarray, Mapping[float, float | None]]]) -> "Figure":
     """Return a Figure with the share of samples below every value.
 
     Parameters
@@ -47,7 +51,7 @@ def figure(title: str, caption: str, shown: Mapping[str, tuple[Any, Mapping[floa
     return drawing
 
 
-def _distribution(axis: Any, name: str, values: Any, marks: Mapping[float, float | None]) -> None:
+def _distribution(axis: Any, name: str, values: np.ndarray, marks: Mapping[float, float | None]) -> None:
     known = values[~np.isnan(values)]
     finite = np.sort(known[np.isfinite(known)])
     axis.step(finite, np.arange(1, len(finite) + 1) / len(known), where="post", color="#0072B2")
@@ -211,7 +215,7 @@ class Campaign:
             )
         return self.problem.trajectory(looked_at[int(number)], samples)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Return what JSON can hold: samples, outcomes, worst, quantiles, events, failures, search, resumed."""
         return {
             "samples": len(self.results),
@@ -224,11 +228,11 @@ class Campaign:
             "resumed": self.resumed,
         }
 
-    def _told(self, index: int, metric: str) -> dict[str, Any]:
+    def _told(self, index: int, metric: str) -> Json:
         value = _finite(float(self.values(metric)[index]))
         return {"index": index, "value": value, "sample": self.problem.sample(index).numbers}
 
-    def _searched(self) -> dict[str, Any] | None:
+    def _searched(self) -> Json | None:
         if self.search is None:
             return None
         return {
@@ -239,7 +243,7 @@ class Campaign:
             "looked_at": len(self.search.looked_at),
         }
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> "pd.DataFrame":
         """Return a pandas DataFrame over the index: numbers that differ, and metrics, with units; nan where unknown."""
         import pandas as pd
 
@@ -279,7 +283,7 @@ class Campaign:
         self.plot().savefig(drawn, format="png", dpi=150, metadata={"Software": None})
         return drawn.getvalue()
 
-    def plot(self) -> Any:
+    def plot(self) -> "Figure":
         """Return a matplotlib Figure of the distribution of the metrics."""
         problem, levels = self.problem, self.quantiles(_MARKED)
         law = problem.controller.title if problem.controller else "no control"

@@ -28,7 +28,7 @@ from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import shortly
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_nonnegative, require_positive
-from quakedesign.files import temporary_folder
+from quakedesign.files import Json, temporary_folder
 from quakedesign.laws import Controller, LinearLaw
 from quakedesign.loop import Scheme, simulation_scheme
 from quakedesign.loop.actuators.chain import DIRECT
@@ -178,7 +178,7 @@ class CampaignProblem(ABC):
 
     @property
     @abstractmethod
-    def own_inputs(self) -> dict[str, Any]:
+    def own_inputs(self) -> Json:
         """What determines the digits beside `inputs` of every problem."""
 
     def outcome(self, result: SampleResult) -> Outcome:
@@ -187,7 +187,7 @@ class CampaignProblem(ABC):
         return self.criterion.outcome(peak, error, result.events, followed=self.controller is not None)
 
     @property
-    def inputs(self) -> dict[str, Any]:
+    def inputs(self) -> Json:
         """Everything that determines the digits of every sample, as JSON can hold it."""
         law = {"law": self.controller.name} | plain(self.controller) if self.controller else None
         named = {"name": self.scheme.name} | plain(self.scheme.settings)
@@ -343,7 +343,7 @@ class SlidingProblem(CampaignProblem):
         return criterion_of(self.fault)
 
     @property
-    def own_inputs(self) -> dict[str, Any]:
+    def own_inputs(self) -> Json:
         """See `Problem.own_inputs`."""
         return {"method": self.method, "stress": self.stress, "stress_period": self.stress_period}
 
@@ -615,7 +615,7 @@ class SteppedProblem(CampaignProblem):
         return CompiledProgram.of(step, self._watched.index("diverged"))
 
     @property
-    def own_inputs(self) -> dict[str, Any]:
+    def own_inputs(self) -> Json:
         """See `Problem.own_inputs`."""
         return {"method": self.method.name, "load": plain(self.load)}
 
@@ -635,7 +635,7 @@ class SteppedProblem(CampaignProblem):
         """See `Problem.metrics`."""
         return tuple(self._figures(defaultdict(lambda: 1.0, diverged=-1.0)))
 
-    def _figures(self, watched: dict[str, float]) -> dict[str, Any]:
+    def _figures(self, watched: dict[str, float]) -> Json:
         measured = metrics(
             watched,
             controlled=self.controller is not None,

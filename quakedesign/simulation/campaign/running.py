@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, require_whole
 from quakedesign.exact import rational
 from quakedesign.fault import Fault
 from quakedesign.fault.equilibrium import by_equilibrium
-from quakedesign.fault.model import require_seed
 from quakedesign.files import sole_writer, temporary_folder
 from quakedesign.laws import Controller
 from quakedesign.loop import Scheme
@@ -50,10 +49,7 @@ _DEATH = (
 
 
 def dispatch(
-    task: Callable[..., Any],
-    batches: Mapping[int, tuple[Any, ...]],
-    crew: Crew,
-    keep: Callable[[int, Any], None],
+    task: Callable[..., Any], batches: Mapping[int, tuple[Any, ...]], crew: Crew, keep: Callable[[int, Any], None]
 ) -> dict[int, str]:
     """Reasons why batches failed, by their key; none for those whose answer was kept.
 
@@ -200,7 +196,7 @@ def campaign_problem(
     ParameterError
         When a value is out of range, or a scheme or integrator is unknown.
     """
-    require_seed(seed)
+    require_whole(0, seed=seed)
     way, step, own = own_way(controller, scheme, step)
     entries: dict[str, Any] = {"fault": fault, "controller": controller, "seed": seed}
     entries["setting"] = RunSetting.of(fault, step, duration, 1, settled_from)

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError
+from quakedesign.errors import ParameterError, is_whole
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_nonnegative
 
@@ -119,7 +119,7 @@ def noise_seed(seed: int, index: int) -> int:
 
 def require_count(samples: int) -> None:
     """Refuse a number of samples that is none."""
-    if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+    if not is_whole(samples, 1, MOST_SAMPLES):
         raise ParameterError(f"samples must be a whole number, 1 to {MOST_SAMPLES}. Received {samples!r}.")
 
 

@@ -16,7 +16,7 @@ from msgspec import Meta
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import CertificateError, PolynomialError
-from quakedesign.files import parse_toml, read_text
+from quakedesign.files import Json, parse_toml, read_text
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, combination, constant, degree, evaluate, product
 from quakedesign.sos.exact.polynomial_files import TERMS, Names, PointEntries, SosEntries, proof_entries
@@ -115,19 +115,26 @@ class Attraction:
     @property
     def verdict(self) -> str:
         """``proved``, ``refuted`` or ``undecided``."""
-        if self.proof is None:
-            return "undecided"
-        return "refuted" if isinstance(self.proof, Point) else "proved"
+        return "undecided" if self.proof is None else "refuted" if self.refutation else "proved"
+
+    @property
+    def refutation(self) -> Point | None:
+        """The proof where it is a point that refutes the claim."""
+        match self.proof:
+            case Point() as point:
+                return point
+        return None
 
     @property
     def height(self) -> Fraction | None:
         """V at the point of a refutation; None without one."""
-        return evaluate(self.lyapunov, self.proof.coordinates) if isinstance(self.proof, Point) else None
+        return evaluate(self.lyapunov, self.refutation.coordinates) if self.refutation else None
 
     @property
     def equilibrium(self) -> bool:
         """Whether the point of a refutation is one where the field vanishes, so that no other V helps."""
-        return isinstance(self.proof, Point) and not any(evaluate(f, self.proof.coordinates) for f in self.field)
+        point = self.refutation
+        return point is not None and not any(evaluate(f, point.coordinates) for f in self.field)
 
     def check(self) -> bool:
         """Whether the proof decides, in exact arithmetic and without a solver; an undecided claim is True.
@@ -138,9 +145,11 @@ class Attraction:
             When that takes more work than a check may.
         """
         with limited():
-            if self.proof is None:
-                return True
-            return self.refuted_by(self.proof) if isinstance(self.proof, Point) else self._proves(self.proof)
+            match self.proof:
+                case Point() as point:
+                    return self.refuted_by(point)
+                case proof:
+                    return proof is None or self._proves(proof)
 
     def _proves(self, proof: LyapunovProof) -> bool:
         parts = ((self.positive, proof.positive), (self.decrease, proof.decrease))
@@ -332,9 +341,9 @@ def text(claim: Attraction) -> str:
         V=PolynomialEntries(claim.lyapunov),
         level=() if claim.level is None else (claim.level,),
     )
-    plain: dict[str, Any] = {"format": 1, "kind": "attraction"} | written(entries)
-    if isinstance(proof, Point):
-        plain |= proof_entries(proof)
+    plain: Json = {"format": 1, "kind": "attraction"} | written(entries)
+    if claim.refutation is not None:
+        plain |= proof_entries(claim.refutation)
     else:
         plain["multiplier"] = polynomial_text(claim.multiplier)
         plain |= {part: proof_entries(getattr(proof, part))["sos"] for part in ("positive", "decrease")}

@@ -8,7 +8,7 @@ from math import lcm
 from operator import add
 from typing import Any, TypeVar
 
-from flint import fmpq, fmpq_mpoly_ctx, fmpz_mat
+from flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz_mat
 
 from quakedesign.errors import PolynomialError
 from quakedesign.exact import fraction_of, fraction_of_float, to_sympy
@@ -23,19 +23,19 @@ Polynomial = Mapping[Exponents, Fraction]
 
 
 @cache
-def ring(variables: int) -> Any:
+def ring(variables: int) -> fmpq_mpoly_ctx:
     """Multivariate polynomial ring over ℚ (python-flint context)."""
     return fmpq_mpoly_ctx.get([f"u{i}" for i in range(variables)], "degrevlex")
 
 
-def element(polynomial: Polynomial, variables: int) -> Any:
+def element(polynomial: Polynomial, variables: int) -> fmpq_mpoly:
     """Element of the ring."""
     spend(len(polynomial), longest(polynomial.values()))  # all over one denominator
     entries = {e: fmpq(c.numerator, c.denominator) for e, c in polynomial.items() if c}
     return ring(variables).from_dict(entries)
 
 
-def mapping(polynomial: Any) -> dict[Exponents, Fraction]:
+def mapping(polynomial: fmpq_mpoly) -> dict[Exponents, Fraction]:
     """Sparse form of an element of the ring."""
     return {tuple(map(int, e)): fraction_of(c) for e, c in polynomial.to_dict().items()}
 
@@ -49,7 +49,7 @@ def product(variables: int, factors: Iterable[Polynomial]) -> dict[Exponents, Fr
     return mapping(reduce(multiplied, (element(f, variables) for f in others)))
 
 
-def multiplied(left: Any, right: Any) -> Any:
+def multiplied(left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
     """Product of two elements of the ring, its work counted before."""
     if counted():
         spend(len(left) * len(right), _height(left) + _height(right))
@@ -58,7 +58,7 @@ def multiplied(left: Any, right: Any) -> Any:
     return result
 
 
-def _height(polynomial: Any) -> int:
+def _height(polynomial: fmpq_mpoly) -> int:
     """Bits of the longest coefficient."""
     return max((int(c.height_bits()) for c in polynomial.coeffs()), default=0)
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from msgspec import Meta
 
 from quakedesign.errors import CertificateError, PolynomialError
+from quakedesign.files import Json
 from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, Square, SumOfSquares
 from quakedesign.sos.exact.strict import (
@@ -171,18 +172,19 @@ def load(text: str) -> tuple[Statement, Proof]:
 
 def text(statement: Statement, proof: Proof) -> str:
     """Text of the file, the same for the same proof."""
-    plain: dict[str, Any] = {name: PolynomialEntries(getattr(statement, name)) for name in ("polynomial", "multiplier")}
+    plain: Json = {name: PolynomialEntries(getattr(statement, name)) for name in ("polynomial", "multiplier")}
     plain |= {name: tuple(map(PolynomialEntries, getattr(statement, name))) for name in ("inequalities", "equalities")}
     file = {"format": 1} | written(made(StatementEntries, statement, **plain)) | proof_entries(proof)
     return json.dumps(file, ensure_ascii=True, separators=(",", ":")) + "\n"
 
 
-def proof_entries(proof: Proof) -> dict[str, Any]:
+def proof_entries(proof: Proof) -> Json:
     """Entries of a proof under its kind."""
-    if isinstance(proof, Point):
-        return {"negative": written(PointEntries(proof.coordinates))}
-    if isinstance(proof, Functional):
-        return {"not-sos": written(FunctionalEntries(PolynomialEntries(proof.values)))}
+    match proof:
+        case Point():
+            return {"negative": written(PointEntries(proof.coordinates))}
+        case Functional():
+            return {"not-sos": written(FunctionalEntries(PolynomialEntries(proof.values)))}
     squares, multiplier = (
         tuple(
             made(GramEntries, one, basis=tuple(b if isinstance(b, tuple) else polynomial_text(b) for b in one.basis))

@@ -1,10 +1,9 @@
 """Statement of a problem: whether multiplier · polynomial lies in the cone of a basic semialgebraic set."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property
 from itertools import combinations
-from typing import Any
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import PolynomialError
@@ -197,6 +196,6 @@ def statement(
     )
 
 
-def _subsets(indices: Any, largest: int) -> Iterator[Any]:
+def _subsets(indices: Sequence[int], largest: int) -> Iterator[tuple[int, ...]]:
     for size in range(largest + 1):
         yield from combinations(indices, size)

@@ -482,14 +482,15 @@ def _whole(exponent: Any) -> Any:
 def _names_of_inputs(inputs: Sequence[Any]) -> tuple[str, ...]:
     names: dict[str, None] = {}
     for one in inputs:
-        if isinstance(one, str):
-            names |= dict.fromkeys(names_in_text(one))
-        elif hasattr(one, "free_symbols"):
-            names |= dict.fromkeys(sorted(s.name for s in one.free_symbols))
-        elif isinstance(one, Mapping):
-            raise PolynomialError(
-                "a polynomial given by its exponents needs its variables. Received none. Give variables=('x', 'y')."
-            )
+        match one:
+            case str():
+                names |= dict.fromkeys(names_in_text(one))
+            case object(free_symbols=symbols):
+                names |= dict.fromkeys(sorted(s.name for s in symbols))
+            case Mapping():
+                raise PolynomialError(
+                    "a polynomial given by its exponents needs its variables. Received none. Give variables=('x', 'y')."
+                )
     return tuple(names) or ("x",)
 
 
@@ -520,11 +521,8 @@ def _sympy(given: Any, names: tuple[str, ...]) -> dict[Exponents, Fraction]:
 
 
 def _constraint(given: Any, names: tuple[str, ...]) -> tuple[str, dict[Exponents, Fraction]]:
-    kind: str
-    if isinstance(given, str):
-        kind, _, polynomial = parse_constraint(given, names)
-    else:
-        kind, polynomial = _read_relation(given, names)
+    read = parse_constraint if isinstance(given, str) else _read_relation
+    kind, *_, polynomial = read(given, names)
     if not polynomial:
         raise PolynomialError(f"a constraint must not be always true. Received {given}. Omit this constraint.")
     return kind, polynomial
@@ -533,12 +531,13 @@ def _constraint(given: Any, names: tuple[str, ...]) -> tuple[str, dict[Exponents
 def _read_relation(given: Any, names: tuple[str, ...]) -> tuple[str, dict[Exponents, Fraction]]:
     import sympy as sp
 
-    if isinstance(given, sp.GreaterThan):
-        return "inequality", _sympy(given.lhs - given.rhs, names)
-    if isinstance(given, sp.LessThan):
-        return "inequality", _sympy(given.rhs - given.lhs, names)
-    if isinstance(given, sp.Equality):
-        return "equality", _sympy(given.lhs - given.rhs, names)
+    match given:
+        case sp.GreaterThan():
+            return "inequality", _sympy(given.lhs - given.rhs, names)
+        case sp.LessThan():
+            return "inequality", _sympy(given.rhs - given.lhs, names)
+        case sp.Equality():
+            return "equality", _sympy(given.lhs - given.rhs, names)
     raise PolynomialError(
         f"a constraint is text such as 'x >= 0', or a SymPy relation >=, <=, Eq. Received {given!s:.60}. "
         "Strict inequalities are not closed; use >=."

@@ -10,9 +10,9 @@ from dataclasses import field
 from fractions import Fraction
 from functools import reduce
 from math import comb, lcm
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from flint import fmpq, fmpq_mat, fmpz_mat
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz_mat
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.exact import fraction_of
@@ -121,7 +121,7 @@ def in_echelon_form(square: Square) -> Square:
     return Square(product=square.product, basis=basis, gram=upper)
 
 
-def form(basis: Sequence[Element], gram: IntegerGram, size: int) -> Any:
+def form(basis: Sequence[Element], gram: IntegerGram, size: int) -> fmpq_mpoly:
     """Form bᵀQb in the ring, added up in integers.
 
     Raises
@@ -230,10 +230,11 @@ def holds(statement: Statement, proof: Proof) -> bool:
         is negative at a point of the set. False proves nothing.
     """
     try:
-        if isinstance(proof, SumOfSquares):
-            return multiplier_is_positive(statement, proof.multiplier) and _identity_holds(statement, proof)
-        if isinstance(proof, Functional):
-            return _functional_holds(statement, proof)
+        match proof:
+            case SumOfSquares():
+                return multiplier_is_positive(statement, proof.multiplier) and _identity_holds(statement, proof)
+            case Functional():
+                return _functional_holds(statement, proof)
         return _point_holds(statement, proof)
     except (ValueError, TypeError, AttributeError):
         return False
@@ -284,7 +285,7 @@ def _with_integers(squares: Iterable[Square]) -> list[tuple[Square, IntegerGram]
     return [(square, integer_gram(square)) for square in squares]
 
 
-def _target(statement: Statement) -> Any:
+def _target(statement: Statement) -> fmpq_mpoly:
     """multiplier · polynomial in the ring."""
     size = len(statement.variables)
     return multiplied(element(statement.multiplier, size), element(statement.polynomial, size))
@@ -292,7 +293,7 @@ def _target(statement: Statement) -> Any:
 
 def _right_side(
     statement: Statement, squares: Iterable[tuple[Square, IntegerGram]], cofactors: Iterable[Polynomial]
-) -> Any:
+) -> fmpq_mpoly:
     """Σ (Π g_i)·bᵀQb + Σ q_k h_k in the ring."""
     size = len(statement.variables)
     total = _sum(statement, squares)
@@ -301,13 +302,13 @@ def _right_side(
     return total
 
 
-def _sum(statement: Statement, squares: Iterable[tuple[Square, IntegerGram]]) -> Any:
+def _sum(statement: Statement, squares: Iterable[tuple[Square, IntegerGram]]) -> fmpq_mpoly:
     """Σ (Π g_i)·bᵀQb in the ring."""
     size = len(statement.variables)
     one = ring(size).constant(1)
     inequalities = [element(g, size) for g in statement.inequalities]
     total = 0 * one
-    products = dict[tuple[int, ...], Any]()
+    products = dict[tuple[int, ...], fmpq_mpoly]()
     for square, gram in squares:
         if square.product not in statement.products or not has_own_monomials(square.basis):
             raise ValueError(
@@ -365,18 +366,9 @@ def _point_holds(statement: Statement, proof: Point) -> bool:
     )
 
 
-def residual(statement: Statement, squares: Sequence[Square], cofactors: Sequence[Polynomial]) -> Any:
+def residual(statement: Statement, squares: Sequence[Square], cofactors: Sequence[Polynomial]) -> Polynomial:
     """Target minus the right-hand side of a proposed proof."""
     return mapping(_target(statement) - _right_side(statement, _with_integers(squares), cofactors))
 
 
-__all__ = [
-    "Functional",
-    "Point",
-    "Proof",
-    "Square",
-    "SumOfSquares",
-    "holds",
-    "localizing_matrix",
-    "residual",
-]
+__all__ = ["Functional", "Point", "Proof", "Square", "SumOfSquares", "holds", "localizing_matrix", "residual"]

@@ -15,7 +15,7 @@ import msgspec
 
 from quakedesign.errors import CertificateError
 from quakedesign.exact import exact_text
-from quakedesign.files import write_whole
+from quakedesign.files import Json, write_whole
 from quakedesign.text import one_line
 
 _Kind = TypeVar("_Kind")
@@ -55,7 +55,7 @@ def _depth(text: str) -> int:
     return max(accumulate(1 if bracket in "[{" else -1 for bracket in brackets), default=0)
 
 
-def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def unique(pairs: list[tuple[str, Any]]) -> Json:
     """Object whose keys differ. Raises CertificateError for others."""
     need(len({k for k, _ in pairs}) == len(pairs), "a key occurs twice in one object")
     return dict(pairs)
@@ -81,7 +81,7 @@ def need(condition: bool, reason: str) -> None:
         _refuse(reason)
 
 
-def headed(raw: Any, kind: str = "") -> dict[str, Any]:
+def headed(raw: Any, kind: str = "") -> Json:
     """Entries of a file without the format's number and, if there is one, its kind, which must be the given one."""
     if not isinstance(raw, dict):
         _refuse("the file must be an object")
@@ -190,14 +190,15 @@ def read_as(kind: type[_Kind], raw: Any, what: str = "the file") -> _Kind:
 
 def written(value: Any) -> Any:
     """Entries of a file that `read_as` reads as a value."""
-    if isinstance(value, Fraction):
-        return exact_text(value)
-    if isinstance(value, PolynomialEntries):
-        return polynomial_text(value)
-    if isinstance(value, tuple | list):
-        return [written(entry) for entry in value]
-    if isinstance(value, Mapping):
-        return {key: written(entry) for key, entry in value.items()}
+    match value:
+        case Fraction():
+            return exact_text(value)
+        case PolynomialEntries():
+            return polynomial_text(value)
+        case tuple() | list():
+            return [written(entry) for entry in value]
+        case Mapping():
+            return {key: written(entry) for key, entry in value.items()}
     if parts := _parts(cast(Any, type(value))):
         entries = ((key, getattr(value, name), default) for name, key, default in parts)
         return {key: written(entry) for key, entry, default in entries if default is _NONE or entry != default}
@@ -235,16 +236,17 @@ def _difference(raw: Any, again: Any) -> str:
     """Place of the first entry that differs between what was read and what would be written; empty without one."""
     if type(raw) is not type(again):
         return " "
-    if isinstance(raw, dict):
-        for key, entry in raw.items():
-            if key not in again:
-                return f".{one_line(key)[:40]}"
-            if place := _difference(entry, again[key]):
-                return f".{key}{place}"
-    elif isinstance(raw, list):
-        for number, pair in enumerate(zip(raw, again, strict=True)):
-            if place := _difference(*pair):
-                return f"[{number}]{place}"
+    match raw:
+        case dict():
+            for key, entry in raw.items():
+                if key not in again:
+                    return f".{one_line(key)[:40]}"
+                if place := _difference(entry, again[key]):
+                    return f".{key}{place}"
+        case list():
+            for number, pair in enumerate(zip(raw, again, strict=True)):
+                if place := _difference(*pair):
+                    return f"[{number}]{place}"
     return "" if raw == again else " "
 
 

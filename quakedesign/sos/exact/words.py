@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
-from typing import Any
 
 from quakedesign.exact import LowerBound, UpperBound, exact_text
+from quakedesign.files import Json
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.attraction import Attraction, Region
 from quakedesign.sos.exact.polynomial import Polynomial, evaluate
@@ -49,7 +49,10 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
     lines += [*_reason(answer), *filter(None, [answer.remark])]
     lines += ["about nothing: the set is empty"] if answer.set_is_empty else []
     if verbose:
-        lines += [f"Gram matrices {when} reduction: {_sizes(sizes)}" for when, sizes in answer.blocks.items()]
+        lines += [
+            f"Gram matrices {when} reduction: {' + '.join(map(str, sizes)) or 'none'}"
+            for when, sizes in answer.blocks.items()
+        ]
     lines.append(f"{answer.seconds:.2f} s; checked in exact arithmetic")
     return lines if answer.proof is not None else [*lines[:-1], f"{answer.seconds:.2f} s"]
 
@@ -70,25 +73,24 @@ def statement_words(answer: Answer) -> list[str]:
 
 def _reason(answer: Answer) -> list[str]:
     proof, statement = answer.proof, answer.statement
-    if isinstance(proof, SumOfSquares):
-        digits = max((len(exact_text(q)) for s in proof.squares for q in s.gram), default=1)
-        count = sum(len(s.basis) for s in proof.squares)
-        return [
-            f"a sum of {count} square{'s' * (count != 1)} with rational coefficients of at most {digits} characters"
-        ]
-    if isinstance(proof, Functional):
-        return [
-            f"no such sum of squares with summands of degree up to {statement.degree}: a rational functional with "
-            f"{len(proof.values)} values is non-negative on all of them and negative here"
-        ]
-    if isinstance(proof, Point):
-        point = ", ".join(f"{n} = {exact_text(v)}" for n, v in zip(statement.variables, proof.coordinates, strict=True))
-        return [f"negative at {point}", f"value {_shown(_value(answer, proof))}"]
+    match proof:
+        case SumOfSquares():
+            digits = max((len(exact_text(q)) for s in proof.squares for q in s.gram), default=1)
+            count = sum(len(s.basis) for s in proof.squares)
+            return [
+                f"a sum of {count} square{'s' * (count != 1)} with rational coefficients of at most {digits} characters"
+            ]
+        case Functional():
+            return [
+                f"no such sum of squares with summands of degree up to {statement.degree}: a rational functional with "
+                f"{len(proof.values)} values is non-negative on all of them and negative here"
+            ]
+        case Point():
+            point = ", ".join(
+                f"{n} = {exact_text(v)}" for n, v in zip(statement.variables, proof.coordinates, strict=True)
+            )
+            return [f"negative at {point}", f"value {_shown(evaluate(answer.statement.polynomial, proof.coordinates))}"]
     return ["neither a rational proof nor a rational refutation was found; this says nothing about the polynomial"]
-
-
-def _value(answer: Answer, point: Point) -> Fraction:
-    return evaluate(answer.statement.polynomial, point.coordinates)
 
 
 def _shown(value: Fraction) -> str:
@@ -103,10 +105,6 @@ def _short(text: str) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 
-def _sizes(sizes: Sequence[int]) -> str:
-    return " + ".join(map(str, sizes)) or "none"
-
-
 # ----------------------------------------------------------------------
 # A region of attraction in sentences, and as facts.
 
@@ -116,7 +114,7 @@ def claim_words(claim: Attraction) -> list[str]:
     names = claim.variables
     lines = [f"{name}' = {polynomial_words(f, names)}" for name, f in zip(names, claim.field, strict=True)]
     lines.append(f"V = {polynomial_words(claim.lyapunov, names)}")
-    if isinstance(claim.proof, Point):
+    if claim.refutation is not None:
         level = [f"level {claim.level} is not proved by V"] if claim.level is not None else []
         return [*lines, *level, *_point_words(claim)]
     if claim.proof is None:
@@ -137,11 +135,10 @@ def region_words(region: Region) -> list[str]:
     return [*lines, *filter(None, [region.remark])]
 
 
-def region_entries(region: Region) -> dict[str, Any]:
+def region_entries(region: Region) -> Json:
     """The same for JSON; exact numbers are texts."""
     shown = region.proved or region.refuted
-    point = region.refuted.proof if region.refuted is not None else None
-    coordinates = point.coordinates if isinstance(point, Point) else None
+    point = region.refuted.refutation if region.refuted is not None else None
     return {
         "verdict": region.verdict,
         "variables": list(shown.variables) if shown else None,
@@ -151,7 +148,7 @@ def region_entries(region: Region) -> dict[str, Any]:
         "shape": None if region.inclusion is None else _shape(region),
         "shape_level": None if region.shape_level is None else str(region.shape_level),
         "refuted_above": None if region.refuted_above is None else str(region.refuted_above),
-        "point": None if coordinates is None else [str(x) for x in coordinates],
+        "point": None if point is None else [str(x) for x in point.coordinates],
         "equilibrium": None if region.refuted is None else region.refuted.equilibrium,
         "remark": region.remark or None,
     }
@@ -171,9 +168,9 @@ def _start(claim: Attraction) -> str:
 
 
 def _point_words(claim: Attraction) -> list[str]:
-    assert isinstance(claim.proof, Point)
+    assert claim.refutation is not None
     assert claim.height is not None
-    point = ", ".join(f"{name} = {x}" for name, x in zip(claim.variables, claim.proof.coordinates, strict=True))
+    point = ", ".join(f"{name} = {x}" for name, x in zip(claim.variables, claim.refutation.coordinates, strict=True))
     if claim.equilibrium:
         return [f"another equilibrium, so that no V helps beyond: {point}"]
     what = "V is not positive" if claim.height <= 0 else "V does not fall"

@@ -65,7 +65,7 @@ class _Rays:
         top = max((sum(e) for e in polynomial), default=0)
         return [Arrays({e: c for e, c in polynomial.items() if sum(e) == k}, self.size) for k in range(top + 1)]
 
-    def crossings(self, directions: Any, parts: list[Arrays]) -> Any:
+    def crossings(self, directions: np.ndarray, parts: list[Arrays]) -> np.ndarray:
         """Points, one a row, from which on a polynomial is no longer negative; infinite where it remains so."""
         table = np.array([part.at(directions) for part in parts]).T
         distances = np.array([_first_root(row) for row in table])
@@ -73,22 +73,22 @@ class _Rays:
             np.isfinite(distances)[:, None], np.nan_to_num(distances, posinf=0.0)[:, None] * directions, np.inf
         )
 
-    def heights(self, directions: Any) -> Any:
+    def heights(self, directions: np.ndarray) -> np.ndarray:
         """V where it stops to fall in every direction; infinite where it never does."""
         points = self.crossings(directions, self.rate)
         finite = np.isfinite(points).all(axis=1)
         return np.where(finite, self.lyapunov.at(np.where(finite[:, None], points, 0.0)), np.inf)
 
-    def height(self, direction: Any) -> float:
+    def height(self, direction: np.ndarray) -> float:
         """V where it stops to fall in one direction."""
         return float(self.heights((direction / np.linalg.norm(direction))[None, :])[0])
 
-    def sampled(self) -> Any:
+    def sampled(self) -> np.ndarray:
         """Seeded directions, one a row, and those of the axes."""
         random = np.random.default_rng(_SEED).standard_normal((_DIRECTIONS * self.size, self.size))
         return np.concatenate([random / np.linalg.norm(random, axis=1)[:, None], np.eye(self.size), -np.eye(self.size)])
 
-    def lowest(self, directions: Any) -> list[Any]:
+    def lowest(self, directions: np.ndarray) -> list[np.ndarray]:
         """Directions, refined, in which V stops to fall where it is lowest."""
         heights = self.heights(directions)
         order = np.argsort(heights, kind="stable")[:_REFINED]
@@ -96,7 +96,7 @@ class _Rays:
         return [minimize(self.height, d, method="Nelder-Mead", options=_PRECISE).x for d in starts]
 
 
-def _first_root(row: Any) -> float:
+def _first_root(row: np.ndarray) -> float:
     """Smallest r > 0 from which on Σ row_k·r^k is not negative; infinite if there is none."""
     used = np.flatnonzero(row)
     if not len(used) or row[used[0]] > 0:
@@ -119,7 +119,7 @@ def lowest_crossing(claim: Attraction) -> Point | None:
     return min(candidates, key=lambda point: evaluate(claim.lyapunov, point.coordinates), default=None)
 
 
-def _rational(claim: Attraction, x: Any) -> Iterator[Point]:
+def _rational(claim: Attraction, x: np.ndarray) -> Iterator[Point]:
     """Points near one, or a little beyond it, that refute."""
     for beyond in _BEYOND:
         for tolerance in _TOLERANCES:
@@ -128,7 +128,7 @@ def _rational(claim: Attraction, x: Any) -> Iterator[Point]:
                 yield point
 
 
-def _fractions(x: Any, tolerance: float) -> tuple[Fraction, ...]:
+def _fractions(x: np.ndarray, tolerance: float) -> tuple[Fraction, ...]:
     """Simple fractions near coordinates; those far below the largest are zero."""
     least = 1e-9 * float(np.abs(x).max())
     return tuple(simplest(float(v), tolerance) if abs(v) > least else Fraction(0) for v in x)
@@ -201,15 +201,14 @@ def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attr
     for degree_now in range(2, top + 1, 2):
         for _ in range(_ROUNDS):
             candidates = (with_shape(certify(claim), shape) for claim in _improved(best, shape, degree_now))
-            better = next((region for region in candidates if _grows(best, region)), None)
+            least = None if best.shape_level is None else _GROWTH * best.shape_level
+            better = next(
+                (r for r in candidates if r.shape_level and least is not None and r.shape_level > least), None
+            )
             if better is None:
                 break
             best = better
     return best
-
-
-def _grows(old: Region, new: Region) -> bool:
-    return new.shape_level is not None and old.shape_level is not None and new.shape_level > _GROWTH * old.shape_level
 
 
 def _improved(region: Region, shape: Polynomial, top: int) -> Iterator[Attraction]:
@@ -346,12 +345,7 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
 
 
 def region_of_attraction(
-    field: Mapping[Any, Any],
-    V: Any = None,
-    *,
-    relative: float = 1e-4,
-    degree: int | None = None,
-    shape: Any = None,
+    field: Mapping[Any, Any], V: Any = None, *, relative: float = 1e-4, degree: int | None = None, shape: Any = None
 ) -> Region:
     """Find the largest level ρ for which V̇ < 0 wherever V < ρ, but at the origin: then {V < ρ} is attracted by it.
 
@@ -432,12 +426,8 @@ def _refuted(claim: Attraction) -> Attraction | None:
     refuted = replace(claim, proof=lowest_crossing(claim))
     if refuted.height is None:
         return None
-    return _checked(replace(refuted, level=_just_above(refuted.height) if refuted.height > 0 else None))
-
-
-def _just_above(height: Fraction) -> Fraction:
-    """Simple number above one, by less than two parts in a thousand million."""
-    return simplest_between(height * (1 + Fraction(1, 10**9)), height * (1 + Fraction(2, 10**9)))
+    low, high = (refuted.height * (1 + Fraction(part, 10**9)) for part in (1, 2))
+    return _checked(replace(refuted, level=simplest_between(low, high) if low > 0 else None))
 
 
 def _checked(claim: Attraction) -> Attraction | None:

@@ -6,18 +6,21 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
 
 from quakedesign.sos.solve.moment import MomentProgram, options, pairs, useful
 
-_handed: ContextVar[dict[int, Any] | None] = ContextVar("handed", default=None)
+if TYPE_CHECKING:
+    import cvxpy as cp
+
+_handed: ContextVar["dict[int, cp.Problem] | None"] = ContextVar("handed", default=None)
 
 
 @contextmanager
-def stated_problems() -> Iterator[list[Any]]:
+def stated_problems() -> "Iterator[list[cp.Problem]]":
     """Collect the cvxpy problems solved within a block, each once, in the order of their first solution.
 
     Parameters, variables and multipliers have the values of the last solve. To be handed over, all is solved in this
@@ -29,8 +32,8 @@ def stated_problems() -> Iterator[list[Any]]:
     list of cvxpy.Problem
         Complete when the block ends.
     """
-    by_number: dict[int, Any] = {}
-    problems: list[Any] = []
+    by_number: dict[int, cp.Problem] = {}
+    problems: list[cp.Problem] = []
     token = _handed.set(by_number)
     try:
         yield problems
@@ -44,14 +47,14 @@ def handing_back() -> bool:
     return _handed.get() is not None
 
 
-def hand_back(problem: Any) -> None:
+def hand_back(problem: "cp.Problem") -> None:
     """Note a problem that is about to be solved."""
     handed = _handed.get()
     if handed is not None:
         handed.setdefault(id(problem), problem)
 
 
-def solve(problem: Any, **chosen: Any) -> bool:
+def solve(problem: "cp.Problem", **chosen: Any) -> bool:
     """Run Clarabel; whether there is an answer worth looking at. Its status is no verdict."""
     import cvxpy as cp
 
@@ -74,7 +77,7 @@ class Compiled:
         Disciplined in its Parameters (DPP), none of which is a term of the objective by itself.
     """
 
-    def __init__(self, problem: Any) -> None:
+    def __init__(self, problem: "cp.Problem") -> None:
         self.problem = problem
         self.solver_seconds = 0.0
         self._solvers: dict[str, Any] = {}
@@ -128,7 +131,7 @@ class Compiled:
         return True
 
 
-def in_cones(shapes: Sequence[MomentProgram], moments: Any) -> list[Any]:
+def in_cones(shapes: Sequence[MomentProgram], moments: "cp.Expression") -> "list[cp.Constraint]":
     """cvxpy constraints on functionals, one a shape, below each other: zero on its relations, ⪰ 0 on its blocks.
 
     Blocks of one size are one constraint, which compiles some ten times faster than one for every block.

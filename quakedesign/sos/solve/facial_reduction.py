@@ -7,7 +7,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -152,7 +151,7 @@ def _modulo(block: Block, relations: Sequence[Polynomial]) -> Block | None:
 
 
 def at_kernels(
-    blocks: Sequence[Block], grams: Sequence[Any], threshold: float, tolerance: float, scale: Sequence[Fraction]
+    blocks: Sequence[Block], grams: Sequence[np.ndarray], threshold: float, tolerance: float, scale: Sequence[Fraction]
 ) -> list[Block] | None:
     """Blocks without the numerical kernels of their Gram matrices, rounded; None if there is no kernel."""
     reduced, smaller_face = [], False
@@ -165,7 +164,7 @@ def at_kernels(
     return reduced if smaller_face else None
 
 
-def _kernel(block: Block, gram: Any, threshold: float, tolerance: float, scale: Sequence[Fraction]) -> list[Row]:
+def _kernel(block: Block, gram: np.ndarray, threshold: float, tolerance: float, scale: Sequence[Fraction]) -> list[Row]:
     """Rational basis of the eigenspace of small eigenvalues, in the simplest fractions of the unscaled variables."""
     values, vectors = np.linalg.eigh(gram)
     space = vectors[:, values < threshold].T

@@ -53,7 +53,8 @@ class Requirement:
     @property
     def present(self) -> Sequence[Block]:
         """Blocks of `shape`."""
-        return _blocks(self.template) if self.blocks is None else self.blocks
+        multiples = [] if self.blocks is not None else [r for _, _, r in relations(self.template)]
+        return modulo(initial_blocks(self.template), multiples) if self.blocks is None else self.blocks
 
     def coefficient(self, e: Exponents) -> Affine:
         """Coefficient of a monomial."""
@@ -148,10 +149,6 @@ def _insert(affine: Affine, pivot: int, row: Affine) -> Affine:
 
 def _value(affine: Affine, values: Sequence[Fraction]) -> Fraction:
     return sum((c * v for c, v in zip(affine[1:], values, strict=True) if c), start=affine[0])
-
-
-def _blocks(template: Statement) -> list[Block]:
-    return modulo(initial_blocks(template), [r for _, _, r in relations(template)])
 
 
 def _annihilators(need: Requirement) -> Iterable[dict[Exponents, Fraction]]:

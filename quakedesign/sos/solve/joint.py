@@ -12,6 +12,7 @@ multiplier of its own among the unknowns.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache
 from threading import Lock
 from typing import Any
@@ -27,7 +28,7 @@ from quakedesign.sos.solve.moment import MomentProgram
 from quakedesign.sos.solve.rounding import relations
 
 _MOST_CACHED = 32
-_cached: dict[tuple[Any, ...], "JointProgram"] = {}
+_cached: dict[tuple[object, ...], "JointProgram"] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,10 +82,7 @@ class JointProgram:
         self._stated: dict[tuple[int, int], _Stated] = {}
 
     def solve(
-        self,
-        demands: Sequence[Demand],
-        fixed: Sequence[Polynomial] | None = None,
-        limits: DecisionBounds | None = None,
+        self, demands: Sequence[Demand], fixed: Sequence[Polynomial] | None = None, limits: DecisionBounds | None = None
     ) -> Proposal | None:
         """Decision with the largest margin for demands of the same structure; None if the solver fails.
 
@@ -115,7 +113,7 @@ class JointProgram:
         }
         return self._stated[kind].solve(values)
 
-    def _row(self, polynomials: Sequence[Mapping[Exponents, Any]]) -> Any:
+    def _row(self, polynomials: Sequence[Mapping[Exponents, Fraction]]) -> np.ndarray:
         """Coefficients of one polynomial for every demand, beside each other."""
         return np.concatenate([shape.vector(p) for shape, p in zip(self._shapes, polynomials, strict=True)])
 
@@ -147,7 +145,7 @@ class _Stated:
         constraints = [self.unit, self.link, *in_cones(shapes, moments), *signs]
         self.compiled = Compiled(cp.Problem(cp.Minimize(cost), constraints))
 
-    def solve(self, values: Mapping[str, Any]) -> Proposal | None:
+    def solve(self, values: Mapping[str, object]) -> Proposal | None:
         """Proposal for the values of all Parameters."""
         with self._alone:
             for name, parameter in self.given.items():
@@ -171,7 +169,7 @@ def _shape_of(structure: Structure) -> MomentProgram:
     return MomentProgram([b.shape() for b in blocks], rows)
 
 
-def _times(demand: Demand, part: Polynomial) -> Mapping[Exponents, Any]:
+def _times(demand: Demand, part: Polynomial) -> Mapping[Exponents, Fraction]:
     one = demand.template.multiplier
     if len(one) == 1 and not any(map(any, one)):
         return part

@@ -10,16 +10,20 @@ Gram entries, and between polynomials of one shape only the cost changes.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache
 from time import perf_counter
-from typing import Any, Self
+from typing import Self
 
 import clarabel
 import numpy as np
+from clarabel import DefaultSolution
 from scipy import sparse
 
 from quakedesign.sos.exact.polynomial import Exponents
 
+Array = np.ndarray
+Sided = tuple[sparse.csc_matrix, np.ndarray]  # a matrix and the right side of its equations
 _LARGEST_MARGINS = (4.0, 1e-2, 1e-5)  # keep the programme bounded where every polynomial is in the cone
 
 
@@ -29,7 +33,7 @@ class Shape:
 
     weight: Mapping[Exponents, float]
     basis: tuple[Exponents, ...]  # Monomials m (length n)
-    face: Any = None  # array (r × n), optional: The basis is face·m; the monomials themselves unless given
+    face: np.ndarray | list[list[float]] | None = None  # (r × n): The basis is face·m; m itself unless given
 
     @property
     def size(self) -> int:
@@ -43,10 +47,10 @@ class MomentSolution:
 
     margin: float
     # grams, moments: list of array: Q = Z + t·I and L(g_S·b bᵀ) of every block
-    grams: list[Any]
-    moments: list[Any]
+    grams: list[np.ndarray]
+    moments: list[np.ndarray]
     functional: Mapping[Exponents, float]
-    cofactors: Any  # array: Coefficients of the multiples of the equalities, in the order of their rows
+    cofactors: Sequence[float] | np.ndarray  # Coefficients of the multiples of the equalities, by their rows
 
 
 class MomentProgram:
@@ -72,7 +76,7 @@ class MomentProgram:
             np.array([float(c) for r in relations for c in r.values()]),
         )
         self.relation_count = len(relations)
-        self._solver: Any = None
+        self._solver: clarabel.DefaultSolver | None = None
         self._chosen: tuple[float, bool] | None = None
         self.solver_seconds = 0.0
 
@@ -82,7 +86,7 @@ class MomentProgram:
         own._solver = None
         return own
 
-    def covers(self, target: Mapping[Exponents, Any]) -> bool:
+    def covers(self, target: Mapping[Exponents, object]) -> bool:
         """Whether every monomial of a target can be produced at all."""
         return all(e in self.index for e in target)
 
@@ -102,7 +106,9 @@ class MomentProgram:
         solution = self.solve(target, accuracy)
         return None if solution is None else solution.margin
 
-    def _answer(self, target: Mapping[Exponents, float], chosen: tuple[float, bool], most: float) -> Any:
+    def _answer(
+        self, target: Mapping[Exponents, float], chosen: tuple[float, bool], most: float
+    ) -> DefaultSolution | None:
         """What the solver says; None if that is not worth looking at."""
         cost = np.append(self.vector(target), most)
         if self._solver is None or self._chosen != chosen:
@@ -118,7 +124,7 @@ class MomentProgram:
         self.solver_seconds = perf_counter() - began  # its own solve_time holds the set-up of the first solve
         return answer if useful(answer) else None
 
-    def _solution(self, answer: Any) -> MomentSolution:
+    def _solution(self, answer: DefaultSolution) -> MomentSolution:
         x, z, s = (np.array(v) for v in (answer.x, answer.z, answer.s))
         count = 1 + self.relation_count
         margin = -z[0]
@@ -136,10 +142,10 @@ class MomentProgram:
             cofactors=-z[1:count],
         )
 
-    def _cones(self) -> list[Any]:
+    def _cones(self) -> list[clarabel.PSDTriangleConeT]:
         return [clarabel.PSDTriangleConeT(s.size) for s in self.blocks]
 
-    def _matrix(self, more: Sequence[tuple[int, int, float]], *, equations: int, limits: int) -> Any:
+    def _matrix(self, more: Sequence[tuple[int, int, float]], *, equations: int, limits: int) -> Sided:
         """Sparse matrix and right side: trace, relations, further rows, then minus the localizing matrices.
 
         The unknowns are the values of L and one more; `more` has further entries.
@@ -175,19 +181,19 @@ class MomentProgram:
             return None
         return dict(zip(self.index, answer.x[:-1], strict=True))
 
-    def triangles(self) -> Any:
+    def triangles(self) -> sparse.csr_array:
         """Sparse map from L to the upper triangles of all localizing matrices, column by column, below each other."""
         rows, columns, values, diagonal = self.localizing
         size = sum(s.size * (s.size + 1) // 2 for s in self.blocks)
         plain = np.where(_marked(size, diagonal)[rows], values, values / np.sqrt(2.0))
         return sparse.csr_array((plain, (rows, columns)), shape=(size, len(self.keys)))
 
-    def relations(self) -> Any:
+    def relations(self) -> sparse.csr_array:
         """Sparse map from L to its values at the multiples of the equalities."""
         rows, columns, values = self.relation_entries
         return sparse.csr_array((values, (rows, columns)), shape=(self.relation_count, len(self.keys)))
 
-    def vector(self, target: Mapping[Exponents, Any]) -> Any:
+    def vector(self, target: Mapping[Exponents, Fraction | float]) -> np.ndarray:
         """Coefficients in the order of the monomials, as floats.
 
         Raises
@@ -203,7 +209,7 @@ class MomentProgram:
         return vector
 
 
-def useful(answer: Any) -> bool:
+def useful(answer: DefaultSolution) -> bool:
     """Whether an answer of the solver is worth looking at; its status is no verdict."""
     finite = np.all(np.isfinite(answer.x)) and np.all(np.isfinite(answer.z))
     return str(answer.status) in _USEFUL and bool(finite)
@@ -213,17 +219,17 @@ _USEFUL = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
 
 
 @lru_cache(maxsize=256)
-def _zero(size: int) -> Any:
+def _zero(size: int) -> sparse.csc_matrix:
     return sparse.csc_matrix((size, size))
 
 
-def _marked(size: int, places: Any) -> Any:
+def _marked(size: int, places: np.ndarray) -> np.ndarray:
     marks = np.zeros(size, dtype=bool)
     marks[places] = True
     return marks
 
 
-def _by_columns(entries: Any, rows: Any, columns: Any, shape: tuple[int, int]) -> Any:
+def _by_columns(entries: Array, rows: Array, columns: Array, shape: tuple[int, int]) -> sparse.csc_matrix:
     """Sparse matrix with entries in one place added up, in a third of the time that SciPy takes for a small one."""
     places = columns * shape[0] + rows
     order = np.argsort(places, kind="stable")
@@ -234,7 +240,9 @@ def _by_columns(entries: Any, rows: Any, columns: Any, shape: tuple[int, int]) -
     return sparse.csc_matrix((np.add.reduceat(entries[order], starts), down, ends), shape=shape)
 
 
-def _localizing(blocks: Sequence[Shape], entries: list[Any], where: Any, width: int) -> Any:
+def _localizing(
+    blocks: Sequence[Shape], entries: list[tuple[Array, Array]], where: Array, width: int
+) -> tuple[Array, ...]:
     """Rows, columns and values of all localizing matrices below each other, and the rows of their diagonals."""
     rows, columns, values, diagonal = [], [], [], []
     start = first = 0
@@ -257,13 +265,13 @@ def _localizing(blocks: Sequence[Shape], entries: list[Any], where: Any, width: 
     return tuple(np.concatenate(part) if part else np.zeros(0, dtype=np.int64) for part in parts)
 
 
-def options(accuracy: float) -> dict[str, Any]:
+def options(accuracy: float) -> dict[str, float]:
     """What Clarabel is asked for, by the names of its settings."""
     exact = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), accuracy)
     return {"presolve_enable": False, "chordal_decomposition_enable": False, "max_iter": 100, **exact}
 
 
-def settings(accuracy: float, refined: bool = True) -> Any:
+def settings(accuracy: float, refined: bool = True) -> clarabel.DefaultSettings:
     """Settings of Clarabel with these values."""
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -273,7 +281,7 @@ def settings(accuracy: float, refined: bool = True) -> Any:
     return settings
 
 
-def _unique(stacked: list[Any]) -> Any:
+def _unique(stacked: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     together = np.concatenate(stacked)
     span = together.max(axis=0).astype(object) + 1
     if int(np.prod(span)) < 2**62:
@@ -285,24 +293,24 @@ def _unique(stacked: list[Any]) -> Any:
 
 
 @lru_cache(maxsize=256)
-def pairs(size: int) -> Any:
+def pairs(size: int) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns of the upper triangle, column by column; read-only."""
     columns, rows = np.tril_indices(size)
     rows.flags.writeable = columns.flags.writeable = False
     return rows, columns
 
 
-def _diagonal(size: int) -> Any:
+def _diagonal(size: int) -> np.ndarray:
     return np.arange(1, size + 1).cumsum() - 1
 
 
-def _unit_vector(size: int) -> Any:
+def _unit_vector(size: int) -> np.ndarray:
     vector = np.zeros(size * (size + 1) // 2)
     vector[_diagonal(size)] = 1.0
     return vector
 
 
-def _entries(block: Shape) -> Any:
+def _entries(block: Shape) -> tuple[np.ndarray, np.ndarray]:
     """Exponents (terms × pairs × variables) and factors of the scaled upper triangle of L(g·m mᵀ)."""
     basis = np.array(block.basis, dtype=np.int64)
     rows, columns = pairs(len(basis))
@@ -313,7 +321,7 @@ def _entries(block: Shape) -> Any:
     return terms[:, None, :] + sums[None, :, :], values
 
 
-def _congruence(face: Any) -> Any:
+def _congruence(face: np.ndarray | list[list[float]]) -> sparse.csr_matrix:
     """Sparse map from the scaled triangle of M to that of F M Fᵀ."""
     face = np.asarray(face, dtype=float)
     a, b = pairs(face.shape[0])
@@ -323,7 +331,7 @@ def _congruence(face: Any) -> Any:
     return sparse.csr_matrix(whole)
 
 
-def _full(triangle: Any, size: int) -> Any:
+def _full(triangle: np.ndarray, size: int) -> np.ndarray:
     rows, columns = pairs(size)
     matrix = np.zeros((size, size))
     values = np.where(rows == columns, 1.0, 1 / np.sqrt(2.0)) * triangle

@@ -7,12 +7,11 @@ polynomials and their derivatives as arrays.
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import chain, islice, product
-from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog, minimize
 
-from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, evaluate
+from quakedesign.sos.exact.polynomial import Polynomial, degree, evaluate
 from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Point, holds
 from quakedesign.sos.solve.facial_reduction import simplest
@@ -30,19 +29,19 @@ class Arrays:
         self._slopes = self.exponents.T * self.coefficients
         self._lower = np.maximum(self.exponents - np.eye(variables, dtype=np.int64)[:, None], 0)
 
-    def __call__(self, x: Any) -> float:
+    def __call__(self, x: np.ndarray) -> float:
         """Value at a point."""
         return float(self.coefficients @ np.prod(np.asarray(x) ** self.exponents, axis=1))
 
-    def at(self, points: Any) -> Any:
+    def at(self, points: np.ndarray) -> np.ndarray:
         """Values at points, one a row."""
-        return np.prod(points[:, None, :] ** self.exponents[None, :, :], axis=2) @ self.coefficients
+        return np.asarray(np.prod(points[:, None, :] ** self.exponents[None, :, :], axis=2) @ self.coefficients)
 
-    def gradient(self, x: Any) -> Any:
+    def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient at a point."""
-        return (self._slopes * np.prod(np.asarray(x) ** self._lower, axis=2)).sum(axis=1)
+        return np.asarray((self._slopes * np.prod(np.asarray(x) ** self._lower, axis=2)).sum(axis=1))
 
-    def hessian(self, x: Any) -> Any:
+    def hessian(self, x: np.ndarray) -> np.ndarray:
         """Matrix of second derivatives at a point."""
         x, size = np.asarray(x), len(x)
         result = np.zeros((size, size))
@@ -71,7 +70,7 @@ def _polynomial(statement: Statement) -> Arrays:
     return Arrays(statement.polynomial, len(statement.variables))
 
 
-def violation(statement: Statement, points: Any) -> Any:
+def violation(statement: Statement, points: np.ndarray) -> np.ndarray:
     """Largest relative violation of the inequalities at points (one a row); zero inside."""
     worst, size = np.zeros(len(points)), len(statement.variables)
     for g in statement.inequalities:
@@ -134,7 +133,7 @@ def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[flo
             yield moved.tolist(), step
 
 
-def _into(statement: Statement, point: Any) -> Any:
+def _into(statement: Statement, point: np.ndarray) -> np.ndarray | None:
     """Direction, of largest coordinate at most 1, along which the slowest active constraint grows the fastest."""
     rows = []
     for g in (Arrays(g, len(point)) for g in statement.inequalities):
@@ -186,16 +185,18 @@ def local_minima(statement: Statement, hints: Sequence[Sequence[float]] = ()) ->
         yield from _constrained(statement, hints)
 
 
-def _on_sphere(statement: Statement, hints: Any) -> Iterator[list[float]]:
+def _on_sphere(statement: Statement, hints: Sequence[Sequence[float]]) -> Iterator[list[float]]:
     size = len(statement.variables)
     p = statement.polynomial
     top = degree(p)
     homogeneous = all(sum(e) == top for e in p)
-    signed = [any(g.keys() == {_unit(size, i)} for g in statement.inequalities) for i in range(size)]
+    signed = [
+        any(g.keys() == {tuple(int(i == j) for j in range(size))} for g in statement.inequalities) for i in range(size)
+    ]
     lift = {(*(2 * x if s else x for x, s in zip(e, signed, strict=True)), 2 * (top - sum(e))): c for e, c in p.items()}
     form = Arrays(lift, size + 1)
 
-    def value(v: Any) -> Any:
+    def value(v: np.ndarray) -> tuple[float, np.ndarray]:
         full = np.append(v, 1.0) if homogeneous else v
         x = _state(full[:-1], signed)
         level = float(x @ x) + (0.0 if homogeneous else full[-1] ** 4)
@@ -227,20 +228,16 @@ def _on_sphere(statement: Statement, hints: Any) -> Iterator[list[float]]:
                 yield (x / np.abs(x).max() * far).tolist()
 
 
-def _state(v: Any, signed: Any) -> Any:
+def _state(v: np.ndarray, signed: list[bool]) -> np.ndarray:
     return np.where(signed, v**2, v)
 
 
-def _lifted(hint: Any, signed: Any, homogeneous: bool) -> Any:
+def _lifted(hint: Sequence[float], signed: list[bool], homogeneous: bool) -> np.ndarray:
     x = np.where(signed, np.sqrt(np.abs(hint)), hint)
     return x if homogeneous else np.append(x, 1.0)
 
 
-def _unit(size: int, index: int) -> Exponents:
-    return tuple(int(i == index) for i in range(size))
-
-
-def _constrained(statement: Statement, hints: Any) -> Iterator[list[float]]:
+def _constrained(statement: Statement, hints: Sequence[Sequence[float]]) -> Iterator[list[float]]:
     size = len(statement.variables)
     p = Arrays(statement.polynomial, size)
     limits = [("ineq", Arrays(g, size)) for g in statement.inequalities]

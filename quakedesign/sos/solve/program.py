@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import diags_array
@@ -26,6 +26,9 @@ from quakedesign.sos.solve.facial_reduction import Block, at_kernels
 from quakedesign.sos.solve.forced_equations import Forced, Requirement
 from quakedesign.sos.solve.moment import MomentProgram, pairs
 from quakedesign.sos.solve.rounding import relations
+
+if TYPE_CHECKING:
+    import cvxpy as cp
 
 # ----------------------------------------------------------------------
 # Positivity with decision variables: solved by cvxpy and Clarabel, rounded, and proved polynomial by polynomial.
@@ -72,16 +75,16 @@ class Program:
 
         self.variables, self.decisions = tuple(variables), tuple(decisions)
         self._vector = cp.Variable(len(self.decisions), name="decisions")
-        self.constraints: list[Any] = []
+        self.constraints: list[cp.Constraint] = []
         self._required: list[Requirement] = []
         self._forced = Forced(requirements=())
-        self._grams: list[list[Any]] = []
-        self._margin: Any = None
+        self._grams: list[list[cp.Variable]] = []
+        self._margin: cp.Variable | None = None
         self._status = ""
         self._definite: list[list[list[dict[Exponents, Fraction]]]] = []
         self._objective: dict[Exponents, Fraction] = {}
 
-    def __getitem__(self, decision: str) -> Any:
+    def __getitem__(self, decision: str) -> "cp.Expression":
         """Decision as a cvxpy expression, for further constraints; these steer the search and are not proved."""
         return self._vector[self.decisions.index(decision)]
 
@@ -148,12 +151,12 @@ class Program:
         """Set an affine function of the decisions to minimise."""
         self._objective = {e: -c for e, c in self._affine(objective).items()}
 
-    def problem(self) -> Any:
+    def problem(self) -> "cp.Problem":
         """The cvxpy problem as it is first solved, on the faces that the requirements force."""
         self._forced = Forced(requirements=tuple(self._required)).reduced(self.decisions)
         return self._problem()
 
-    def _problem(self) -> Any:
+    def _problem(self) -> "cp.Problem":
         import cvxpy as cp
 
         return cp.Problem(cp.Maximize(self._value(self._objective)), self._constraints(0.0))
@@ -277,7 +280,7 @@ class Program:
             answers.append(answer)
         return tuple(answers)
 
-    def _constraints(self, margin: Any) -> list[Any]:
+    def _constraints(self, margin: "cp.Variable | float") -> "list[cp.Constraint]":
         constraints, self._grams = list(self.constraints), []
         for need in self._forced.requirements:
             grams, equations = _membership(self._vector, need, margin)
@@ -292,7 +295,7 @@ class Program:
             raise PolynomialError("a program must require something. Received nothing. Call require first.")
         return constraints
 
-    def _value(self, affine: Mapping[Exponents, Fraction]) -> Any:
+    def _value(self, affine: Mapping[Exponents, Fraction]) -> "cp.Expression":
         zero = (0,) * len(self.decisions)
         units = [tuple(int(i == j) for j in range(len(zero))) for i in range(len(zero))]
         return np.array([float(affine.get(u, 0)) for u in units]) @ self._vector + float(affine.get(zero, 0))
@@ -351,13 +354,12 @@ def largest(
 
 
 def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fraction:
-    return sum(
-        (c * (values[e.index(1)] if any(e) else 1) for e, c in affine.items()),
-        start=Fraction(0),
-    )
+    return sum((c * (values[e.index(1)] if any(e) else 1) for e, c in affine.items()), start=Fraction(0))
 
 
-def _membership(vector: Any, need: Requirement, margin: Any) -> tuple[list[Any], list[Any]]:
+def _membership(
+    vector: "cp.Variable", need: Requirement, margin: "cp.Variable | float"
+) -> "tuple[list[cp.Variable], list[cp.Constraint]]":
     """Gram matrices, less the margin, and the equations between their coefficients and those of the polynomial."""
     import cvxpy as cp
 
@@ -370,7 +372,7 @@ def _membership(vector: Any, need: Requirement, margin: Any) -> tuple[list[Any],
         return [], vanishing
     reachable = [{e: c for e, c in part.items() if e in reached} for part in need.parts]
     left, triangles = np.array([shape.vector(part) for part in reachable]).T, shape.triangles()
-    total: Any = left[:, 0] + left[:, 1:] @ vector
+    total: cp.Expression = left[:, 0] + left[:, 1:] @ vector
     grams, start = [], 0
     for block in shape.blocks:
         gram = cp.Variable((block.size, block.size), symmetric=True)
@@ -384,10 +386,12 @@ def _membership(vector: Any, need: Requirement, margin: Any) -> tuple[list[Any],
     return grams, [*vanishing, total == 0]
 
 
-def _definite(vector: Any, rows: list[list[dict[Any, Any]]], margin: Any) -> Any:
+def _definite(
+    vector: "cp.Variable", rows: list[list[dict[Exponents, Fraction]]], margin: "cp.Variable | float"
+) -> "cp.Constraint":
     size = len(rows)
     zero = (0,) * vector.shape[0]
-    total: Any = np.array([[float(entry.get(zero, 0)) for entry in row] for row in rows])
+    total: cp.Expression = np.array([[float(entry.get(zero, 0)) for entry in row] for row in rows])
     for k in range(vector.shape[0]):
         unit = tuple(int(i == k) for i in range(len(zero)))
         total = total + vector[k] * np.array([[float(entry.get(unit, 0)) for entry in row] for row in rows])
@@ -413,7 +417,7 @@ class Membership:
         rows = [{e: float(c) for e, c in r.items()} for _, _, r in relations(template)]
         self._program = MomentProgram([b.shape() for b in initial_blocks(template)], rows)
 
-    def margin(self, polynomial: Mapping[Exponents, Any]) -> float:
+    def margin(self, polynomial: Mapping[Exponents, Fraction | float]) -> float:
         """Largest t with polynomial − t·Σ b² in the cone, in floating point: no proof; NaN when the solver fails.
 
         Raises

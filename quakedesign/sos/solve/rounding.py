@@ -30,6 +30,7 @@ from quakedesign.sos.exact.proofs import (
     Proof,
     Square,
     SumOfSquares,
+    as_polynomial,
     identity_holds,
     residual,
 )
@@ -108,11 +109,12 @@ class System:
         block = self.blocks[k]
         left, right = block.basis[i], block.basis[j]
         factor = Fraction(1 if i == j else 2)
-        if isinstance(left, tuple) and isinstance(right, tuple):
-            shift = times(left, right)
-            return {times(shift, e): factor * c for e, c in block.weight.items()}
-        parts: list[Polynomial] = [{b: Fraction(1)} if isinstance(b, tuple) else b for b in (left, right)]
-        return {e: factor * c for e, c in product(len(self.statement.variables), (*parts, block.weight)).items()}
+        match left, right:
+            case tuple(), tuple():
+                shift = times(left, right)
+                return {times(shift, e): factor * c for e, c in block.weight.items()}
+        parts = as_polynomial(left), as_polynomial(right), block.weight
+        return {e: factor * c for e, c in product(len(self.statement.variables), parts).items()}
 
     def flat(self, solution: MomentSolution) -> list[float]:
         """All unknowns of a solution in order."""
@@ -202,10 +204,11 @@ class Scaled:
 
     def restore(self, proof: Proof) -> Proof:
         """Proof of the statement in u from one in ũ."""
-        if isinstance(proof, Point):
-            return Point(coordinates=tuple(s * x for s, x in zip(self.scale, proof.coordinates, strict=True)))
-        if isinstance(proof, Functional):
-            return Functional(values={e: v * monomial(self.scale, e) for e, v in proof.values.items()})
+        match proof:
+            case Point():
+                return Point(coordinates=tuple(s * x for s, x in zip(self.scale, proof.coordinates, strict=True)))
+            case Functional():
+                return Functional(values={e: v * monomial(self.scale, e) for e, v in proof.values.items()})
         return self.restored(proof)
 
     def restored(self, proof: SumOfSquares) -> SumOfSquares:
@@ -237,8 +240,9 @@ def _moved(square: Square, scale: Sequence[Fraction], factor: Fraction) -> Squar
 
 def _rescaled(basis_element: Element, scale: Sequence[Fraction]) -> tuple[Element, Fraction]:
     """Basis element in the other variables, and the factor that its rows of the Gram matrix take."""
-    if isinstance(basis_element, tuple):
-        return basis_element, monomial(scale, basis_element)
+    match basis_element:
+        case tuple():
+            return basis_element, monomial(scale, basis_element)
     polynomial = rescaled(basis_element, scale)
     lead = abs(next(iter(polynomial.values())))
     return {e: c / lead for e, c in polynomial.items()}, lead

@@ -18,12 +18,12 @@ import numpy as np
 
 from quakedesign.errors import ParameterError, PolynomialError
 from quakedesign.exact import UpperBound, rational
-from quakedesign.files import read_bytes
+from quakedesign.files import Json, read_bytes
 from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.polynomial import Exponents, degree, full_matrix
 from quakedesign.sos.exact.polynomial_statement import Statement, statement
 from quakedesign.sos.exact.polynomial_text import read, read_element
-from quakedesign.sos.exact.proofs import Element, Square, SumOfSquares, as_polynomial, in_echelon_form, residual
+from quakedesign.sos.exact.proofs import Square, SumOfSquares, as_polynomial, in_echelon_form, residual
 from quakedesign.sos.exact.strict import unique
 from quakedesign.sos.solve.decide import KERNELS
 from quakedesign.sos.solve.engine import decide, versions
@@ -35,6 +35,8 @@ from quakedesign.text import shown
 # ----------------------------------------------------------------------
 # Gram matrices that somebody else's solver has found: rounded and put right exactly, or answered otherwise.
 
+Array = np.ndarray
+Matrixed = tuple[Block, Array]
 _NEAR = Fraction(1, 100)  # of the largest coefficient: a matrix with a larger error is about another polynomial
 
 
@@ -84,7 +86,7 @@ def verify(
     products = [(), *((i,) for i in range(len(inequalities)))]
     squares = [_square(s, q, b, names) for s, q, b in zip(products, grams, bases, strict=True)]
     degrees = [0, *map(degree, inequalities)]
-    reached = [d + 2 * max(map(_degree, s.basis)) for d, s in zip(degrees, squares, strict=True)]
+    reached = [d + 2 * max(degree(as_polynomial(b)) for b in s.basis) for d, s in zip(degrees, squares, strict=True)]
     problem = statement(
         names, exact, inequalities=inequalities, products=False, degree_bound=max(degree(exact), *reached)
     )
@@ -95,10 +97,6 @@ def _listed(given: Any) -> list[Any]:
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise PolynomialError(f"matrices and bases must be sequences. Received {shown(given)}.")
     return list(given)
-
-
-def _degree(element: Element) -> int:
-    return degree(as_polynomial(element))
 
 
 def _square(product: tuple[int, ...], gram: Any, basis: Any, names: tuple[str, ...]) -> Square:
@@ -151,7 +149,7 @@ def _verified(problem: Statement, squares: Sequence[Square]) -> Answer:
     return replace(answer, remark=f"no proof comes from {matrix}; {why} without it")
 
 
-def _block(moved: Statement, square: Square) -> tuple[Block, Any]:
+def _block(moved: Statement, square: Square) -> Matrixed:
     """Block and matrix of a square."""
     support = sorted({e for b in square.basis for e in as_polynomial(b)})
     monomials = tuple(b for b in square.basis if isinstance(b, tuple))
@@ -166,7 +164,7 @@ def _block(moved: Statement, square: Square) -> tuple[Block, Any]:
     return block, np.array([[float(v) for v in row] for row in full_matrix(square.gram, len(square.basis))])
 
 
-def _proposed(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Any]) -> Iterator[tuple[str, Any]]:
+def _proposed(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Array]) -> Iterator[tuple[str, Any]]:
     """Proofs from the matrices as they are, then from what is left of them beside their kernels."""
     yield "rounded", _rounded(moved, blocks, grams)
     for threshold, tolerance in KERNELS:
@@ -175,7 +173,7 @@ def _proposed(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Any]) -> I
         yield "rounded beside its kernel", _rounded(moved, *zip(*left, strict=True)) if left else None
 
 
-def _beside(block: Block, gram: Any, threshold: float, tolerance: float, moved: Scaled) -> tuple[Block, Any] | None:
+def _beside(block: Block, gram: Array, threshold: float, tolerance: float, moved: Scaled) -> Matrixed | None:
     """Block without the numerical kernel of its matrix, and the matrix there; None if nothing is left."""
     smaller = at_kernels([block], [gram], threshold, tolerance, decimal_units(moved.scale))
     if smaller is None:
@@ -187,13 +185,13 @@ def _beside(block: Block, gram: Any, threshold: float, tolerance: float, moved: 
     return smaller[0], inverse.T @ full.T @ gram @ full @ inverse
 
 
-def _rows(block: Block, monomials: Sequence[Exponents]) -> Any:
+def _rows(block: Block, monomials: Sequence[Exponents]) -> np.ndarray:
     """Basis of a block in monomials, one element a row."""
     polynomials = [as_polynomial(b) for b in block.basis]
     return np.array([[float(p.get(e, 0)) for e in monomials] for p in polynomials])
 
 
-def _rounded(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Any]) -> SumOfSquares | None:
+def _rounded(moved: Scaled, blocks: Sequence[Block], grams: Sequence[np.ndarray]) -> SumOfSquares | None:
     least = min(float(np.linalg.eigvalsh(g)[0]) for g in grams)
     if not least > 0:
         return None
@@ -266,7 +264,7 @@ def _number(written: str) -> Fraction | str:
         return written
 
 
-def _gram_file(raw: dict[str, Any]) -> GramFile:
+def _gram_file(raw: Json) -> GramFile:
     names, polynomial, basis = raw["variables"], raw["polynomial"], raw["basis"]
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or not isinstance(basis, list):
         raise PolynomialError(
