@@ -730,8 +730,8 @@ def _as_column(values: list[Any]) -> Any:
 
 def _diagonal(column: Any) -> Any:
     """One column for every entry that is not zero."""
-    kept = [i for i, v in enumerate(column.entries()) if not v.is_zero()]
-    return arb_mat([[column[i, 0] if i == j else arb(0) for j in kept] for i in range(column.nrows())])
+    nonzero = [i for i, v in enumerate(column.entries()) if not v.is_zero()]
+    return arb_mat([[column[i, 0] if i == j else arb(0) for j in nonzero] for i in range(column.nrows())])
 
 
 def _above(parts: list[Any]) -> Any:
