@@ -2,7 +2,7 @@ from .exact.guarantee_files import guarantee_document as guarantee_document
 from .exact.guarantee_files import load_guarantee as load_guarantee
 from .exact.guarantee_files import read_guarantee as read_guarantee
 from .exact.guarantee_files import save_guarantee as save_guarantee
-from .exact.loop import Held as Held
+from .exact.loop import SampledLoop as SampledLoop
 from .exact.proof import NoProof as NoProof
 from .exact.proof import Proof as Proof
 from .exact.sliding_small_gain import SlidingClaims as SlidingClaims
@@ -21,7 +21,7 @@ from .exact.stick_slip_guarantee import StickSlipProof as StickSlipProof
 from .result import Guarantee as Guarantee
 from .result import PlantGuarantee as PlantGuarantee
 from .search.adversary import WorstCase as WorstCase
-from .search.adversary import worst_found as worst_found
+from .search.adversary import worst_tracking as worst_tracking
 from .search.compensated_search import Compensation as Compensation
 from .search.compensated_search import compensated as compensated
 from .search.compensated_search import design_compensated as design_compensated
@@ -43,4 +43,4 @@ from .search.linear_design import tightened as tightened
 from .sliding_result import guarantee_sliding as guarantee_sliding
 from .stick_slip_result import StickSlipGuarantee as StickSlipGuarantee
 from .tracking_result import TrackingGuarantee as TrackingGuarantee
-from .tracking_result import attacked as attacked
+from .tracking_result import with_worst_case as with_worst_case

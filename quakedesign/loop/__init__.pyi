@@ -17,7 +17,7 @@ from .error_loop import held_loop as held_loop
 from .error_loop import sliding_loop as sliding_loop
 from .error_loop import starts as starts
 from .layer import Layer as Layer
-from .layer import with_known_area as with_known_area
+from .layer import with_response_area as with_response_area
 from .periodic import Fading as Fading
 from .periodic import Instants as Instants
 from .periodic import PeriodicLoop as PeriodicLoop

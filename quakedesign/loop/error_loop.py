@@ -110,13 +110,13 @@ def held_loop(
     maps = [(jump, path.part or step), *([(arrival, step - path.part)] if path.part else [])]
     left_out, fading = _left_out(path)
     push = _push(path)
-    asked = {"asked": _unit(n, path.valve)} if lag or diffusion else {}
+    valve_output = {"asked": _unit(n, path.valve)} if lag or diffusion else {}
     loop = PeriodicLoop(
         states=("e1", "e2", *law.states, *(f"waiting{i}" for i in range(path.waiting)), "valve", *path.behind),
         flow=_flow(path, push, model, model.gain / authority),
         segments=tuple(Segment(jump=j, duration=time, ends=ends, past_ends=past_ends) for j, time in maps),
         inputs={"acceleration": _unit(n, 1), "drift": _drift(law, authority, path), **moving},
-        outputs={"slip_error": _unit(n, 0), "slip_rate_error": _unit(n, 1), "push": push, **left_out, **asked},
+        outputs={"slip_error": _unit(n, 0), "slip_rate_error": _unit(n, 1), "push": push, **left_out, **valve_output},
         sampled=sampled,
         fading=fading,
     )
@@ -152,9 +152,9 @@ def starts(
     """
     made = list(zip(*law.first, strict=True)) or [(Fraction(0),) * len(law.states)] * 2
     rest = [Fraction(0)] * (size - 2 - len(law.states))
-    found = [(error, [*_unit(2, k), *made[k], *rest]) for k, error in enumerate(errors)]
-    found += [(off, [Fraction(0), Fraction(0), *made[k], *rest]) for k, off in enumerate(noise)]
-    return tuple(tuple(bound * v for v in column) for bound, column in found if bound and any(column))
+    columns = [(error, [*_unit(2, k), *made[k], *rest]) for k, error in enumerate(errors)]
+    columns += [(off, [Fraction(0), Fraction(0), *made[k], *rest]) for k, off in enumerate(noise)]
+    return tuple(tuple(bound * v for v in column) for bound, column in columns if bound and any(column))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -288,17 +288,17 @@ def _events(law: LinearLaw, authority: Fraction, path: _Path) -> tuple[Matrix, M
     """Jump of a sample, with further columns for w and r′, and of a pressure that arrives between samples, if any."""
     n, valve, first, zero = path.size, path.valve, 2 + path.own, Fraction(0)
     jump = [list(_unit(n + 2, i)) for i in range(n)]
-    asked = [zero] * (n + 2)
-    asked[0], asked[1] = (authority * v for v in law.feedback[:2])
-    asked[n] = authority * sum(law.feedback[2:], zero)
-    *moved, asked[n + 1] = [row[1] for row in law.of_reference] or [zero] * (path.own + 1)
-    asked[n + 1] *= authority
-    for i, fed, kept, r_rate in zip(range(2, first), law.measured, law.update, moved, strict=True):
-        jump[i] = [*fed[:2], *kept, *[zero] * (n - first), sum(fed[2:], zero), r_rate]
-        asked[i] = authority * law.output[i - 2]
+    commanded = [zero] * (n + 2)
+    commanded[0], commanded[1] = (authority * v for v in law.feedback[:2])
+    commanded[n] = authority * sum(law.feedback[2:], zero)
+    *moved, commanded[n + 1] = [row[1] for row in law.of_reference] or [zero] * (path.own + 1)
+    commanded[n + 1] *= authority
+    for i, fed, update, r_rate in zip(range(2, first), law.measured, law.update, moved, strict=True):
+        jump[i] = [*fed[:2], *update, *[zero] * (n - first), sum(fed[2:], zero), r_rate]
+        commanded[i] = authority * law.output[i - 2]
     line = [*range(first, valve), *([] if path.part else [valve])]
     for place, before in zip(reversed(line), [*reversed(line[:-1]), None], strict=True):
-        jump[place] = asked if before is None else list(_unit(n + 2, before))
+        jump[place] = commanded if before is None else list(_unit(n + 2, before))
     arrival = [list(_unit(n, valve - 1 if i == valve else i)) for i in range(n)]
     if path.part:
         return tuple(map(tuple, jump)), _stepped(arrival, path)
@@ -410,7 +410,7 @@ def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction
     push = tuple(authority * v for v in (*law.feedback, *law.output))
     plant = (model.slip, -model.rate, *[zero] * len(law.states))
     pushed = tuple(v + model.gain / authority * p for v, p in zip(plant, push, strict=True))
-    own = tuple((*fed, *kept) for fed, kept in zip(law.measured, law.rates, strict=True))
+    own = tuple((*fed, *rates) for fed, rates in zip(law.measured, law.rates, strict=True))
     still = (zero,) * len(law.states)
     steady = steady_states(law.rates, law.output, still, one)
     inputs = {

@@ -14,7 +14,7 @@ from quakedesign.simulation.run import sampled_scheme
 from quakedesign.studies.runs import differentiator_premise, sensor
 
 
-def export_answer(
+def export_result(
     fault: Fault,
     law: Controller,
     folder: Path,

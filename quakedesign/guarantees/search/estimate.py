@@ -13,7 +13,7 @@ from math import floor, inf, log10
 import numpy as np
 from scipy.linalg import expm
 
-from quakedesign.guarantees.exact.loop import GainSpread, Held
+from quakedesign.guarantees.exact.loop import GainSpread, SampledLoop
 from quakedesign.guarantees.exact.norms import START
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain, bounds_from
@@ -44,8 +44,8 @@ class BoundsEstimate:
     drift_gain: float
 
 
-def estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
-    """Bounds of the theorem with trapezoidal sums instead of upper bounds; None for an unstable or very slow loop."""
+def estimated(task: FaultPlant, held: SampledLoop) -> BoundsEstimate | None:
+    """Bounds of the theorem by trapezoidal sums; None for an unstable or very slow loop."""
     gains = gains_of(held.loop(task))
     if gains is None:
         return None
@@ -53,39 +53,39 @@ def estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
     return BoundsEstimate(bounds, max(gains["slip_error", "drift"]))
 
 
-def slowly_estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
-    """The same for a slow input gain, with nominal loops at the ends and in the middle of its range."""
+def slowly_estimated(task: FaultPlant, held: SampledLoop) -> BoundsEstimate | None:
+    """Estimate with a slowly varying input gain, at the ends and the middle of its range."""
     low, high = task.beta
-    found = []
+    every = []
     for share in _ENDS:
         gains = gains_of(held.loop(task, replace(task.model, gain=(low + share * (high - low)) * task.authority)))
         if gains is None:
             return None
-        found.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
-    whole = {key: tuple(v for gains in found for v in gains[key]) for key in found[0]}
+        every.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
+    whole = {key: tuple(v for gains in every for v in gains[key]) for key in every[0]}
     spread = GainSpread(half=_SPREAD * (high - low), aged=Fraction(0))
     bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
     return BoundsEstimate(bounds, max(whole["slip_error", "drift"]))
 
 
-def closeness(task: FaultPlant, held: Held) -> tuple[float, Bounds | None]:
-    """Small gain [-] with the bounds if a proof is expected, below 1; else 1 + the small gain for errors of 0.
+def closeness(task: FaultPlant, held: SampledLoop) -> tuple[float, Bounds | None]:
+    """Small gain [-] with bounds if a proof is expected; else 1 + the small gain at zero error.
 
-    For friction that depends on the slip alone the input gain is slow, and its deviation depends on the bound of the
-    slip error, which is found by fixed-point iteration for the nominal loops of the first and the last part of the
-    range. Infinite for an unstable or very slow nominal loop.
+    For friction that depends on the slip alone the input gain varies slowly. Its deviation depends on the bound of the
+    slip error, a fixed point for the nominal loops of the first and the last part of the range. The result is infinite
+    for an unstable or very slow nominal loop.
     """
     if task.friction.rate_slope:
-        found = estimated(task, held)
-        bounds = None if found is None else found.bounds
+        values = estimated(task, held)
+        bounds = None if values is None else values.bounds
         return _closeness(bounds, inf if bounds is None else _small(bounds))
     whole: dict[tuple[str, str], tuple[float, ...]] = {}
     for model in (_PARTS.models(task)[0], _PARTS.models(task)[-1]):
         gains = gains_of(held.loop(task, model))
         if gains is None:
             return inf, None
-        whole = {key: whole.get(key, ()) + found for key, found in gains.items()}
-    whole |= {(y, "aged"): found for (y, name), found in whole.items() if name == "acceleration"}
+        whole = {key: whole.get(key, ()) + values for key, values in gains.items()}
+    whole |= {(y, "aged"): values for (y, name), values in whole.items() if name == "acceleration"}
     slip_error, least = 0.0, inf
     for turn in range(_TURNS):
         spread = replace(_PARTS.spread(task, Fraction(slip_error)), aged=Fraction(0))
@@ -140,18 +140,18 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
         gains[name] = np.sum(sides, axis=0)
     gains |= {START: _free(np.array(loop.start, dtype=float).T, flows, doublings, rows)} if loop.start else {}
     return {
-        (output, name): tuple(float(v + loop.at_once.get((output, name), 0)) for v in found)
+        (output, name): tuple(float(v + loop.at_once.get((output, name), 0)) for v in values)
         for name, of in gains.items()
-        for output, found in zip(loop.outputs, of, strict=True)
+        for output, values in zip(loop.outputs, of, strict=True)
     }
 
 
 @dataclass(frozen=True, slots=True)
 class _Slowest:
-    """Decay over a period of the slowest mode and of all others, with left and right eigenvector of the slowest.
+    """Decay per period of the slowest mode and of all others, with its eigenvectors.
 
-    A complex pair, or two modes with nearly equal decay, are not separated: all modes count as others, as they do
-    where all modes decay within a few periods.
+    All modes count as others where the slowest is a complex pair, where two modes decay almost equally, and where all
+    modes decay within a few periods.
     """
 
     decay: float
@@ -180,7 +180,7 @@ class _Slowest:
 
 
 def _entries(loop: PeriodicLoop) -> Iterator[tuple[str, np.ndarray, int | None]]:
-    """Every input, and the segment whose jump it enters with, if any; a fading input counts as one at the jump."""
+    """Inputs and the segment whose jump they enter with; fading inputs enter with a jump."""
     for name, row in loop.inputs.items():
         yield name, np.array(row, float), None
     for name, row in loop.sampled.items():
@@ -191,7 +191,7 @@ def _entries(loop: PeriodicLoop) -> Iterator[tuple[str, np.ndarray, int | None]]
 
 
 def _pulses(loop: PeriodicLoop, flows: list[_Flow]) -> Iterator[tuple[str, list[np.ndarray]]]:
-    """Every input that acts near a jump only, with half the sum and half the difference of both sides."""
+    """Inputs that act near a jump, with half the sum and half the difference of both sides."""
     for name, pulse in loop.pulses.items():
         entry = np.array(pulse.entry, float)
         before, after = flows[pulse.first].jump @ entry * float(pulse.before), entry * float(pulse.after)
@@ -212,14 +212,14 @@ def _of_input(
     for _ in range(doublings):
         before, later = np.hstack([before, later @ before]), later @ later
     before = np.hstack([before, left])
-    found = []
+    peaks = []
     for flow, part in zip(flows, sums, strict=True):
         since, row = part.since(rows), rows
         for i in range(_PIECES + 1):
-            found.append(np.abs(row @ flow.jump @ before).sum(axis=1) + since[:, i])
+            peaks.append(np.abs(row @ flow.jump @ before).sum(axis=1) + since[:, i])
             row = row @ flow.step
         before = np.hstack([flow.whole @ before, part.columns])
-    return np.array(found).T
+    return np.array(peaks).T
 
 
 def _free(start: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray) -> np.ndarray:
@@ -227,14 +227,14 @@ def _free(start: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarra
     columns, period = start[None], reduce(lambda now, flow: flow.whole @ now, flows, np.eye(len(start)))
     for _ in range(doublings):
         columns, period = np.concatenate([columns, period @ columns]), period @ period
-    found = []
+    peaks = []
     for flow in flows:
         now = flow.jump @ columns
         for _ in range(_PIECES + 1):
-            found.append(np.abs(rows @ now).sum(axis=2).max(axis=0))
+            peaks.append(np.abs(rows @ now).sum(axis=2).max(axis=0))
             now = flow.step @ now
         columns = flow.whole @ columns
-    return np.array(found).T
+    return np.array(peaks).T
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,22 +277,22 @@ _FORGOTTEN_POLE = 100  # a trajectory ends when the initial state has decayed by
 
 
 def own_poles(law: LinearLaw) -> np.ndarray:
-    """Eigenvalues of F, the integral's first: of the law by itself, as it is while friction holds the fault."""
+    """Eigenvalues of F, the integral's first: poles of the law while the fault is at rest."""
     poles = np.linalg.eigvals(np.array(law.update, dtype=float).reshape((len(law.states),) * 2))
     return np.asarray(poles[np.argsort(np.abs(poles - 1), kind="stable")])
 
 
 def moved(flow: np.ndarray, inputs: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """e^{Ah}, and what inputs (columns) add that are held over a time h [s]."""
+    """e^{Ah}, and the response to inputs (columns) with zero-order hold over a time h [s]."""
     size, count = inputs.shape
     whole = np.zeros((size + count, size + count))
     whole[:size, :size], whole[:size, size:] = flow, inputs
-    found = np.asarray(expm(whole * length))
-    return found[:size, :size], found[:size, size:]
+    exponential = np.asarray(expm(whole * length))
+    return exponential[:size, :size], exponential[:size, size:]
 
 
 def periods_to_forget(radius: float) -> int:
-    """Periods until the state of a loop with a decay factor per period has decayed to 1/100, within limits."""
+    """Periods until a decay factor per period reaches 1/100, within limits."""
     pace = -np.log(np.clip(radius, 1e-9, 1 - 1e-9))
     return int(np.clip(np.ceil(np.log(_FORGOTTEN_POLE) / pace), PERIODS, _MOST_POLE_PERIODS))
 
